@@ -13,6 +13,7 @@ use servowire_decode::fault::Fault;
 use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Origin, Printer};
 use servowire_decode::settings::Settings;
+use servowire_decode::time::Time;
 
 use crate::byte;
 
@@ -86,7 +87,7 @@ fn read(format: Option<Format>, data: &[u8], size: usize) -> String {
 fn edges(line: &mut dyn Line, said: &mut String) {
     let channels = line.channels().len();
     writeln!(said, "{:?}", line.channels()).unwrap();
-    let (mut changes, mut last) = (Vec::new(), i64::MIN);
+    let (mut changes, mut last) = (Vec::new(), -Time::MAX);
     for _ in 0..1 << 20 {
         changes.clear();
         let more = line.read(&mut changes);
@@ -169,7 +170,7 @@ pub fn any(data: &[u8]) {
 struct Memory {
     names: Vec<String>,
     changes: Vec<Change>,
-    end: i64,
+    end: Time,
     given: bool,
 }
 
@@ -185,7 +186,7 @@ impl Line for Memory {
         Ok(false)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.end
     }
 }
@@ -208,8 +209,8 @@ pub fn survey(mut data: &[u8]) {
     let grid = [50_000, 25_000, 31_250, 18_750, 15_625, 7_812, 13_333, 10_000][usize::from(byte(&mut data) % 8)];
     let mut levels = vec![true; names.len()];
     let mut changes: Vec<Change> =
-        (0..).zip(&levels).map(|(channel, level)| Change { time: 0, channel, level: *level }).collect();
-    let mut time = 0_i64;
+        (0..).zip(&levels).map(|(channel, level)| Change { time: Time::ZERO, channel, level: *level }).collect();
+    let mut time = Time::ZERO;
     while data.len() > 1 {
         let (length, which) = (byte(&mut data), byte(&mut data));
         // Long runs are longer than a frame.

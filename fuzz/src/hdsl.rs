@@ -9,7 +9,7 @@ use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, Control, Rule, RunningDisparity, Word};
 use hdsl::sync::{Es, Synchroniser};
 use hdsl::{
-    AlignmentStage, Answer, DeltaDelta, Dialect, EncoderId, Error, Policy, PositionBits, PositionRule, PositionTracker,
+    Answer, DeltaDelta, Dialect, EncoderId, Error, FastPosition, Policy, PositionBits, PositionRule, PositionTracker,
     Window,
 };
 
@@ -114,15 +114,18 @@ pub fn learn(data: &[u8]) {
     }
 }
 
-/// Acceleration words and safe positions in any order: widths hold, and as long as no estimate leaves 11 bits both
-/// positions agree.
+/// Acceleration words and safe positions in any order: widths hold, as long as no estimate leaves 11 bits both register rules agree,
+/// and a position is given only after three safe positions.
 ///
 /// ```text
 /// 0  width      then steps: 0 a safe position follows (8 bytes), 1 none, 2 no word, other: a word (2 bytes)
 /// ```
 pub fn position(mut data: &[u8]) {
     let Some(bits) = PositionBits::new(byte(&mut data)) else { return };
-    let Some(id) = EncoderId::new(u32::from(bits.get() - 8) << 4) else { return };
+    // From 11 bits on an encoder can have them.
+    let id = u32::from(bits.get()).checked_sub(11).and_then(|more| EncoderId::new(3 | more << 4));
+    let mut fast = id.and_then(|id| FastPosition::new(id).ok());
+    let mut safe_positions = 0;
     let mut tracker = PositionTracker::new(bits);
     let mut other = PositionTracker::with_rule(bits, PositionRule::Ti);
     // Of a position with fewer bits the vendor's receiver takes differences that are too large.
@@ -134,16 +137,20 @@ pub fn position(mut data: &[u8]) {
                 let safe = word(&mut data) & bits.mask();
                 tracker.align(safe);
                 other.align(safe);
+                fast.iter_mut().for_each(|fast| fast.align(Some(safe)));
+                safe_positions += 1;
             }
             1 => {
                 tracker.no_safe_position();
                 other.no_safe_position();
+                fast.iter_mut().for_each(|fast| fast.align(None));
             }
             event => {
                 let value = u16::from_le_bytes([byte(&mut data), byte(&mut data)]);
                 let value = DeltaDelta::from_word(value).ok().filter(|_| event != 2);
                 tracker.step(value);
                 other.step(value);
+                fast.iter_mut().for_each(|fast| fast.step(value));
                 let change = tracker.registers().vel.wrapping_sub(before).wrapping_shl(8) >> 8;
                 assert!((-1024..=1023).contains(&change), "{change}");
                 agree &= value.is_some() || (-1023..=1022).contains(&change);
@@ -151,8 +158,9 @@ pub fn position(mut data: &[u8]) {
         }
         let (shown, others) = (tracker.registers(), other.registers());
         assert!(shown.pos <= bits.mask() && (-(1 << 23)..1 << 23).contains(&shown.vel));
-        let usable = tracker.evidence(id, 0).at(0, Policy::new(0)).is_ok();
-        assert!(!usable || tracker.stage() == AlignmentStage::Check);
+        if let Some(Ok(fast)) = fast.map(|fast| fast.evidence(0, 0).at(0, Policy::new(0))) {
+            assert!(safe_positions > 2 && fast.bound() == 0 && fast.position().unsigned_abs() <= bits.mask());
+        }
         assert!(!agree || (shown.pos, shown.vel) == (others.pos, others.vel));
     }
 }

@@ -141,7 +141,7 @@ const LIMIT: u16 = 4;
 /// ```
 pub fn ring(mut data: &[u8]) {
     let limit = NonZeroU16::new(LIMIT).expect("not 0");
-    let limits = Limits::new(limit, 20).with_ready(60);
+    let limits = Limits::new(limit, 20).with_ready(Some(60));
     let mac_id = |place| MacId::new(place).expect("below 32");
     let axis = |place| {
         let mode = ActiveCode::CyclicPosition;

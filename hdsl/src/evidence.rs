@@ -1,36 +1,57 @@
 //! What a control loop may use of the positions, judged at the moment of use.
 
-use servowire_core::{Feedback, Tolerance, Words};
+use servowire_core::{Angle, Feedback, Shaft, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
-/// In spite of what a position may be used: nothing.
+/// In spite of what a position may be used: up to so many acceleration words that are missing.
+///
+/// One wrong bit takes an acceleration word away, and with it the exact position for 17 to 24 frames, until a safe position has shown
+/// what was in the word and another one has agreed. In the meantime the position is estimated, with a bound that grows.
+///
+/// ```
+/// use hdsl::{Policy, Tolerated};
+/// // Not older than 30 µs, and over up to 8 missing words of a shaft whose speed changes by up to 12 steps a frame in a frame.
+/// let policy = Policy::new(30_000).tolerating(Tolerated::missing_words(8, 12));
+/// # let _ = policy;
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[non_exhaustive]
-pub struct Tolerated {}
+pub struct Tolerated {
+    words: u8,
+    acceleration: u16,
+}
 
 impl Tolerated {
     /// Nothing: every doubt counts.
-    pub const NOTHING: Self = Self {};
+    pub const NOTHING: Self = Self { words: 0, acceleration: 0 };
+
+    /// Missing acceleration words, this many at most since the position was exact. `acceleration` is the largest of the shaft, in
+    /// either direction, in steps a frame²; 1024 is all that the link can carry. [`Sample::bound`] holds for that.
+    pub const fn missing_words(words: u8, acceleration: u16) -> Self {
+        Self { words, acceleration }
+    }
 }
 
 impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// Up to which age a position may be used.
+/// Up to which age, and over how many missing words, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// A fast position that may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Sample {
     pub(crate) position: i64,
     pub(crate) velocity: i32,
+    pub(crate) bound: u32,
+    pub(crate) frame: u32,
+    pub(crate) steps_per_turn: u32,
     pub(crate) sampled_ns: u64,
 }
 
@@ -45,48 +66,115 @@ impl Sample {
         self.velocity
     }
 
-    /// When the sampling edge of its H-frame left the master, on the clock that the ends of the frames were told by.
+    /// How far the position may be off in either direction, in steps: 0 unless acceleration words are missing and the policy
+    /// tolerates that.
+    pub const fn bound(&self) -> u32 {
+        self.bound
+    }
+
+    /// Number of the H-frame, modulo 2^32: the next one has the next number, also if a frame between them was lost.
+    pub const fn frame(&self) -> u32 {
+        self.frame
+    }
+
+    /// The angle within the turn, for [`Master::set_steps_per_turn`](crate::master::Master::set_steps_per_turn); 0 without.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "less than the steps of a turn")]
+    pub const fn angle(&self) -> Angle {
+        match self.position.checked_rem_euclid(self.steps_per_turn as i64) {
+            Some(steps) => Angle::from_counts(steps as u32, self.steps_per_turn),
+            None => Angle::ZERO,
+        }
+    }
+
+    /// How far that angle may be off in either direction; half a turn at most.
+    pub const fn angle_bound(&self) -> Angle {
+        if self.bound >= self.steps_per_turn / 2 {
+            return Angle::HALF;
+        }
+        Angle::from_counts(self.bound, self.steps_per_turn)
+    }
+
+    /// When the shaft was there, on the clock that the ends of the frames were told by: when the sampling edge of its H-frame left the
+    /// master, and [`Master::set_latency_ns`](crate::master::Master::set_latency_ns) later.
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns
     }
 }
 
 servowire_core::one_line!(Sample {
-    Self { position, velocity, sampled_ns } => "{} at {} a frame, sampled at {} ns", position, velocity, sampled_ns;
+    Self { position, velocity, bound: 0, sampled_ns, .. } =>
+        "{} at {} a frame, sampled at {} ns", position, velocity, sampled_ns;
+    Self { position, velocity, bound, sampled_ns, .. } =>
+        "{} within {} at {} a frame, sampled at {} ns", position, bound, velocity, sampled_ns;
 });
 
 /// What there is to say about the fast position after an H-frame: from [`Master::fast`](crate::master::Master::fast).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Evidence(pub(crate) Result<Sample, Doubt>);
+pub struct Evidence {
+    pub(crate) doubt: Option<Doubt>,
+    pub(crate) sample: Sample,
+    /// Missing words, if but for them the position would be known.
+    pub(crate) missing: Option<u8>,
+    /// How many frames they have counted, all together, and the way that was estimated in these.
+    pub(crate) frames: u32,
+    pub(crate) way: u32,
+}
 
 impl Evidence {
     /// Before the first H-frame.
-    pub const NEVER: Self = Self(Err(Doubt::Never));
+    pub const NEVER: Self = Self::doubtful(Doubt::Never);
+
+    pub(crate) const fn doubtful(doubt: Doubt) -> Self {
+        let sample = Sample { position: 0, velocity: 0, bound: 0, frame: 0, steps_per_turn: 0, sampled_ns: 0 };
+        Self { doubt: Some(doubt), sample, missing: None, frames: 0, way: 0 }
+    }
 
     /// The fast position, if it may be used at this time: the truth as long as the real speed stays below a sixteenth of the
-    /// range a frame.
+    /// range a frame, or within [`Sample::bound`] of it over missing words that the policy tolerates.
     ///
     /// # Errors
-    /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`], then
+    /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::Speed`], [`Doubt::Estimated`], [`Doubt::Alignment`], then
     /// [`Doubt::Old`].
     pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
-        match self.0 {
-            Ok(sample) => match policy.check_age(now_ns, sample.sampled_ns) {
-                Ok(()) => Ok(sample),
-                Err(age_ns) => Err(Doubt::Old { age_ns }),
-            },
-            Err(doubt) => Err(doubt),
+        let mut sample = self.sample;
+        if let Some(doubt) = self.doubt {
+            match self.over_missing_words(policy.tolerated()) {
+                Some(bound) => sample.bound = bound,
+                None => return Err(doubt),
+            }
         }
+        match policy.check_age(now_ns, sample.sampled_ns) {
+            Ok(()) => Ok(sample),
+            Err(age_ns) => Err(Doubt::Old { age_ns }),
+        }
+    }
+
+    /// How far the position may be off, if no more words are missing than is tolerated.
+    #[cold]
+    const fn over_missing_words(&self, tolerated: Tolerated) -> Option<u32> {
+        match self.missing {
+            Some(words) if words <= tolerated.words && tolerated.words != 0 => {
+                Some(self.frames.saturating_mul(tolerated.acceleration as u32).saturating_add(self.way))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// For an [`EvidenceShaftCell`].
+impl Shaft for Evidence {
+    fn shaft(sample: &Sample) -> (Angle, u64) {
+        (sample.angle(), sample.sampled_ns())
     }
 }
 
 /// A safe position that may be used. It must not close a control loop: it is not in step with the pulse (SICK manual,
 /// p. 67).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SafeSample {
     pub(crate) position: i64,
@@ -119,7 +207,7 @@ servowire_core::one_line!(SafeSample {
 /// What there is to say about the safe position after an H-frame: from [`Master::safe`](crate::master::Master::safe).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SafeEvidence(pub(crate) Result<SafeSample, Doubt>);
 
@@ -211,54 +299,55 @@ const fn whole(low: u32, high: u32) -> u64 {
     (high as u64) << 32 | low as u64
 }
 
-/// A verdict, a position or the age in a doubt, what came with the position, the instant of sampling.
-const fn pack(verdict: u32, wide: u64, more: u32, sampled_ns: u64) -> [u32; 6] {
-    let ([low, high], [early, late]) = (halves(wide), halves(sampled_ns));
-    [verdict, low, high, more, early, late]
-}
-
-const fn pack_doubt(doubt: Doubt) -> [u32; 6] {
-    let age_ns = if let Doubt::Old { age_ns } = doubt { age_ns } else { 0 };
-    pack(number(doubt), age_ns, 0, 0)
-}
-
 /// Carries evidence from where it is received to where it is used, between two priorities or cores.
-pub type EvidenceCell = servowire_core::Cell<Evidence, 6>;
+pub type EvidenceCell = servowire_core::Cell<Evidence, 10>;
 
-impl Words<6> for Evidence {
-    fn to_words(&self) -> [u32; 6] {
-        match self.0 {
-            Ok(Sample { position, velocity, sampled_ns }) => pack(
-                0,
-                u64::from_le_bytes(position.to_le_bytes()),
-                u32::from_le_bytes(velocity.to_le_bytes()),
-                sampled_ns,
-            ),
-            Err(doubt) => pack_doubt(doubt),
-        }
+/// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 10>;
+
+/// For an [`EvidenceCell`]; the lower half of a number of 64 bits is first.
+///
+/// ```text
+///  word 0      doubt in bits 0..=7, missing words in 8..=15, whether but for them the position would be known in 16
+///  word 1, 2   position, or the age in a doubt
+///  word 3      velocity       4  frame      5  steps a turn      6, 7  instant      8  frames      9  way
+/// ```
+impl Words<10> for Evidence {
+    fn to_words(&self) -> [u32; 10] {
+        let Sample { position, velocity, bound: _, frame, steps_per_turn, sampled_ns } = self.sample;
+        let verdict = self.doubt.map_or(0, number) | self.missing.map_or(0, |words| u32::from(words) << 8 | 1 << 16);
+        let wide = match self.doubt {
+            Some(Doubt::Old { age_ns }) => age_ns,
+            _ => u64::from_le_bytes(position.to_le_bytes()),
+        };
+        let ([low, high], [early, late]) = (halves(wide), halves(sampled_ns));
+        let velocity = u32::from_le_bytes(velocity.to_le_bytes());
+        [verdict, low, high, velocity, frame, steps_per_turn, early, late, self.frames, self.way]
     }
 
-    fn from_words([verdict, low, high, velocity, early, late]: [u32; 6]) -> Self {
-        let wide = whole(low, high);
-        Self(match verdict {
-            0 => Ok(Sample {
-                position: i64::from_le_bytes(wide.to_le_bytes()),
-                velocity: i32::from_le_bytes(velocity.to_le_bytes()),
-                sampled_ns: whole(early, late),
-            }),
-            number => Err(doubt(number, wide)),
-        })
+    fn from_words(words: [u32; 10]) -> Self {
+        let [verdict, low, high, velocity, frame, steps_per_turn, early, late, frames, way] = words;
+        let ([code, missing, followed, _], wide) = (verdict.to_le_bytes(), whole(low, high));
+        let doubt = (code != 0).then(|| doubt(code.into(), wide));
+        let position = if let Some(Doubt::Old { .. }) = doubt { 0 } else { i64::from_le_bytes(wide.to_le_bytes()) };
+        let velocity = i32::from_le_bytes(velocity.to_le_bytes());
+        let sampled_ns = whole(early, late);
+        let sample = Sample { position, velocity, bound: 0, frame, steps_per_turn, sampled_ns };
+        Self { doubt, sample, missing: (followed != 0).then_some(missing), frames, way }
     }
 }
 
 impl Words<6> for SafeEvidence {
     fn to_words(&self) -> [u32; 6] {
-        match self.0 {
+        let (verdict, wide, summary, sampled_ns) = match self.0 {
             Ok(SafeSample { position, summary, sampled_ns }) => {
-                pack(0, u64::from_le_bytes(position.to_le_bytes()), summary.into(), sampled_ns)
+                (0, u64::from_le_bytes(position.to_le_bytes()), summary.into(), sampled_ns)
             }
-            Err(doubt) => pack_doubt(doubt),
-        }
+            Err(Doubt::Old { age_ns }) => (number(Doubt::Old { age_ns }), age_ns, 0, 0),
+            Err(doubt) => (number(doubt), 0, 0, 0),
+        };
+        let ([low, high], [early, late]) = (halves(wide), halves(sampled_ns));
+        [verdict, low, high, summary, early, late]
     }
 
     fn from_words([verdict, low, high, summary, early, late]: [u32; 6]) -> Self {
@@ -295,11 +384,16 @@ mod tests {
             Doubt::Old { age_ns: 0x1_0000_0002 },
         ];
         for told in doubts {
-            assert_eq!(Evidence::from_words(Evidence(Err(told)).to_words()), Evidence(Err(told)));
+            let evidence = Evidence::doubtful(told);
+            assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
             assert_eq!(SafeEvidence::from_words(SafeEvidence(Err(told)).to_words()), SafeEvidence(Err(told)));
         }
-        let evidence = Evidence(Ok(Sample { position: i64::MIN, velocity: -2, sampled_ns: 0x1_0000_0003 }));
-        assert_eq!(evidence.to_words(), [0, 0, 0x8000_0000, 0xffff_fffe, 3, 1]);
+        let sample = Sample { sampled_ns: 0x1_0000_0003, ..sample(i64::MIN, -2) };
+        let evidence = Evidence { doubt: None, sample, missing: Some(0), frames: 0, way: 0 };
+        assert_eq!(evidence.to_words(), [0x1_0000, 0, 0x8000_0000, 0xffff_fffe, 8, 9, 3, 1, 0, 0]);
+        assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
+        let evidence = Evidence { doubt: Some(Doubt::Estimated), missing: Some(3), frames: 17, way: 4, ..evidence };
+        assert_eq!(evidence.to_words(), [0x1_0303, 0, 0x8000_0000, 0xffff_fffe, 8, 9, 3, 1, 17, 4]);
         assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
         let safe = SafeEvidence(Ok(SafeSample { position: -1, summary: 0x81, sampled_ns: u64::MAX }));
         assert_eq!(SafeEvidence::from_words(safe.to_words()), safe);
@@ -307,10 +401,44 @@ mod tests {
 
     const POLICY: Policy = Policy::new(50_000);
 
+    fn sample(position: i64, velocity: i32) -> Sample {
+        Sample { position, velocity, bound: 0, frame: 8, steps_per_turn: 9, sampled_ns: 0 }
+    }
+
+    /// Three words are missing, over 17 frames; 40 steps of the way were estimated.
+    #[test]
+    fn missing_words_are_tolerated_with_a_bound() {
+        let known = Evidence { doubt: None, sample: sample(5, 1), missing: Some(0), frames: 0, way: 0 };
+        let evidence = Evidence { doubt: Some(Doubt::Estimated), missing: Some(3), frames: 17, way: 40, ..known };
+        let at =
+            |evidence: Evidence, tolerated| evidence.at(0, POLICY.tolerating(tolerated)).map(|sample| sample.bound());
+        for (words, verdict) in [(0, Err(Doubt::Estimated)), (2, Err(Doubt::Estimated)), (3, Ok(210)), (255, Ok(210))] {
+            assert_eq!(at(evidence, Tolerated::missing_words(words, 10)), verdict);
+            assert_eq!(at(known, Tolerated::missing_words(words, 10)), Ok(0));
+            assert!(at(Evidence { missing: None, ..evidence }, Tolerated::missing_words(words, 10)).is_err());
+        }
+        assert_eq!(at(Evidence { frames: u32::MAX, ..evidence }, Tolerated::missing_words(3, 10)), Ok(u32::MAX));
+        assert_eq!(
+            evidence.at(50_001, POLICY.tolerating(Tolerated::missing_words(3, 10))),
+            Err(Doubt::Old { age_ns: 50_001 })
+        );
+    }
+
+    /// A quarter of a turn of 1000 steps, also below 0, and half a degree.
+    #[test]
+    fn angles() {
+        let at = |position| Sample { steps_per_turn: 1000, bound: 2, ..sample(position, 0) };
+        assert_eq!([250, -750, 7250].map(|position| at(position).angle().millidegrees()), [90_000; 3]);
+        assert_eq!(at(0).angle_bound().millidegrees(), 720);
+        assert_eq!(Sample { bound: 500, ..at(0) }.angle_bound(), Angle::HALF);
+        let unknown = Sample { steps_per_turn: 0, ..at(7) };
+        assert_eq!((unknown.angle(), unknown.angle_bound()), (Angle::ZERO, Angle::HALF));
+    }
+
     #[test]
     fn a_value_that_nobody_refreshes_becomes_old() {
-        let sample = Sample { position: -7, velocity: 12, sampled_ns: 1_000_000 };
-        let evidence = Evidence(Ok(sample));
+        let sample = Sample { sampled_ns: 1_000_000, ..sample(-7, 12) };
+        let evidence = Evidence { doubt: None, sample, missing: None, frames: 0, way: 0 };
         assert_eq!(evidence.at(1_050_000, POLICY), Ok(sample));
         assert_eq!(evidence.at(1_050_001, POLICY), Err(Doubt::Old { age_ns: 50_001 }));
         assert_eq!(Feedback::at(&evidence, 900_000, POLICY), Err(Doubt::Old { age_ns: 100_000 }));
@@ -322,15 +450,16 @@ mod tests {
     /// What was known when the evidence was taken goes before the age.
     #[test]
     fn doubts_do_not_age() {
-        assert_eq!(Evidence(Err(Doubt::NoLink)).at(u64::MAX, POLICY), Err(Doubt::NoLink));
+        assert_eq!(Evidence::doubtful(Doubt::NoLink).at(u64::MAX, POLICY), Err(Doubt::NoLink));
         assert_eq!(Evidence::default().at(0, Policy::new(u64::MAX)), Err(Doubt::Never));
         assert_eq!(SafeEvidence::default().at(0, Policy::new(u64::MAX)), Err(Doubt::Never));
     }
 
     #[test]
     fn as_a_log_shows_them() {
-        let sample = Sample { position: -7, velocity: 12, sampled_ns: 34 };
+        let sample = Sample { sampled_ns: 34, ..sample(-7, 12) };
         assert_eq!(sample.to_string(), "-7 at 12 a frame, sampled at 34 ns");
+        assert_eq!(Sample { bound: 5, ..sample }.to_string(), "-7 within 5 at 12 a frame, sampled at 34 ns");
         let safe = SafeSample { position: 5, summary: 0x81, sampled_ns: 34 };
         assert_eq!(safe.to_string(), "5, SUMMARY 81h, sampled at 34 ns");
         assert_eq!(Doubt::Old { age_ns: 3 }.to_string(), "the position is 3 ns old");

@@ -24,6 +24,7 @@
 
 mod disparity;
 mod head;
+mod rules;
 
 use nrz_line::{Search, Window};
 
@@ -41,6 +42,7 @@ pub use head::{
     is_coded_for_balance,
 };
 pub use nrz_line::Cause as LineCause;
+pub use rules::{BrokenRule, CarriedDisparity, HeadRules};
 
 /// What a frame is answered with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,17 +1,11 @@
-//! The fast position: the second differences of the acceleration channel integrated twice, aligned with the safe
-//! position once a V-frame.
+//! The registers POS and VEL of a receiver: the second differences of the acceleration channel integrated twice, aligned with the
+//! safe position once a V-frame, as the vendors do it.
 
 use crate::acceleration::DeltaDelta;
-use crate::doubt::Doubt;
-use crate::encoder_id::{EncoderId, PositionBits};
-use crate::evidence::{Evidence, Sample};
+use crate::encoder_id::PositionBits;
 
 const POSITION: u64 = 0xff_ffff_ffff;
 const VELOCITY: u32 = 0xff_ffff;
-/// Half of what 24 bits hold, in steps a frame. From here to the wrap it takes 4,096 frames of the highest acceleration,
-/// and every eighth is compared with a safe position.
-const FASTEST: i32 = 1 << 22;
-
 /// How velocity and position are calculated.
 ///
 /// Either way last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 stands in for an acceleration word that cannot be used (HDSL
@@ -22,7 +16,8 @@ const FASTEST: i32 = 1 << 22;
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum PositionRule {
     /// The estimate is limited to the 11 bits of a real value. Positions and their differences are taken modulo the
-    /// width of the position (SICK manual, p. 44).
+    /// width of the position (SICK manual, p. 44). A V-frame tells the velocity modulo an eighth of the range, so after stage 1 it
+    /// is within a sixteenth.
     #[default]
     Sick,
     /// As the firmware of the Motor Control SDK does it.
@@ -55,7 +50,7 @@ pub enum AlignmentStage {
 
 /// The registers of a receiver that belong to the fast position, by the vendor's names.
 ///
-/// They hold numbers whether these are right or not. What may be used comes from [`PositionTracker::evidence`].
+/// They hold numbers whether these are right or not. What may be used comes from [`FastPosition`](crate::FastPosition).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -104,8 +99,6 @@ pub struct PositionTracker {
     stage: AlignmentStage,
     unreliable: bool,
     errors: u32,
-    /// Safe positions in a row that agreed with the tracked one, in stages 2 and 3.
-    agreed: u8,
 }
 
 impl PositionTracker {
@@ -129,7 +122,6 @@ impl PositionTracker {
             stage: AlignmentStage::Position,
             unreliable: false,
             errors: 0,
-            agreed: 0,
         }
     }
 
@@ -151,7 +143,6 @@ impl PositionTracker {
     fn without_value(&mut self) -> (i32, i16) {
         self.errors = self.errors.saturating_add(1);
         self.stage = AlignmentStage::Position;
-        self.agreed = 0;
         self.unreliable = true;
         self.estimate()
     }
@@ -205,7 +196,7 @@ impl PositionTracker {
     /// ```
     ///
     /// One V-frame tells the speed modulo an eighth of the range only. The alignment is right for speeds of up to a
-    /// sixteenth of the range a frame; see [`evidence`](Self::evidence).
+    /// sixteenth of the range a frame; by [`PositionRule::Sick`] the speed is brought into that range.
     pub fn align(&mut self, safe: u64) {
         let relative = i64::from(self.relative);
         let mask = match self.rule {
@@ -225,6 +216,9 @@ impl PositionTracker {
                 let [v0, v1, v2, v3, ..] = (x >> 3).to_le_bytes();
                 self.velocity = self.velocity.wrapping_add(u32::from_le_bytes([v0, v1, v2, v3])) & VELOCITY;
                 self.position = self.position.wrapping_add_signed(x.wrapping_mul(2)) & mask;
+                if self.rule == PositionRule::Sick {
+                    self.velocity = self.reduced();
+                }
                 self.stage = AlignmentStage::Settle;
             }
             AlignmentStage::Settle => self.stage = AlignmentStage::Check,
@@ -234,55 +228,18 @@ impl PositionTracker {
                 self.unreliable = true;
             }
         }
-        self.agreed = match self.stage {
-            AlignmentStage::Check if agrees => self.agreed.saturating_add(1),
-            _ => 0,
-        };
         self.relative = 0;
-    }
-
-    /// What a control loop may use, with the sign that this encoder's positions have. `sampled_ns` is when the sampling edge of
-    /// the last H-frame was.
-    pub fn evidence(&self, id: EncoderId, sampled_ns: u64) -> Evidence {
-        Evidence(self.fast().map(|(raw, velocity)| Sample { position: id.position(raw), velocity, sampled_ns }))
-    }
-
-    /// Position and velocity, if they may be used.
-    ///
-    /// That is more than the flag POS being clear: two safe positions in a row have to agree, since a velocity that is
-    /// wrong by a sixteenth of the range passes one comparison; and the velocity has to be below a sixteenth of the range
-    /// a frame, since one that is wrong by an eighth of the range passes all of them. So what is given is the truth as
-    /// long as the real speed is below that limit, which is above 300 000 revolutions a minute for an encoder that
-    /// counts one turn. From 27 bits on the velocity has to be below 2^22 steps a frame as well: beyond twice that it
-    /// leaves its 24 bits. An encoder of 30 bits a turn may then do 20 000 revolutions a minute.
-    ///
-    /// # Errors
-    /// [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
-    pub(crate) fn fast(&self) -> Result<(u64, i32), Doubt> {
-        let velocity = self.velocity();
-        let limit =
-            1_i32.checked_shl(u32::from(self.bits.get()).saturating_sub(4)).map_or(FASTEST, |limit| limit.min(FASTEST));
-        if self.errors > 0 {
-            Err(Doubt::Estimated)
-        } else if self.unreliable || self.agreed < 2 {
-            Err(Doubt::Alignment)
-        } else if velocity < limit.wrapping_neg() || velocity >= limit {
-            Err(Doubt::Speed)
-        } else {
-            Ok((self.position & self.mask, velocity))
-        }
     }
 
     /// In place of [`align`](Self::align) when the V-frame brought no safe position.
     pub const fn no_safe_position(&mut self) {
         self.stage = AlignmentStage::Position;
-        self.agreed = 0;
         self.unreliable = true;
         self.relative = 0;
     }
 
     /// Marks the position as unreliable until an alignment succeeds.
-    pub const fn doubt(&mut self) {
+    pub(crate) const fn doubt(&mut self) {
         self.unreliable = true;
     }
 
@@ -295,6 +252,13 @@ impl PositionTracker {
             acc_err_cnt: self.errors,
             pos_flag: self.unreliable,
         }
+    }
+
+    /// The velocity within a sixteenth of the range, where its 24 bits hold more than that.
+    fn reduced(&self) -> u32 {
+        let [a, b, c, d, ..] = sign_extend(self.velocity.into(), self.mask >> 3).to_le_bytes();
+        let eighth = u32::from(self.bits.get()).saturating_sub(3);
+        if eighth < 24 { u32::from_le_bytes([a, b, c, d]) & VELOCITY } else { self.velocity }
     }
 
     /// The velocity with its sign.
@@ -392,79 +356,6 @@ mod tests {
                 tracker.step(value.map(|v| DeltaDelta::new(v).unwrap()));
                 prop_assert!((-1024..=1023).contains(&(tracker.registers().vel - before)));
                 prop_assert_eq!(tracker.registers().acc_err_cnt > 0, value.is_none());
-            }
-        }
-    }
-
-    /// Small ranges pass often, the speed is anything up to a sixteenth of the range a frame, words and safe positions are
-    /// lost: in every frame the position given is the truth, or none is given.
-    fn truth_or_nothing(rule: PositionRule, bits: u8, start: u64, speed: i64, steps: &[(i64, u8)]) -> (u32, u32) {
-        let bits = PositionBits::new(bits).unwrap();
-        let limit = 1_i64 << (bits.get() - 4);
-        let modulo = |p: i64| p.rem_euclid(1 << bits.get()) as u64;
-        let mut tracker = PositionTracker::with_rule(bits, rule);
-        let (mut position, mut velocity) = (start as i64, speed.rem_euclid(2 * limit) - limit);
-        let (mut before, mut given, mut wrong) = (position, 0, 0);
-        for (k, (a, lost)) in steps.iter().enumerate() {
-            let next = (velocity + a.clamp(&-1024, &1023)).clamp(-limit, limit - 1);
-            let value = dd(next - velocity);
-            velocity = next;
-            position += velocity;
-            tracker.step(if *lost == 0 { None } else { value });
-            if k % 8 == 7 {
-                if *lost == 1 {
-                    tracker.no_safe_position();
-                } else {
-                    tracker.align(modulo(before));
-                }
-                before = position;
-            }
-            if let Ok(fast) = tracker.fast() {
-                given += 1;
-                wrong += u32::from(fast != (modulo(position), velocity as i32));
-            }
-        }
-        (given, wrong)
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(if cfg!(miri) { 2 } else { 2000 }))]
-        #[test]
-        fn the_position_given_is_the_truth(
-            ti: bool, bits in 8..=40_u8, start: u64, speed: i64,
-            a in prop::collection::vec((-1100..1100_i64, prop_oneof![1 => 0..2_u8, 60 => Just(9)]), 160)
-        ) {
-            let rule = if ti { PositionRule::Ti } else { PositionRule::Sick };
-            let (_, wrong) = truth_or_nothing(rule, bits, start & 0xff_ffff_ffff, speed, &a);
-            prop_assert_eq!(wrong, 0);
-        }
-    }
-
-    /// 24 bits of velocity wrap long before a sixteenth of a wide range: no position is given there, on either side.
-    #[test]
-    fn a_velocity_near_its_24_bits_is_not_used() {
-        for bits in 27..=40 {
-            let limit = 1_i64 << (bits - 4);
-            for (speed, a) in [((1_i64 << 23) - 60_000, 1000), (60_000 - (1_i64 << 23), -1000)] {
-                let (_, wrong) = truth_or_nothing(PositionRule::Sick, bits, 77, speed + limit, &[(a, 9); 160]);
-                assert_eq!(wrong, 0, "{bits} {speed}");
-            }
-        }
-    }
-
-    /// The range is passed in every V-frame: the position is given all the time nevertheless, and it is right.
-    #[test]
-    fn passing_the_range_does_no_harm() {
-        for bits in (8..=26).step_by(crate::thin(6)) {
-            for speed in [-(1 << (bits - 4)), -3, 3, (1 << (bits - 4)) - 1] {
-                let (given, wrong) = truth_or_nothing(
-                    PositionRule::Sick,
-                    bits,
-                    (1 << bits) - 5,
-                    speed + (1 << (bits - 4)),
-                    &[(0, 9); 100],
-                );
-                assert_eq!((given, wrong), (100 - 31, 0), "{bits} {speed}");
             }
         }
     }

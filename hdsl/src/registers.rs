@@ -1,7 +1,8 @@
 //! The register map of the receiver: one byte an address, several bytes with the highest first.
 //!
-//! Addresses and bits are those of the Motor Control SDK (HDSL register list); where the SICK IP core differs, the
-//! register says so.
+//! A [`Registers`] has the addresses of the Motor Control SDK (HDSL register list) by either rule. The SICK IP core has its own: 40h
+//! registers, a bank with those of safe channel 2, POSTX and the flags of the online status beside them. An image of it becomes one
+//! of these with [`Registers::from_core`]; [`RemoteReceiver`] reaches either device by its own map.
 //!
 //! A [`Registers`] is an image of that map. Beside a [`Master`](crate::master::Master) it is kept up to date with
 //! [`Registers::apply`] and takes what an application writes with [`Registers::write`]. The image of a foreign receiver,
@@ -9,16 +10,17 @@
 //!
 //! ```
 //! use hdsl::Dialect;
-//! use hdsl::registers::{OnlineD, Registers};
+//! use hdsl::registers::{Register, Registers};
 //!
 //! let mut memory = [0_u8; Registers::LEN];
 //! memory[0x03] = 0x8f; // MASTER_QM
 //! memory[0x10..0x15].copy_from_slice(&[0, 0x12, 0x34, 0x56, 0x78]); // POS
 //! memory[0x50..0x52].copy_from_slice(&[0x18, 0x02]); // ONLINE_STATUS_D
 //! let map = Registers::from_bytes(&Dialect::TI, memory);
-//! assert_eq!((map.link(), map.quality(), map.pos()), (true, 15, 0x1234_5678));
+//! assert_eq!((map.link(), map.quality(), map.pos()), (true, 15, None));
 //! assert_eq!(map.online_d().to_string(), "FIX1 POS FREL");
-//! assert!(map.online_d().contains(OnlineD::POS));
+//! // POS: the position is estimated or not aligned.
+//! assert_eq!(map.get(Register::Pos), [0, 0x12, 0x34, 0x56, 0x78]);
 //! ```
 
 mod apply;
@@ -35,14 +37,26 @@ pub use pipe::{PipeFifo, PipeReading};
 
 use crate::dialect::Dialect;
 pub use crate::dialect::RegisterRule;
+use crate::encoder_id::PositionBits;
+use crate::fast::FastPosition;
+use crate::position::{AlignmentStage, PositionTracker};
+use crate::vframe::VFrame;
 
 /// An image of the register map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Registers {
     bytes: [u8; Self::LEN],
-    rule: RegisterRule,
+    dialect: Dialect,
     pipe: PipeFifo,
+    /// POS and VEL by the rule of the dialect.
+    tracker: PositionTracker,
+    /// What may be used of them; none of a foreign image.
+    fast: Option<FastPosition>,
+    /// The blocks of a V-frame, which are shown one H-frame after its end.
+    v_frame: Option<VFrame>,
+    /// The last good safe position, or none because the encoder had none.
+    last_safe: Option<u64>,
 }
 
 impl Registers {
@@ -58,13 +72,43 @@ impl Registers {
         all.put(Register::PcAdd, [0x80, 0x00]);
         all.put(Register::PcOff, [0x80, 0x00]);
         all.put(Register::AccErrCntThresh, [0x1f]);
+        if dialect.registers == RegisterRule::Sick {
+            all.put(Register::MaxAcc, [0xff]);
+            all.put(Register::MaxDev, [0xff; 2]);
+        }
         all.restart();
         all
     }
 
     /// An image that was read from somewhere else.
     pub const fn from_bytes(dialect: &Dialect, bytes: [u8; Self::LEN]) -> Self {
-        Self { bytes, rule: dialect.registers, pipe: PipeFifo::new() }
+        Self {
+            bytes,
+            dialect: *dialect,
+            pipe: PipeFifo::new(),
+            tracker: PositionTracker::new(PositionBits::MAX),
+            fast: None,
+            v_frame: None,
+            last_safe: Some(0),
+        }
+    }
+
+    /// Registers of the SICK core, without those of the encoder.
+    pub const CORE_LEN: usize = 0x40;
+
+    /// An image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if that was read. The online
+    /// status is no register there; all its flags are clear here.
+    pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
+        let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
+        for (address, byte) in (0..).zip(drive) {
+            all.set_byte(address, *byte);
+        }
+        let Some([.., version, _, _, _, id, _, _, _, _, _, _, _, _, s0, s1, s2, s3, s4, s5, s6, s7]) = safe2 else {
+            return all;
+        };
+        all.put(Register::Version2, [*version, *id, *s0, *s1, *s2, *s3, *s4, *s5]);
+        all.put(Register::VPosCrc2, [*s6, *s7]);
+        all
     }
 
     /// All bytes.
@@ -120,16 +164,30 @@ impl Registers {
         qm & 15
     }
 
-    /// POS4..POS0: the fast position, 40 bits, usable or not: see ONLINE_STATUS_D, and
-    /// [`Master::fast`](crate::master::Master::fast) for one to use.
-    pub fn pos(&self) -> u64 {
-        self.get40(Register::Pos)
+    /// POS4..POS0: the fast position, 40 bits, if it may be used: the link is up and POS is clear, and in a map that is kept with
+    /// [`apply`](Self::apply) what [`Master::fast`](crate::master::Master::fast) gives is the same. A receiver that is
+    /// elsewhere can show a position that is not aligned without saying so.
+    pub fn pos(&self) -> Option<u64> {
+        self.shown().map(|(pos, _)| pos)
     }
 
-    /// VEL2..VEL0: speed in steps an H-frame, usable or not.
-    pub fn vel(&self) -> i32 {
+    /// VEL2..VEL0: speed in steps an H-frame, if the position may be used.
+    pub fn vel(&self) -> Option<i32> {
+        self.shown().map(|(_, vel)| vel)
+    }
+
+    fn shown(&self) -> Option<(u64, i32)> {
+        let pos = self.get40(Register::Pos);
         let [a, b, c] = self.get(Register::Vel);
-        i32::from_be_bytes([a, b, c, 0]) >> 8
+        let vel = i32::from_be_bytes([a, b, c, 0]) >> 8;
+        let claimed = self.link() && !self.online_d().contains(OnlineD::POS);
+        let agrees = self.fast.is_none_or(|fast| fast.is_at(pos, vel));
+        (claimed && agrees).then_some((pos, vel))
+    }
+
+    /// How far POS is aligned with the safe position.
+    pub const fn stage(&self) -> AlignmentStage {
+        self.tracker.stage()
     }
 
     /// VPOS4..VPOS0: safe position 1, 40 bits: the last good one, of whatever age. For one to use there is
@@ -220,7 +278,9 @@ mod tests {
         let mut map = Registers::new(&Dialect::TI);
         map.put40(Register::Pos, 0x12_3456_789a);
         map.put(Register::Vel, [0xff, 0xff, 0xfe]);
-        assert_eq!((map.pos(), map.vel()), (0x12_3456_789a, -2));
+        assert_eq!((map.pos(), map.vel()), (None, None));
+        map.put(Register::MasterQm, [0x88]);
+        assert_eq!((map.pos(), map.vel()), (Some(0x12_3456_789a), Some(-2)));
         assert_eq!(map.byte(0x14), Some(0x9a));
         map.put(Register::EventH, [0x08, 0]);
         map.put(Register::EventS, [0x01]);
@@ -235,6 +295,6 @@ mod tests {
         let bytes = core::array::from_fn(|at| at as u8);
         let map = Registers::from_bytes(&Dialect::TI, bytes);
         assert_eq!(map.as_bytes(), &bytes);
-        assert_eq!((map.pos(), map.vpos2()), (0x10_1112_1314, 0x47_4849_4a4b));
+        assert_eq!((map.vpos(), map.vpos2()), (0x19_1a1b_1c1d, 0x47_4849_4a4b));
     }
 }

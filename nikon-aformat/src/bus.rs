@@ -21,8 +21,6 @@
 //! assert_eq!(bus.of(second), Outcome::Missing);
 //! ```
 
-use core::fmt;
-
 use nrz_line::BitOrder;
 
 use crate::error::Error;
@@ -103,15 +101,7 @@ impl Addresses {
     }
 }
 
-impl fmt::Display for Addresses {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const DIGITS: [&str; 8] = ["0", "1", "2", "3", "4", "5", "6", "7"];
-        let asked = DIGITS.into_iter().enumerate().filter(|(ea, _)| self.0 >> ea & 1 == 1);
-        servowire_core::write_names(f, asked.map(|(_, digit)| digit))
-    }
-}
-
-servowire_core::format_as_displayed!(Addresses);
+servowire_core::listed!(Addresses { |addresses| addresses.iter() => "{}" });
 
 /// What came from one address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -236,6 +226,11 @@ impl Bus {
     /// The addresses that were asked.
     pub const fn asked(&self) -> Addresses {
         self.asked
+    }
+
+    /// The addresses that sent a good response, asked or not.
+    pub(crate) const fn heard(&self) -> Addresses {
+        self.heard
     }
 
     /// The addresses that were asked and sent nothing good.

@@ -139,8 +139,9 @@ servowire_core::errors! {
             /// Requests made.
             tries: u16,
         },
-        /// A reset was interrupted before the eighth request, so it was **not done**. The eight requests have to be sent anew.
-        #[error("no response to the reset after {done} good responses of 8: not done")]
+        /// A plain reset was interrupted before the eighth response. Whether it was done is not known: requests that the encoder
+        /// had counted before may have made up the eight. The eight have to be sent anew.
+        #[error("no response to the reset after {done} good responses of 8: whether it was done is not known")]
         Interrupted = 19 {
             /// Good responses in succession so far.
             done: u8,
@@ -149,8 +150,9 @@ servowire_core::errors! {
         /// or the encoder reports that it could not be stored. Find out before it is repeated.
         #[error("whether a command that cannot be undone was done is not known")]
         EffectUnknown = 20,
-        /// What was written is not what is read back.
-        #[error("what was written is not what is read back")]
+        /// The act was not done: reading back shows it, or fewer than eight requests of a reset were sent after the encoder had
+        /// been made to count anew.
+        #[error("not done")]
         NotDone = 21,
         /// MEMERR is set: an access to the EEPROM failed.
         #[error("the encoder reports a failed access to its EEPROM")]
@@ -161,6 +163,12 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 25,
+        /// Two sound responses came to a request that one encoder answers: which one is its answer is not known.
+        #[error("two responses came to one request")]
+        TwoResponses = 26,
+        /// The settings of the line leave no time for a response: nothing is to be sent.
+        #[error("the settings of the line leave no time for a response")]
+        Line = 27,
     }
 }
 

@@ -34,7 +34,7 @@ servowire_core::shaft_evidence! {
     /// assert_eq!(evidence.at(1_200_000, commutation), Err(Doubt::Old { age_ns: 200_000 }));
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
-    Evidence
+    Evidence, st_bits
 }
 
 impl Evidence {

@@ -36,7 +36,6 @@ mod response;
 mod status;
 pub mod stream;
 mod temperature;
-mod text;
 mod timing;
 mod tolerated;
 mod type_word;

@@ -22,8 +22,8 @@
 //! // The response comes in one block, 3 us after the request; its last delimiter ends at 25.5 us.
 //! let heard = [0x2085_u16, 0xf64a, 0x8009, 0x80a1].map(|word| Some(word.reverse_bits()));
 //! let progress = transaction.hear(&heard, 25_500);
-//! // Command 4 asks all encoders; the others may answer until 449 us.
-//! let Progress::Done { value, ready_ns: 449_000 } = progress else { panic!("{progress:?}") };
+//! // Command 4 asks all encoders: seven others may have their turn of 23.5 us, and the next request is 10 us later.
+//! let Progress::Done { value, ready_ns: 200_500 } = progress else { panic!("{progress:?}") };
 //! assert_eq!(value.response.abs(), Some(51_200 << 17 | 86_639));
 //! assert_eq!((value.sampled_ns, value.began_ns), (4_500, 7_500));
 //! # Ok::<(), nikon_aformat::OutOfRange>(())

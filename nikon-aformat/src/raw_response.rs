@@ -1,5 +1,3 @@
-use core::fmt;
-
 use nrz_line::{BitOrder, Window};
 
 use crate::contents::{Contents, apart, framed, together};
@@ -7,7 +5,6 @@ use crate::crc::{mirrored, next_word};
 use crate::error::Error;
 use crate::frame::{framing, pack, truncated};
 use crate::layout::{FRAME_BITS, Layout, MAX_FRAMES};
-use crate::text::write_words;
 use crate::units::Units;
 
 /// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
@@ -152,10 +149,5 @@ const fn bytes(contents: [u16; MAX_FRAMES as usize]) -> [u8; 2 * MAX_FRAMES as u
     [a, b, c, d, e, f, g, h, i, j, k, l]
 }
 
-impl fmt::Display for RawResponse {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_words(f, self.words(BitOrder::MsbFirst))
-    }
-}
-
-servowire_core::format_as_displayed!(RawResponse);
+// As vendor documents print them, the first bit of the line in bit 15.
+servowire_core::listed!(RawResponse { |raw| raw.words(BitOrder::MsbFirst) => "{:04X}" });

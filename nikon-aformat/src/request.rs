@@ -1,5 +1,3 @@
-use core::fmt;
-
 use nrz_line::{BitOrder, OutOfBounds, Window};
 
 use crate::command::{Command, Version};
@@ -12,7 +10,6 @@ use crate::layout::Layout;
 use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
 use crate::operation::Operation;
 use crate::resolution::Resolution;
-use crate::text::write_words;
 use crate::units::Units;
 
 #[cfg(test)]
@@ -319,10 +316,5 @@ impl Frames {
 
 servowire_core::one_line!(Request { Self { ea, operation } => "to {}: {}", ea, operation; });
 
-impl fmt::Display for Frames {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_words(f, self.as_slice().iter().map(|frame| frame.word(BitOrder::MsbFirst)))
-    }
-}
-
-servowire_core::format_as_displayed!(Frames);
+// As vendor documents print them, the first bit of the line in bit 15.
+servowire_core::listed!(Frames { |frames| frames.as_slice().iter().map(|frame| frame.word(BitOrder::MsbFirst)) => "{:04X}" });

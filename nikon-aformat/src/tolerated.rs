@@ -1,6 +1,6 @@
 use servowire_core::Tolerance;
 
-use crate::marks::{NO_TURNS, OBJECTIONS, of_alarms, of_status};
+use crate::marks::{NO_TURNS, OBJECTIONS, alarms, of_alarms, of_status, status};
 use crate::status::{Alm, EncoderStatus};
 
 /// Up to which age, and in spite of what, a position may be used.
@@ -15,58 +15,82 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// In spite of what a position may be used: status bits, and alarms where a response carries them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Tolerated {
-    status: EncoderStatus,
-    alarms: Alm,
-    /// Turns may be anything, or missing: they are not used.
-    any_turns: bool,
-}
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
+pub struct Tolerated(u32);
 
 impl Tolerated {
     /// Nothing.
-    pub const NOTHING: Self = Self { status: EncoderStatus::empty(), alarms: Alm::empty(), any_turns: false };
+    pub const NOTHING: Self = Self(0);
 
     #[cfg(test)]
-    pub(crate) const ANY_TURNS: Self = Self { any_turns: true, ..Self::NOTHING };
+    pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
     /// As one drive does where turns are not used: an encoder without its battery shows BATT. The turns are not judged then, and
     /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
     /// is about to fail.
-    pub const SINGLE_TURN: Self = Self { status: EncoderStatus::BATT, alarms: Alm::BATT, any_turns: true };
+    pub const SINGLE_TURN: Self = Self(NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
 
     /// These status bits too.
     #[must_use]
     pub const fn status(self, status: EncoderStatus) -> Self {
-        Self { status: self.status.union(status), ..self }
+        Self(self.0 | of_status(status))
     }
 
     /// These alarms too.
     #[must_use]
     pub const fn alarms(self, alarms: Alm) -> Self {
-        Self { alarms: self.alarms.union(alarms), ..self }
+        Self(self.0 | of_alarms(alarms))
     }
 
     /// What of these marks is not tolerated.
     #[inline]
     pub(crate) const fn objects_to(self, marks: u32) -> u32 {
-        let turns = if self.any_turns { NO_TURNS } else { 0 };
-        marks & OBJECTIONS & !(turns | of_status(self.status) | of_alarms(self.alarms))
+        marks & OBJECTIONS & !self.0
     }
 
-    /// Whether turns may be anything.
+    /// Whether turns may be anything, or missing: they are not used.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
-        self.any_turns
+        self.0 & NO_TURNS != 0
     }
 }
 
 servowire_core::one_line!(Tolerated {
-    Self { status, alarms, any_turns: true } => "status {} and alarms {}, any turns", status, alarms;
-    Self { status, alarms, any_turns: false } => "status {} and alarms {}", status, alarms;
+    Self(marks) if marks & NO_TURNS != 0 => "status {} and alarms {}, any turns", status(*marks), alarms(*marks);
+    Self(marks) => "status {} and alarms {}", status(*marks), alarms(*marks);
 });
 
 impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
+}
+
+/// What is tolerated, as it is written down.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[cfg(any(feature = "serde", feature = "arbitrary"))]
+struct Written {
+    status: EncoderStatus,
+    alarms: Alm,
+    any_turns: bool,
+}
+
+#[cfg(any(feature = "serde", feature = "arbitrary"))]
+impl From<Written> for Tolerated {
+    fn from(Written { status, alarms, any_turns }: Written) -> Self {
+        Self(if any_turns { NO_TURNS } else { 0 }).status(status).alarms(alarms)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Tolerated> for Written {
+    fn from(tolerated: Tolerated) -> Self {
+        Self { status: status(tolerated.0), alarms: alarms(tolerated.0), any_turns: tolerated.ignores_turns() }
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Tolerated {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        from.arbitrary::<Written>().map(Self::from)
+    }
 }

@@ -12,7 +12,7 @@ use rtex_block::{Command32, MacId, Response};
 fn main() -> Result<(), SameMacId> {
     let mac_id = MacId::new(5).unwrap_or_default();
     let some = NonZeroU16::MIN.saturating_add(7);
-    let limits = Limits::new(some, 50).with_ready(200);
+    let limits = Limits::new(some, 50).with_ready(Some(200));
     let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits));
     let mut ring = Ring::new([axis], 2)?;
     let mut drive =

@@ -11,16 +11,16 @@ use crate::error::ErrorClass;
 pub enum Doubt {
     /// No good block has come yet.
     Never,
-    /// The counter echo has stood still, or no block has come, for longer than the policy allows.
+    /// No block has come on time for longer than the policy allows.
     Old {
-        /// From the block that brought the last new counter echo until now, ns.
+        /// From the last block that came on time until now, ns.
         age_ns: u64,
     },
     /// The position is too old, for the last block was refused.
     Refused {
         /// Why it was.
         class: ErrorClass,
-        /// From the block that brought the last new counter echo until now, ns.
+        /// From the last block that came on time until now, ns.
         age_ns: u64,
     },
     /// The drive reports an alarm: it may have lost its encoder.

@@ -49,7 +49,7 @@ struct Rates {
 ///
 /// Pr7.29 to Pr7.31 of the drive must be 0: otherwise it sends other values in these places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Sample {
     position: i32,
     rates: Option<Rates>,
@@ -104,7 +104,7 @@ servowire_core::one_line!(Sample {
 /// # Ok::<(), rtex_block::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Evidence {
     sample: Option<Sample>,
     status: StatusFlags,
@@ -139,6 +139,11 @@ impl Evidence {
             Some(sample) => sample,
             None => Sample { position: 0, rates: None, sampled_ns: 0 },
         }
+    }
+
+    /// With the alarm of a block that was not on time, if it reports one.
+    pub(crate) const fn alarmed(self, status: StatusFlags) -> Self {
+        Self { status: self.status.union(status.intersection(StatusFlags::ALARM)), ..self }
     }
 
     /// With the reason why the last block was refused.

@@ -1,8 +1,8 @@
 //! The controller's side: what has to happen around the blocks, without any input or output of its own.
 //!
 //! The pieces work alone or together. [`Ring`] joins the axes: it takes the responses of all drives once per update period
-//! and gives the commands of the next. [`Master`] adds the phases, the watchdog and the memory of the ASIC. Time is
-//! counted in update periods.
+//! and gives the commands of the next. [`Master`] adds the phases, the watchdog and the memory of the ASIC, [`Run`] the common
+//! jobs. Limits are counted in update periods, ages by the clock.
 
 mod axis;
 mod check;
@@ -18,6 +18,7 @@ pub mod procedure;
 mod profile_move;
 mod progress;
 mod ring;
+mod run;
 mod service;
 mod servo_off;
 mod slaves;
@@ -26,10 +27,10 @@ mod sub_handshake;
 
 pub use axis::Axis;
 pub use check::{Acknowledgement, Checked, Expected};
-pub use config::{AxisConfig, Limits, StopPolicy};
+pub use config::{AxisConfig, Limits, StopCategory};
 pub use counter::{CommandCounter, Turn};
 pub use counters::Counters;
-pub use echo::{EchoWatch, ReceiveWatchdog};
+pub use echo::{Arrival, EchoWatch};
 pub use handshake::Handshake;
 pub use heard::Heard;
 pub use led::{Led, Pattern, led, pattern};
@@ -37,8 +38,9 @@ pub use phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 pub use profile_move::{CommandEnded, MoveStage, ProfileMove};
 pub use progress::{Failure, Progress};
 pub use ring::{Ring, RingFailure, SameMacId};
+pub use run::{Ended, Run};
 pub use service::{Master, MasterConfig, SetupError};
 pub use servo_off::{ActiveCode, ServoOff};
-pub use slaves::{Order, Slave, SlaveInfo, compare};
+pub use slaves::{Slave, SlaveInfo, compare};
 pub use state::{AskError, AxisState, RingSwitchOnError, SetpointError, StopReason, SwitchOnError};
 pub use sub_handshake::SubHandshake;

@@ -13,8 +13,7 @@
 //! emptied before the ASIC is told to go on; on a host whose addresses count 16-bit units (TMS320F28388) every address of the
 //! ASIC, which the vendor gives in bytes, is halved. System Design Guide for Master, notes on the host.
 //!
-//! The words are written to where the caller wants them, for one block or for the memory of a whole ring. Where
-//! the bytes already lie in that memory ([`image_to_words32`]), they are turned in place.
+//! The words are written to where the caller wants them, for one block or for the memory of a whole ring.
 
 /// The two sides do not have the same size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -27,83 +26,76 @@ pub struct SizeMismatch {
     pub words: usize,
 }
 
-/// Packs bytes into 32-bit words.
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for u8 {}
+    impl Sealed for u16 {}
+    impl Sealed for u32 {}
+}
+
+/// A word of the bus: `u8`, `u16` or `u32`. The byte that goes out first is in its lowest bits, on every host.
+pub trait Word: Copy + Default + sealed::Sealed {
+    /// Bytes of a word.
+    const BYTES: usize;
+    /// A word of as many bytes; 0 for any other number of them.
+    #[doc(hidden)]
+    fn load(bytes: &[u8]) -> Self;
+    /// Into as many bytes; nothing happens with any other number of them.
+    #[doc(hidden)]
+    fn store(self, bytes: &mut [u8]);
+}
+
+macro_rules! words {
+    ($($word:ty),*) => {$(
+        impl Word for $word {
+            const BYTES: usize = size_of::<$word>();
+
+            #[inline]
+            fn load(bytes: &[u8]) -> Self {
+                bytes.try_into().map_or(0, <$word>::from_le_bytes)
+            }
+
+            #[inline]
+            fn store(self, bytes: &mut [u8]) {
+                if let Ok(place) = bytes.try_into() {
+                    let place: &mut [u8; size_of::<$word>()] = place;
+                    *place = self.to_le_bytes();
+                }
+            }
+        }
+    )*};
+}
+words!(u8, u16, u32);
+
+/// Packs bytes into words.
 ///
 /// ```
-/// let mut words = [0; 4];
+/// let mut words = [0_u32; 4];
 /// let block = [0xc5, 0x20, 0xc1, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0x9c, 0xff, 0xff, 0xff];
-/// rtex_block::pack::to_words32(&block, &mut words).unwrap();
+/// rtex_block::pack::to_words(&block, &mut words).unwrap();
 /// assert_eq!(words, [0x00c1_20c5, 1_000, 0, 0xffff_ff9c]);
 /// ```
 ///
 /// # Errors
-/// [`SizeMismatch`] unless there are four bytes a word; nothing is written then.
-pub fn to_words32(bytes: &[u8], words: &mut [u32]) -> Result<(), SizeMismatch> {
-    check(bytes.len(), words.len(), 4)?;
-    for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(4)) {
-        if let Ok(four) = chunk.try_into() {
-            *word = u32::from_le_bytes(four);
-        }
+/// [`SizeMismatch`] unless the words hold just these bytes; nothing is written then.
+pub fn to_words<W: Word>(bytes: &[u8], words: &mut [W]) -> Result<(), SizeMismatch> {
+    check(bytes.len(), words.len(), W::BYTES)?;
+    for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(W::BYTES)) {
+        *word = W::load(chunk);
     }
     Ok(())
 }
 
-/// Packs bytes into 16-bit words.
+/// Unpacks words into bytes.
 ///
 /// # Errors
-/// [`SizeMismatch`] unless there are two bytes a word; nothing is written then.
-pub fn to_words16(bytes: &[u8], words: &mut [u16]) -> Result<(), SizeMismatch> {
-    check(bytes.len(), words.len(), 2)?;
-    for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(2)) {
-        if let Ok(two) = chunk.try_into() {
-            *word = u16::from_le_bytes(two);
-        }
+/// [`SizeMismatch`] unless the words hold just these bytes; nothing is written then.
+pub fn from_words<W: Word>(words: &[W], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
+    check(bytes.len(), words.len(), W::BYTES)?;
+    for (chunk, word) in bytes.chunks_exact_mut(W::BYTES).zip(words) {
+        word.store(chunk);
     }
     Ok(())
-}
-
-/// Unpacks 32-bit words into bytes.
-///
-/// # Errors
-/// [`SizeMismatch`] unless there are four bytes a word; nothing is written then.
-pub fn from_words32(words: &[u32], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
-    check(bytes.len(), words.len(), 4)?;
-    for (chunk, word) in bytes.chunks_exact_mut(4).zip(words) {
-        if let Ok(four) = chunk.try_into() {
-            let four: &mut [u8; 4] = four;
-            *four = word.to_le_bytes();
-        }
-    }
-    Ok(())
-}
-
-/// Unpacks 16-bit words into bytes.
-///
-/// # Errors
-/// [`SizeMismatch`] unless there are two bytes a word; nothing is written then.
-pub fn from_words16(words: &[u16], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
-    check(bytes.len(), words.len(), 2)?;
-    for (chunk, word) in bytes.chunks_exact_mut(2).zip(words) {
-        if let Ok(two) = chunk.try_into() {
-            let two: &mut [u8; 2] = two;
-            *two = word.to_le_bytes();
-        }
-    }
-    Ok(())
-}
-
-/// Turns words whose memory was filled byte by byte into numbers, in place; nothing to do on a little-endian host.
-pub fn image_to_words32(words: &mut [u32]) {
-    for word in words {
-        *word = u32::from_le(*word);
-    }
-}
-
-/// Turns words whose memory was filled byte by byte into numbers, in place; nothing to do on a little-endian host.
-pub fn image_to_words16(words: &mut [u16]) {
-    for word in words {
-        *word = u16::from_le(*word);
-    }
 }
 
 fn check(bytes: usize, words: usize, width: usize) -> Result<(), SizeMismatch> {
@@ -118,28 +110,25 @@ mod tests {
     proptest! {
         #[test]
         fn there_and_back(bytes: [u8; 32]) {
-            let (mut wide, mut narrow, mut back) = ([0; 8], [0; 16], [0; 32]);
-            to_words32(&bytes, &mut wide).unwrap();
-            from_words32(&wide, &mut back).unwrap();
+            let (mut wide, mut narrow, mut back) = ([0_u32; 8], [0_u16; 16], [0; 32]);
+            to_words(&bytes, &mut wide).unwrap();
+            from_words(&wide, &mut back).unwrap();
             prop_assert_eq!(back, bytes);
-            to_words16(&bytes, &mut narrow).unwrap();
-            from_words16(&narrow, &mut back).unwrap();
+            to_words(&bytes, &mut narrow).unwrap();
+            from_words(&narrow, &mut back).unwrap();
             prop_assert_eq!(back, bytes);
             for (k, word) in wide.iter().enumerate() {
                 prop_assert_eq!(word & 0xff, u32::from(bytes[4 * k]));
                 prop_assert_eq!(u32::from(narrow[2 * k + 1]) << 16 | u32::from(narrow[2 * k]), *word);
             }
-            let mut image = bytes.chunks(4).map(|c| u32::from_ne_bytes(c.try_into().unwrap())).collect::<std::vec::Vec<_>>();
-            image_to_words32(&mut image);
-            prop_assert_eq!(image, wide);
         }
     }
 
     #[test]
     fn sizes_must_agree() {
-        let mut words = [7; 4];
+        let mut words = [7_u32; 4];
         for size in (0..=32).filter(|&n| n != 16) {
-            let refused = to_words32(&[0; 32][..size], &mut words);
+            let refused = to_words(&[0; 32][..size], &mut words);
             assert_eq!(refused, Err(SizeMismatch { bytes: size, words: 4 }));
         }
         assert_eq!(words, [7; 4]);

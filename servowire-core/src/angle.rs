@@ -31,7 +31,7 @@ impl Angle {
     }
 
     /// From a count of an encoder and its counts per turn, rounded down to 2^-32 turn; exact if these are a power of two,
-    /// which also takes no division. Whole turns in the count drop out. Counts per turn of 0 give no turn.
+    /// which also takes no division. Whole turns are dropped. With 0 counts per turn the angle is 0.
     pub const fn from_counts(counts: u32, counts_per_turn: u32) -> Self {
         if counts_per_turn.is_power_of_two() {
             // A shift by 32, of one count per turn, leaves nothing: every count is whole turns.
@@ -107,8 +107,8 @@ pub struct Commutation {
 }
 
 impl Commutation {
-    /// A motor with so many pole pairs, the electrical angle where the encoder reads 0, and which way the encoder counts.
-    /// `None` without a pole pair.
+    /// For a motor with `pole_pairs`: the electrical angle at which the encoder reads 0, and the direction in which the encoder
+    /// counts. `None` for 0 pole pairs.
     pub const fn new(pole_pairs: u16, offset: Angle, sense: Sense) -> Option<Self> {
         match NonZeroU16::new(pole_pairs) {
             Some(pole_pairs) => Some(Self { pole_pairs, offset, sense }),
@@ -121,7 +121,7 @@ impl Commutation {
         self.pole_pairs.get()
     }
 
-    /// The electrical angle where the encoder reads 0.
+    /// The electrical angle at which the encoder reads 0.
     pub const fn offset(&self) -> Angle {
         self.offset
     }
@@ -140,7 +140,7 @@ impl Commutation {
         }
     }
 
-    /// What becomes of an error of the mechanical angle: times the pole pairs, and half a turn at most.
+    /// The error of the electrical angle that follows from one of the mechanical angle: times the pole pairs, at most half a turn.
     pub const fn bound(&self, mechanical: Angle) -> Angle {
         let bound = mechanical.0.saturating_mul(self.pole_pairs.get() as u32);
         if bound < Angle::HALF.0 { Angle(bound) } else { Angle::HALF }

@@ -5,10 +5,10 @@ use crate::four_slots::FourSlots;
 
 /// What can travel through a [`Cell`]: its fields, packed into `W` words.
 pub trait Words<const W: usize>: Sized {
-    /// The words.
+    /// Packs the value into words.
     fn to_words(&self) -> [u32; W];
 
-    /// The value that has these words. Words that no value has cannot come from a cell; they may become anything.
+    /// Unpacks a value. A cell only ever gives words that [`to_words`](Self::to_words) has made; other ones may become any value.
     fn from_words(words: [u32; W]) -> Self;
 }
 
@@ -20,7 +20,7 @@ pub trait Words<const W: usize>: Sized {
 /// last put completely. It takes 4 × `W` + 2 words of memory. The order of all loads and stores is model-checked.
 ///
 /// [`split`](Self::split) gives the two ends, once. They may be moved to where they are used, an interrupt among them, if
-/// the cell lives for ever: take it from `cortex_m::singleton!` or a `StaticCell`, and hand one end to the interrupt before
+/// the cell is `'static`: take it from `cortex_m::singleton!` or a `StaticCell`, and hand one end to the interrupt before
 /// it is enabled, as a local resource of RTIC or a `static mut` of a `cortex-m-rt` handler, for example.
 ///
 /// ```
@@ -75,7 +75,7 @@ impl<F: Feedback + Words<W>, const W: usize> Cell<F, W> {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// Its two ends. What is in the cell stays there.
+    /// The two ends. The cell keeps what it holds.
     pub const fn split(&mut self) -> (Writer<'_, F, W>, Reader<'_, F, W>) {
         let slots = &self.slots;
         (Writer { slots, evidence: PhantomData }, Reader { slots, evidence: PhantomData })

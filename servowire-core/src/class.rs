@@ -17,7 +17,7 @@ pub trait Class: Copy + Eq + Debug + 'static {
 
 /// An error that belongs to a [`Class`].
 pub trait Classified: Copy {
-    /// The classes there are.
+    /// All classes of this error.
     type Class: Class;
 
     /// The class of this error.

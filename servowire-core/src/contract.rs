@@ -136,3 +136,85 @@ macro_rules! receive {
         }
     };
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Machine, Procedure, Progress, Step};
+
+    /// Every method gives back its name and what it was told.
+    struct Echo;
+
+    type Said = (&'static str, usize);
+
+    #[expect(clippy::unused_self, reason = "the shape of a machine")]
+    impl Echo {
+        fn transmission(&self) -> &'static str {
+            "transmission"
+        }
+
+        fn hear(&mut self, unit: &[u8], end_ns: u64) -> Progress<usize, Said> {
+            Progress::Done { value: unit.len(), ready_ns: end_ns }
+        }
+
+        fn framing_error(&mut self, end_ns: u64) -> Progress<usize, Said> {
+            Progress::Failed { error: ("framing_error", 0), ready_ns: end_ns }
+        }
+
+        fn poll(&mut self, now_ns: u64) -> Progress<usize, Said> {
+            Progress::Failed { error: ("poll", 0), ready_ns: now_ns }
+        }
+
+        fn progress(&self) -> Progress<usize, Said> {
+            Progress::Pending { until_ns: 5 }
+        }
+
+        fn start(&mut self, now_ns: u64) -> Step<&'static str, usize, Said> {
+            Step::Send { request: "start", not_before_ns: now_ns }
+        }
+
+        fn receive(&mut self, outcome: Result<usize, Said>, ready_ns: u64) -> Step<&'static str, usize, Said> {
+            match outcome {
+                Ok(value) => Step::Done { value, ready_ns },
+                Err(error) => Step::Failed { error, ready_ns },
+            }
+        }
+    }
+
+    machine!(Echo { &'static str, [u8] => usize, Said });
+    procedures!(&'static str => usize, Said { Echo => usize; });
+
+    #[test]
+    fn a_machine_is_forwarded_with_all_that_it_is_told() {
+        type Ended<M> = Progress<<M as Machine>::Value, <M as Machine>::Error>;
+        fn all<M: Machine<Unit = [u8]>>(mut machine: M) -> (M::Transmission, [Ended<M>; 4]) {
+            let heard = machine.hear(&[1, 2, 3], 1 << 40);
+            let damaged = machine.framing_error(2 << 40);
+            let asked = machine.poll(3 << 40);
+            (machine.transmission(), [heard, damaged, asked, machine.progress()])
+        }
+        let said = [
+            Progress::Done { value: 3, ready_ns: 1 << 40 },
+            Progress::Failed { error: ("framing_error", 0), ready_ns: 2 << 40 },
+            Progress::Failed { error: ("poll", 0), ready_ns: 3 << 40 },
+            Progress::Pending { until_ns: 5 },
+        ];
+        assert_eq!(all(Echo), ("transmission", said));
+    }
+
+    #[test]
+    fn a_procedure_is_forwarded_with_all_that_it_is_told() {
+        fn all<P: Procedure>(
+            mut procedure: P,
+            value: P::Response,
+            error: P::Error,
+        ) -> [Step<P::Request, P::Value, P::Error>; 3] {
+            [procedure.start(1 << 40), procedure.receive(Ok(value), 2 << 40), procedure.receive(Err(error), 3 << 40)]
+        }
+        let said = [
+            Step::Send { request: "start", not_before_ns: 1 << 40 },
+            Step::Done { value: 7, ready_ns: 2 << 40 },
+            Step::Failed { error: ("x", 1), ready_ns: 3 << 40 },
+        ];
+        assert_eq!(all(Echo, 7, ("x", 1)), said);
+    }
+}

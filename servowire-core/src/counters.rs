@@ -164,9 +164,15 @@ mod tests {
             ((3 << 41) + 7, 1 << 41, 249_999),
             (3 << 42, 1 << 42, 250_000),
             (3 << 60, 1 << 60, 250_000),
+            // All of them failed: nothing is left of the room for the million.
+            (0, (1 << 44) - 1, 1_000_000),
+            (0, (1 << 45) - 1, 1_000_000),
+            (0, u64::MAX, 1_000_000),
         ] {
             assert_eq!(Counters::<4> { good, errors: [0, errors, 0, 0] }.errors_per_million(), rate, "{good} {errors}");
         }
+        // More failures in all than a counter holds.
+        assert_eq!(Counters::<4> { good: 7, errors: [5, u64::MAX, 0, 5] }.errors(), u64::MAX);
         let mut counters = Counters::<4> { good: u64::MAX - 1, errors: [0, 0, 3, 0] };
         assert_eq!(counters.errors_per_million(), 0);
         for _ in 0..3 {

@@ -1,4 +1,4 @@
-/// A leaky bucket: errors fill it, good transactions drain it, and above its limit the line is unfit for use.
+/// A leaky bucket: errors fill it, good transactions drain it, and above its limit the line must not be used.
 ///
 /// One error in a hundred thousand transactions is the life of a drive, three in a row is a broken cable. With a
 /// `weight` of 100 and a `limit` of 250 the third error in a row is too much, and so is any rate above one in 101.
@@ -17,7 +17,7 @@ impl ErrorRate {
         Self { level: 0, weight, limit }
     }
 
-    /// Counts the outcome of a transaction; whether the limit is passed now.
+    /// Counts the outcome of a transaction. Returns whether the limit is now exceeded.
     pub fn record<T, E>(&mut self, outcome: &Result<T, E>) -> bool {
         self.level = match outcome {
             Ok(_) => self.level.saturating_sub(1),
@@ -26,12 +26,12 @@ impl ErrorRate {
         self.is_exceeded()
     }
 
-    /// What is in the bucket.
+    /// The level of the bucket.
     pub const fn level(&self) -> u32 {
         self.level
     }
 
-    /// Whether the limit is passed.
+    /// Returns whether the limit is exceeded.
     pub const fn is_exceeded(&self) -> bool {
         self.level > self.limit
     }
@@ -58,6 +58,14 @@ mod tests {
             rate.record(&GOOD);
         }
         assert_eq!((rate.level(), rate.is_exceeded()), (0, false));
+    }
+
+    #[test]
+    fn a_full_bucket_stays_full() {
+        let mut rate = ErrorRate::new(u32::MAX - 1, u32::MAX - 2);
+        assert!(rate.record(&BAD) && rate.record(&BAD) && rate.record(&BAD));
+        assert_eq!(rate.level(), u32::MAX);
+        assert!(rate.record(&GOOD) && !rate.record(&GOOD));
     }
 
     #[test]

@@ -33,6 +33,30 @@
 /// assert_eq!(ErrorClass::ALL.iter().map(|class| class.number()).collect::<Vec<_>>(), [1, 2]);
 /// ```
 ///
+/// An error that is too long does not compile, nor does a class with the number 0:
+///
+/// ```compile_fail,E0080
+/// servowire_core::errors! {
+///     /// 24 bytes.
+///     pub enum Error {
+///         /// Three words.
+///         #[error("{a} {b} {c}")]
+///         Long = 1 { a: u64, b: u64, c: u64 },
+///     }
+/// }
+/// ```
+///
+/// ```compile_fail,E0080
+/// servowire_core::errors! {
+///     /// With the number of no error.
+///     pub enum Error {
+///         /// The first.
+///         #[error("first")]
+///         First = 0,
+///     }
+/// }
+/// ```
+///
 /// A crate with `nom` parsers adds [`nom_error!`](crate::nom_error).
 #[macro_export]
 macro_rules! errors {
@@ -225,6 +249,46 @@ pub const fn snake_case(name: &str) -> Snake {
 #[cfg(test)]
 mod tests {
     use super::snake_case;
+    use crate::{Class, Classified, Counters};
+
+    #[allow(dead_code, unreachable_pub, reason = "declared as a crate would, not all of it used")]
+    mod declared {
+        crate::errors! {
+            /// Numbers that tell nothing of the order.
+            pub enum Error {
+                /// Checked first.
+                #[error("first")]
+                First = 9,
+                /// Checked second, as long as an error may be.
+                #[error("second, {value}")]
+                Second = 2 {
+                    /// Eight of sixteen bytes.
+                    value: u64,
+                },
+                /// Checked last.
+                #[error("last")]
+                Last = 255,
+            }
+        }
+    }
+    use declared::{Error, ErrorClass};
+
+    #[test]
+    fn places_follow_the_order_and_numbers_are_those_declared() {
+        let errors = [Error::First, Error::Second { value: 1 }, Error::Last];
+        assert_eq!(errors.map(|error| Class::index(error.class())), [0, 1, 2]);
+        assert_eq!(errors.map(|error| Class::number(Classified::class(error))), [9, 2, 255]);
+        assert_eq!(errors.map(|error| Class::name(error.class())), ["first", "second", "last"]);
+        assert_eq!(<ErrorClass as Class>::ALL, [ErrorClass::First, ErrorClass::Second, ErrorClass::Last]);
+        let known = (0..=u8::MAX).filter_map(|number| ErrorClass::from_number(number).map(|class| (number, class)));
+        assert!(known.eq([(2, ErrorClass::Second), (9, ErrorClass::First), (255, ErrorClass::Last)]));
+        let mut counters = Counters::<3>::new();
+        counters.record::<(), _>(&Err(Error::Last));
+        assert_eq!(
+            [ErrorClass::First, ErrorClass::Second, ErrorClass::Last].map(|class| counters.of(class)),
+            [0, 0, 1]
+        );
+    }
 
     #[test]
     fn names_in_snake_case() {

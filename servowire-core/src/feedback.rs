@@ -1,5 +1,4 @@
-/// In spite of what a value may be used: alarms that a drive lives with, status bits; `()` for a protocol that has nothing
-/// of the kind.
+/// What a policy can tolerate: alarms that a drive can live with, status bits; `()` for a protocol without any.
 pub trait Tolerance: Copy {
     /// Nothing: every alarm is a doubt.
     const NOTHING: Self;
@@ -9,8 +8,8 @@ impl Tolerance for () {
     const NOTHING: Self = ();
 }
 
-/// Up to which age, and in spite of what, a value may be used. There is deliberately no default age: how far a shaft turns
-/// within it is known to the control loop alone.
+/// How old a value may be, and which alarms it may carry, to be used. There is deliberately no default age: only the control
+/// loop knows how far a shaft turns in that time.
 ///
 /// Each protocol crate names its own: `type Policy = servowire_core::Policy<Tolerated>`.
 ///
@@ -29,12 +28,12 @@ pub struct Policy<T> {
 }
 
 impl<T: Tolerance> Policy<T> {
-    /// Up to this age, in ns from the instant of sampling, and in spite of nothing.
+    /// Values up to this age, in ns from the instant of sampling; no alarm is tolerated.
     pub const fn new(max_age_ns: u64) -> Self {
         Self { max_age_ns, tolerated: T::NOTHING }
     }
 
-    /// In spite of this, in place of what was tolerated before.
+    /// Also values with these alarms, in place of those tolerated before.
     #[must_use]
     pub const fn tolerating(self, tolerated: T) -> Self {
         Self { tolerated, ..self }
@@ -45,18 +44,18 @@ impl<T: Tolerance> Policy<T> {
         self.max_age_ns
     }
 
-    /// In spite of what a value may be used.
+    /// The alarms that are tolerated.
     pub const fn tolerated(&self) -> T {
         self.tolerated
     }
 
-    /// Whether what was sampled then may be used now, as far as its age goes.
+    /// Checks the age of a value.
     ///
-    /// An instant that is ahead counts as far as it is ahead: a clock that was set back makes no value young. A little ahead
-    /// is ordinary, where a reader looks at its clock and is interrupted by the writer before it reads.
+    /// An instant of sampling after `now_ns` counts by its distance, so a clock that was set back does not make a value young.
+    /// A short distance is normal: a reader looks at its clock, and the writer interrupts it before it reads.
     ///
     /// # Errors
-    /// How far the instant of sampling is away, in ns: more than the longest age.
+    /// The age, in ns: more than the longest one.
     pub const fn check_age(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
         if now_ns < sampled_ns {
             self.check_ahead(now_ns, sampled_ns)
@@ -76,8 +75,7 @@ impl<T: Tolerance> Policy<T> {
     }
 }
 
-/// Evidence of a position, speed or torque that is judged where it is used, not where it was received: in between it
-/// grows old.
+/// Evidence of a position, speed or torque. It is judged where it is used, not where it was received, for it ages in between.
 ///
 /// Protocol crates implement it by forwarding to an inherent `const fn at`, so that the text of a control loop is the same
 /// for all of them:
@@ -118,7 +116,7 @@ impl<T: Tolerance> Policy<T> {
 /// assert_eq!(Evidence::NEVER.at(1_040_000, policy), Err(Doubt::Never));
 /// ```
 pub trait Feedback: Copy {
-    /// In spite of what its values may be used.
+    /// What a policy can tolerate.
     type Tolerated: Tolerance;
     /// A value that may be used, with its instant of sampling.
     type Sample: Copy;

@@ -14,12 +14,12 @@ impl<C: Class> Findings<C> {
     /// No fault.
     pub const NONE: Self = Self { bits: 0, classes: PhantomData };
 
-    /// Whether a fault of this class was found.
+    /// Returns whether a fault of this class was found.
     pub fn contains(self, class: C) -> bool {
         self.bits & bit(class) != 0
     }
 
-    /// Whether no fault was found.
+    /// Returns whether no fault was found.
     pub const fn is_empty(self) -> bool {
         self.bits == 0
     }
@@ -180,6 +180,39 @@ mod tests {
         assert_eq!(found.iter().collect::<Vec<_>>(), [Kind::First, Kind::Third]);
         assert_eq!(found.to_string(), "first third");
     }
+
+    /// A class by its place, of more than a set holds.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Place(usize);
+
+    impl Class for Place {
+        const ALL: &'static [Self] = &[Self(0), Self(31), Self(32), Self(63), Self(64)];
+
+        fn index(self) -> usize {
+            self.0
+        }
+
+        fn name(self) -> &'static str {
+            "place"
+        }
+
+        fn number(self) -> u8 {
+            self.0 as u8 + 1
+        }
+    }
+
+    #[test]
+    fn up_to_64_classes_are_told_apart() {
+        for place in [0, 31, 32, 63] {
+            let mut found = Findings::NONE;
+            found.insert(Place(place));
+            assert_eq!(found.iter().collect::<Vec<_>>(), [Place(place)]);
+        }
+        let mut found = Findings::NONE;
+        found.insert(Place(64));
+        assert!(found.is_empty() && !found.contains(Place(64)));
+    }
+
     #[cfg(feature = "serde")]
     #[test]
     fn written_as_the_classes() {

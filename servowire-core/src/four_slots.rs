@@ -33,11 +33,11 @@ type Word = AtomicU32;
 
 /// `control` before the first value.
 const NOTHING: u32 = 0;
-/// In `control` ever after.
+/// In `control` from the first value on.
 const SOMETHING: u32 = 1;
 /// In `control`: the newest pair. A pair is named by its first slot, 0 or 2.
 const PAIR: u32 = 2;
-/// In `control`, above so many bits: the newest slot of pair 0, and two bits above it that of pair 2.
+/// Bits of `control` below the newest slot of pair 0; that of pair 2 lies two bits higher.
 const NEWEST: u32 = 2;
 /// Any slot.
 const SLOT: u32 = 3;

@@ -140,7 +140,7 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// For an encoder with so many counts per turn, on a shaft that never turns faster than this, in turns per second.
+    /// For an encoder with `counts_per_turn` on a shaft that never turns faster than `max_turns_per_s`.
     ///
     /// Two samples tell the speed only if the shaft has moved less than half a turn between them, for 0.7 of a turn looks
     /// like 0.3 of a turn backward. At 100 turns per second (6000 rpm) that is 5 ms. After a longer gap the next sample
@@ -160,8 +160,8 @@ impl Tracker {
         }
     }
 
-    /// The next sample. A sample with the instant of the one before does not count twice; one before it, after the clock was
-    /// set back, is a first one.
+    /// The next sample. The same sample again changes nothing. One that contradicts the last (another angle at the same
+    /// instant, or an earlier instant because the clock was set back) is a first one.
     pub fn sample(&mut self, angle: Angle, sampled_ns: u64) -> Motion {
         let motion = match self.last {
             Some(last) if last.sampled_ns == sampled_ns && last.angle == angle => last,
@@ -172,7 +172,7 @@ impl Tracker {
         motion
     }
 
-    /// A sample is missing or doubtful: the next one is a first one.
+    /// To be called when a sample is missing or doubtful: the next one is a first one.
     pub const fn interrupt(&mut self) -> Motion {
         self.last = None;
         Motion::UNKNOWN

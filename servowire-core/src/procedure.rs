@@ -7,7 +7,7 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Progress<T, E> {
-    /// Not finished. Poll at this time, if nothing is received before.
+    /// Not finished. Poll at this time if nothing is received earlier.
     Pending {
         /// When the wait is over, in ns.
         until_ns: u64,
@@ -60,6 +60,17 @@ pub enum Step<R, T, E> {
     },
 }
 
+impl<R, T, E> Step<R, T, E> {
+    /// What a procedure wants next that is made of this one: `done` goes on when it has succeeded.
+    pub fn and_then<U>(self, done: impl FnOnce(T, u64) -> Step<R, U, E>) -> Step<R, U, E> {
+        match self {
+            Self::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+            Self::Done { value, ready_ns } => done(value, ready_ns),
+            Self::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
+        }
+    }
+}
+
 impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
     /// How the procedure ended, done or failed; `None` if there is something to send.
     pub const fn ended(&self) -> Option<Self> {
@@ -76,4 +87,18 @@ pub struct Polling {
     pub interval_ns: u32,
     /// Requests without success after which the access fails; 0 counts as 1.
     pub max_tries: u16,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Step;
+
+    #[test]
+    fn done_and_failed_are_ends_and_to_send_is_none() {
+        type Any = Step<u8, u8, u8>;
+        for end in [Any::Done { value: 1, ready_ns: 2 }, Any::Failed { error: 3, ready_ns: 4 }] {
+            assert_eq!(end.ended(), Some(end));
+        }
+        assert_eq!(Any::Send { request: 5, not_before_ns: 6 }.ended(), None);
+    }
 }

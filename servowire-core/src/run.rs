@@ -16,8 +16,8 @@ pub struct Ended<T, E> {
 /// Takes a procedure through its exchanges.
 ///
 /// `exchange` is given a request and the time in ns before which it must not leave. It does the exchange and says how it ended,
-/// refused answers included. Its own error ends the procedure at once, for what the procedure cannot know of: a port that is
-/// gone.
+/// refused answers included. Its own error ends the procedure at once; it is meant for what the procedure cannot handle, such
+/// as a port that is gone.
 ///
 /// ```
 /// use servowire_core::{Ended, Procedure, Step, run};
@@ -54,7 +54,7 @@ pub struct Ended<T, E> {
 /// ```
 ///
 /// # Errors
-/// That of `exchange`: whether the last request had its effect is not known then.
+/// That of `exchange`. Whether the last request took effect is then unknown.
 pub fn run<P: Procedure, F>(
     procedure: &mut P,
     now_ns: u64,
@@ -134,12 +134,20 @@ mod tests {
 
     type Played = (Vec<(u8, u64)>, Result<Ended<u8, char>, &'static str>);
 
+    /// By both loops, which make the same of it.
     fn play(answers: &[Result<Result<u8, char>, &'static str>]) -> Played {
-        let (mut seen, mut answers) = (Vec::new(), answers.iter());
+        let (mut seen, mut rest) = (Vec::new(), answers.iter());
         let ended = run(&mut Three::default(), 100, |request, not_before_ns| {
             seen.push((request, not_before_ns));
-            answers.next().unwrap().map(|outcome| Ended { outcome, ready_ns: not_before_ns + 20 })
+            rest.next().unwrap().map(|outcome| Ended { outcome, ready_ns: not_before_ns + 20 })
         });
+        let (mut awaited, mut rest, mut three) = (Vec::new(), answers.iter(), Three::default());
+        let exchange = async |request, not_before_ns| {
+            awaited.push((request, not_before_ns));
+            rest.next().unwrap().map(|outcome| Ended { outcome, ready_ns: not_before_ns + 20 })
+        };
+        let ready = pin!(run_async(&mut three, 100, exchange)).poll(&mut Context::from_waker(Waker::noop()));
+        assert_eq!((ready, awaited), (Poll::Ready(ended), seen.clone()));
         (seen, ended)
     }
 

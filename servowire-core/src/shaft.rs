@@ -79,7 +79,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftCell<F, W> {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// Its two ends, as those of [`Cell`](crate::Cell::split). What is in the cell stays there; the speed begins anew.
+    /// The two ends, as those of [`Cell`](crate::Cell::split). The cell keeps what it holds; the next sample is a first one.
     pub const fn split(&mut self, tracker: Tracker) -> (ShaftWriter<'_, F, W>, ShaftReader<'_, F, W>) {
         let slots = &self.slots;
         (ShaftWriter { slots, tracker, evidence: PhantomData }, ShaftReader { slots, evidence: PhantomData })
@@ -103,7 +103,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
     /// Puts the newest evidence, in place of all before.
     ///
     /// The policy, that of the reader as a rule, decides which evidence goes into the speed. After a doubt the speed is not
-    /// known until there are two good samples again, as in the beginning.
+    /// known until there are two good samples again, as at the start.
     pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
         let motion = if let Ok(sample) = evidence.at(now_ns, policy) {
             let (angle, sampled_ns) = F::shaft(&sample);
@@ -178,10 +178,11 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 /// All that can speak against a position stands in one word of marks, so that one mask says what is tolerated of it. What the
 /// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
 /// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names what speaks against a
-/// position. The fields are private to the module in which this stands, so nobody else makes a sample.
+/// position. The fields are private to the module in which this stands, so nobody else makes a sample. The last word is the name
+/// of the field for the width of the single turn, in files.
 #[macro_export]
 macro_rules! shaft_evidence {
-    ($(#[$about:meta])* Evidence) => {
+    ($(#[$about:meta])* Evidence, $bits:ident) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -211,7 +212,7 @@ macro_rules! shaft_evidence {
                 let tolerated = policy.tolerated();
                 if policy.check_age(now_ns, sampled_ns).is_ok() && tolerated.objects_to(marks) == 0 {
                     let turns = if tolerated.ignores_turns() { None } else { Some(turns) };
-                    Ok(Sample { sampled_ns, single_turn, turns, bits: single_turn_bits(marks) })
+                    Ok(Sample { sampled_ns, single_turn, turns, $bits: single_turn_bits(marks) })
                 } else {
                     Err(self.doubt(now_ns, policy))
                 }
@@ -275,7 +276,7 @@ macro_rules! shaft_evidence {
             sampled_ns: u64,
             single_turn: u32,
             turns: Option<i32>,
-            bits: u8,
+            $bits: u8,
         }
 
         $crate::one_line!(Sample {
@@ -297,7 +298,7 @@ macro_rules! shaft_evidence {
 
             /// The place in the turn as an angle.
             pub const fn angle(self) -> $crate::Angle {
-                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.bits as u32)))
+                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.$bits as u32)))
             }
 
             /// Turns, if the policy judged them.
@@ -308,7 +309,7 @@ macro_rules! shaft_evidence {
             /// Both parts in counts, turns times the counts of a turn and the single turn; if the policy judged the turns.
             pub const fn counts(self) -> Option<i64> {
                 match self.turns {
-                    Some(turns) => Some((turns as i64).wrapping_shl(self.bits as u32) | self.single_turn as i64),
+                    Some(turns) => Some((turns as i64).wrapping_shl(self.$bits as u32) | self.single_turn as i64),
                     None => None,
                 }
             }
@@ -399,5 +400,37 @@ mod tests {
             field(&mut reader, ns.into()).map(|(_, known)| known)
         });
         assert!(known.eq([Ok(false), Ok(true), Err(Doubt::Bad), Ok(false), Ok(true)]));
+    }
+
+    /// What is too old for the position is too old for the speed.
+    #[test]
+    fn evidence_that_comes_late_is_no_sample_of_the_speed() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
+        let mut known = |sampled_ns: u32, put_ns| {
+            writer.put(Count(7, true, sampled_ns), put_ns, POLICY);
+            reader.motion(sampled_ns.into(), POLICY).map(|motion| motion.speed())
+        };
+        assert_eq!(known(50_000, 60_000), Ok(None));
+        assert_eq!(known(100_000, 200_000), Ok(Some(0)));
+        // 1 ns more than the longest age.
+        assert_eq!(known(150_000, 250_001), Ok(None));
+        assert_eq!(known(200_000, 210_000), Ok(None));
+        assert_eq!(known(250_000, 260_000), Ok(Some(0)));
+    }
+
+    /// Whoever splits a cell again finds what was in it, and a speed that starts anew.
+    #[test]
+    fn a_cell_that_is_split_again_keeps_its_value() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let tracker = Tracker::new(1 << 16, 1_000).unwrap();
+        let (mut writer, _) = cell.split(tracker);
+        writer.put(Count(7, true, 50_000), 50_000, POLICY);
+        writer.put(Count(7, true, 100_000), 100_000, POLICY);
+        let (mut writer, mut reader) = cell.split(tracker);
+        assert_eq!(reader.latest(), Count(7, true, 100_000));
+        assert_eq!(reader.motion(100_000, POLICY).map(|motion| motion.speed()), Ok(Some(0)));
+        writer.put(Count(7, true, 150_000), 150_000, POLICY);
+        assert_eq!(reader.motion(150_000, POLICY).map(|motion| motion.speed()), Ok(None));
     }
 }

@@ -22,8 +22,8 @@ pub fn write_names<'a>(f: &mut fmt::Formatter<'_>, names: impl IntoIterator<Item
 /// }
 /// servowire_core::show_flags!(Lamps);
 ///
-/// let texts = [0x00, 0x09, 0x41, 0x40].map(|bits| Lamps::from_bits_retain(bits).to_string());
-/// assert_eq!(texts, ["-", "GREEN RED", "GREEN 40h", "40h"]);
+/// let texts = [0x00, 0x09, 0x41, 0x40, 0x03, 0x02].map(|bits| Lamps::from_bits_retain(bits).to_string());
+/// assert_eq!(texts, ["-", "GREEN RED", "GREEN 40h", "40h", "GREEN 02h", "02h"]);
 /// ```
 #[macro_export]
 macro_rules! show_flags {
@@ -61,19 +61,46 @@ macro_rules! show_flags {
     };
 }
 
-/// `defmt::Format`, behind the calling crate's feature of this name, that prints what `Display` prints.
+/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, of a value that is a list: each item by the same
+/// format string, with a blank between two, `-` for none. There is no `core::fmt` in firmware.
+///
+/// ```
+/// pub struct Frames(Vec<u16>);
+/// servowire_core::listed!(Frames { |frames| &frames.0 => "{:04X}" });
+///
+/// assert_eq!(Frames(vec![0x12, 0xabcd]).to_string(), "0012 ABCD");
+/// assert_eq!(Frames(vec![]).to_string(), "-");
+/// ```
 #[macro_export]
-macro_rules! format_as_displayed {
-    ($($name:ty),+ $(,)?) => {
-        $(
-            #[cfg(feature = "defmt")]
-            #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-            impl defmt::Format for $name {
-                fn format(&self, f: defmt::Formatter<'_>) {
-                    defmt::write!(f, "{}", defmt::Display2Format(self));
+macro_rules! listed {
+    ($type:ty { |$value:ident| $items:expr => $format:literal }) => {
+        impl core::fmt::Display for $type {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let ($value, mut gap) = (self, "");
+                for item in $items {
+                    f.write_str(gap)?;
+                    write!(f, $format, item)?;
+                    gap = " ";
+                }
+                f.write_str(if gap.is_empty() { "-" } else { "" })
+            }
+        }
+
+        #[cfg(feature = "defmt")]
+        #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+        impl defmt::Format for $type {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                let ($value, mut gap) = (self, "");
+                for item in $items {
+                    defmt::write!(f, "{=str}", gap);
+                    defmt::write!(f, $format, item);
+                    gap = " ";
+                }
+                if gap.is_empty() {
+                    defmt::write!(f, "-");
                 }
             }
-        )+
+        }
     };
 }
 

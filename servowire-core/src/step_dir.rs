@@ -75,3 +75,25 @@ impl fmt::Display for Command {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Direction::{Forward, Reverse};
+    use super::*;
+
+    #[test]
+    fn the_direction_of_steps_and_a_step_on() {
+        for (steps, direction) in [(i64::MIN, Reverse), (-1, Reverse), (0, Forward), (1, Forward), (i64::MAX, Forward)]
+        {
+            assert_eq!(Direction::of(steps), direction, "{steps}");
+        }
+        assert_eq!(
+            [Forward, Reverse].map(|way| (way.dir(), way.code(), way.advance(-7))),
+            [(false, 0, -6), (true, 1, -8)]
+        );
+        assert_eq!(
+            (Direction::default(), Forward.advance(i64::MAX), Reverse.advance(i64::MIN)),
+            (Forward, i64::MIN, i64::MAX)
+        );
+    }
+}

@@ -45,6 +45,9 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nom::Parser;
+    use nom::branch::alt;
+    use nom::combinator::{map_res, verify};
 
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     enum Fault {
@@ -65,5 +68,16 @@ mod tests {
         assert_eq!(unit::<_, Fault, _>(&[4], 3, even), Err(Err::Incomplete(Needed::new(2))));
         assert_eq!(unit::<_, Fault, _>(&[5, 5], 1, even), Err(Err::Error(Fault::Odd(5))));
         assert_eq!(missing::<Fault>(0), Err::Incomplete(Needed::Unknown));
+    }
+
+    /// What the decoder said is there behind the combinators of a caller, too.
+    #[test]
+    fn a_combinator_keeps_the_refusal() {
+        let one = |input| unit::<_, Fault, _>(input, 1, even);
+        let either = |input| alt((one, one)).parse(input);
+        assert_eq!(either(&[7]), Err(Err::Error(Fault::Odd(7))));
+        assert_eq!(either(&[8]), Ok((&[][..], 8)));
+        assert_eq!(map_res(one, |_| Result::<(), _>::Err(Fault::Odd(1))).parse(&[8]), Err(Err::Error(Fault::Odd(1))));
+        assert_eq!(verify(one, |value| *value > 8).parse(&[8]), Err(Err::Error(Fault::Combinator)));
     }
 }

@@ -28,7 +28,7 @@ pub enum ClockError {
         /// By how much, ns.
         by_ns: u64,
     },
-    /// It gives the same reading for ever.
-    #[error("the clock stands")]
+    /// It gives the same reading again and again.
+    #[error("the clock stands still")]
     Stopped,
 }

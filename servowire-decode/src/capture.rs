@@ -6,6 +6,7 @@
 pub mod analyzer;
 pub mod archive;
 mod can;
+mod columns;
 pub mod fst;
 pub mod hexlog;
 mod hints;
@@ -26,6 +27,7 @@ pub mod vcd;
 
 use std::path::Path;
 
+pub use columns::{Column, columns};
 pub use hints::{Format, Guard, Hints};
 pub use input::{Input, Live, SeekRead};
 pub use kinds::{ByteLog, Capture};

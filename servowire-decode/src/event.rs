@@ -5,6 +5,8 @@ use std::fmt::{Display, Write as _};
 
 use bitflags::Flags;
 
+use crate::time::Time;
+
 /// A frame, or the absence of one that was due.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
@@ -38,6 +40,13 @@ impl Event {
         Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
     }
 
+    /// Says where fields are, by their names.
+    #[must_use]
+    pub(crate) fn locate(mut self, span: impl Fn(&str) -> Option<Span>) -> Self {
+        self.fields.iter_mut().for_each(|field| field.span = span(field.name));
+        self
+    }
+
     /// A frame whose beginning the capture does not hold: no fault of the line.
     pub fn cut(place: Place) -> Self {
         Self::remark(place, "cut", "the capture begins inside a frame")
@@ -52,29 +61,6 @@ impl Event {
     pub fn cut_off(place: Place) -> Self {
         Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
     }
-
-    /// No answer, called `what`, came to the request at `place` within `timeout`, in picoseconds, or until `now`, when
-    /// somebody `asked` again or the recording ended.
-    pub fn silence(
-        place: Place,
-        kind: &'static str,
-        what: &str,
-        timeout: i64,
-        (now, asked): (i64, bool),
-        cause: &str,
-    ) -> Self {
-        let (place, reason) = match place {
-            Place::Time { end: start, .. } => {
-                let end = start.saturating_add(timeout).min(now);
-                let within = end.saturating_sub(start) as f64 / 1e6;
-                (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
-            }
-            Place::Line(_) if asked => (place, format!("no {what} before the next request")),
-            Place::Line(_) => (place, format!("no {what} before the log ends")),
-        };
-        let refusal = Refusal { cause: Some(cause.to_owned()), ..Refusal::new(NO_RESPONSE, reason) };
-        Self::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
-    }
 }
 
 /// Where in a capture.
@@ -83,12 +69,22 @@ pub enum Place {
     /// In picoseconds of the capture's time.
     Time {
         /// The first edge.
-        start: i64,
+        start: Time,
         /// The end of the last bit.
-        end: i64,
+        end: Time,
     },
     /// A line of a log without times.
     Line(u64),
+}
+
+impl Place {
+    /// When it ends; none in a log without times.
+    pub fn end(self) -> Option<Time> {
+        match self {
+            Self::Time { end, .. } => Some(end),
+            Self::Line(_) => None,
+        }
+    }
 }
 
 /// Who spoke on a line with two ends.
@@ -107,9 +103,41 @@ pub struct Field {
     pub name: &'static str,
     /// What it held.
     pub value: Value,
+    /// Where it is; none of what is said of the frame as a whole, whose place is that of the event.
+    pub span: Option<Span>,
+}
+
+/// Where a field is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// Its first bit on the line, counted from 0 at the beginning of the frame.
+    pub first: u32,
+    /// Its last bit.
+    pub last: u32,
+    /// From when to when these bits were on the line.
+    pub place: Place,
+}
+
+impl Span {
+    /// Bits `first` to `last` of a frame at `place`, of `count` bits that follow each other.
+    pub(crate) fn even(place: Place, count: u32, first: u32, last: u32) -> Self {
+        let place = match place {
+            Place::Time { start, end } => {
+                let at = |bit: u32| start + (end - start) / i64::from(count.max(1)) * i64::from(bit);
+                Place::Time { start: at(first), end: if last + 1 == count { end } else { at(last + 1) } }
+            }
+            line @ Place::Line(_) => line,
+        };
+        Self { first, last, place }
+    }
 }
 
 impl Field {
+    /// A field that is said of the frame as a whole.
+    pub fn new(name: &'static str, value: Value) -> Self {
+        Self { name, value, span: None }
+    }
+
     /// A number without a unit.
     pub fn number(name: &'static str, value: impl Into<i64>) -> Self {
         Self::measured(name, value, "")
@@ -117,23 +145,23 @@ impl Field {
 
     /// A number with its unit.
     pub fn measured(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Self {
-        Self { name, value: Value::Number { value: value.into(), unit } }
+        Self::new(name, Value::Number { value: value.into(), unit })
     }
 
     /// A code or check value of so many hex digits.
     pub fn hex(name: &'static str, value: impl Into<u64>, digits: usize) -> Self {
-        Self { name, value: Value::Hex { value: value.into(), digits } }
+        Self::new(name, Value::Hex { value: value.into(), digits })
     }
 
     /// Named bits, by the names that the protocol's crate gives them.
     pub fn flags<F: Flags<Bits: Into<u64>>>(name: &'static str, flags: &F, digits: usize) -> Self {
         let set = flags.iter_names().map(|(name, _)| name).collect();
-        Self { name, value: Value::Flags { raw: flags.bits().into(), digits, set } }
+        Self::new(name, Value::Flags { raw: flags.bits().into(), digits, set })
     }
 
     /// What displays itself.
     pub fn text(name: &'static str, what: impl Display) -> Self {
-        Self { name, value: Value::Text(what.to_string()) }
+        Self::new(name, Value::Text(what.to_string()))
     }
 
     /// Bytes or words in hex, so many digits each, a space between them.
@@ -144,7 +172,7 @@ impl Field {
             // A String takes everything.
             let _ = write!(text, "{space}{:0digits$X}", value.into());
         }
-        Self { name, value: Value::Text(text) }
+        Self::new(name, Value::Text(text))
     }
 }
 
@@ -237,7 +265,7 @@ pub struct Refusal {
     /// The bit of that field, in the order of the line.
     pub bit: Option<u32>,
     /// When that was, in picoseconds.
-    pub time: Option<i64>,
+    pub time: Option<Time>,
     /// What probably caused it.
     pub cause: Option<String>,
 }

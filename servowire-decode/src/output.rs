@@ -17,6 +17,7 @@ use crate::capture::Change;
 use crate::event::{Event, NO_RESPONSE, Verdict};
 use crate::recognition::Note;
 use crate::sink::{Sink, Tally};
+use crate::time::Time;
 
 /// All outputs of one file together.
 pub struct Output<'a> {
@@ -143,7 +144,7 @@ impl<'a> Output<'a> {
     }
 
     /// Whether nothing that was asked for can come any more once a recording was read up to `time`.
-    pub fn is_over(&self, time: i64) -> bool {
+    pub fn is_over(&self, time: Time) -> bool {
         self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
     }
 

@@ -1,10 +1,108 @@
-//! Times in picoseconds, out of what the formats write.
+//! Instants of a capture, and what the formats write of them.
+
+use std::fmt;
+use std::ops::{Add, AddAssign, Neg, Sub};
+
+use serde::{Serialize, Serializer};
 
 /// Picoseconds in a second.
 pub const SECOND: i64 = 1_000_000_000_000;
 
+/// An instant of a capture in picoseconds: since its beginning or its trigger (before that it is negative), or since 1970 where
+/// the format tells the date. There is room for any number of years; what lies between two instants is a plain number of
+/// picoseconds, which ends at 106 days.
+///
+/// In memory it need not be aligned to more than eight bytes: edges with a level take 24.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(packed(8))]
+pub struct Time(i128);
+
+impl Time {
+    /// Where a capture begins that does not say it otherwise.
+    pub const ZERO: Self = Self(0);
+    /// After all captures.
+    pub const MAX: Self = Self(i128::MAX);
+
+    /// From picoseconds.
+    pub const fn from_ps(picoseconds: i128) -> Self {
+        Self(picoseconds)
+    }
+
+    /// In picoseconds.
+    pub const fn ps(self) -> i128 {
+        self.0
+    }
+
+    /// In microseconds, nearly.
+    pub fn us(self) -> f64 {
+        self.0 as f64 / 1e6
+    }
+
+    /// The same instant on a clock that is 0 at `origin`.
+    #[must_use]
+    pub const fn since(self, origin: Self) -> Self {
+        Self(self.0.saturating_sub(origin.0))
+    }
+}
+
+impl Add<i64> for Time {
+    type Output = Self;
+
+    fn add(self, picoseconds: i64) -> Self {
+        Self(self.0.saturating_add(picoseconds.into()))
+    }
+}
+
+impl AddAssign<i64> for Time {
+    fn add_assign(&mut self, picoseconds: i64) {
+        *self = *self + picoseconds;
+    }
+}
+
+impl Sub<i64> for Time {
+    type Output = Self;
+
+    fn sub(self, picoseconds: i64) -> Self {
+        Self(self.0.saturating_sub(picoseconds.into()))
+    }
+}
+
+/// The way from one to the other, at most 106 days.
+impl Sub for Time {
+    type Output = i64;
+
+    #[inline]
+    fn sub(self, before: Self) -> i64 {
+        let way = self.0.saturating_sub(before.0);
+        i64::try_from(way).unwrap_or(if way < 0 { i64::MIN } else { i64::MAX })
+    }
+}
+
+impl Neg for Time {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self(self.0.saturating_neg())
+    }
+}
+
+impl fmt::Display for Time {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.ps().fmt(f)
+    }
+}
+
+impl Serialize for Time {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_i128(self.0)
+    }
+}
+
+/// Longer times are none: 30 million years.
+const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
+
 /// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
-pub fn from_decimal(text: &str) -> Option<i64> {
+pub fn from_decimal(text: &str) -> Option<Time> {
     let text = text.trim();
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -19,17 +117,16 @@ pub fn from_decimal(text: &str) -> Option<i64> {
         // Only an exponent is left as a legal form.
         return if text.contains(['e', 'E']) { from_seconds(text.parse().ok()?) } else { None };
     }
-    let whole: i64 = if whole.is_empty() { 0 } else { whole.parse().ok()? };
-    let part = part.bytes().chain(std::iter::repeat(b'0')).take(12).fold(0_i64, |n, b| n * 10 + i64::from(b - b'0'));
-    let time = whole.checked_mul(SECOND)?.checked_add(part)?;
-    Some(if negative { -time } else { time })
+    let whole: i128 = if whole.is_empty() { 0 } else { whole.parse().ok()? };
+    let part = part.bytes().chain(std::iter::repeat(b'0')).take(12).fold(0, |n, b| n * 10 + i128::from(b - b'0'));
+    let time = whole.checked_mul(SECOND.into())?.checked_add(part)?;
+    (time < MOST).then_some(Time(if negative { -time } else { time }))
 }
 
 /// Seconds as a floating point number in picoseconds; nothing for what no capture can hold.
-pub fn from_seconds(seconds: f64) -> Option<i64> {
+pub fn from_seconds(seconds: f64) -> Option<Time> {
     let time = (seconds * 1e12).round();
-    // 9e18 ps are 104 days.
-    (time.abs() < 9e18).then_some(time as i64)
+    (time.abs() < MOST as f64).then_some(Time(time as i128))
 }
 
 /// A frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
@@ -56,7 +153,7 @@ pub fn frequency(text: &str) -> Option<f64> {
 }
 
 /// A time as people write it, with its unit: `500us`, `0.5 ms`, `-2s`; in picoseconds.
-pub fn duration(text: &str) -> Option<i64> {
+pub fn duration(text: &str) -> Option<Time> {
     let bare = text.trim();
     let digits = bare.trim_end_matches(char::is_alphabetic);
     let picoseconds = match bare.get(digits.len()..)? {
@@ -98,26 +195,26 @@ impl Clock {
 
     /// When sample `index` was taken.
     #[inline]
-    pub fn time(self, index: u64) -> i64 {
+    pub fn time(self, index: u64) -> Time {
         let time = index.checked_mul(self.picoseconds).and_then(|time| time.checked_add(self.samples / 2));
         match time {
-            Some(time) if self.samples == 1 => time.min(i64::MAX as u64) as i64,
-            Some(time) => (time / self.samples) as i64,
+            Some(time) if self.samples == 1 => Time(time.into()),
+            Some(time) => Time((time / self.samples).into()),
             None => self.late(index),
         }
     }
 
     /// The same where 64 bits do not hold the product.
     #[cold]
-    fn late(self, index: u64) -> i64 {
+    fn late(self, index: u64) -> Time {
         let time = u128::from(index) * u128::from(self.picoseconds) + u128::from(self.samples / 2);
-        i64::try_from(time / u128::from(self.samples)).unwrap_or(i64::MAX)
+        Time((time / u128::from(self.samples)) as i128)
     }
 
     /// The sample nearest to a time that is not negative.
-    pub fn index(self, time: i64) -> u64 {
-        let time = time.max(0) as u64;
-        let index = (u128::from(time) * u128::from(self.rate) + SECOND as u128 / 2) / SECOND as u128;
+    pub fn index(self, time: Time) -> u64 {
+        let index =
+            time.0.max(0).saturating_mul(self.rate.into()).saturating_add(i128::from(SECOND / 2)) / i128::from(SECOND);
         u64::try_from(index).unwrap_or(u64::MAX)
     }
 }
@@ -145,7 +242,7 @@ mod tests {
             ("9999999999999999", None),
             ("1e300", None),
         ] {
-            assert_eq!(from_decimal(text), want, "{text:?}");
+            assert_eq!(from_decimal(text).map(Time::ps), want, "{text:?}");
         }
     }
 
@@ -163,8 +260,20 @@ mod tests {
             ("", None),
             ("1e30s", None),
         ] {
-            assert_eq!(duration(text), want, "{text:?}");
+            assert_eq!(duration(text).map(Time::ps), want, "{text:?}");
         }
+    }
+
+    #[test]
+    fn years_are_no_limit() {
+        // 100 years after 1970, to the picosecond.
+        let late = from_decimal("3155760000.000000000001").unwrap();
+        assert_eq!(late.ps(), 3_155_760_000_000_000_000_001);
+        assert_eq!((late + 1 - late, late.since(late + -5).ps()), (1, 5));
+        // Between two instants lie at most 106 days.
+        assert_eq!([late - Time::ZERO, Time::ZERO - late], [i64::MAX, i64::MIN]);
+        assert_eq!(Clock::new(1).time(u64::MAX).ps(), i128::from(u64::MAX) * 1_000_000_000_000);
+        assert!([Time::MAX + 1, Time::MAX - -1, -(-Time::MAX - 1)].iter().all(|time| *time == Time::MAX));
     }
 
     proptest! {

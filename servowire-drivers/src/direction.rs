@@ -75,6 +75,7 @@ pub struct PinTooSlow {
     pub window_ns: u32,
 }
 
+#[cfg(feature = "tformat")]
 impl Worst {
     /// Whether the window is long enough for it.
     pub(crate) fn check(self, window_ns: u32) -> Result<(), PinTooSlow> {
@@ -164,14 +165,17 @@ impl<D: Direction> Switch<D> {
         self.direction.transmit()
     }
 
+    #[cfg(feature = "tformat")]
     pub(crate) const fn is_on(&self) -> bool {
         self.on
     }
 
+    #[cfg(feature = "tformat")]
     pub(crate) fn worst(&self) -> Option<Worst> {
         self.direction.worst()
     }
 
+    #[cfg(feature = "tformat")]
     /// Whether it can be switched within such a window.
     pub(crate) fn check(&self, window_ns: u32) -> Result<(), PinTooSlow> {
         self.worst().map_or(Ok(()), |worst| worst.check(window_ns))
@@ -203,7 +207,7 @@ impl<D: Direction> Drop for Guard<'_, D> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "tformat"))]
 mod tests {
     use super::*;
 

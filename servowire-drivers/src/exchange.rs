@@ -1,31 +1,9 @@
-//! What every driver does while an exchange goes on, and between two exchanges of a procedure.
+//! What every driver does between two exchanges of a procedure.
 
-use core::ops::ControlFlow;
-
-use servowire_core::{ClockError, Ended, Progress};
+use servowire_core::Ended;
 
 use crate::quiet::Line;
 use crate::{Clock, Error};
-
-/// Up to when to wait for more of the answer, or how the exchange has ended; then it is known from when on the line is free.
-pub(crate) fn next<T, E>(
-    progress: Progress<T, E>,
-    line: &mut Line,
-    clock: &mut impl Clock,
-) -> Result<ControlFlow<Result<T, E>, u64>, ClockError> {
-    match progress {
-        Progress::Pending { until_ns } => Ok(ControlFlow::Continue(until_ns)),
-        Progress::Done { value, ready_ns } => {
-            line.clean(ready_ns);
-            Ok(ControlFlow::Break(Ok(value)))
-        }
-        Progress::Failed { error, ready_ns } => {
-            let now_ns = line.now_ns(clock)?;
-            line.failed(ready_ns, now_ns);
-            Ok(ControlFlow::Break(Err(error)))
-        }
-    }
-}
 
 /// An exchange as a procedure hears of it: a fault of the port is a lost answer, and what that means is for the procedure to
 /// say. Everything else that is not of the protocol ends the procedure.
@@ -48,31 +26,9 @@ pub(crate) fn ended<T, IO, PIN, P, D>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quiet::Settle;
+    use servowire_core::ClockError;
 
     type Fault = Error<u8, u8, u8, u8>;
-
-    /// A line on which a request of 10 us left at 10 us, and how an exchange goes on at 20 us.
-    fn after(progress: Progress<u8, u8>) -> (ControlFlow<Result<u8, u8>, u64>, Line) {
-        let mut line = Line::new(8_000);
-        line.begin(90_000);
-        line.sent(10_000);
-        (next(progress, &mut line, &mut || 20_000).unwrap(), line)
-    }
-
-    #[test]
-    fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
-        let (flow, mut line) = after(Progress::Pending { until_ns: 70_000 });
-        assert_eq!(flow, ControlFlow::Continue(70_000));
-        assert_eq!(line.settle(30_000).next(false, 30_000), Settle::Until(100_000));
-        let (flow, mut line) = after(Progress::Done { value: 2, ready_ns: 25_000 });
-        assert_eq!(flow, ControlFlow::Break(Ok(2)));
-        assert_eq!(line.settle(24_999).next(false, 24_999), Settle::Until(25_000));
-        assert_eq!(line.settle(25_000).next(false, 25_000), Settle::Quiet);
-        let (flow, mut line) = after(Progress::Failed { error: 3, ready_ns: 25_000 });
-        assert_eq!(flow, ControlFlow::Break(Err(3)));
-        assert_eq!(line.settle(30_000).next(false, 99_999), Settle::Until(100_000));
-    }
 
     #[test]
     fn only_faults_of_the_answer_are_for_the_procedure() {

@@ -14,7 +14,6 @@ pub(crate) struct Leaving {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(clippy::struct_field_names, reason = "the unit is part of the name")]
 struct Ends {
     earliest_ns: u64,
     latest_ns: u64,
@@ -50,6 +49,16 @@ impl Leaving {
         let slack_ns = u64::from(self.worst.wake_ns).saturating_add(self.worst.clock_ns.into());
         let last_ns = earliest_ns.saturating_add(self.window_ns).saturating_sub(slack_ns);
         Some(latest_ns.saturating_add(last_ns.saturating_sub(latest_ns) >> 1))
+    }
+
+    /// Longer than a whole request needs to leave, with the driver on as long after it as it may be.
+    pub(crate) const fn longest_ns(&self) -> u64 {
+        self.field_ns.saturating_mul(4).saturating_add(self.window_ns.saturating_mul(2))
+    }
+
+    /// Whether so much time passed that an answer may have begun.
+    pub(crate) const fn is_late(&self, before_ns: u64, after_ns: u64) -> bool {
+        after_ns.saturating_sub(before_ns) > self.window_ns
     }
 
     /// By how much the driver may have gone off too late, if it was off by the reading `now_ns`.

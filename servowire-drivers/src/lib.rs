@@ -31,7 +31,7 @@ mod leaving;
 pub mod nikon;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
-#[cfg(feature = "async")]
+#[cfg(all(feature = "async", any(feature = "nikon", feature = "rtex", feature = "tformat")))]
 mod race;
 #[cfg(feature = "rtex")]
 pub mod rtex;

@@ -60,10 +60,14 @@ impl Line {
     /// A look at the clock: every one goes through here, so that no wait is for ever.
     #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
-        let last_ns = self.check.last_ns();
-        match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {
+        let now_ns = match clock.now_ns() {
+            Ok(now_ns) => now_ns,
+            Err(error) => return Err(self.lost(error, self.check.last_ns())),
+        };
+        match self.check.check(now_ns) {
             Ok(now_ns) => Ok(now_ns),
-            Err(error) => Err(self.lost(error, last_ns)),
+            Err(error @ ClockError::Backwards { by_ns }) => Err(self.lost(error, now_ns.saturating_add(by_ns))),
+            Err(error) => Err(error),
         }
     }
 
@@ -166,22 +170,30 @@ impl Settling {
     }
 }
 
+/// What a wait gave, and the time after it.
+pub(crate) struct Heard<T> {
+    pub(crate) what: Option<T>,
+    pub(crate) now_ns: u64,
+}
+
 /// Looks until there is something, at the latest until `until_ns`. What came while the clock was read is not late.
+#[inline(always)]
 pub(crate) fn spin<T>(
     line: &mut Line,
     clock: &mut impl Clock,
     until_ns: u64,
     mut look: impl FnMut() -> Option<T>,
-) -> Result<Option<T>, ClockError> {
-    let mut over = false;
+) -> Result<Heard<T>, ClockError> {
+    let mut over_ns = None;
     loop {
-        if let Some(found) = look() {
-            return Ok(Some(found));
+        let what = look();
+        match (over_ns, what) {
+            (_, Some(what)) => return Ok(Heard { what: Some(what), now_ns: line.now_ns(clock)? }),
+            (Some(now_ns), None) => return Ok(Heard { what: None, now_ns }),
+            (None, None) => {}
         }
-        if over {
-            return Ok(None);
-        }
-        over = line.now_ns(clock)? >= until_ns;
+        let now_ns = line.now_ns(clock)?;
+        over_ns = (now_ns >= until_ns).then_some(now_ns);
     }
 }
 
@@ -209,6 +221,27 @@ mod tests {
         assert_eq!(settling.next(false, 107_000), Settle::Quiet);
         line.clean(107_000);
         assert_eq!(line.settle(107_000).next(false, 107_000), Settle::Quiet);
+    }
+
+    /// After a request of 10 us an answer may be talking until 100 us, unless it is known better.
+    #[test]
+    fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
+        let sent = || {
+            let mut line = Line::new(8_000);
+            line.begin(90_000);
+            line.sent(10_000);
+            line
+        };
+        assert_eq!(sent().settle(30_000).next(false, 30_000), Settle::Until(100_000));
+        let mut good = sent();
+        good.clean(25_000);
+        assert_eq!(good.settle(24_999).next(false, 24_999), Settle::Until(25_000));
+        assert_eq!(good.settle(25_000).next(false, 25_000), Settle::Quiet);
+        let mut refused = sent();
+        refused.failed(25_000, 20_000);
+        assert_eq!(refused.settle(30_000).next(false, 99_999), Settle::Until(100_000));
+        refused.failed(25_000, 99_000);
+        assert_eq!(refused.settle(99_000).next(false, 99_000), Settle::Until(107_000));
     }
 
     /// It may have left at any time up to the next call.

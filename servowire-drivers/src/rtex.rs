@@ -13,12 +13,15 @@
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
-//! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. So the
-//! exchange looks at [`FrameCount`] and at the clock before and after it reads, and reads once more if the bank was switched between;
-//! if it was again, it takes none. System Design Guide for Master, chapters 1 and 2.
+//! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. The counter
+//! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at [`FrameCount`] before
+//! and after, and reads once more if it was not one frame. If it is not again, each axis takes its block only if that is on time
+//! ([`Arrival`](rtex_block::master::Arrival)); where two frames have the same counter (two communications in an update period) and the
+//! bank was switched between, none is taken. System Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
-//! period without an answer, as the echo watch of each axis counts them, and what was not written is replaced in the next period.
+//! period without an answer of that drive, as the echo watch of its axis counts them; all others are read, and every place is written
+//! whatever fails, so a servo-off reaches every drive that can be reached. What was not written is replaced in the next period.
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -28,8 +31,7 @@ mod port;
 use core::convert::Infallible;
 
 use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
-use rtex_block::timing::TimerSystem;
-use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
+use rtex_block::{BlockSize, Command32, Evidence, MacId, pack};
 use servowire_core::{ClockCheck, ClockError};
 
 use crate::clock::MAX_LOOKS;
@@ -57,7 +59,8 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
-    /// The bank was switched while the blocks were read, each time: none of them was taken.
+    /// The blocks were not of one frame, each time they were read, or a drive stands still: those that are not on time were not
+    /// taken.
     pub torn: bool,
 }
 
@@ -126,7 +129,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.late
     }
 
-    /// Exchanges that could not read the blocks of one frame.
+    /// Exchanges whose blocks were not of one frame.
     pub const fn torn(&self) -> u32 {
         self.torn
     }
@@ -137,7 +140,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// What is known of the actual position, speed and torque of the axis at `place`; nothing of a place that the ring does not
-    /// have. Its instant is the start of the frame that brought the last new counter echo, by the driver's clock.
+    /// have. Its instant is the start of the frame that brought the last block on time, by the driver's clock.
     pub fn evidence(&self, place: usize) -> Evidence {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
@@ -184,23 +187,19 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// the time of the interrupt.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::Clock`]; commands were written if they could be, and the next exchange goes on.
+    /// [`Error::Io`] and [`Error::Clock`], the first of them; every block was read and written that could be, and the next exchange
+    /// goes on.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
         {
             self.began_ns = Some(began_ns);
         }
-        let read = self.read(began_ns);
+        let Read { heard, torn, fault } = self.read();
         let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
             self.master.frame_received();
         }
-        let (heard, torn, fault) = match read {
-            Ok(Some(heard)) => (heard, false, None),
-            Ok(None) => ([Heard::Nothing; N], true, None),
-            Err(fault) => ([Heard::Nothing; N], false, Some(fault)),
-        };
         self.torn = self.torn.saturating_add(torn.into());
         // The frame before brought them: rather too old than too young.
         let end_ns = began_ns.saturating_sub(self.master.config().periods.com_ns.into());
@@ -218,27 +217,30 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.clear();
     }
 
-    /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
-    fn read(&mut self, began_ns: u64) -> Result<Option<[Heard; N]>, Failure<P>> {
+    /// The blocks of one frame, if that can be had.
+    fn read(&mut self) -> Read<P, N> {
+        let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None };
         for _ in 0..READS {
-            let before = self.bank(began_ns)?;
-            let mut all = [Heard::Nothing; N];
-            for (place, heard) in all.iter_mut().enumerate() {
-                *heard = self.block(place).map_err(Error::Io)?;
+            let frames = self.received.get();
+            read.fault = None;
+            for (place, heard) in read.heard.iter_mut().enumerate() {
+                *heard = self.block(place).unwrap_or_else(|fault| {
+                    read.fault.get_or_insert(Error::Io(fault));
+                    Heard::Nothing
+                });
             }
-            if self.bank(began_ns)? == before {
-                return Ok(Some(all));
+            let mixed = self.master.ring().is_torn(&read.heard) || self.has_changed(&read.heard);
+            let switched = self.received.get() != frames;
+            read.torn = mixed || switched;
+            if !read.torn {
+                break;
+            }
+            if switched && !mixed {
+                // They look like one frame and are not.
+                read.heard = [Heard::Nothing; N];
             }
         }
-        Ok(None)
-    }
-
-    /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
-    fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
-        match self.master.config().timer {
-            TimerSystem::External => Ok(self.received.get()),
-            TimerSystem::Internal => self.frames_since(began_ns),
-        }
+        read
     }
 
     /// Frames that have begun since the one at `began_ns`.
@@ -252,36 +254,43 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.check.check(self.clock.now_ns()?)
     }
 
-    fn block(&mut self, place: usize) -> Result<Heard, P::Error> {
-        let size = self.master.config().size;
-        let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], [0; rtex_block::LEN32]);
-        let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);
-        twice(|| self.port.read(place, words))?;
-        P::Word::unpack(words, bytes);
-        Ok(match size {
-            BlockSize::Bytes16 => Response::parse(bytes).into(),
-            BlockSize::Bytes32 => Response32::parse(bytes).into(),
-        })
+    /// Whether a block that was read has another echo by now: the bank was switched in the middle of the last block.
+    fn has_changed(&mut self, heard: &[Heard; N]) -> bool {
+        let echo = |heard: &Heard| heard.response().map(|response| response.update_counter_echo);
+        let first = heard.iter().enumerate().find_map(|(place, heard)| Some((place, echo(heard)?)));
+        first.is_some_and(|(place, before)| self.block(place).is_ok_and(|now| echo(&now) != Some(before)))
     }
 
+    fn block(&mut self, place: usize) -> Result<Heard, P::Error> {
+        let (size, mut memory) = (self.master.config().size, [P::Word::default(); MOST_WORDS]);
+        let words = words_of::<P>(size, &mut memory);
+        twice(|| self.port.read(place, words))?;
+        Ok(Heard::parse(size, words))
+    }
+
+    /// Every place, whatever fails; the first fault.
     fn write(&mut self, commands: &[Command32; N]) -> Result<(), P::Error> {
-        let size = self.master.config().size;
+        let (size, mut result) = (self.master.config().size, Ok(()));
         for (place, command) in commands.iter().enumerate() {
-            let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], command.emit());
-            let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);
-            P::Word::pack(bytes, words);
-            twice(|| self.port.write(place, words))?;
+            let (mut memory, bytes) = ([P::Word::default(); MOST_WORDS], command.emit());
+            let words = words_of::<P>(size, &mut memory);
+            // The sizes agree.
+            pack::to_words(bytes.get(..size.bytes()).unwrap_or_default(), words).unwrap_or(());
+            result = result.and(twice(|| self.port.write(place, words)));
         }
-        Ok(())
+        result
     }
 }
 
-/// As much of both as a block has.
-fn block_of<'a, P: Port>(
-    size: BlockSize,
-    words: &'a mut [P::Word; MOST_WORDS],
-    bytes: &'a mut [u8; rtex_block::LEN32],
-) -> (&'a mut [P::Word], &'a mut [u8]) {
+/// The blocks of an exchange.
+struct Read<P: Port, const N: usize> {
+    heard: [Heard; N],
+    torn: bool,
+    fault: Option<Failure<P>>,
+}
+
+/// As many words as a block has.
+fn words_of<P: Port>(size: BlockSize, words: &mut [P::Word; MOST_WORDS]) -> &mut [P::Word] {
     let count = size.bytes().checked_div(P::Word::BYTES).unwrap_or(0);
-    (words.get_mut(..count).unwrap_or_default(), bytes.get_mut(..size.bytes()).unwrap_or_default())
+    words.get_mut(..count).unwrap_or_default()
 }

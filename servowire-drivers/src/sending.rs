@@ -1,6 +1,7 @@
 //! A request on its way out, with the line driver on.
 
 use servowire_core::ClockError;
+use tformat::master::Line;
 
 use crate::direction::Switch;
 use crate::leaving::Leaving;
@@ -18,21 +19,7 @@ pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     leaving: Option<Leaving>,
     /// Fields that a `write` has been asked to take and that may be on their way.
     asked: usize,
-    /// The longest that a whole request may still need to leave.
-    longest_ns: u64,
-    window_ns: u64,
     start_ns: Option<u64>,
-}
-
-/// Times of a request, ns.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Times {
-    /// A field.
-    pub(crate) field_ns: u32,
-    /// All of its fields.
-    pub(crate) fields_ns: u32,
-    /// From its end to the earliest answer.
-    pub(crate) window_ns: u32,
 }
 
 /// When a request began to leave, and by how much the driver went off too late after it.
@@ -44,22 +31,23 @@ pub(crate) struct Sent {
 
 impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     /// Switches the driver on.
+    #[inline]
     pub(crate) fn begin(
         switch: &'a mut Switch<D>,
         clock: &'a mut C,
-        line: &'a mut quiet::Line,
-        times: Times,
+        state: &'a mut quiet::Line,
+        line: &Line,
     ) -> Result<Self, D::Error> {
-        let leaving = switch.worst().map(|worst| Leaving::new(worst, times.field_ns, times.window_ns));
-        let window_ns = u64::from(times.window_ns);
-        // What the pin and the UART need has been found to fit the window.
-        let longest_ns = window_ns.saturating_mul(2).saturating_add(times.fields_ns.into());
-        let sending = Self { switch, clock, line, leaving, asked: 0, longest_ns, window_ns, start_ns: None };
+        // The line is driven on after a request for as long as nobody answers.
+        let (field_ns, window_ns) = (line.rate.fields_ns(1), line.turn_around_ns);
+        let leaving = switch.worst().map(|worst| Leaving::new(worst, field_ns, window_ns));
+        let sending = Self { switch, clock, line: state, leaving, asked: 0, start_ns: None };
         sending.switch.on()?;
         Ok(sending)
     }
 
     /// When the first field may be handed over; at once if the hardware switches.
+    #[inline]
     pub(crate) fn lead_until_ns(&mut self, lead_ns: u32) -> Result<Option<u64>, ClockError> {
         let Some(Worst { clock_ns, .. }) = self.switch.worst() else { return Ok(None) };
         let now_ns = self.line.now_ns(self.clock)?;
@@ -68,13 +56,14 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
 
     /// How many of these fields are to be handed over at once: the time of the first one is the time of the request.
     pub(crate) const fn piece<'b>(&self, fields: &'b [u8]) -> &'b [u8] {
-        match fields.split_first_chunk::<1>() {
+        match fields.split_at_checked(1) {
             Some((first, _)) if self.leaving.is_some() && self.start_ns.is_none() => first,
             _ => fields,
         }
     }
 
     /// A `write` is about to take them; now.
+    #[inline]
     pub(crate) fn ask(&mut self, fields: &[u8]) -> Result<u64, ClockError> {
         let now_ns = self.line.now_ns(self.clock)?;
         self.asked = fields.len();
@@ -82,6 +71,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// It was asked at `before_ns` and has taken so many.
+    #[inline]
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64) -> Result<(), ClockError> {
         let after_ns = self.line.now_ns(self.clock)?;
         self.asked = 0;
@@ -89,7 +79,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         if let Some(leaving) = &mut self.leaving {
             leaving.taken(fields, before_ns, after_ns);
             // One field that was held up may have begun to leave as late as that, and nothing before it is an answer to it.
-            if after_ns.saturating_sub(before_ns) > self.window_ns {
+            if leaving.is_late(before_ns, after_ns) {
                 start_ns = after_ns;
             }
         }
@@ -98,16 +88,19 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// When the driver is to go off.
+    #[inline]
     pub(crate) fn off_ns(&self) -> Option<u64> {
         self.leaving.and_then(|leaving| leaving.off_ns())
     }
 
     /// The request has left: switches the driver off, and tells whether that went well; if not, it is tried once more.
+    #[inline]
     pub(crate) fn end(mut self) -> Result<Result<Sent, ClockError>, D::Error> {
         self.switch.off()?;
         Ok(self.sent())
     }
 
+    #[inline]
     fn sent(&mut self) -> Result<Sent, ClockError> {
         let now_ns = self.line.now_ns(self.clock)?;
         self.line.sent(now_ns);
@@ -117,16 +110,19 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
 }
 
 impl<D: Direction, C: Clock> Drop for Sending<'_, D, C> {
+    #[inline]
     fn drop(&mut self) {
         if !self.switch.is_on() {
             return;
         }
-        if let Some(leaving) = self.leaving.as_mut().filter(|_| self.asked > 0) {
-            let now_ns = self.line.now_ns(self.clock).unwrap_or(self.line.last_ns());
-            leaving.taken(self.asked, now_ns, now_ns);
-        }
-        if let Some(off_ns) = self.off_ns() {
-            self.line.sit_out(self.clock, off_ns, self.longest_ns);
+        if let Some(leaving) = &mut self.leaving {
+            if self.asked > 0 {
+                let now_ns = self.line.now_ns(self.clock).unwrap_or(self.line.last_ns());
+                leaving.taken(self.asked, now_ns, now_ns);
+            }
+            if let Some(off_ns) = leaving.off_ns() {
+                self.line.sit_out(self.clock, off_ns, leaving.longest_ns());
+            }
         }
         // Nobody is there to hear of it; the next call tries again before it listens.
         let _: Result<(), _> = self.switch.off();

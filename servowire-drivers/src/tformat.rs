@@ -12,9 +12,7 @@ pub mod asynch;
 pub mod blocking;
 
 use tformat::master::Line;
-use tformat::{AllData, Error, Request, Response};
-
-use crate::sending::Times;
+use tformat::{AllData, Error, Frame, Request, Response};
 
 /// What a `Driver` was made of.
 #[derive(Debug, Clone, Copy)]
@@ -34,15 +32,9 @@ const LOST: Error = Error::NoResponse { echo: false };
 const MAX_BYTES: usize = 16;
 
 /// How long this request and the longest answer to it take.
-fn longest_ns(line: &Line, request: Request) -> u64 {
-    let fields = request.emit().fields().saturating_add(12);
+fn longest_ns(line: &Line, request: &Frame) -> u64 {
+    let fields = request.fields().saturating_add(12);
     u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
-}
-
-/// Times of a request with so many fields. The line is driven on after it for as long as nobody answers.
-fn times(line: &Line, fields: u8) -> Times {
-    let rate = line.rate;
-    Times { field_ns: rate.fields_ns(1), fields_ns: rate.fields_ns(fields), window_ns: line.turn_around_ns }
 }
 
 /// Why there was no answer: not for a reason of the encoder, if the line was still driven when it began to answer.

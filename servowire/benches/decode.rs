@@ -34,6 +34,7 @@ use servowire_decode::output::printer::{Origin, Printer};
 use servowire_decode::protocols::tformat;
 use servowire_decode::settings::{Settings, Widths};
 use servowire_decode::sink::Tally;
+use servowire_decode::time::Time;
 
 /// Samples a bit.
 const N: usize = 8;
@@ -154,7 +155,7 @@ fn one_by_one(samples: &[bool]) -> Tally {
     let mut receiver = Receiver::new(Format::new(N as u32, 8).unwrap());
     let mut protocol = tformat::Decoder::new(BIT, Widths::default());
     let mut tally = Tally::default();
-    let time = |sample: u64| i64::try_from(sample).unwrap() * BIT / N as i64;
+    let time = |sample: u64| Time::from_ps(i128::from(sample) * i128::from(BIT) / N as i128);
     for &sample in samples {
         if let Some(field) = receiver.push(sample) {
             let start = time(field.start);

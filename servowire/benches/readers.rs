@@ -39,6 +39,7 @@ use servowire_decode::event::Event;
 use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Origin, Printer};
 use servowire_decode::output::vcd::VcdOut;
+use servowire_decode::time::Time;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -311,7 +312,7 @@ fn write(edges: &Edges, path: &Path) -> String {
     let mut out = Output::new("memory", &mut nowhere).with_vcd(Some(&mut vcd));
     out.channels(&["line".to_owned()]).unwrap();
     for (time, level) in edges {
-        out.change(&Change { time: *time, channel: 0, level: *level }).unwrap();
+        out.change(&Change { time: Time::from_ps((*time).into()), channel: 0, level: *level }).unwrap();
     }
     out.end().unwrap();
     format!("{} edges", edges.len())

@@ -9,14 +9,15 @@ use plotters::prelude::*;
 
 use servowire_decode::event::{Event, Place, Position, Verdict};
 use servowire_decode::output::printer::{Origin, Printer};
+use servowire_decode::time::Time;
 
 /// Buckets of a time axis; when there are more, two become one.
 const MOST: usize = 2000;
 /// Bars of a histogram.
 const MOST_BARS: usize = 160;
 /// Width of the first buckets, in picoseconds: of times, of delays.
-const FIRST: i64 = 1_000_000;
-const FIRST_BAR: i64 = 10_000;
+const FIRST: i128 = 1_000_000;
+const FIRST_BAR: i128 = 10_000;
 /// Classes of errors that have a row of their own.
 const MOST_CLASSES: usize = 12;
 
@@ -55,21 +56,21 @@ impl Gather for u64 {
 /// Values by time (or by length), in buckets that grow with the capture: memory is bounded however long it is.
 #[derive(Debug, Clone)]
 struct Buckets<T> {
-    width: i64,
+    width: i128,
     most: usize,
-    held: BTreeMap<i64, T>,
+    held: BTreeMap<i128, T>,
 }
 
 impl<T: Gather> Buckets<T> {
-    fn new(width: i64, most: usize) -> Self {
+    fn new(width: i128, most: usize) -> Self {
         Self { width, most, held: BTreeMap::new() }
     }
 
-    fn add(&mut self, at: i64, value: &T) {
+    fn add(&mut self, at: i128, value: &T) {
         self.held.entry(at.div_euclid(self.width)).and_modify(|bucket| bucket.join(value)).or_insert(value.clone());
         while self.held.len() > self.most {
             self.width = self.width.saturating_mul(2);
-            let mut joined: BTreeMap<i64, T> = BTreeMap::new();
+            let mut joined: BTreeMap<i128, T> = BTreeMap::new();
             for (index, bucket) in std::mem::take(&mut self.held) {
                 joined.entry(index.div_euclid(2)).and_modify(|first| first.join(&bucket)).or_insert(bucket);
             }
@@ -78,7 +79,7 @@ impl<T: Gather> Buckets<T> {
     }
 
     /// The beginnings of the buckets and what they hold.
-    fn iter(&self) -> impl Iterator<Item = (i64, &T)> {
+    fn iter(&self) -> impl Iterator<Item = (i128, &T)> {
         self.held.iter().map(|(index, value)| (index.saturating_mul(self.width), value))
     }
 }
@@ -109,7 +110,7 @@ pub(crate) struct Picture {
     delays: Buckets<u64>,
     errors: BTreeMap<&'static str, Buckets<u64>>,
     /// First and last time.
-    extent: Option<(i64, i64)>,
+    extent: Option<(Time, Time)>,
 }
 
 impl Picture {
@@ -129,20 +130,20 @@ impl Picture {
         let (first, last) = self.extent.unwrap_or((start, end));
         self.extent = Some((first.min(start), last.max(end)));
         if let Some(delay) = event.delay {
-            self.delays.add(delay, &1);
+            self.delays.add(delay.into(), &1);
         }
         if let Verdict::Refused(refusal) = &event.verdict {
             let rows = self.errors.len();
             let class =
                 if rows < MOST_CLASSES || self.errors.contains_key(refusal.class) { refusal.class } else { "other" };
-            self.errors.entry(class).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start, &1);
+            self.errors.entry(class).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start.ps(), &1);
         }
         if let Some(position) = event.position {
             self.position(origin, start, position);
         }
     }
 
-    fn position(&mut self, origin: &Origin, time: i64, position: Position) {
+    fn position(&mut self, origin: &Origin, time: Time, position: Position) {
         let turns = position.turns();
         let curve = self.curves.entry((origin.speaks, position.span)).or_insert_with(|| Curve {
             name: origin.lane().map_or_else(String::new, |lane| lane.channel.clone()),
@@ -153,7 +154,7 @@ impl Picture {
         let value = if curve.turns { turns } else { Some(position.counts as f64) };
         if let Some(value) = value {
             curve.count += 1;
-            curve.values.add(time, &Span { first: value, least: value, most: value, last: value });
+            curve.values.add(time.ps(), &Span { first: value, least: value, most: value, last: value });
         }
     }
 
@@ -178,8 +179,8 @@ impl Picture {
 
     /// The time axis, in milliseconds.
     fn milliseconds(&self) -> std::ops::Range<f64> {
-        let (first, last) = self.extent.unwrap_or((0, 1));
-        let (first, last) = (first as f64 / 1e9, last as f64 / 1e9);
+        let (first, last) = self.extent.unwrap_or((Time::ZERO, Time::ZERO + 1));
+        let (first, last) = (first.ps() as f64 / 1e9, last.ps() as f64 / 1e9);
         first..last.max(first + 1e-6)
     }
 
@@ -259,7 +260,7 @@ impl Picture {
         let first = self.delays.iter().next().map_or(0, |(delay, _)| delay);
         let last = self.delays.iter().last().map_or(FIRST, |(delay, _)| delay + width);
         let most = self.delays.iter().map(|(_, count)| *count).max().unwrap_or(1);
-        let us = |delay: i64| delay as f64 / 1e6;
+        let us = |delay: i128| delay as f64 / 1e6;
         let mut chart = ChartBuilder::on(area)
             .margin(10)
             .x_label_area_size(32)

@@ -103,9 +103,13 @@ impl Map {
         let periods = if periods.is_empty() { "none".to_owned() } else { periods.join(" ") };
         line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
 
-        let doubt = if d.contains(OnlineD::POS) { ", not to be used: POS" } else { "" };
-        let position = number(id, map.pos());
-        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.vel()))?;
+        match (map.pos(), map.vel()) {
+            (Some(position), Some(velocity)) => {
+                line(out, "fast position", format_args!("{}, {velocity} steps a frame", number(id, position)))?;
+            }
+            _ if d.contains(OnlineD::POS) => line(out, "fast position", "none to be used: POS")?,
+            _ => line(out, "fast position", "none to be used: the link is down")?,
+        }
         self.safe(out, id)?;
         self.messages(out)?;
 

@@ -1,6 +1,7 @@
 //! `servowire talk`: a T-Format encoder at a USB-RS485 adapter.
 
 mod act;
+pub mod fault;
 pub mod link;
 pub mod port;
 pub mod relay;
@@ -136,21 +137,21 @@ impl Arguments {
     }
 
     /// The encoder at a port that is open.
-    fn link<P: port::Port>(&self, port: P) -> Result<Link<P>, link::Fault> {
+    fn link<P: port::Port>(&self, port: P) -> Result<Link<P>, fault::Fault> {
         Link::open(port, Duration::from_millis(self.timeout)).map_err(|fault| match fault {
-            link::Fault::Encoder(error) => link::Fault::Nobody(error, port::megabits(self.rate)),
+            fault::Fault::Encoder(error) => fault::Fault::Nobody(error, port::megabits(self.rate)),
             fault => fault,
         })
     }
 
-    fn perform(&self) -> Result<ExitCode, link::Fault> {
+    fn perform(&self) -> Result<ExitCode, fault::Fault> {
         let port = port::open(&self.port, self.rate)?;
         if let What::Simulate(simulate) = &self.what {
             let Simulate { id, rpm, echo, .. } = *simulate;
             let done = if let Some(encoder) = &simulate.encoder {
-                let named = |fault: link::Fault| match fault {
+                let named = |fault: fault::Fault| match fault {
                     fault if fault.names_itself() => fault,
-                    fault => link::Fault::Port(format!("{encoder}: {fault}")),
+                    fault => fault::Fault::Port(format!("{encoder}: {fault}")),
                 };
                 let mut link = self.link(port::open(encoder, self.rate)?).map_err(named)?;
                 act::relay(port, &mut link, echo, simulate.csv.as_deref())

@@ -70,7 +70,7 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Evidence {
     sampled_ns: u64,
     /// `None`: nothing was heard yet.
@@ -159,7 +159,7 @@ impl Words<4> for Evidence {
 
 /// A position that may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Sample {
     sampled_ns: u64,
     address: DeviceAddress,

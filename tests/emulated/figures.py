@@ -8,9 +8,11 @@ tests/bare-metal/budget.toml, by the name of the kernel that stands behind them 
 if a figure is missing, or if more stack was used than the bound allows.
 """
 
+import json
 import pathlib
 import re
 import struct
+import subprocess
 import sys
 import tomllib
 
@@ -42,6 +44,14 @@ def sizes(path):
             flash += in_file
             ram += in_memory if RAM <= virtual < RAM + (1 << 20) else 0
     return flash, ram
+
+
+def built(folder, target):
+    """Where cargo puts the images of a folder, and their names."""
+    command = ["cargo", "metadata", "--no-deps", "--format-version", "1"]
+    told = json.loads(subprocess.run(command, check=True, capture_output=True, cwd=FIRMWARE / folder).stdout)
+    names = {binary["name"] for package in told["packages"] for binary in package["targets"] if "bin" in binary["kind"]}
+    return pathlib.Path(told["target_directory"]) / target / "release", names
 
 
 def number(text):
@@ -79,13 +89,12 @@ def main():
 
     for folder, target, runs in IMAGES:
         readme = (FIRMWARE / folder / "README.md").read_text()
-        built = FIRMWARE / folder / "target" / target / "release"
-        images = {path.name for path in built.iterdir() if path.is_file() and not path.suffix and path.name[0] != "."}
+        place, images = built(folder, target)
         for names, cells in rows(readme):
             (flash, _), (ram, _), (deep, _), (count, kernel) = map(number, cells)
             for name in names:
                 images.discard(name)
-                path = built / name
+                path = place / name
                 is_flash, is_ram = sizes(path)
                 bound = stack.bound(objdump, path)
                 ran = measured.get((name, "stack"), 0)

@@ -1,13 +1,14 @@
 // What every pair of images has to do: run it, hurt the line in some exchanges, and check what both have made of it.
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
 import { appendFileSync } from 'node:fs';
-import { fileURLToPath } from 'node:url';
 import { Chip } from './chip.mjs';
 import { Wire, units } from './wire.mjs';
 
-export const IMAGES = fileURLToPath(
-  new URL('../../examples/firmware/rp2040/target/thumbv6m-none-eabi/release/', import.meta.url),
-);
+const cargo = execFileSync('cargo', ['metadata', '--no-deps', '--format-version', '1'], {
+  cwd: new URL('../../examples/firmware/rp2040/', import.meta.url),
+});
+export const IMAGES = `${JSON.parse(cargo).target_directory}/thumbv6m-none-eabi/release/`;
 export const HZ = 120e6;
 const MS = HZ / 1000;
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the firmware images and runs those for which there is an emulator: RP2040s in pairs, two chips and a wire, with their PIO's
-# scheduler compared with an independent emulator; the RP2350's PIO program in that one; the STM32F405 under QEMU. Needs node, python3 and qemu-system-arm; installs the rest
-# by name: targets from rustup, the emulators from npm and PyPI.
+# scheduler compared with an independent emulator; the RP2350 with both cores, PIO and DMA against an encoder; the STM32F405 under QEMU.
+# Needs node, python3 and qemu-system-arm; installs the rest by name: targets from rustup, the emulators from npm and PyPI.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -15,6 +15,12 @@ target() { rustup target list --installed | grep -qx "$1" || rustup target add "
 
 # build IMAGES [ARGUMENT...]
 build() { (cd "$firmware/$1" && cargo build --release --locked --bins "${@:2}"); }
+
+# built FOLDER: where cargo puts what it builds there
+built() {
+    (cd "$1" && cargo metadata --no-deps --format-version 1) |
+        python3 -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])'
+}
 
 objdump=$(dirname "$(rustc --print target-libdir)")/bin/llvm-objdump
 [ -x "$objdump" ] || rustup component add llvm-tools
@@ -32,19 +38,22 @@ done
 
 [ -d node_modules/rp2040js ] || npm ci --silent --no-audit --no-fund
 [ -x .venv/bin/python ] || python3 -m venv .venv
-.venv/bin/python -c 'import pioemu' 2>/dev/null || .venv/bin/pip install --quiet rp2040-pio-emulator==0.88.0
+.venv/bin/python -c 'import pioemu, unicorn, elftools' 2>/dev/null ||
+    .venv/bin/pip install --quiet rp2040-pio-emulator==0.88.0 unicorn==2.1.4 pyelftools==0.33
 
 node --test --test-reporter=spec
 for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m5; do
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done
 
-.venv/bin/python hdsl.py "$firmware/rp2350-hdsl/target/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl"
+hdsl=$(built "$firmware/rp2350-hdsl")/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
+.venv/bin/python rp2350/compare.py "$hdsl"
+.venv/bin/python rp2350/hdsl.py "$hdsl"
 
 build stm32f405 --features emulated
 (cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)
-python3 stm32f405.py "$firmware/stm32f405/target/thumbv7em-none-eabihf/release/servowire-stm32f405" \
-    ../../target/debug/tformat-encoder
+python3 stm32f405.py "$(built "$firmware/stm32f405")/thumbv7em-none-eabihf/release/servowire-stm32f405" \
+    "$(built ../..)/debug/tformat-encoder"
 # Its figures are those of the image that is flashed.
 build stm32f405
 

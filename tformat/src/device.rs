@@ -25,7 +25,7 @@
 
 mod behaviour;
 
-use nrz_line::{Format, Receiver, Window};
+use nrz_line::{Field, Format, Receiver, Window};
 
 use crate::address::{Address, Adf};
 use crate::count::{Abm, Abs};
@@ -279,8 +279,15 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// One line bit was received, which ended at `end_ns`; the line idles high.
+    #[inline]
     pub fn hear_bit(&mut self, level: bool, end_ns: u64) -> Option<Transmission> {
         let field = self.bits.push(level)?;
+        self.field(field, end_ns)
+    }
+
+    /// One bit in ten at most ends a field: what it takes stays out of the way of the others.
+    #[inline(never)]
+    fn field(&mut self, field: Field, end_ns: u64) -> Option<Transmission> {
         let [byte, _] = field.content.to_le_bytes();
         if field.delimiter { self.byte(byte, end_ns) } else { self.framing_error(end_ns) }
     }

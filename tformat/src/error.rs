@@ -142,6 +142,9 @@ servowire_core::errors! {
         /// Two sound responses came in one block: which one answers the request is not known.
         #[error("two responses came to one request")]
         TwoResponses = 19,
+        /// The settings of the line leave no time for a response: nothing is to be sent.
+        #[error("the settings of the line leave no time for a response")]
+        Line = 20,
     }
 }
 

@@ -33,7 +33,7 @@ servowire_core::shaft_evidence! {
     /// assert_eq!(evidence.at(140_000, commutation), Err(Doubt::Old { age_ns: 135_520 }));
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
-    Evidence
+    Evidence, abs_bits
 }
 
 impl Evidence {

@@ -1,6 +1,6 @@
 use servowire_core::Tolerance;
 
-use crate::marks::{NO_TURNS, OBJECTIONS, WIDE_TURNS};
+use crate::marks::{NO_TURNS, OBJECTIONS, WIDE_TURNS, alarms};
 use crate::status::Almc;
 
 /// Up to which age, and in spite of which alarms, a position may be used.
@@ -18,44 +18,66 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 /// Where ALMC does not come, in all responses but that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]: it
 /// is tolerated where they all are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Tolerated {
-    alarms: Almc,
-    /// Turns may be anything, or missing: they are not used.
-    turns: bool,
-}
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
+pub struct Tolerated(u32);
+
+servowire_core::one_line!(Tolerated {
+    Self(marks) if marks & NO_TURNS != 0 => "alarms {}, any turns", alarms(*marks);
+    Self(marks) => "alarms {}", alarms(*marks);
+});
 
 impl Tolerated {
     /// Nothing.
-    pub const NOTHING: Self = Self { alarms: Almc::empty(), turns: false };
+    pub const NOTHING: Self = Self(0);
     /// What one drive tolerates that counts turns: an overflow of the turns is ignored, a low battery is a warning.
     pub const MULTI_TURN: Self = Self::NOTHING.alarms(Almc::OF.union(Almc::BA));
     /// What the same drive tolerates where turns are not used: all that concerns the turns and the battery. The turns are
     /// not judged then, and the [`Sample`](crate::Sample) does not have them.
     pub const SINGLE_TURN: Self =
-        Self { turns: true, ..Self::MULTI_TURN }.alarms(Almc::BE.union(Almc::ME).union(Almc::OS));
+        Self(Self::MULTI_TURN.0 | NO_TURNS | WIDE_TURNS).alarms(Almc::BE.union(Almc::ME).union(Almc::OS));
 
     /// These alarms too.
     #[must_use]
     pub const fn alarms(self, alarms: Almc) -> Self {
-        Self { alarms: self.alarms.union(alarms), ..self }
+        Self(self.0 | alarms.bits() as u32)
     }
 
     /// What of these marks is not tolerated.
     #[inline]
     pub(crate) const fn objects_to(self, marks: u32) -> u32 {
-        let turns = if self.turns { NO_TURNS | WIDE_TURNS } else { 0 };
-        marks & OBJECTIONS & !(turns | self.alarms.bits() as u32)
+        marks & OBJECTIONS & !self.0
     }
 
-    /// Whether turns may be anything.
+    /// Whether turns may be anything, or missing: they are not used.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
-        self.turns
+        self.0 & NO_TURNS != 0
     }
 }
 
 impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
+}
+
+/// What is tolerated, as it is written down.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Written {
+    alarms: Almc,
+    turns: bool,
+}
+
+#[cfg(feature = "serde")]
+impl From<Written> for Tolerated {
+    fn from(Written { alarms, turns }: Written) -> Self {
+        let turns = if turns { NO_TURNS | WIDE_TURNS } else { 0 };
+        Self(turns).alarms(alarms)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Tolerated> for Written {
+    fn from(tolerated: Tolerated) -> Self {
+        Self { alarms: alarms(tolerated.0), turns: tolerated.ignores_turns() }
+    }
 }

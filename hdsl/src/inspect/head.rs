@@ -66,6 +66,17 @@ servowire_core::one_line!(HeadDamage {
     Self::Missing => "a frame is missing";
 });
 
+impl HeadDamage {
+    /// The class of the check, for statistics.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Parameter => "invalid_word",
+            Self::OneBit | Self::TwoBits => "head",
+            Self::Missing => "missing",
+        }
+    }
+}
+
 /// What there is where the head of a frame was due: `line` begins three bits before that place, and it may be three bits off
 /// either way.
 pub fn head_damage(line: Window) -> HeadDamage {

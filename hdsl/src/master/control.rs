@@ -1,17 +1,23 @@
 //! The application's side of the receiver: positions to use, messages, settings.
 
-use super::{Master, State};
+use super::{FREE_RUNNING_NS, HALF_FRAME_NS, Master, State};
 use crate::doubt::Doubt;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
 use crate::evidence::{Evidence, SafeEvidence};
+use crate::frame::Stuffing;
 use crate::message::{Finished, LongRequest, ShortRequest};
 use crate::sync::{Es, Synchroniser};
 
 impl Master {
     /// What there is to say about the fast position after the last H-frame, to be judged where it is used.
     pub fn fast(&self) -> Evidence {
-        self.linked().map_or(Evidence(Err(Doubt::NoLink)), |id| self.link.fast(id, self.sampled_ns()))
+        if self.linked().is_none() {
+            return Evidence::doubtful(Doubt::NoLink);
+        }
+        let mut evidence = self.link.fast(self.number(), self.sampled_ns());
+        evidence.sample.steps_per_turn = self.steps_per_turn;
+        evidence
     }
 
     /// What there is to say about the safe position of the last V-frame, to be judged where it is used.
@@ -24,6 +30,45 @@ impl Master {
         match (self.state, self.lost) {
             (State::Running, None) => self.encoder,
             _ => None,
+        }
+    }
+
+    /// Number of the last H-frame.
+    #[expect(clippy::cast_possible_truncation, reason = "modulo 2^32")]
+    const fn number(&self) -> u32 {
+        self.counters.frames.wrapping_sub(1) as u32
+    }
+
+    /// Steps of a turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
+    pub const fn set_steps_per_turn(&mut self, steps: u32) {
+        self.steps_per_turn = steps;
+    }
+
+    /// Blocks of stuffing after each H-frame of a running link that is free running, 0 at first. A frame lasts 11.52 µs and 0.64 µs a
+    /// block: for a processor that needs more time, or another rate of positions. [`ahead`](Self::ahead) goes with it.
+    pub const fn set_stuffing(&mut self, stuffing: Stuffing) {
+        self.stuffing = stuffing;
+        self.usual_ns = FREE_RUNNING_NS.wrapping_add((stuffing.get() as u32).wrapping_mul(640));
+    }
+
+    /// How long after its edge has left the master an encoder samples: 5 ns a metre of cable, and up to 100 ns of its own (SICK
+    /// manual, p. 12). It counts in the instants of positions; 0 at first.
+    pub const fn set_latency_ns(&mut self, latency_ns: u16) {
+        self.latency_ns = latency_ns;
+    }
+
+    /// So many H-frames went over the line whose answers will not be heard, before the one that is heard next: a block of samples was
+    /// overwritten, a head was repeated. Their words are missing, their V-frames have no safe position, and the numbers of frames go
+    /// on. Up to 16 are made good like that; of a longer gap the link does not recover.
+    ///
+    /// A frame of which nobody tells is known by its time, if its end is told half a frame too late; then no fast position is given until
+    /// three safe positions have come.
+    pub fn skip(&mut self, frames: u8) {
+        self.counters.frames = self.counters.frames.wrapping_add(frames.into());
+        let frame_ns = self.longest_ns.saturating_sub(HALF_FRAME_NS);
+        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(frame_ns.into()));
+        if self.state == State::Running {
+            (0..frames.min(16)).for_each(|_| self.link.skip());
         }
     }
 

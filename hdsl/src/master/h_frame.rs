@@ -1,6 +1,7 @@
 //! What an H-frame brought.
 
 use super::{RestartReason, State};
+use crate::acceleration::DeltaDelta;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
 use crate::frame::{Stuffing, Tail, Trailer};
@@ -17,7 +18,7 @@ use crate::vframe::VFrame;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SignalQuality {
-    /// RSSI of this answer.
+    /// RSSI of this answer. On a running link a receiver of samples looks at a quarter of its bits, at another one in each frame.
     pub rssi: Rssi,
     /// The delay of the cable, as learned at the start.
     pub delay: Delay,
@@ -46,16 +47,11 @@ pub struct HFrame {
     pub signal: Option<SignalQuality>,
     /// The quality monitor, 0..=15.
     pub quality: u8,
-    /// Registers POS and VEL, usable or not: for the register map alone.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub(crate) pos: u64,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub(crate) vel: i32,
-    /// The flag POS: the fast position is estimated or not aligned.
-    pub doubtful: bool,
+    /// The acceleration, of a running link and if its word can be used.
+    pub acceleration: Option<DeltaDelta>,
     /// Acceleration words in a row that could not be used.
     pub acceleration_errors: u32,
-    /// The safe blocks of a V-frame, one H-frame after its end.
+    /// The safe blocks, in the last H-frame of a V-frame.
     pub v_frame: Option<VFrame>,
     /// The word of the pipe channel, K30.7 included.
     pub pipe: Option<Reading>,
@@ -71,7 +67,7 @@ pub struct HFrame {
 
 servowire_core::one_line!(HFrame {
     Self { restarted: Some(reason), was, .. } => "{}, the link starts anew: {}", was, reason;
-    Self { was, quality, doubtful: true, .. } => "{}, quality {}, fast position doubtful", was, quality;
+    Self { was: State::Running, quality, acceleration: None, .. } => "RUNNING, quality {}, no acceleration", quality;
     Self { was, quality, .. } => "{}, quality {}", was, quality;
 });
 
@@ -85,9 +81,7 @@ impl HFrame {
         encoder: None,
         signal: None,
         quality: QualityMonitor::START,
-        pos: 0,
-        vel: 0,
-        doubtful: false,
+        acceleration: None,
         acceleration_errors: 0,
         v_frame: None,
         pipe: None,
@@ -97,15 +91,21 @@ impl HFrame {
         short_free: false,
     };
 
+    /// What a link brings, at its end.
+    pub(super) const fn clear(&mut self) {
+        self.quality = QualityMonitor::START;
+        self.acceleration = None;
+        self.acceleration_errors = 0;
+        self.pipe = None;
+        self.init = false;
+    }
+
     /// Clears what belongs to one frame.
     #[inline]
     pub(super) fn begin(&mut self, state: State, signal: Option<SignalQuality>) {
         self.was = state;
         self.signal = signal;
-        self.encoder = None;
         self.v_frame = None;
-        self.pipe = None;
-        self.init = false;
         self.finished = Finished { short: None, long: None };
     }
 
@@ -146,7 +146,7 @@ impl HFrame {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
-    /// H-frames.
+    /// H-frames, heard or told of.
     pub frames: u64,
     /// Restarts.
     pub restarts: u32,

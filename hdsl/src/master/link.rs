@@ -8,8 +8,8 @@ use crate::doubt::Doubt;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
 use crate::evidence::{Evidence, SafeEvidence, SafeSample};
+use crate::fast::FastPosition;
 use crate::parameter::{EncoderByte, EncoderSymbol};
-use crate::position::{AlignmentStage, PositionTracker};
 use crate::quality::{QualityEvent, QualityMonitor, QualityRule};
 use crate::symbol::Reading;
 use crate::vframe::VFrame;
@@ -19,39 +19,33 @@ use crate::vframe::VFrame;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Link {
     quality: QualityMonitor,
-    tracker: PositionTracker,
+    fast: FastPosition,
     vframe: VFrame,
     /// Place in the V-frame, 0..=7.
     at: u8,
     msync: bool,
     /// At least one V-frame is complete: messages may be sent.
     settled: bool,
-    /// The blocks of the last V-frame; its results are shown one frame later.
-    last: VFrame,
-    is_new: bool,
-    /// The last good safe position, or none because the encoder had none.
-    last_safe: Option<u64>,
+    /// What the last V-frame brought as a safe position, with SUMMARY.
+    safe: Result<(u64, u8), Doubt>,
+    /// TEST2 of the last V-frame is to be counted.
+    test2: bool,
     /// When the safe position of the last V-frame was sampled, and that of the present one.
     last_sampled_ns: u64,
     sampled_ns: u64,
 }
 
 impl Link {
-    pub(super) fn new(dialect: &Dialect, bits: PositionBits) -> Self {
-        let mut tracker = PositionTracker::with_rule(bits, dialect.position);
-        if dialect.doubt_at_lock {
-            tracker.doubt();
-        }
+    pub(super) fn new(dialect: &Dialect, id: EncoderId, bits: PositionBits) -> Self {
         Self {
             quality: QualityMonitor::new(dialect.quality),
-            tracker,
+            fast: FastPosition::start(id, bits),
             vframe: VFrame::default(),
             at: 0,
             msync: true,
             settled: false,
-            last: VFrame::default(),
-            is_new: false,
-            last_safe: Some(0),
+            safe: Err(Doubt::NoVFrame),
+            test2: false,
             last_sampled_ns: 0,
             sampled_ns: 0,
         }
@@ -69,31 +63,37 @@ impl Link {
         self.settled
     }
 
-    pub(super) const fn stage(&self) -> AlignmentStage {
-        self.tracker.stage()
-    }
-
     /// A V-frame begins after the H-frame that was sampled then.
     pub(super) const fn latch(&mut self, sampled_ns: u64) {
         (self.last_sampled_ns, self.sampled_ns) = (self.sampled_ns, sampled_ns);
     }
 
-    pub(super) fn fast(&self, id: EncoderId, sampled_ns: u64) -> Evidence {
-        self.tracker.evidence(id, sampled_ns)
+    pub(super) const fn fast(&self, frame: u32, sampled_ns: u64) -> Evidence {
+        self.fast.evidence(frame, sampled_ns)
     }
 
     /// The safe position of the last V-frame.
     pub(super) fn safe(&self, id: EncoderId) -> SafeEvidence {
-        SafeEvidence(match self.last.safe1.vpos() {
-            _ if !self.settled => Err(Doubt::NoVFrame),
-            Ok(raw) => Ok(SafeSample {
-                position: id.position(raw),
-                summary: self.last.safe1.status(),
-                sampled_ns: self.last_sampled_ns,
-            }),
-            Err(Error::PositionInvalid { .. }) => Err(Doubt::Withheld),
-            Err(_) => Err(Doubt::Stale),
-        })
+        let sampled_ns = self.last_sampled_ns;
+        SafeEvidence(self.safe.map(|(raw, summary)| SafeSample { position: id.position(raw), summary, sampled_ns }))
+    }
+
+    /// A frame whose answer is not heard: its word is missing, and so is a byte of both safe blocks.
+    pub(super) fn skip(&mut self) {
+        self.fast.step(None);
+        // What comes later in this V-frame is not in order any more.
+        self.vframe = VFrame::default();
+        if self.at == 7 {
+            self.fast.align(None);
+            self.safe = Err(Doubt::Stale);
+            self.msync = !self.msync;
+        }
+        self.at = self.at.wrapping_add(1) & 7;
+    }
+
+    /// Frames went by unheard.
+    pub(super) const fn interrupt(&mut self) {
+        self.fast.interrupt();
     }
 }
 
@@ -101,7 +101,7 @@ impl Master {
     /// One H-frame of RX0..RX7.
     pub(super) fn run(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
-        self.show_v_frame();
+        self.count_test();
         self.link.vframe.put(self.dialect.rule, self.link.at, answer);
         self.h_frame.pipe = Some(answer.pipe());
         self.count_words(answer);
@@ -115,28 +115,22 @@ impl Master {
             self.end_v_frame();
         }
         self.link.at = self.link.at.wrapping_add(1) & 7;
-        self.h_frame.doubtful = self.link.tracker.registers().pos_flag;
         self.h_frame.quality = self.link.quality.value();
         if self.link.quality.is_lost() {
             return Err(RestartReason::Quality);
         }
-        let errors = self.link.tracker.registers().acc_err_cnt;
+        let errors = self.h_frame.acceleration_errors;
         if self.dialect.restart_on_acceleration_errors && errors > 0 && errors >= u32::from(self.threshold) {
             return Err(RestartReason::AccelerationErrors);
         }
         Ok(())
     }
 
-    /// The results of a V-frame, one H-frame after its end.
+    /// The firmware of the SDK counts TEST2 one H-frame after the V-frame.
     #[inline]
-    fn show_v_frame(&mut self) {
-        if !core::mem::take(&mut self.link.is_new) {
-            return;
-        }
-        let last = self.link.last;
-        self.h_frame.v_frame = Some(last);
-        // The firmware of the SDK looks at channel 2 only with a good channel 1.
-        if self.dialect.quality == QualityRule::Ti && last.safe1.is_sound() && last.safe2.status() & 0x40 != 0 {
+    fn count_test(&mut self) {
+        if self.link.test2 {
+            self.link.test2 = false;
             self.link.quality.count(QualityEvent::Test2);
         }
     }
@@ -169,12 +163,9 @@ impl Master {
             Ok(value) => Some(value),
             Err(error) => self.unusable(&answer, error),
         };
-        let tracker = &mut self.link.tracker;
-        tracker.step(value);
-        let shown = tracker.registers();
-        self.h_frame.pos = shown.pos;
-        self.h_frame.vel = shown.vel;
-        self.h_frame.acceleration_errors = shown.acc_err_cnt;
+        self.link.fast.step(value);
+        self.h_frame.acceleration = value;
+        self.h_frame.acceleration_errors = self.link.fast.missing_in_a_row();
     }
 
     /// An acceleration word with something wrong: counted, and used all the same if the dialect does so.
@@ -192,11 +183,11 @@ impl Master {
 
     /// After RX7: judges the safe channels and aligns the fast position.
     fn end_v_frame(&mut self) {
-        let VFrame { safe1, safe2 } = self.link.vframe;
+        let link = &mut self.link;
+        let VFrame { safe1, safe2 } = &link.vframe;
         let position = safe1.vpos();
         let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
         let sound2 = safe2.is_sound();
-        let link = &mut self.link;
         link.quality.count_blocks(sound1, sound2);
         if !sound1 {
             self.counters.safe1 = self.counters.safe1.wrapping_add(1);
@@ -204,24 +195,15 @@ impl Master {
         if !sound2 {
             self.counters.safe2 = self.counters.safe2.wrapping_add(1);
         }
-        let safe = match position {
-            Ok(position) => {
-                link.last_safe = Some(position);
-                Some(position)
-            }
-            Err(Error::PositionInvalid { .. }) => {
-                link.last_safe = None;
-                None
-            }
-            Err(_) if self.dialect.stale_position => link.last_safe,
-            Err(_) => None,
+        // The firmware of the SDK looks at channel 2 only with a good channel 1.
+        link.test2 = self.dialect.quality == QualityRule::Ti && sound1 && safe2.status() & 0x40 != 0;
+        link.fast.align(position.ok());
+        link.safe = match position {
+            Ok(raw) => Ok((raw, safe1.status())),
+            Err(Error::PositionInvalid { .. }) => Err(Doubt::Withheld),
+            Err(_) => Err(Doubt::Stale),
         };
-        match safe {
-            Some(position) => link.tracker.align(position),
-            None => link.tracker.no_safe_position(),
-        }
-        link.last = link.vframe;
-        link.is_new = true;
+        self.h_frame.v_frame = Some(link.vframe);
         link.msync = !link.msync;
         link.settled = true;
         self.latch();

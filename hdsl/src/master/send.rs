@@ -1,7 +1,7 @@
 //! What the receiver sends: the head of the next H-frame, before or after the answer of the present one, and the end of a frame.
 
 use super::{Master, RestartReason, State};
-use crate::frame::{Extra, Head, Stuffing, Trailer};
+use crate::frame::{Extra, H_FRAME_BITS, Head, STUFFING_BITS, Stuffing, Trailer};
 use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
 
@@ -22,7 +22,7 @@ pub struct Transmission {
 impl Master {
     /// The next head before the answer of the present frame is taken in, for a processor that is not done with an answer when the
     /// next head has to begin: call it while the answer comes in, send the head, and give the samples to
-    /// [`hear`](Self::hear) while it is on the line. The frame has no stuffing then.
+    /// [`hear`](Self::hear) while it is on the line.
     ///
     /// What an answer changes comes a frame later on the line. If it is the end of the link, the frame that is out already is
     /// sent to its end; [`fast`](Self::fast) and [`safe`](Self::safe) give nothing from the loss on, and what [`hear`](Self::hear) gives for that
@@ -68,6 +68,16 @@ impl Master {
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
         transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
+    }
+
+    /// From the end of one window to that of the next one, which is that of `present`, and half a free-running frame, in ns.
+    pub(super) fn present_ns(&self) -> u32 {
+        let extra = self.present.head.extra().map_or(0, |extra| extra.bits().into());
+        let bits = H_FRAME_BITS
+            .wrapping_add(extra)
+            .wrapping_add(STUFFING_BITS.wrapping_mul(self.h_frame.tail.stuffing.get().into()));
+        // 106.67 ns each.
+        bits.wrapping_add(H_FRAME_BITS / 2).wrapping_mul(320) / 3
     }
 
     /// Stuffing after a START frame: time for the search.

@@ -285,7 +285,7 @@ impl LongRequest {
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], [`Error::Header`] if a
-    /// sound answer is for another request, [`Error::Resource`] if the encoder refused.
+    /// sound answer is for another request or brings less or more than was asked for, [`Error::Resource`] if the encoder refused.
     pub fn parse_answer(&self, bytes: &[u8]) -> Result<Data, Error> {
         let answer = LongAnswer::parse(bytes)?;
         self.check_answer(answer)?;
@@ -294,8 +294,12 @@ impl LongRequest {
 
     /// Whether a sound answer belongs to this request.
     pub(super) fn check_answer(&self, answer: LongAnswer) -> Result<(), Error> {
-        let want = header(self.address, self.is_read(), false, self.indirect, Length::None);
-        let got = header(answer.address, answer.read, false, answer.indirect, Length::None);
+        let (wanted, length) = match (&self.access, &answer.result) {
+            (Access::Read(length), Ok(data)) => (*length, data.length),
+            _ => (Length::None, Length::None),
+        };
+        let want = header(self.address, self.is_read(), false, self.indirect, wanted);
+        let got = header(answer.address, answer.read, false, answer.indirect, length);
         if got != want {
             return Err(Error::Header { got: u16::from_be_bytes(got), want: u16::from_be_bytes(want) });
         }
@@ -359,7 +363,7 @@ impl LongAnswer {
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer
-    /// without its two bytes.
+    /// of another length than two bytes.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = long_start(bytes)?;
         Self::of_covered(checked(bytes, answer_len(first))?)
@@ -372,8 +376,8 @@ impl LongAnswer {
         };
         let result = match (first & LOFF != 0, rest) {
             (false, data) => Ok(Data::new(data)?),
-            (true, [detail, class, ..]) => Err(ResourceError::new(*class, *detail)),
-            (true, _) => return Err(Error::DataLength { len: 0 }),
+            (true, [detail, class]) => Err(ResourceError::new(*class, *detail)),
+            (true, other) => return Err(Error::DataLength { len: u8::try_from(other.len()).unwrap_or(u8::MAX) }),
         };
         Ok(Self { address: address(*first, *low), read: first & LRW != 0, indirect: first & LIND != 0, result })
     }

@@ -1,9 +1,12 @@
 //! From what an H-frame brought to the registers.
 
 use super::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Register, RegisterRule, Registers};
+use crate::encoder_id::PositionBits;
 use crate::error::Error;
+use crate::fast::FastPosition;
 use crate::master::{HFrame, State};
 use crate::message::LongAnswer;
+use crate::position::PositionTracker;
 use crate::vframe::{SafeBlock, VFrame};
 
 /// The events of the drive that stand at the places of their status.
@@ -18,18 +21,20 @@ impl Registers {
             return self.masked_events();
         }
         let mut news = Interrupts::empty();
-        if let Some(frame) = &h_frame.v_frame {
-            news = match self.rule {
+        let before = core::mem::replace(&mut self.v_frame, h_frame.v_frame);
+        if let Some(frame) = &before {
+            news = match self.dialect.registers {
                 RegisterRule::Sick => self.v_frame(frame),
                 RegisterRule::Ti => self.v_frame_ti(frame),
             };
         }
+        self.positions(h_frame);
         self.numbers(h_frame);
         self.messages(h_frame);
         self.status(h_frame);
         if h_frame.state == State::Running {
             // The sampling instant's frame is over; safe positions come once a V-frame.
-            self.put(Register::PosTx, [if h_frame.v_frame.is_some() { 3 } else { 2 }]);
+            self.put(Register::PosTx, [if before.is_some() { 3 } else { 2 }]);
             news.insert(Interrupts::H_FRAME);
         }
         news | self.masked_events()
@@ -66,6 +71,8 @@ impl Registers {
         self.put(Register::SafeCtrl, [0]);
         self.put(Register::PosTx, [0]);
         self.pipe = super::PipeFifo::new();
+        self.tracker = PositionTracker::new(PositionBits::MAX);
+        (self.fast, self.v_frame, self.last_safe) = (None, None, Some(0));
         self.raise(Event::PRST | Event::QMLW);
         self.raise_s(EventS::PRST | EventS::QMLW);
     }
@@ -76,6 +83,50 @@ impl Registers {
 
     fn raise_s(&mut self, events: EventS) {
         self.put(Register::EventS, [(self.event_s() | events).bits()]);
+    }
+
+    /// POS and VEL by the rule of the dialect, and whether they may be used.
+    fn positions(&mut self, h_frame: &HFrame) {
+        if let Some((id, bits)) = h_frame.encoder.and_then(|id| Some((id, id.check().ok()?))) {
+            self.tracker = PositionTracker::with_rule(bits, self.dialect.position);
+            if self.dialect.doubt_at_lock {
+                self.tracker.doubt();
+            }
+            self.fast = Some(FastPosition::start(id, bits));
+        }
+        if h_frame.was != State::Running {
+            return;
+        }
+        self.tracker.step(h_frame.acceleration);
+        // What the alignment changes is shown with the next frame.
+        let shown = self.tracker.registers();
+        self.put40(Register::Pos, shown.pos);
+        let [_, velocity @ ..] = shown.vel.to_be_bytes();
+        self.put::<3>(Register::Vel, velocity);
+        let position = h_frame.v_frame.map(|frame| frame.safe1.vpos());
+        if let Some(fast) = &mut self.fast {
+            fast.step(h_frame.acceleration);
+            if let Some(position) = position {
+                fast.align(position.ok());
+            }
+        }
+        let safe = match position {
+            None => return,
+            Some(Ok(position)) => {
+                self.last_safe = Some(position);
+                Some(position)
+            }
+            Some(Err(Error::PositionInvalid { .. })) => {
+                self.last_safe = None;
+                None
+            }
+            Some(Err(_)) if self.dialect.stale_position => self.last_safe,
+            Some(Err(_)) => None,
+        };
+        match safe {
+            Some(position) => self.tracker.align(position),
+            None => self.tracker.no_safe_position(),
+        }
     }
 
     /// What is shown as it is.
@@ -92,14 +143,11 @@ impl Registers {
         if h_frame.was != State::Running {
             return;
         }
-        self.put40(Register::Pos, h_frame.pos);
-        let [_, velocity @ ..] = h_frame.vel.to_be_bytes();
-        self.put::<3>(Register::Vel, velocity);
-        let most = if self.rule == RegisterRule::Sick { 31 } else { 255 };
+        let most = if self.dialect.registers == RegisterRule::Sick { 31 } else { 255 };
         let errors = u8::try_from(h_frame.acceleration_errors.min(most)).unwrap_or(u8::MAX);
         self.put(Register::AccErrCnt, [errors]);
         if let Some(word) = h_frame.pipe {
-            match self.rule {
+            match self.dialect.registers {
                 RegisterRule::Sick => self.pipe.put(word),
                 RegisterRule::Ti => self.put(Register::PipeD, [word.raw()]),
             }
@@ -113,7 +161,7 @@ impl Registers {
         let low = h_frame.quality < crate::quality::QualityMonitor::LOW;
         for (flag, on) in [
             (OnlineD::PRST, h_frame.state <= State::Check),
-            (OnlineD::POS, h_frame.doubtful),
+            (OnlineD::POS, h_frame.state == State::Running && self.tracker.registers().pos_flag),
             (OnlineD::QMLW, low),
             (OnlineD::MIN, h_frame.init),
             (OnlineD::FREL, h_frame.long_free),
@@ -134,7 +182,7 @@ impl Registers {
         }
         self.put(Register::OnlineStatusD, d.bits().to_be_bytes());
 
-        let arisen = match self.rule {
+        let arisen = match self.dialect.registers {
             RegisterRule::Sick => d.difference(before),
             RegisterRule::Ti => d,
         };
@@ -163,6 +211,9 @@ impl Registers {
             if let Ok(answer) = result {
                 if let Some(data) = answer.data {
                     self.put(Register::SPcData, [data]);
+                    if self.dialect.registers == RegisterRule::Sick {
+                        self.put(Register::PcData, [data]);
+                    }
                 }
             }
             self.put(Register::SlaveRegCtrl, [0x3f]);
@@ -177,7 +228,7 @@ impl Registers {
 
     fn long_answer(&mut self, answer: &LongAnswer) {
         self.put(Register::PcAdd, answer.header());
-        match (answer.result, self.rule) {
+        match (answer.result, self.dialect.registers) {
             (Ok(data), _) => self.put_buffer(data.as_bytes()),
             (Err(error), RegisterRule::Sick) => self.put_buffer(&[error.detail(), error.class_code()]),
             (Err(error), RegisterRule::Ti) => self.put_buffer(&[error.class_code(), error.detail()]),
@@ -273,7 +324,7 @@ impl Registers {
         one.set(Online1::SSUM, summary != 0);
         self.put(Register::OnlineStatusD, d.bits().to_be_bytes());
         self.put(Register::SafeSum, [summary]);
-        let known = self.rule == RegisterRule::Sick && before & mask != 0;
+        let known = self.dialect.registers == RegisterRule::Sick && before & mask != 0;
         if summary & mask != 0 && !known {
             self.raise(Event::SUM);
         }

@@ -178,7 +178,7 @@ fn a_damaged_acceleration_word() {
                 let bits = answer([vertical, parameter, pipe, STILL[0], Character::data(low), second]);
                 let _ = desk.feed(bits & !(0x3ff << 30) | high << 30);
                 assert_eq!(
-                    desk.map.vel() == i32::from(value.get()) && !desk.map.online_d().contains(OnlineD::POS),
+                    desk.map.vel() == Some(i32::from(value.get())) && !desk.map.online_d().contains(OnlineD::POS),
                     used
                 );
                 assert_eq!((desk.quality(), desk.map.get(Register::AccErrCnt)), (13, [u8::from(!used)]));

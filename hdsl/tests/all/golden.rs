@@ -94,10 +94,10 @@ fn the_traces_show_what_is_said_of_them() {
         let map = |at: usize| Registers::from_bytes(&dialect, frames[at].registers.as_slice().try_into().unwrap());
         let doubtful = |at: usize| map(at).online_d().contains(OnlineD::POS);
         // Wrap of the 24 bits.
-        assert_eq!((map(98).pos(), map(99).pos()), (0xff_ffd8, 0));
-        assert_eq!((map(119).vel(), map(120).vel(), map(139).pos()), (40, -40, 0));
+        assert_eq!((map(98).pos(), map(99).pos()), (Some(0xff_ffd8), Some(0)));
+        assert_eq!((map(119).vel(), map(120).vel(), map(139).pos()), (Some(40), Some(-40), Some(0)));
         assert!(!doubtful(169) && doubtful(170) && !doubtful(199));
-        assert_eq!((map(199).pos(), map(199).quality()), ((1 << 24) - 2400, 15));
+        assert_eq!((map(199).pos(), map(199).quality()), (Some((1 << 24) - 2400), 15));
         // The name that the long message asked for, in PC_BUFFER.
         assert_eq!(&frames[199].registers[0x20..0x28], b"RESOLUTN");
         assert_eq!(frames.iter().filter(|frame| frame.answer.is_none()).count(), 18);

@@ -142,7 +142,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
                     "wrong fast position, {since_poison} frames after the last bad word: {fast:?}, truth {} {}, {tracker:?}",
                     motion.at(0),
                     motion.velocity,
-                    tracker = (master.stage(), master.frame(), master.counters(), event, since_event),
+                    tracker = (map.stage(), master.frame(), master.counters(), event, since_event),
                 );
                 tally.explained += 1;
             }

@@ -151,7 +151,7 @@ fn a_safe_position_of_before() {
         while bench.master.counters().safe1 == 0 {
             let _ = bench.frame();
         }
-        assert_eq!((bench.master.stage(), bench.master.h_frame().doubtful), (phase, doubtful));
+        assert_eq!((bench.map.stage(), bench.map.online_d().contains(OnlineD::POS)), (phase, doubtful));
     }
 }
 

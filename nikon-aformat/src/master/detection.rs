@@ -75,27 +75,17 @@ impl Detection {
         };
         let step = reading.receive(outcome, ready_ns);
         self.reading = Some(reading);
-        match step {
-            Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-            Step::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
-            Step::Done { value, ready_ns } => {
-                let type_word = TypeWord(value);
-                let value = Detected { ea: reading.ea(), type_word, resolution: type_word.resolution() };
-                Step::Done { value, ready_ns }
-            }
-        }
+        step.and_then(|word, ready_ns| {
+            let type_word = TypeWord(word);
+            let value = Detected { ea: reading.ea(), type_word, resolution: type_word.resolution() };
+            Step::Done { value, ready_ns }
+        })
     }
 
     const fn read(&mut self, ea: EncoderAddress, not_before_ns: u64) -> Step<Detected> {
         let mut reading = EepromRead::new(ea, TypeWord::EEPROM_ADDRESS);
-        let first = reading.start(not_before_ns);
+        let request = reading.begin();
         self.reading = Some(reading);
-        match first {
-            Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-            // Never: a read begins with a request.
-            Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => {
-                Step::Failed { error: Error::NoResponse, ready_ns }
-            }
-        }
+        Step::Send { request, not_before_ns }
     }
 }

@@ -118,13 +118,18 @@ impl EepromRead {
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
+        Step::Send { request: self.begin(), not_before_ns: now_ns }
+    }
+
+    /// The first request.
+    pub(super) const fn begin(&mut self) -> Request {
         // A read that was started and has not ended is broken off by this.
         self.known = self.known && (!self.started || self.end.is_some());
         self.started = true;
         self.tries = 0;
         self.end = None;
         self.next = if self.known { Next::First } else { Next::Other };
-        Step::Send { request: self.next_request(), not_before_ns: now_ns }
+        self.next_request()
     }
 
     servowire_core::receive! {

@@ -19,8 +19,11 @@ use crate::timing::REQUEST_GAP_NS;
 /// | it ends with | the encoder |
 /// |---|---|
 /// | `Done`, with the response to STATUS | has done it |
-/// | [`Error::Interrupted`], [`Error::Busy`], [`Error::MemoryFault`], [`Error::NoResponse`] and other faults of the first response | has **not** done it |
+/// | [`Error::NotDone`] | has **not** done it: it had begun to count anew, and fewer than eight requests were sent |
+/// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::NoResponse`] and other faults of the first response | was not asked to |
 /// | [`Error::EffectUnknown`] | may have done it; it may be busy until `ready_ns` |
+///
+/// So it may begin after any past: an attempt that was broken off, a controller that has started anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardedReset {
@@ -48,10 +51,15 @@ impl GuardedReset {
     servowire_core::receive! { Response }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        if self.started {
-            return self.reset.receive(outcome, ready_ns);
-        }
         let soon_ns = ready_ns.saturating_add(REQUEST_GAP_NS.into());
+        if self.started {
+            return match self.reset.receive(outcome, ready_ns) {
+                Step::Failed { error: Error::Interrupted { .. }, .. } => {
+                    Step::Failed { error: Error::NotDone, ready_ns: soon_ns }
+                }
+                step => step,
+            };
+        }
         let (request, ea) = apart(self.reset.request());
         let error = match outcome {
             Ok(response) if response.command() != Some(request.command()) => Error::NotCarried,

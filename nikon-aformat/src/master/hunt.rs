@@ -116,24 +116,29 @@ impl Hunt {
     }
 
     /// Whether a sound response begins inside the frames at hand and goes on in the block: then the first of these frames has
-    /// lost those that followed it, and that the CRC-8 is right is chance.
+    /// lost those that followed it, and that the CRC-8 is right is chance. Not so where the next response begins right after
+    /// the frames at hand, as on a line that lost nothing: then the other one is chance, which a shaft at rest repeats for ever.
     fn is_overtaken(&self, expected: &Expected, times: &Times<'_>, at: usize) -> bool {
         let next = at.saturating_add(1);
-        (1..self.got).any(|lost| {
-            let (Some(first), Some(more)) =
-                (self.contents.get(lost), times.block.frames.get(next..next.saturating_add(lost)))
-            else {
-                return false;
-            };
-            if expected.differs_first(*first) != 0 {
-                return false;
-            }
-            let mut contents = [0; RawResponse::MAX_FRAMES];
-            let kept = self.contents.iter().take(self.got).skip(lost).copied();
-            let frames = kept.chain(more.iter().map(|frame| frame.unwrap_or(0)));
-            contents.iter_mut().zip(frames).for_each(|(to, from)| *to = from);
-            RawResponse::of(contents, expected.layout()).is_sound()
-        })
+        let begins = |at: usize| {
+            times.block.frames.get(at).is_none_or(|frame| frame.is_some_and(|first| expected.differs_first(first) == 0))
+        };
+        !begins(next)
+            && (1..self.got).any(|lost| {
+                let (Some(first), Some(more)) =
+                    (self.contents.get(lost), times.block.frames.get(next..next.saturating_add(lost)))
+                else {
+                    return false;
+                };
+                if expected.differs_first(*first) != 0 || !begins(next.saturating_add(lost)) {
+                    return false;
+                }
+                let mut contents = [0; RawResponse::MAX_FRAMES];
+                let kept = self.contents.iter().take(self.got).skip(lost).copied();
+                let frames = kept.chain(more.iter().map(|frame| frame.unwrap_or(0)));
+                contents.iter_mut().zip(frames).for_each(|(to, from)| *to = from);
+                RawResponse::of(contents, expected.layout()).is_sound()
+            })
     }
 
     fn drop_first(&mut self) {

@@ -1,3 +1,4 @@
+use crate::bus::Addresses;
 use crate::expected::Expected;
 use crate::layout::{FRAME_BITS, Layout};
 use crate::number::EncoderAddress;
@@ -95,6 +96,23 @@ impl Line {
             .saturating_add(others)
             .saturating_add(response)
             .saturating_add(self.latency_budget_ns())
+    }
+
+    /// When nobody speaks any more who answers a multi-response request at all, in ns: these have been heard, the last of them
+    /// until `end_ns`, and every other one up to [`highest`](Self::highest) may still have its turn.
+    pub(super) const fn silent_ns(&self, expected: &Expected, heard: Addresses, end_ns: u64) -> u64 {
+        let others = Addresses::first(self.highest.get().saturating_add(1)).without(heard).len();
+        if others == 0 {
+            return end_ns;
+        }
+        let turn_ns = self.response_ns(expected.layout()).saturating_add(self.idle_between_responses_ns);
+        let turns_ns = turn_ns.saturating_mul(others as u32).saturating_add(self.latency_budget_ns());
+        end_ns.saturating_add(turns_ns as u64)
+    }
+
+    /// Whether a response can be taken at all: it has to begin, by its stamps, after the turn-around and before the time-out.
+    pub(super) const fn leaves_time(&self) -> bool {
+        self.early_ns() <= self.response_timeout_ns as u64
     }
 
     /// The time after which a transaction is over in any case, in ns from its start.

@@ -14,8 +14,8 @@ use crate::timing::{REQUEST_GAP_NS, WRITE_BUSY_NS};
 /// One good response after the other has to come: where one is missing or refused, the encoder may not have heard the request,
 /// and the count would begin anew. It is not repeated on its own; [`start`](Self::start) begins again from one.
 ///
-/// The encoder counts requests, not procedures: seven that were interrupted and one more are eight. Use
-/// [`GuardedReset`](super::GuardedReset), which starts the count again before it begins.
+/// The encoder counts requests, not procedures: seven that were interrupted and one more are eight. So no failure of it says that
+/// nothing was done. Use [`GuardedReset`](super::GuardedReset), which starts the count again before it begins.
 ///
 /// Release 9.2 of the AM243x Motor Control SDK sends the code a ninth time, which later releases call a defect. The
 /// effect shows in the response to the next request, here STATUS.
@@ -89,7 +89,7 @@ impl Reset {
     servowire_core::receive! {
         /// The value is the response to STATUS.
         ///
-        /// Fails with [`Error::Interrupted`] (not done) if one of the first seven responses does not come, and with
+        /// Fails with [`Error::Interrupted`] if one of the first seven responses does not come, and with
         /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
         /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR.
         Response
@@ -101,12 +101,11 @@ impl Reset {
             return self.status(outcome, ready_ns);
         }
         if !outcome.is_ok_and(|response| self.is_answer(response)) {
-            let done = core::mem::take(&mut self.done);
-            if done >= Self::REQUESTS.saturating_sub(1) {
-                let ready_ns = ready_ns.saturating_add(WRITE_BUSY_NS.into());
-                return Step::Failed { error: Error::EffectUnknown, ready_ns };
-            }
-            return Step::Failed { error: Error::Interrupted { done }, ready_ns: soon_ns };
+            let error = match core::mem::take(&mut self.done) {
+                7.. => Error::EffectUnknown,
+                done => Error::Interrupted { done },
+            };
+            return Step::Failed { error, ready_ns: ready_ns.saturating_add(WRITE_BUSY_NS.into()) };
         }
         self.done = self.done.saturating_add(1);
         if self.done < Self::REQUESTS {
@@ -200,7 +199,7 @@ mod tests {
             let end = reset.receive(Err(Error::NoResponse), 0);
             let want = match done {
                 7 => Step::Failed { error: Error::EffectUnknown, ready_ns: 30_000_000 },
-                _ => Step::Failed { error: Error::Interrupted { done }, ready_ns: 10_000 },
+                _ => Step::Failed { error: Error::Interrupted { done }, ready_ns: 30_000_000 },
             };
             assert_eq!(end, want);
             assert_eq!(reset.done(), 0);
@@ -218,7 +217,7 @@ mod tests {
         for other in [word, elsewhere, status(Command::Status, 0)] {
             let _ = reset.start(0);
             let end = reset.receive(Ok(other), 0);
-            assert_eq!(end, Step::Failed { error: Error::Interrupted { done: 0 }, ready_ns: 10_000 });
+            assert_eq!(end, Step::Failed { error: Error::Interrupted { done: 0 }, ready_ns: 30_000_000 });
         }
         let _ = reset.start(0);
         for _ in 0..8 {

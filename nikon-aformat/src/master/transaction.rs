@@ -74,7 +74,8 @@ impl Transaction {
     /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `start_ns`.
     ///
     /// A request that encoders of this version do not understand fails at once with
-    /// [`Error::UnsupportedInVersion`] and is not to be sent.
+    /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
+    /// [`Error::Line`]: it is not to be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
         let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
@@ -87,7 +88,7 @@ impl Transaction {
             asked_ns,
             until_ns: asked_ns.saturating_add(line.answered_ns(&expected).into()),
             refused: None,
-            end: request.check(resolution).err().map(Err),
+            end: refusal(request, resolution, &line).map(Err),
             ready_ns: start_ns,
         }
     }
@@ -115,14 +116,16 @@ impl Transaction {
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() {
             let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
+            let others = expected.command().is_multi_response();
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| match found.outcome {
                 Ok(response) if end.is_none() => {
                     *end = Some(Ok(Exchange { response, sampled_ns: *asked_ns, began_ns: found.began_ns }));
-                    let others = expected.command().is_multi_response();
-                    let free_ns = if others { found.end_ns.max(*until_ns) } else { found.end_ns };
-                    *ready_ns = free_ns.saturating_add(line.request_gap_ns.into());
+                    let heard = Addresses::NONE.with(response.ea);
+                    let free_ns = if others { line.silent_ns(expected, heard, found.end_ns) } else { found.end_ns };
+                    *ready_ns = free_ns.min(found.end_ns.max(*until_ns)).saturating_add(line.request_gap_ns.into());
                 }
-                Ok(_) => {}
+                Ok(_) if others => {}
+                Ok(_) => *end = Some(Err(Error::TwoResponses)),
                 Err(error) => *refused = refused.or(Some(error)),
             });
         }
@@ -152,8 +155,10 @@ impl Transaction {
 
 /// A multi-response request and the responses of all encoders, frame by frame or in blocks.
 ///
-/// It is done when every encoder that was asked has been heard, or when the slot of the highest address on the line has
-/// passed; what is missing then is said by [`Bus`]. A response that is lost or damaged costs no other one.
+/// Each response can be used as soon as it has come, by [`exchange`](Self::exchange); a missing encoder delays nobody's. It is
+/// done when every encoder that was asked has been heard, or when those that are missing have had their turn; which they are is
+/// said by [`Bus`]. The line is free once every address up to [`Line::highest`] has been heard or has had its turn: say how many
+/// encoders there are. A response that is lost or damaged costs no other one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BusTransaction {
@@ -186,7 +191,7 @@ impl BusTransaction {
             None => line,
         };
         let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
-        let refused = request.check(resolution).err();
+        let refused = refusal(request, resolution, &line);
         Self {
             request,
             expected,
@@ -225,7 +230,7 @@ impl BusTransaction {
     /// was switched on. If that is after the request, a response may stand anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
         if !self.ended {
-            let Self { hunt, line, expected, bus, began_ns, .. } = self;
+            let Self { hunt, line, expected, bus, began_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
                 if let Ok(response) = found.outcome {
                     if let Some(began) = began_ns.get_mut(usize::from(response.ea.get())) {
@@ -233,6 +238,9 @@ impl BusTransaction {
                     }
                 }
                 bus.take(found.outcome);
+                if found.outcome.is_ok() {
+                    *until_ns = line.silent_ns(expected, bus.heard(), found.end_ns).min(*until_ns);
+                }
             });
             self.ended = self.bus.heard_all();
             self.free();
@@ -253,7 +261,7 @@ impl BusTransaction {
         self.progress()
     }
 
-    /// Encoders that were not asked, or heard already, may still speak.
+    /// Encoders that were not heard may still speak.
     fn free(&mut self) {
         self.ready_ns = self.until_ns.saturating_add(self.line.request_gap_ns.into());
     }
@@ -278,6 +286,11 @@ impl BusTransaction {
         let began_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
         Some(Exchange { response, sampled_ns: self.asked_ns, began_ns })
     }
+}
+
+/// Why a request is not to be sent.
+fn refusal(request: Request, resolution: Resolution, line: &Line) -> Option<Error> {
+    request.check(resolution).err().or_else(|| (!line.leaves_time()).then_some(Error::Line))
 }
 
 servowire_core::machine!(Transaction { Transmission, [Option<u16>] => Exchange, Error });

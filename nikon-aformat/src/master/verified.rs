@@ -1,5 +1,6 @@
 use super::eeprom::{READY_POLLING, is_busy, status_of};
 use super::{EepromRead, Step, Write};
+use crate::command::Command;
 use crate::data::Data;
 use crate::error::Error;
 use crate::number::EncoderAddress;
@@ -11,7 +12,8 @@ use crate::status::Alm;
 /// A [`Write`] that ends as done, not done, or with an unknown effect.
 ///
 /// 1. STATUS, until ES0 is clear: a busy encoder repeats the arguments and does nothing. MEMERR must be clear, so that it tells
-///    about this write. (Not where the address of the encoder is not known: commands 19 and 20.)
+///    about this write. The only encoder on a line (command 19) is asked for its address before, by command 17; where an encoder
+///    is chosen by its identification code (command 20) its address is not known, and MEMERR says nothing.
 /// 2. The write, **once**, 30 ms, STATUS. MEMERR must still be clear.
 /// 3. What was written is read back, also if the response to the write is missing.
 ///
@@ -20,13 +22,17 @@ use crate::status::Alm;
 /// | `Done` | has stored it |
 /// | [`Error::NotDone`] | has something else stored |
 /// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::BankError`] | was not asked to write, or reports that it failed |
-/// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back |
+/// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back, or MEMERR is set and may have been before (command 20) |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerifiedWrite {
     write: Write,
     back: Back,
+    /// Whom to ask for the status.
+    ea: EncoderAddress,
     phase: Phase,
+    /// MEMERR is set, perhaps since before.
+    doubtful: bool,
     tries: u16,
     end: Option<Step<()>>,
 }
@@ -34,6 +40,7 @@ pub struct VerifiedWrite {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Phase {
+    Address,
     Ready,
     Writing,
     ReadingBack,
@@ -60,30 +67,42 @@ impl VerifiedWrite {
             Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),
             _ => Back::Id(Request::new(ea, Operation::IdRead1)),
         };
-        Self { write, back, phase: Phase::Ready, tries: 0, end: None }
+        Self { write, back, ea, phase: Phase::Ready, doubtful: false, tries: 0, end: None }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<()> {
         self.tries = 0;
+        self.doubtful = false;
         self.end = None;
         let Request { ea, operation } = self.write.request();
+        self.ea = ea;
         match operation {
-            Operation::IdWrite2 { .. } | Operation::SetAddress2 { .. } => self.begin(now_ns),
-            _ => {
-                self.phase = Phase::Ready;
-                Step::Send { request: Request::new(ea, Operation::Status), not_before_ns: now_ns }
-            }
+            Operation::SetAddress2 { .. } => self.begin(now_ns),
+            Operation::IdWrite2 { .. } => self.ask(Phase::Address, now_ns),
+            _ => self.ask(Phase::Ready, now_ns),
         }
+    }
+
+    /// Asks for the address of the only encoder, or for the status.
+    const fn ask(&mut self, phase: Phase, not_before_ns: u64) -> Step<()> {
+        self.phase = phase;
+        let operation = if let Phase::Address = phase { Operation::IdRead2 } else { Operation::Status };
+        Step::Send { request: Request::new(self.ea, operation), not_before_ns }
     }
 
     servowire_core::receive! { () }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         match self.phase {
+            Phase::Address => self.address(outcome, ready_ns),
             Phase::Ready => self.ready(outcome, ready_ns),
             Phase::Writing => match self.write.receive(outcome, ready_ns) {
                 Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+                Step::Failed { error: Error::MemoryFault, ready_ns } if self.is_chosen_by_id() => {
+                    self.doubtful = true;
+                    self.read_back(ready_ns)
+                }
                 Step::Failed { error: error @ (Error::MemoryFault | Error::BankError), ready_ns } => {
                     Step::Failed { error, ready_ns }
                 }
@@ -99,9 +118,28 @@ impl VerifiedWrite {
         Step::Send { request: self.write.request(), not_before_ns }
     }
 
+    /// Whether the address of the encoder is not known before.
+    const fn is_chosen_by_id(&self) -> bool {
+        matches!(self.write.request().operation, Operation::SetAddress2 { .. })
+    }
+
+    fn address(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
+        match outcome {
+            Ok(response) if response.command() == Some(Command::IdRead2) => {
+                self.ea = response.ea;
+                self.tries = 0;
+                self.ask(Phase::Ready, ready_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into()))
+            }
+            other => {
+                let ask = Request::new(self.ea, Operation::IdRead2);
+                self.again(ask, other.err().unwrap_or(Error::NotCarried), ready_ns)
+            }
+        }
+    }
+
     fn ready(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         let soon_ns = ready_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
-        let error = match status_of(self.write.request().ea, outcome) {
+        let error = match status_of(self.ea, outcome) {
             Ok((response, alm)) if !is_busy(response) && !alm.contains(Alm::MEMBUSY) => {
                 if alm.contains(Alm::MEMERR) {
                     return Step::Failed { error: Error::MemoryFault, ready_ns: soon_ns };
@@ -111,8 +149,7 @@ impl VerifiedWrite {
             Ok(_) => Error::Busy { tries: self.tries.saturating_add(1) },
             Err(error) => error,
         };
-        let ask = Request::new(self.write.request().ea, Operation::Status);
-        self.again(ask, error, ready_ns)
+        self.again(Request::new(self.ea, Operation::Status), error, ready_ns)
     }
 
     /// Asks once more, a millisecond later, up to forty times.
@@ -128,30 +165,26 @@ impl VerifiedWrite {
     fn read_back(&mut self, not_before_ns: u64) -> Step<()> {
         self.phase = Phase::ReadingBack;
         self.tries = 0;
-        match &mut self.back {
-            Back::Word { read, .. } => match read.start(not_before_ns) {
-                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                // Never: a read begins with a request.
-                Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => {
-                    Step::Failed { error: Error::EffectUnknown, ready_ns }
-                }
-            },
-            Back::Id(request) => Step::Send { request: *request, not_before_ns },
-        }
+        let request = match &mut self.back {
+            Back::Word { read, .. } => read.begin(),
+            Back::Id(request) => *request,
+        };
+        Step::Send { request, not_before_ns }
     }
 
     fn compare(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         let written = self.write.request();
         match &mut self.back {
             Back::Word { read, data } => match read.receive(outcome, ready_ns) {
-                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                Step::Done { value, ready_ns } if value == *data => Step::Done { value: (), ready_ns },
-                Step::Done { ready_ns, .. } => Step::Failed { error: Error::NotDone, ready_ns },
                 Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
+                Step::Done { value, ready_ns } if value != *data => Step::Failed { error: Error::NotDone, ready_ns },
+                step => step.and_then(|_, ready_ns| Step::Done { value: (), ready_ns }),
             },
             Back::Id(request) => {
                 let request = *request;
                 match outcome.ok().and_then(|response| same(written, request, response)) {
+                    // Whether it was stored is what MEMERR would say.
+                    Some(true) if self.doubtful => Step::Failed { error: Error::EffectUnknown, ready_ns },
                     Some(true) => Step::Done { value: (), ready_ns },
                     Some(false) => Step::Failed { error: Error::NotDone, ready_ns },
                     None => self.again(request, Error::EffectUnknown, ready_ns),

@@ -80,7 +80,8 @@ impl Write {
         /// The value is the response to STATUS.
         ///
         /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with [`Error::EffectUnknown`] if no
-        /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set.
+        /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set, by this write or since
+        /// before.
         Response
     }
 

@@ -36,19 +36,14 @@ fn seeds(ends: &[&str], run: impl Fn(&Setup, &mut Shown)) {
 
 #[test]
 fn hostile_resets() {
-    let ends =
-        ["zero preset: done", "zero preset: interrupted", "zero preset: effect_unknown", "noisy zero preset: done"];
+    let ends = ["zero preset: done", "zero preset: not_done", "zero preset: effect_unknown", "noisy zero preset: done"];
     seeds(&ends, |setup, shown| zero_presets(setup, setup.seed % 8 >= 4, 6, shown));
 }
 
 #[test]
 fn hostile_addresses() {
-    let ends = [
-        "address by wire: done",
-        "address by wire: interrupted",
-        "address by ID: done",
-        "address by ID: effect_unknown",
-    ];
+    let ends =
+        ["address by wire: done", "address by wire: not_done", "address by ID: done", "address by ID: effect_unknown"];
     seeds(&ends, |setup, shown| {
         addresses_by_wire(setup, 4, shown);
         addresses_by_id(setup, 6, shown);

@@ -207,9 +207,12 @@ fn an_identification_code_is_read_back() {
 fn other_writes_and_how_they_are_read_back() {
     let new = EncoderId::truncate(0x12_3456);
     let zero = EncoderAddress::ZERO;
-    // No address to ask for the status: it begins with the write; every address may answer.
+    // It is asked for its address and its status before; every address may answer.
     let mut only = VerifiedWrite::new(Write::id_of_the_only_encoder(new));
-    assert_eq!(only.start(7), send(zero, Operation::IdWrite2 { id: new }, 7));
+    assert_eq!(only.start(7), send(zero, Operation::IdRead2, 7));
+    assert_eq!(only.receive(LOST, 0), send(zero, Operation::IdRead2, MS));
+    assert_eq!(only.receive(id(EA, Command::IdRead2, 0, 1), 0), send(EA, Operation::Status, 10_000));
+    assert_eq!(only.receive(idle(), 0), send(zero, Operation::IdWrite2 { id: new }, 10_000));
     assert_eq!(only.receive(LOST, 0), send(zero, Operation::IdRead2, 30 * MS));
     assert_eq!(only.receive(id(EA, Command::IdRead2, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
 
@@ -236,6 +239,46 @@ fn other_writes_and_how_they_are_read_back() {
     let _ = word.start(0);
     assert_eq!(word.receive(idle(), 0), send(EA, bank, 10_000));
     assert_eq!(word.receive(LOST, 0), send(EA, Operation::EepromReadBank { bank: 3, address: 0x11 }, 30 * MS));
+}
+
+/// MEMERR that was set long ago: command 19 does not begin, command 20 cannot know, and neither says that it failed.
+#[test]
+fn an_old_memory_fault_says_nothing_of_a_write() {
+    let (new, zero) = (EncoderId::truncate(0x12_3456), EncoderAddress::ZERO);
+    let fault = || said(EA, Command::Status, 0, Data::Status { alm: Alm::MEMERR, pm_alm: PmAlm::empty() });
+    let mut only = VerifiedWrite::new(Write::id_of_the_only_encoder(new));
+    let _ = only.start(0);
+    let _ = only.receive(id(EA, Command::IdRead2, 0, 1), 0);
+    assert_eq!(only.receive(fault(), 0), Step::Failed { error: Error::MemoryFault, ready_ns: 10_000 });
+
+    for (held, error) in [(0x12_3456, Error::EffectUnknown), (1, Error::NotDone)] {
+        let mut address = VerifiedWrite::new(Write::address(new, EA));
+        assert_eq!(address.start(7), send(EA, Operation::SetAddress2 { id: new }, 7));
+        let answered = id(zero, Command::SetAddress2, 0, 0x12_3456);
+        assert_eq!(address.receive(answered, 0), send(EA, Operation::Status, 30 * MS));
+        assert_eq!(address.receive(fault(), 0), send(EA, Operation::IdRead1, 0));
+        let end = address.receive(id(EA, Command::IdRead1, 0, held), 9);
+        assert_eq!(end, Step::Failed { error, ready_ns: 9 });
+    }
+}
+
+/// The count was begun anew by another command, so fewer than eight requests have no effect; a plain reset cannot say that.
+#[test]
+fn not_done_only_after_the_count_was_begun_anew() {
+    let answer = || said(EA, Command::ZeroPreset, 0, Data::Status { alm: Alm::empty(), pm_alm: PmAlm::empty() });
+    for done in 0..8 {
+        let plain = || Reset::set_single_turn_zero_and_shift_commutation_angle(EA);
+        let (mut guarded, mut bare) = (GuardedReset::new(plain()), plain());
+        let _ = (guarded.start(0), bare.start(0), guarded.receive(idle(), 0));
+        for _ in 0..done {
+            let _ = (guarded.receive(answer(), 0), bare.receive(answer(), 0));
+        }
+        let (sure, open) = (guarded.receive(LOST, 0), bare.receive(LOST, 0));
+        let error = if done == 7 { Error::EffectUnknown } else { Error::Interrupted { done } };
+        assert_eq!(open, Step::Failed { error, ready_ns: 30 * MS });
+        let (error, ready_ns) = if done == 7 { (Error::EffectUnknown, 30 * MS) } else { (Error::NotDone, 10_000) };
+        assert_eq!(sure, Step::Failed { error, ready_ns });
+    }
 }
 
 /// A word of a bank: another address, twice the own one; what comes from another bank or address is begun anew.

@@ -95,14 +95,45 @@ fn what_is_known_of_the_begin_of_a_block() {
     }
 }
 
-/// Of two responses in a block the first is taken, as it would be without the block.
+/// Of two responses in a block nobody knows which one answers; of several encoders that all answer the first is taken.
 #[test]
-fn the_first_response_of_a_block() {
+fn two_responses_in_a_block() {
     let (first, second) = (response(Command::Abs40, 3, 1), response(Command::Abs40, 3, 2));
     let block: Vec<_> = [first, second].iter().flat_map(|r| r.emit().contents().to_vec()).map(Some).collect();
     let mut transaction = start(LINE);
     let _ = transaction.hear_since(&block, 4_500, 100_000);
-    assert_eq!(ended(transaction), Ok(first));
+    assert_eq!(ended(transaction), Err(Error::TwoResponses));
+
+    let all = [response(Command::Abs40Mt, 0, 7), response(Command::Abs40Mt, 1, 8)];
+    let block: Vec<_> = all.iter().flat_map(|r| r.emit().contents().to_vec()).map(Some).collect();
+    let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
+    let mut first = Transaction::start(request, Resolution::default(), LINE, 0);
+    let _ = first.hear_since(&block, 4_500, 100_000);
+    assert_eq!(ended(first), Ok(all[0]));
+}
+
+/// A shaft at rest: inside the responses of a bus that lost nothing there may be another sound one, made of the end of one
+/// response and the begin of the next, in every cycle again. All turns and positions that make one are heard.
+#[test]
+fn no_response_is_lost_on_a_sound_line() {
+    let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
+    let expected = request.expected(Resolution::default());
+    let next = response(Command::Abs40Mt, 1, 0x1234).emit().contents().to_vec();
+    let mut chances = 0;
+    for low in 0..1 << 16 {
+        // The third frame looks like the first one of encoder 0.
+        let contents = response(Command::Abs40Mt, 0, low | 0x0104 << 16 | 5 << 32).emit().contents().to_vec();
+        let inside: Vec<_> = contents[2..].iter().chain(&next[..2]).copied().collect();
+        if Response::parse_words(&expected, &inside, BitOrder::LsbFirst).is_err() {
+            continue;
+        }
+        chances += 1;
+        let block: Vec<_> = contents.iter().chain(&next).copied().map(Some).collect();
+        let mut bus = bus(0b11, LINE);
+        let _ = bus.hear_since(&block, 4_500, 60_000);
+        assert_eq!(bus.bus().missing(), Addresses::NONE, "{low:#x}");
+    }
+    assert!(chances > 100, "{chances}");
 }
 
 /// The first frame comes twice, and the CRC-8 over it and the first three frames is right by chance: the response begins with
@@ -172,7 +203,8 @@ fn when_it_is_over() {
     let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
     let mut first = Transaction::start(request, Resolution::default(), LINE, 0);
     let end = feed(&mut first, &frames(Command::Abs40Mt, 3), 8_000);
-    assert!(matches!(end, Progress::Done { ready_ns, .. } if ready_ns == BUS_UNTIL_NS + 10_000), "{end:?}");
+    // 26 us, seven turns of 23.5 us, 500 ns of latency.
+    assert!(matches!(end, Progress::Done { ready_ns: 201_000, .. }), "{end:?}");
     let mut late = Transaction::start(request, Resolution::default(), LINE, 0);
     let end = feed(&mut late, &frames(Command::Abs40Mt, 3), 900_000);
     assert!(matches!(end, Progress::Done { ready_ns: 928_000, .. }), "{end:?}");
@@ -259,16 +291,19 @@ fn speaks(bus: &mut BusTransaction, address: u8, begin_ns: u64) -> Progress<()> 
     bus.progress()
 }
 
-/// A bus is done when all that were asked have been heard, whoever else speaks; others may speak up to the last slot.
+/// A bus is done when all that were asked have been heard, whoever else speaks; each of the others may have its turn of 23.5 us
+/// after that, and 500 ns until it is handed over.
 #[test]
 fn a_bus_ends_by_its_addresses() {
-    let pending = Progress::Pending { until_ns: BUS_UNTIL_NS + 1 };
-    let done = Progress::Done { value: (), ready_ns: BUS_UNTIL_NS + 10_000 };
+    let pending = |until_ns| Progress::Pending { until_ns };
+    let done = |ready_ns| Progress::Done { value: (), ready_ns };
     let mut all = bus(0b110, LINE);
-    assert_eq!(speaks(&mut all, 0, 8_000), pending);
-    assert_eq!(speaks(&mut all, 1, 30_000), pending);
+    assert_eq!(speaks(&mut all, 0, 8_000), pending(26_000 + 7 * 23_500 + 501));
+    assert_eq!(speaks(&mut all, 1, 30_000), pending(48_000 + 6 * 23_500 + 501));
+    // Each is there as soon as it has come.
+    assert_eq!(all.exchange(ea(1)).map(|exchange| exchange.began_ns), Some(30_000));
     let mut lost = all;
-    assert_eq!(speaks(&mut all, 2, 52_000), done);
+    assert_eq!(speaks(&mut all, 2, 52_000), done(70_000 + 5 * 23_500 + 10_500));
     let read = |bus: &BusTransaction, address| {
         bus.exchange(ea(address)).map(|exchange| (exchange.sampled_ns, exchange.began_ns))
     };
@@ -276,13 +311,66 @@ fn a_bus_ends_by_its_addresses() {
     assert_eq!(read(&all, 2), Some((4_500, 52_000)));
     assert_eq!((read(&all, 0), all.bus().of(ea(0))), (None, Outcome::Extra(response(Command::Abs40Mt, 0, 0))));
     // It has ended: nothing is taken any more.
-    assert_eq!(speaks(&mut all, 2, 80_000), done);
+    assert_eq!(speaks(&mut all, 2, 80_000), done(198_000));
     assert!(all.bus().duplicates().is_empty());
 
-    assert_eq!(lost.poll(BUS_UNTIL_NS), pending);
-    assert_eq!((lost.poll(BUS_UNTIL_NS + 1), lost.bus().missing().bits()), (done, 0b100));
+    assert_eq!(lost.poll(189_500), pending(189_501));
+    assert_eq!((lost.poll(189_501), lost.bus().missing().bits()), (done(199_500), 0b100));
     // Nobody is asked.
     assert_eq!(bus(0, LINE).progress(), Progress::Done { value: (), ready_ns: 0 });
+}
+
+/// Eight encoders at 16 Mbit/s, 1.5 us between two of them: when the last has spoken the line is free but for the pause before
+/// the next request, and a cycle lasts 60 us. Of four at 2.5 Mbit/s one is dead: the others do not wait for its time-out.
+#[test]
+fn a_cycle_ends_when_all_have_spoken() {
+    let frames = |ea| response(Command::Abs40Mt, ea, 5).emit().contents().to_vec();
+    let run = |rate: BitRate, line: Line, asked: Addresses, there: &[u8], gap_ns: u64| {
+        let request = Request::new(asked.highest().unwrap(), Operation::Abs40Mt);
+        let mut bus = BusTransaction::start(request, Resolution::default(), asked, line, 0);
+        let mut at_ns = bus.transmission().end_ns + 3_000;
+        for ea in there {
+            for content in frames(*ea) {
+                at_ns += u64::from(rate.bits_ns(18));
+                let _ = bus.hear(&[Some(content)], at_ns);
+            }
+            at_ns += gap_ns;
+        }
+        let Progress::Done { ready_ns, .. } = (match bus.progress() {
+            Progress::Pending { until_ns } => bus.poll(until_ns),
+            end => end,
+        }) else {
+            panic!("{bus:?}")
+        };
+        (at_ns - gap_ns, ready_ns, bus.bus().missing().bits())
+    };
+    let fast = Line::new(BitRate::Mbit16);
+    let all = run(BitRate::Mbit16, fast, Addresses::ALL, &[0, 1, 2, 3, 4, 5, 6, 7], 1_500);
+    // 1.125 us of request, 3 us, eight responses of 4.5 us, seven pauses; 10 us.
+    assert_eq!(all, (50_625, 60_625, 0));
+    let slow = Line::new(BitRate::Mbit2_5).with_highest(ea(3));
+    let (last_ns, ready_ns, missing) = run(BitRate::Mbit2_5, slow, Addresses::first(4), &[0, 1, 3], 3_000);
+    // One turn: four frames of 7.2 us with three pauses of 0.75 us, 6 us before it; 0.75 us of latency, 10 us.
+    assert_eq!((ready_ns - last_ns, missing), (28_800 + 2_250 + 6_000 + 750 + 10_000, 0b100));
+}
+
+/// A time-out that is over before a response can begin by its stamp.
+#[test]
+fn absurd_lines_are_refused() {
+    let request = Request::new(ea(3), Operation::Abs40);
+    for (line, refused) in [
+        (LINE.with_response_timeout_ns(499), true),
+        (LINE.with_response_timeout_ns(500), false),
+        (LINE.with_turn_around_ns(250_001), true),
+        (LINE.with_turn_around_ns(250_000), false),
+        (LINE.with_hand_over_ns(250_001), true),
+    ] {
+        let one = Transaction::start(request, Resolution::default(), line, 77);
+        let want = Progress::Failed { error: Error::Line, ready_ns: 77 };
+        assert_eq!(one.progress() == want, refused, "{line:?}");
+        let all = BusTransaction::start(request, Resolution::default(), Addresses::ALL, line, 77);
+        assert_eq!(all.progress() == Progress::Failed { error: Error::Line, ready_ns: 77 }, refused, "{line:?}");
+    }
 }
 
 /// The wait is sized for the highest address on the line, and for that of those who are asked.

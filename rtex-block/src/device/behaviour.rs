@@ -21,6 +21,12 @@ flag_set! {
         REFUSES_TO_CLEAR = 1 << 7;
         /// The command that clears an alarm is executed, and the alarm is there all the same.
         ALARM_STAYS = 1 << 8;
+        /// A homing that starts leaves Homing_Complete as it is; otherwise it is 0 until the end.
+        HOMED_THROUGH_HOMING = 1 << 9;
+        /// Homing_Complete goes to 0 with the servo.
+        UNHOMED_BY_SERVO_OFF = 1 << 10;
+        /// Homing_Complete goes to 0 with an alarm.
+        UNHOMED_BY_ALARM = 1 << 11;
     }
 }
 

@@ -1,7 +1,8 @@
 mod execute;
+mod job;
 mod sub_block;
 
-use execute::Job;
+use job::Job;
 
 use super::behaviour::{Behaviour, Quirks};
 use super::check::{Verdict, check};
@@ -9,8 +10,8 @@ use super::config::DriveConfig;
 use super::fault::Fault;
 use super::literals::{
     CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NON_CYCLIC, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON,
-    SHOWN_ACTIVE, SHOWN_ALARM, SHOWN_HOMED, SHOWN_IN_POSITION, SHOWN_IN_PROGRESS, SHOWN_READY, SHOWN_TORQUE_LIMITED,
-    SHOWN_WARNING, SMOOTH_STOP, WRONG_MODE,
+    SHOWN_ACTIVE, SHOWN_ALARM, SHOWN_E_STOP, SHOWN_HOMED, SHOWN_IN_POSITION, SHOWN_IN_PROGRESS, SHOWN_READY,
+    SHOWN_TORQUE_LIMITED, SHOWN_WARNING, SMOOTH_STOP, WRONG_MODE,
 };
 use super::motion::{Drivemode, Motion};
 use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, SPEED_UNIT, SUB_RESPONSE_DATA};
@@ -226,7 +227,7 @@ impl Drive {
         self.fault = fault;
         match fault {
             Fault::Alarm(alarm) => self.raise(alarm),
-            Fault::NoMainPower | Fault::ServoDrop => self.motion.release(0),
+            Fault::NoMainPower | Fault::ServoDrop | Fault::EmergencyStop => self.motion.release(0),
             Fault::None | Fault::Silent | Fault::StaleEcho | Fault::WrongMacId(_) => {}
         }
     }
@@ -238,6 +239,7 @@ impl Drive {
             self.history.rotate_right(1);
             self.history[0] = Some(alarm);
         }
+        self.homed &= !self.behaviour.does(Quirks::UNHOMED_BY_ALARM);
         self.motion.release(0);
     }
 
@@ -270,7 +272,7 @@ impl Drive {
 
     /// Servo_Ready: main power, no alarm, synchronised.
     pub const fn is_ready(&self) -> bool {
-        !matches!(self.fault, Fault::NoMainPower)
+        !matches!(self.fault, Fault::NoMainPower | Fault::EmergencyStop)
             && self.alarm.is_none()
             && self.exchanges >= self.config.sync_exchanges
     }
@@ -311,7 +313,8 @@ impl Drive {
         let [response_data1, ..] = self.response_data();
         let byte1 = self.echo & 0x7f | if self.error.is_some() { 0x80 } else { 0 };
         let tail = self.noncyclic(shown);
-        let present = Block::new(self.config.mac_id.get(), byte1, [shown, self.inputs], response_data1, tail);
+        let inputs = self.inputs | if self.fault == Fault::EmergencyStop { SHOWN_E_STOP } else { 0 };
+        let present = Block::new(self.config.mac_id.get(), byte1, [shown, inputs], response_data1, tail);
         self.pending.rotate_right(1);
         let out = match usize::from(self.behaviour.echo_lag).checked_sub(1) {
             None => present,
@@ -462,8 +465,12 @@ impl Drive {
             CT => Drivemode::Torque(self.data1),
             _ => Drivemode::Profile,
         };
+        if !self.motion.is_active() {
+            self.homed &= !self.behaviour.does(Quirks::UNHOMED_BY_SERVO_OFF);
+        }
         let (hard, smooth) = (self.control & HARD_STOP != 0, self.control & SMOOTH_STOP != 0);
         if mode == Drivemode::Profile && (hard || smooth) && self.motion.is_active() {
+            self.homing = false;
             return self.motion.stop_profile(!hard, ramp, &self.config);
         }
         let pause = self.control & PAUSE != 0;
@@ -473,11 +480,13 @@ impl Drive {
             let (main, sub) = ERR27_4;
             self.raise(Alarm { main, sub });
         }
-        // The origin becomes 0.
+        // The origin becomes 0, if it was found.
         if self.homing && self.motion.profile.is_none() {
             self.homing = false;
-            self.homed = self.motion.is_active();
-            self.motion.shift(self.motion.command.wrapping_neg());
+            if self.motion.is_active() && mode == Drivemode::Profile {
+                self.homed = true;
+                self.motion.shift(self.motion.command.wrapping_neg());
+            }
         }
     }
 }

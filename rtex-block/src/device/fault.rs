@@ -18,6 +18,8 @@ pub enum Fault {
     WrongMacId(MacId),
     /// The main power is gone: the motor is released, and the drive is not ready.
     NoMainPower,
+    /// Emergency stop: the motor is released without an alarm, the drive is not ready, and E-STOP is 1.
+    EmergencyStop,
     /// The motor is released once, without an alarm; Servo_Ready stays 1.
     ServoDrop,
     /// It raises this alarm once, and releases the motor. An alarm that is already there stays.
@@ -30,6 +32,7 @@ servowire_core::one_line!(Fault {
     Self::StaleEcho => "sends its last block again";
     Self::WrongMacId(mac_id) => "sends MAC-ID {}", mac_id;
     Self::NoMainPower => "no main power";
+    Self::EmergencyStop => "emergency stop";
     Self::ServoDrop => "drops the servo";
     Self::Alarm(alarm) => "raises {}", alarm;
 });

@@ -80,6 +80,9 @@ pub(super) const PAUSE: u16 = 0x2000;
 pub(super) const SMOOTH_STOP: u16 = 0x4000;
 pub(super) const HARD_STOP: u16 = 0x8000;
 
+/// E-STOP, byte 3 of a response.
+pub(super) const SHOWN_E_STOP: u8 = 0x80;
+
 /// Status_Flags, byte 2 of a response.
 pub(super) const SHOWN_ACTIVE: u8 = 0x80;
 pub(super) const SHOWN_READY: u8 = 0x40;

@@ -12,17 +12,18 @@ use crate::position::Gear;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Limits {
-    /// Unchanged echoes of the counter that count as a time-out.
+    /// Update periods without a block on time that count as a time-out.
     pub echo: NonZeroU16,
-    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready.
-    pub ready: u32,
+    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed: the main
+    /// power may be switched on whenever somebody likes.
+    pub ready: Option<u32>,
     /// From Servo_On to Servo_Active.
     pub active: u32,
     /// From Servo_On = 0 to Servo_Active = 0.
     pub inactive: u32,
     /// For the answer to a request, and for the start of a profile motion.
     pub answer: u32,
-    /// For a controlled deceleration ([`StopPolicy::Decelerate`]).
+    /// For a controlled deceleration ([`StopCategory::One`] and [`Two`](StopCategory::Two)).
     pub stop: u32,
     /// Consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. One may come from
     /// a single damaged frame; the drive holds the command before it then.
@@ -33,11 +34,11 @@ impl Limits {
     /// `echo` for the echo of the counter and for command errors, `wait` for everything that is waited for. The vendor's
     /// times are not known, so there is no default.
     pub const fn new(echo: NonZeroU16, wait: u32) -> Self {
-        Self { echo, ready: wait, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
+        Self { echo, ready: None, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
     }
 
     servowire_core::builder! {
-        with_ready: ready, u32;
+        with_ready: ready, Option<u32>;
         with_active: active, u32;
         with_inactive: inactive, u32;
         with_answer: answer, u32;
@@ -46,26 +47,20 @@ impl Limits {
     }
 }
 
-/// What an axis does when another one of the ring has failed.
-///
-/// Whatever it says, a failure of the communication makes every axis servo-off in the same update period, as the System
-/// Design Guide for Master asks for; and an axis that fails itself is switched off at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// How an axis is stopped; the categories are those of IEC 60204-1. None of this is a safety function: what has to stop a motor when
+/// this program does not is hardware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum StopPolicy {
+pub enum StopCategory {
     /// Servo-off in the same update period.
-    #[default]
-    AtOnce,
+    Zero,
     /// Slows down, then servo-off; servo-off anyway when [`Limits::stop`] is over. A profile motion is ended with
-    /// Smooth_Stop, a torque command is taken away at once.
-    Decelerate {
-        /// Change of the step (CP, command units) or of the speed (CV, unit by Pr7.25) in each update period; 0 counts
-        /// as 1.
-        per_update: u32,
-    },
-    /// Goes on.
-    None,
+    /// Smooth_Stop, a torque command is taken away at once, and an axis without a [deceleration](AxisConfig::deceleration) is
+    /// switched off at once.
+    One,
+    /// Slows down as in category 1, and stays energised at rest ([`AxisState::Held`](super::AxisState::Held)).
+    Two,
 }
 
 /// What an axis is set up with.
@@ -92,8 +87,13 @@ pub struct AxisConfig {
     pub max_speed: Option<u32>,
     /// Largest torque command in CT, 0.1 % of rated; `None` leaves it to the drive.
     pub max_torque: Option<u32>,
-    /// What it does when another axis fails; at once unless changed.
-    pub stop: StopPolicy,
+    /// How it stops when another axis fails, `None` if it goes on; category 0 unless changed. Whatever it says, a failure of the
+    /// communication makes every axis servo-off in the same update period, as the System Design Guide for Master asks for, and an
+    /// axis that fails itself is switched off at once.
+    pub stop: Option<StopCategory>,
+    /// Change of the step (CP, command units) or of the speed (CV, unit by Pr7.25) in each update period of a stop of category 1 or
+    /// 2; 0 unless changed, which leaves category 0.
+    pub deceleration: u32,
 }
 
 impl AxisConfig {
@@ -108,7 +108,8 @@ impl AxisConfig {
             over_speed: None,
             max_speed: None,
             max_torque: None,
-            stop: StopPolicy::AtOnce,
+            stop: Some(StopCategory::Zero),
+            deceleration: 0,
         }
     }
 
@@ -117,6 +118,7 @@ impl AxisConfig {
         with_over_speed: over_speed, Option<u32>;
         with_max_speed: max_speed, Option<u32>;
         with_max_torque: max_torque, Option<u32>;
-        with_stop: stop, StopPolicy;
+        with_stop: stop, Option<StopCategory>;
+        with_deceleration: deceleration, u32;
     }
 }

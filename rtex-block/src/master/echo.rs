@@ -2,9 +2,40 @@ use core::num::NonZeroU16;
 
 use crate::header::UpdateCounter;
 
-/// Notices that the echo of the counter stands still.
+/// Values of the counter. A block that is as many periods old as that has the echo of a new one, so what must not be taken from an
+/// old block waits for as many new ones.
+pub(super) const TURN: u8 = 4;
+
+/// When a block came, by its counter echo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Arrival {
+    /// With the echo that is due: as many counters behind the one sent last as in every exchange of this system.
+    OnTime,
+    /// With the echo of the block before: no frame came, or the drive stands still.
+    Repeated,
+    /// With the echo of another period: the answer is late, or of the frame after; the bank is the wrong one.
+    OffTime {
+        /// Counters from the one echoed to the one sent last, modulo 4.
+        lag: u8,
+    },
+    /// No block, or one that was refused.
+    Missing,
+}
+
+servowire_core::one_line!(Arrival {
+    Self::OnTime => "on time";
+    Self::Repeated => "the echo of the block before";
+    Self::OffTime { lag } => "the echo of another period, {} counters behind", lag;
+    Self::Missing => "no block";
+});
+
+/// Judges every block by its counter echo, and notices that no block comes on time.
 ///
-/// Sample once per update period. `limit` consecutive samples that equal the one before trip the watch, and it
+/// The lag from the counter sent to the echo read is the same in every exchange of a system; it is learned with the first block,
+/// and anew from a whole turn of the counter as long as the servo is off. A block with another lag is of another frame.
+///
+/// `limit` consecutive samples without a block on time trip the watch, and it
 /// stays tripped: command servo-off to **all** axes then ([`ServoOff`](super::ServoOff)). The time is not given by the
 /// vendor, so the limit is the caller's. System Design Guide for Master, "Time-out by the counter echo".
 ///
@@ -14,55 +45,87 @@ use crate::header::UpdateCounter;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EchoWatch {
     limit: NonZeroU16,
-    echo: Standstill,
+    /// Samples since the last one on time.
+    updates: u16,
+    last: Option<UpdateCounter>,
+    lag: Option<u8>,
+    /// A lag that was seen instead, and how often in a row.
+    other: u8,
+    seen: u8,
 }
 
 impl EchoWatch {
-    /// A watch that trips after `limit` unchanged samples.
+    /// A watch that trips after `limit` samples without a new echo.
     pub const fn new(limit: NonZeroU16) -> Self {
-        Self { limit, echo: Standstill::new() }
+        Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0 }
     }
 
-    /// Takes a sample; `None` where the update period brought no block of the drive, which counts as unchanged.
-    /// Gives whether the watch is tripped.
+    /// Takes a sample where the counter sent is not known; `None` where the update period brought no block of the drive, which
+    /// counts as unchanged. Gives whether the watch is tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
-        if !self.is_tripped() {
-            self.echo.sample(echo);
-        }
+        let is_new = echo.is_some() && echo != self.last;
+        self.last = echo.or(self.last);
+        self.count(is_new);
         self.is_tripped()
+    }
+
+    /// Takes the echo that came after `sent`, `missed` update periods without an exchange before; `learns`: the servo is off.
+    pub(super) fn judge(
+        &mut self,
+        sent: UpdateCounter,
+        echo: Option<UpdateCounter>,
+        missed: u8,
+        learns: bool,
+    ) -> Arrival {
+        let arrival = match echo {
+            None => Arrival::Missing,
+            Some(echo) if self.last == Some(echo) => Arrival::Repeated,
+            Some(echo) => {
+                self.last = Some(echo);
+                self.place(sent.get().wrapping_sub(echo.get()) & 3, missed, learns)
+            }
+        };
+        self.count(arrival == Arrival::OnTime);
+        arrival
+    }
+
+    /// A new echo with this lag.
+    #[inline]
+    fn place(&mut self, lag: u8, missed: u8, learns: bool) -> Arrival {
+        // In a period that was missed no counter was sent, or it went out a frame later.
+        let due = *self.lag.get_or_insert(lag);
+        if lag == due || missed > 0 && lag < due && due <= lag.saturating_add(missed) {
+            self.seen = 0;
+            return Arrival::OnTime;
+        }
+        self.seen = if self.other == lag { self.seen.saturating_add(1) } else { 1 };
+        self.other = lag;
+        if learns && self.seen >= TURN {
+            (self.lag, self.seen) = (Some(lag), 0);
+            return Arrival::OnTime;
+        }
+        Arrival::OffTime { lag }
+    }
+
+    const fn count(&mut self, on_time: bool) {
+        if !self.is_tripped() {
+            self.updates = if on_time { 0 } else { self.updates.saturating_add(1) };
+        }
     }
 
     /// Whether the limit was reached.
     pub const fn is_tripped(&self) -> bool {
-        self.echo.updates >= self.limit.get() as u32
+        self.updates >= self.limit.get()
     }
 
-    /// Forgets everything: the link was set up anew.
+    /// An echo while invalid data go out: the one after it has to be another.
+    pub(super) const fn note(&mut self, echo: UpdateCounter) {
+        self.last = Some(echo);
+    }
+
+    /// The link was set up anew. What lies in the memory from before is not new for that.
     pub const fn reset(&mut self) {
-        *self = Self::new(self.limit);
-    }
-}
-
-/// The last echo of the counter, and how long it has stood still.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) struct Standstill {
-    last: Option<UpdateCounter>,
-    /// Samples since the last one that was another than the one before.
-    updates: u32,
-}
-
-impl Standstill {
-    pub(super) const fn new() -> Self {
-        Self { last: None, updates: 0 }
-    }
-
-    pub(super) fn sample(&mut self, echo: Option<UpdateCounter>) {
-        if echo.is_none() || echo == self.last {
-            self.updates = self.updates.saturating_add(1);
-        } else {
-            (self.last, self.updates) = (echo, 0);
-        }
+        *self = Self { last: self.last, ..Self::new(self.limit) };
     }
 }
 
@@ -73,32 +136,32 @@ impl Standstill {
 /// Guide for Master, chapters 1 and 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ReceiveWatchdog {
+pub(super) struct ReceiveWatchdog {
     limit: NonZeroU16,
     ticks: u16,
 }
 
 impl ReceiveWatchdog {
     /// A watchdog that trips at the `limit`-th tick without a reception.
-    pub const fn new(limit: NonZeroU16) -> Self {
+    pub(super) const fn new(limit: NonZeroU16) -> Self {
         Self { limit, ticks: 0 }
     }
 
     /// A frame was received. A watchdog that has tripped stays so.
-    pub const fn frame_received(&mut self) {
+    pub(super) const fn frame_received(&mut self) {
         if !self.is_tripped() {
             self.ticks = 0;
         }
     }
 
     /// An update period has passed; gives whether the watchdog is tripped.
-    pub const fn tick(&mut self) -> bool {
+    pub(super) const fn tick(&mut self) -> bool {
         self.ticks = self.ticks.saturating_add(1);
         self.is_tripped()
     }
 
     /// Whether the limit was reached.
-    pub const fn is_tripped(&self) -> bool {
+    pub(super) const fn is_tripped(&self) -> bool {
         self.ticks >= self.limit.get()
     }
 }
@@ -129,5 +192,56 @@ mod tests {
         assert!(!watch.sample(None));
         assert!(!watch.sample(None));
         assert!(!watch.sample(UpdateCounter::new(2)));
+    }
+
+    /// By hand: the counter sent goes on by one, and the echo is as many behind.
+    #[test]
+    fn each_block_has_its_place_in_time() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        let mut watch = EchoWatch::new(NonZeroU16::new(9).unwrap());
+        let mut at = |sent: u8, echo: u8| watch.judge(counter(sent), Some(counter(echo)), 0, false);
+        // One behind is what this system has.
+        assert_eq!([at(1, 0), at(2, 1), at(3, 2)], [Arrival::OnTime; 3]);
+        assert_eq!(at(4, 2), Arrival::Repeated);
+        // The frame was late, or the bank was not switched: two behind; then that of the next frame: none behind.
+        assert_eq!([at(5, 3), at(6, 6)], [Arrival::OffTime { lag: 2 }, Arrival::OffTime { lag: 0 }]);
+        assert_eq!([at(7, 4), at(8, 7)], [Arrival::OffTime { lag: 3 }, Arrival::OnTime]);
+        assert_eq!(watch.judge(counter(9), None, 0, false), Arrival::Missing);
+        // With the servo off another lag is learned from a whole turn, with the servo on never.
+        for (learns, last) in [(false, Arrival::OffTime { lag: 3 }), (true, Arrival::OnTime)] {
+            let mut watch = watch;
+            let seen =
+                [11, 12, 13, 14, 15].map(|sent: u8| watch.judge(counter(sent), Some(counter(sent - 3)), 0, learns));
+            assert_eq!(seen[..3], [Arrival::OffTime { lag: 3 }; 3]);
+            assert_eq!(seen[3..], [last; 2]);
+        }
+    }
+
+    /// An exchange that did not take place has sent no counter, and the frame after it carries the one before again.
+    #[test]
+    fn a_missed_exchange_is_no_early_answer() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        for (missed, lags) in [(0, 2..=2), (1, 1..=2), (2, 0..=2), (3, 0..=2)] {
+            for found in 0..4 {
+                let mut watch = EchoWatch::new(NonZeroU16::new(9).unwrap());
+                watch.judge(counter(8), Some(counter(6)), 0, false);
+                watch.judge(counter(9), Some(counter(7)), 0, false);
+                let arrival = watch.judge(counter(10), Some(counter(10 - found)), missed, false);
+                assert_eq!(arrival == Arrival::OnTime, lags.contains(&found), "{missed} {found}: {arrival}");
+            }
+        }
+    }
+
+    /// Late by a period again and again is no better than none.
+    #[test]
+    fn what_is_never_on_time_trips() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        let mut watch = EchoWatch::new(NonZeroU16::new(4).unwrap());
+        watch.judge(counter(0), Some(counter(0)), 0, false);
+        let tripped = [2, 3, 4, 5, 6].map(|sent: u8| {
+            watch.judge(counter(sent), Some(counter(sent - 1)), 0, false);
+            watch.is_tripped()
+        });
+        assert_eq!(tripped, [false, false, false, true, true]);
     }
 }

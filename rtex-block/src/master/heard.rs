@@ -1,4 +1,6 @@
-use crate::error::Error;
+use crate::block::{BlockSize, LEN32};
+use crate::error::{Error, wrong_length};
+use crate::pack::{self, Word};
 use crate::response::Response;
 use crate::sub::{Response32, SubResponse};
 
@@ -17,6 +19,19 @@ pub enum Heard {
 }
 
 impl Heard {
+    /// A block as it lies in the memory of the ASIC.
+    pub fn parse<W: Word>(size: BlockSize, words: &[W]) -> Self {
+        let mut memory = [0; LEN32];
+        let len = words.len().saturating_mul(W::BYTES);
+        let bytes = memory.get_mut(..len).unwrap_or_default();
+        match (pack::from_words(words, bytes), size) {
+            (Err(_), BlockSize::Bytes16) => Self::Refused(wrong_length(len, 16)),
+            (Err(_), BlockSize::Bytes32) => Self::Refused(wrong_length(len, 32)),
+            (Ok(()), BlockSize::Bytes16) => Response::parse(bytes).into(),
+            (Ok(()), BlockSize::Bytes32) => Response32::parse(bytes).into(),
+        }
+    }
+
     /// The main half of a sound block.
     pub const fn response(&self) -> Option<&Response> {
         match self {

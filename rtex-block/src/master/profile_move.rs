@@ -1,4 +1,5 @@
 use super::progress::{Failure, Progress};
+use super::state::StopReason;
 use crate::code::Code;
 use crate::execution::{Execution, ProfileFlags};
 use crate::header::MacId;
@@ -50,6 +51,8 @@ pub struct ProfileMove {
     target_speed: i32,
     stage: MoveStage,
     progress: Progress<CommandEnded>,
+    /// Why it is being broken off.
+    broken: Option<StopReason>,
     latch_sel1: Nibble,
     monitor_sel: u8,
     flags: ProfileFlags,
@@ -71,6 +74,7 @@ impl ProfileMove {
             target_speed,
             stage: MoveStage::Preparing,
             progress: Progress::Pending { left: limit },
+            broken: None,
             latch_sel1: Nibble::ZERO,
             monitor_sel: 0,
             flags: ProfileFlags::empty(),
@@ -108,7 +112,7 @@ impl ProfileMove {
     }
 
     /// How far it is.
-    pub const fn progress(&self) -> Progress<CommandEnded> {
+    pub(super) const fn progress(&self) -> Progress<CommandEnded> {
         self.progress
     }
 
@@ -132,10 +136,14 @@ impl ProfileMove {
         self.monitor_data
     }
 
-    /// Ends it without the drive's doing.
-    pub(super) const fn abandon(&mut self, error: Failure) {
-        if self.progress.is_pending() {
-            self.fail(error);
+    /// It ends for this reason, or because the servo is off, and for no other: at once, or, where the drive `slows` down, with In_Progress. An end that is not
+    /// `confirmed` was one of this kind.
+    pub(super) fn break_off(&mut self, reason: Option<StopReason>, confirmed: bool, slows: bool) {
+        match self.progress {
+            Progress::Pending { .. } if slows => self.broken = self.broken.or(reason),
+            Progress::Pending { .. } => self.fail(broken(self.broken.or(reason))),
+            Progress::Done { .. } if !confirmed => self.fail(broken(reason)),
+            Progress::Done { .. } | Progress::Failed { .. } => {}
         }
     }
 
@@ -169,6 +177,8 @@ impl ProfileMove {
             self.fail(Failure::Execution);
         } else if moves {
             self.stage = MoveStage::Moving;
+        } else if let (MoveStage::Moving, Some(reason)) = (self.stage, self.broken) {
+            self.fail(Failure::Stopped(reason));
         } else if self.stage == MoveStage::Moving {
             let in_position = response.status.contains(StatusFlags::IN_POSITION);
             let warning = execution.contains(Execution::WNG);
@@ -201,4 +211,9 @@ impl ProfileMove {
         self.progress = Progress::Failed { error };
         self.stage = MoveStage::Ended;
     }
+}
+
+/// Why a motion is broken off.
+fn broken(reason: Option<StopReason>) -> Failure {
+    reason.map_or(Failure::ServoOff, Failure::Stopped)
 }

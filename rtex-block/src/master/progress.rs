@@ -1,6 +1,6 @@
 use core::fmt;
 
-use super::state::AskError;
+use super::state::{AskError, StopReason};
 use crate::error_code::ErrorCode;
 use crate::type_code::Pr;
 
@@ -38,6 +38,15 @@ impl<T: fmt::Display> fmt::Display for Progress<T> {
 }
 
 impl<T> Progress<T> {
+    /// What `then` makes of the value, once it is there.
+    pub(super) fn and_then<U>(self, then: impl FnOnce(T) -> Progress<U>) -> Progress<U> {
+        match self {
+            Self::Pending { left } => Progress::Pending { left },
+            Self::Done { value } => then(value),
+            Self::Failed { error } => Progress::Failed { error },
+        }
+    }
+
     /// Whether it goes on.
     pub const fn is_pending(&self) -> bool {
         matches!(self, Self::Pending { .. })
@@ -64,8 +73,10 @@ pub enum Failure {
     TimedOut,
     /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may start yet.
     NotStarted,
-    /// The servo was switched off.
+    /// The servo was switched off, or was not on.
     ServoOff,
+    /// Broken off: the axis has stopped, or is stopping, for this reason.
+    Stopped(StopReason),
     /// The axis did not take the request of a procedure.
     NotSent(AskError),
     /// The axis is not in the mode that the procedure needs.
@@ -79,6 +90,7 @@ servowire_core::one_line!(Failure {
     Self::CommandError(code) => "not accepted: {}", code;
     Self::TimedOut => "no answer in time";
     Self::ServoOff => "the servo was switched off";
+    Self::Stopped(reason) => "broken off: {}", reason;
     Self::NotSent(error) => "not sent: {}", error;
     Self::Mode => "the axis is in another mode";
     Self::Differs(pr) => "{} did not take its value", pr;

@@ -1,4 +1,5 @@
 use super::axis::Axis;
+use super::config::StopCategory;
 use super::counter::{CommandCounter, Turn};
 use super::heard::Heard;
 use super::state::{AxisState, RingSwitchOnError, StopReason};
@@ -7,9 +8,9 @@ use crate::sub::Command32;
 
 /// All axes of a ring, in step: one call in every update period.
 ///
-/// As soon as one axis fails the others stop in the same call: at once if the communication has failed (its echo stands
-/// still), as the System Design Guide for Master asks for, otherwise each by its [`StopPolicy`](super::StopPolicy), which
-/// is at once unless changed.
+/// As soon as one axis fails the others stop in the same call: at once if the communication has failed (no block comes on
+/// time), as the System Design Guide for Master asks for, otherwise each as its [configuration](super::AxisConfig::stop) says,
+/// which is at once unless changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ring<const N: usize> {
@@ -105,7 +106,24 @@ impl<const N: usize> Ring<N> {
         }
         self.share_failures();
         self.sent = self.counter.next();
-        self.axes.each_ref().map(|axis| axis.transmission(self.sent))
+        let sent = self.sent;
+        self.axes.each_mut().map(|axis| axis.transmission(sent))
+    }
+
+    /// Invalid data (00h, counter 0) for all drives.
+    pub(super) fn invalid(&mut self) -> [Command32; N] {
+        self.axes.each_mut().map(|axis| axis.transmission(Turn::Invalid))
+    }
+
+    /// Whether these blocks are of more than one frame: the echoes of one frame are equal. A drive whose processing stands still
+    /// looks like that too.
+    pub fn is_torn(&self, heard: &[Heard; N]) -> bool {
+        let mut echoes = self.axes.iter().zip(heard).filter_map(|(axis, heard)| {
+            let response = heard.response().filter(|response| response.mac_id == axis.config().mac_id)?;
+            Some(response.update_counter_echo)
+        });
+        let first = echoes.next();
+        echoes.any(|echo| Some(echo) != first)
     }
 
     /// Switches all axes on, if all of them are off and ready.
@@ -127,13 +145,19 @@ impl<const N: usize> Ring<N> {
         self.axes.iter_mut().for_each(Axis::switch_off);
     }
 
-    /// Stops all axes at once.
-    pub fn stop(&mut self, reason: StopReason) {
-        self.axes.iter_mut().for_each(|axis| axis.stop(reason));
+    /// Stops all axes on request.
+    pub fn stop(&mut self, category: StopCategory) {
+        self.axes.iter_mut().for_each(|axis| axis.stop(category));
         self.share_failures();
     }
 
-    /// Leaves the stop: every axis waits for Servo_Ready again.
+    /// The communication has failed for this reason.
+    pub(super) fn fail(&mut self, reason: StopReason) {
+        self.axes.iter_mut().for_each(|axis| axis.fail(reason));
+        self.share_failures();
+    }
+
+    /// Leaves the stop: every axis waits for Servo_Ready again, or goes on from [`Held`](AxisState::Held).
     pub fn clear(&mut self) {
         self.failed = None;
         self.axes.iter_mut().for_each(Axis::clear);
@@ -144,19 +168,26 @@ impl<const N: usize> Ring<N> {
         self.axes.iter().all(|axis| axis.state() == state)
     }
 
-    /// Whether the communication with an axis has failed.
+    /// Whether the communication with an axis has failed, be it stopped for another reason before.
     pub fn is_timed_out(&self) -> bool {
-        self.axes.iter().any(|axis| matches!(axis.state(), AxisState::Stopped(reason) if reason.is_communication()))
+        let lost = |axis: &Axis| matches!(axis.state(), AxisState::Stopped(reason) if reason.is_communication());
+        self.axes.iter().any(|axis| axis.is_silent() || lost(axis))
     }
 
+    /// What one axis has failed of, the others do as they were told; all are off if the communication has failed.
     fn share_failures(&mut self) {
         if self.failed.is_none() {
             let place = self.axes.iter().position(|axis| matches!(axis.state(), AxisState::Stopped(_)));
             self.failed = place.and_then(|place| u8::try_from(place).ok());
         }
-        if let Some(place) = self.failed {
-            let at_once = self.is_timed_out();
-            self.axes.iter_mut().for_each(|axis| axis.share_failure(place, at_once));
+        let Some(place) = self.failed else { return };
+        let (at_once, reason) = (self.is_timed_out(), StopReason::OtherAxis { place });
+        for axis in &mut self.axes {
+            match axis.config().stop {
+                _ if at_once => axis.fail(reason),
+                Some(category) if !matches!(axis.state(), AxisState::Stopping(_)) => axis.stop_for(reason, category),
+                _ => {}
+            }
         }
     }
 }

@@ -3,19 +3,17 @@
 use core::num::NonZeroU16;
 
 use super::axis::Axis;
-use super::counter::Turn;
 use super::echo::ReceiveWatchdog;
 use super::heard::Heard;
 use super::led::{Led, led};
 use super::phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 use super::ring::{Ring, SameMacId};
-use super::slaves::{Order, Slave, compare};
+use super::slaves::{Slave, compare};
 use super::state::StopReason;
-use crate::block::{BlockSize, LEN32};
+use crate::block::BlockSize;
 use crate::header::MacId;
-use crate::pack::{self, SizeMismatch};
-use crate::response::Response;
-use crate::sub::{Command32, Response32};
+use crate::pack::{self, SizeMismatch, Word};
+use crate::sub::Command32;
 use crate::timing::{Periods, TimerSystem};
 
 /// What a master is set up with.
@@ -32,8 +30,6 @@ pub struct MasterConfig {
     /// Update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the vendor's
     /// number is not known).
     pub invalid: u32,
-    /// Whether the slave table is in the order of the ring; it is unless changed.
-    pub order: Order,
     /// Update periods without [`Master::frame_received`] that count as a time-out; `None` where the receive interrupt is not used.
     pub watchdog: Option<NonZeroU16>,
 }
@@ -41,12 +37,11 @@ pub struct MasterConfig {
 impl MasterConfig {
     /// Without receive watchdog, with the slave table in the order of the ring.
     pub const fn new(size: BlockSize, periods: Periods, timer: TimerSystem) -> Self {
-        Self { size, periods, timer, invalid: 4, order: Order::Ring, watchdog: None }
+        Self { size, periods, timer, invalid: 4, watchdog: None }
     }
 
     servowire_core::builder! {
         with_invalid: invalid, u32;
-        with_order: order, Order;
         with_watchdog: watchdog, Option<NonZeroU16>;
     }
 }
@@ -81,7 +76,7 @@ pub enum SetupError {
 ///
 /// * The main loop calls [`control`](Self::control) with the state of the ASIC, and shows [`led`](Self::led).
 /// * Interrupts stay off until [`is_running`](Self::is_running).
-/// * The NC interrupt calls one of the `exchange` functions: it reads the blocks of the last reception and writes the next
+/// * The NC interrupt calls [`exchange`](Self::exchange) or [`exchange_words`](Self::exchange_words): it reads the blocks of the last reception and writes the next
 ///   commands, before anything else is calculated. In the external-timer system it comes from the host's timer, in the
 ///   internal-timer system from XSYNC.
 /// * The receive interrupt (XINTRX), where it is used, calls [`frame_received`](Self::frame_received). External timer: its priority is
@@ -129,7 +124,7 @@ impl<const N: usize> Master<N> {
     /// One turn of the main loop: the state of the ASIC, and the slaves that the ring configuration found, once they are
     /// known.
     pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> ControlPhase {
-        let slave_info = found.map(|found| compare(&self.table, found, self.config.order));
+        let slave_info = found.map(|found| compare(&self.table, found));
         let timeout = self.is_timed_out();
         self.phases.step(Inputs { asic, slave_info, tx_ready: self.prepared, timeout });
         self.phases.phase()
@@ -183,10 +178,10 @@ impl<const N: usize> Master<N> {
     pub fn exchange(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         if !self.is_running() {
             self.prepared |= self.phases.phase() == ControlPhase::Prepare;
-            return self.ring.axes().each_ref().map(|axis| axis.transmission(Turn::Invalid));
+            return self.ring.invalid();
         }
         if self.watchdog.as_mut().is_some_and(ReceiveWatchdog::tick) {
-            self.ring.stop(StopReason::ReceiveTimeout);
+            self.ring.fail(StopReason::ReceiveTimeout);
         }
         let commands = self.ring.update(heard, end_ns);
         let timeout = self.is_timed_out();
@@ -194,39 +189,30 @@ impl<const N: usize> Master<N> {
         commands
     }
 
-    /// The exchange over memory of bytes, heard until `end_ns`: the blocks of all axes one after the other, in the order of the axes.
+    /// The exchange over memory of bytes, or of 16- or 32-bit words packed as [`pack`](crate::pack) says, heard until `end_ns`: the
+    /// blocks of all axes one after the other, in the order of the axes.
     ///
     /// # Errors
     /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_bytes(&mut self, rx: &[u8], tx: &mut [u8], end_ns: u64) -> Result<(), SizeMismatch> {
-        self.over(
-            rx,
-            tx,
-            end_ns,
-            1,
-            |words, block| block.copy_from_slice(words),
-            |block, words| words.copy_from_slice(block),
-        )
-    }
-
-    /// The exchange over memory of 16-bit words, packed as [`pack`] says.
-    ///
-    /// # Errors
-    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_words16(&mut self, rx: &[u16], tx: &mut [u16], end_ns: u64) -> Result<(), SizeMismatch> {
-        // The sizes are compared before.
-        let read = |words: &[u16], block: &mut [u8]| pack::from_words16(words, block).unwrap_or(());
-        self.over(rx, tx, end_ns, 2, read, |block, words| pack::to_words16(block, words).unwrap_or(()))
-    }
-
-    /// The exchange over memory of 32-bit words, packed as [`pack`] says.
-    ///
-    /// # Errors
-    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_words32(&mut self, rx: &[u32], tx: &mut [u32], end_ns: u64) -> Result<(), SizeMismatch> {
-        // The sizes are compared before.
-        let read = |words: &[u32], block: &mut [u8]| pack::from_words32(words, block).unwrap_or(());
-        self.over(rx, tx, end_ns, 4, read, |block, words| pack::to_words32(block, words).unwrap_or(()))
+    pub fn exchange_words<W: Word>(&mut self, rx: &[W], tx: &mut [W], end_ns: u64) -> Result<(), SizeMismatch> {
+        let size = self.config.size;
+        let bytes = size.bytes().saturating_mul(N);
+        for words in [rx.len(), tx.len()] {
+            if words.checked_mul(W::BYTES) != Some(bytes) {
+                return Err(SizeMismatch { bytes, words });
+            }
+        }
+        let words = size.bytes().checked_div(W::BYTES).unwrap_or(1);
+        let mut all = [Heard::Nothing; N];
+        for (heard, words) in all.iter_mut().zip(rx.chunks_exact(words)) {
+            *heard = Heard::parse(size, words);
+        }
+        for (command, words) in self.exchange(&all, end_ns).iter().zip(tx.chunks_exact_mut(words)) {
+            let block = command.emit();
+            // The sizes are compared above.
+            pack::to_words(block.get(..size.bytes()).unwrap_or_default(), words)?;
+        }
+        Ok(())
     }
 
     /// Leaves the stop after a time-out, an alarm or a stop of the caller: every axis waits for Servo_Ready again. A mismatch
@@ -239,42 +225,5 @@ impl<const N: usize> Master<N> {
 
     fn is_timed_out(&self) -> bool {
         self.ring.is_timed_out() || self.watchdog.is_some_and(|watchdog| watchdog.is_tripped())
-    }
-
-    /// The exchange over two memories of words of `width` bytes.
-    fn over<W>(
-        &mut self,
-        rx: &[W],
-        tx: &mut [W],
-        end_ns: u64,
-        width: usize,
-        read: impl Fn(&[W], &mut [u8]),
-        write: impl Fn(&[u8], &mut [W]),
-    ) -> Result<(), SizeMismatch> {
-        let size = self.config.size.bytes();
-        let bytes = size.saturating_mul(N);
-        for words in [rx.len(), tx.len()] {
-            if words.checked_mul(width) != Some(bytes) {
-                return Err(SizeMismatch { bytes, words });
-            }
-        }
-        let words = size.checked_div(width).unwrap_or(size);
-        let mut all = [Heard::Nothing; N];
-        for (heard, words) in all.iter_mut().zip(rx.chunks_exact(words)) {
-            let mut memory = [0; LEN32];
-            if let Some(block) = memory.get_mut(..size) {
-                read(words, block);
-                *heard = match self.config.size {
-                    BlockSize::Bytes16 => Response::parse(block).into(),
-                    BlockSize::Bytes32 => Response32::parse(block).into(),
-                };
-            }
-        }
-        for (command, words) in self.exchange(&all, end_ns).iter().zip(tx.chunks_exact_mut(words)) {
-            if let Some(block) = command.emit().get(..size) {
-                write(block, words);
-            }
-        }
-        Ok(())
     }
 }

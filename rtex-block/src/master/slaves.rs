@@ -27,18 +27,8 @@ pub enum SlaveInfo {
     Mismatch,
 }
 
-/// Whether the order along the ring matters; the guide does not say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Order {
-    /// The table lists the slaves in the order of the ring.
-    Ring,
-    /// The slaves may be wired in any order.
-    Any,
-}
-
-/// Compares the slaves found on the ring with the table.
-pub fn compare(table: &[Slave], found: &[Slave], order: Order) -> SlaveInfo {
+/// Compares the slaves found on the ring with the table, which is in the order of the ring: blocks have their place by it.
+pub fn compare(table: &[Slave], found: &[Slave]) -> SlaveInfo {
     let mut seen = 0_u32;
     let unique = found.iter().all(|slave| {
         let bit = 1_u32.wrapping_shl(slave.mac_id.get().into());
@@ -46,12 +36,7 @@ pub fn compare(table: &[Slave], found: &[Slave], order: Order) -> SlaveInfo {
         seen |= bit;
         new
     });
-    let same = table.len() == found.len()
-        && match order {
-            Order::Ring => table == found,
-            Order::Any => table.iter().all(|slave| found.contains(slave)),
-        };
-    if unique && same { SlaveInfo::Match } else { SlaveInfo::Mismatch }
+    if unique && table == found { SlaveInfo::Match } else { SlaveInfo::Mismatch }
 }
 
 #[cfg(test)]
@@ -66,15 +51,12 @@ mod tests {
     fn every_difference_is_a_mismatch() {
         let table = [slave(0, 1), slave(31, 1), slave(7, 2)];
         let turned = [table[2], table[0], table[1]];
-        assert_eq!(compare(&table, &table, Order::Ring), SlaveInfo::Match);
-        assert_eq!(compare(&table, &turned, Order::Ring), SlaveInfo::Mismatch);
-        assert_eq!(compare(&table, &turned, Order::Any), SlaveInfo::Match);
-        for found in [&table[..2], &[table[0], table[1], table[1]], &[table[0], table[1], slave(7, 3)]] {
-            for order in [Order::Ring, Order::Any] {
-                assert_eq!(compare(&table, found, order), SlaveInfo::Mismatch, "{found:?}");
-            }
+        assert_eq!(compare(&table, &table), SlaveInfo::Match);
+        let [one, two, three] = table;
+        for found in [&turned[..], &table[..2], &[one, two, two], &[one, two, slave(7, 3)], &[one, two, three, three]] {
+            assert_eq!(compare(&table, found), SlaveInfo::Mismatch, "{found:?}");
         }
         let twice = [table[0], table[0]];
-        assert_eq!(compare(&twice, &twice, Order::Any), SlaveInfo::Mismatch);
+        assert_eq!(compare(&twice, &twice), SlaveInfo::Mismatch);
     }
 }

@@ -9,12 +9,12 @@ use crate::header::MacId;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The echo of the counter stood still for the limit.
+    /// No block has come on time for the limit: the echo of the counter stands still, or is that of other periods.
     EchoTimeout,
-    /// The echo stood still because the blocks in this place come from the drive with this address: the axes are not
+    /// No block came on time because the blocks in this place come from the drive with this address: the axes are not
     /// listed in the order of the ring, or the drive's switches are set wrong.
     WrongMacId(MacId),
-    /// The echo stood still because every block was refused; the class of the last one.
+    /// No block came on time because every block was refused; the class of the last one.
     Refused(ErrorClass),
     /// The receive watchdog has tripped.
     ReceiveTimeout,
@@ -39,6 +39,8 @@ pub enum StopReason {
     },
     /// The caller stopped it.
     Requested,
+    /// A homing did not end in time, so the axis was stopped.
+    HomingTimeout,
 }
 
 impl StopReason {
@@ -49,7 +51,7 @@ impl StopReason {
 }
 
 servowire_core::one_line!(StopReason {
-    Self::EchoTimeout => "the counter echo stands still";
+    Self::EchoTimeout => "no block comes on time";
     Self::WrongMacId(other) => "the blocks come from drive {}", other;
     Self::Refused(class) => "every block was refused: {}", class.name();
     Self::ReceiveTimeout => "nothing is received";
@@ -62,11 +64,12 @@ servowire_core::one_line!(StopReason {
     Self::CommandError(code) => "command not accepted: {}", code;
     Self::OtherAxis { place } => "axis {} has failed", place;
     Self::Requested => "stopped by the caller";
+    Self::HomingTimeout => "homing did not end in time";
 });
 
 impl core::error::Error for StopReason {}
 
-/// State of an axis. Servo_On is 1 in `SwitchingOn`, `On` and `Stopping`, and in no other state.
+/// State of an axis. Servo_On is 1 in `SwitchingOn`, `On`, `Stopping` and `Held`, and in no other state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AxisState {
@@ -78,8 +81,10 @@ pub enum AxisState {
     SwitchingOn,
     /// Energised: the set-point counts.
     On,
-    /// Slowing down before servo-off; set-points are not taken.
+    /// Slowing down; set-points are not taken.
     Stopping(StopReason),
+    /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not taken.
+    Held(StopReason),
     /// Servo_On = 0, waiting for Servo_Active = 0.
     SwitchingOff,
     /// Servo_On = 0 until [`Axis::clear`](super::Axis::clear).
@@ -89,7 +94,7 @@ pub enum AxisState {
 impl AxisState {
     /// Whether the axis commands Servo_On = 1.
     pub const fn is_servo_on(self) -> bool {
-        matches!(self, Self::SwitchingOn | Self::On | Self::Stopping(_))
+        matches!(self, Self::SwitchingOn | Self::On | Self::Stopping(_) | Self::Held(_))
     }
 }
 
@@ -99,6 +104,7 @@ servowire_core::one_line!(AxisState {
     Self::SwitchingOn => "switching on";
     Self::On => "on";
     Self::Stopping(reason) => "stopping: {}", reason;
+    Self::Held(reason) => "held: {}", reason;
     Self::SwitchingOff => "switching off";
     Self::Stopped(reason) => "stopped: {}", reason;
 });
@@ -110,7 +116,7 @@ servowire_core::one_line!(AxisState {
 pub enum SwitchOnError {
     /// Its servo is not off: the state that it is in.
     State(AxisState),
-    /// This update period brought no position: no good block, or one with the counter echo of the block before.
+    /// This update period brought no position: no good block, or one that was not on time.
     OldPosition,
     /// The drive reports an alarm.
     Alarm,
@@ -172,6 +178,9 @@ pub enum SetpointError {
     /// A profile motion or a request is under way.
     #[error("a profile motion or a request is under way")]
     Busy,
+    /// The axis does not stand, or where it stands is not known: its mode is not changed with the servo on.
+    #[error("the axis does not stand")]
+    NotStanding,
 }
 
 /// A request that an axis does not send.
@@ -180,7 +189,7 @@ pub enum SetpointError {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum AskError {
-    /// Another request, or a profile motion, is under way.
+    /// Another request, or a profile motion, is under way, or its last echoes are.
     #[error("another request or a profile motion is under way")]
     Busy,
     /// The normal command has no answer, and a profile motion is started with

@@ -43,9 +43,9 @@ fn attributes_of_the_present_alarm() {
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
     assert_eq!(calm.run(|axis| attributes.receive(axis)), refused);
 
-    let mut history = AlarmHistory::new(CODES.alarm_history);
     let mut entries = [Alarm { main: 1, sub: 1 }; 3];
-    assert_eq!(pair.run(|axis| history.receive(axis, &mut entries)), Progress::Done { value: () });
+    let mut history = AlarmHistory::new(CODES.alarm_history, &mut entries);
+    assert_eq!(pair.run(|axis| history.receive(axis)), Progress::Done { value: () });
     let none = Alarm { main: 0, sub: 0 };
     assert_eq!(entries, [Alarm { main: 38, sub: 1 }, none, none]);
 }

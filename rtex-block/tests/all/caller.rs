@@ -3,7 +3,7 @@
 use crate::common::Pair;
 use proptest::prelude::*;
 use rtex_block::device::{Behaviour, Fault};
-use rtex_block::master::{ActiveCode, AxisState, Heard, StopReason};
+use rtex_block::master::{ActiveCode, AxisState, Heard, StopCategory};
 use rtex_block::{
     Alarm, CommandBlock, ControlBits, Nibble, NonCyclicCode, NonCyclicCommand, Response, SubCode, TypeCode,
 };
@@ -73,7 +73,7 @@ fn act(pair: &mut Pair, action: Action) {
         Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
-        Action::Stop => axis.stop(StopReason::Requested),
+        Action::Stop => axis.stop(StopCategory::Zero),
         Action::Control(bits) => axis.set_control(ControlBits::from_bits_retain(bits)),
         Action::FeedForward(value) => _ = axis.set_feed_forward(value),
         Action::SubFeedForward(two, three) => _ = axis.set_sub_feed_forward(two, three),
@@ -118,7 +118,7 @@ proptest! {
         for action in actions {
             act(&mut pair, action);
             // The axis between two updates, before anything is received.
-            let block = pair.axis.transmission(pair.counter.next()).main.emit();
+            let block = pair.axis.clone().transmission(pair.counter.next()).main.emit();
             let off = CommandBlock::of(&block).unwrap().is_servo_off();
             prop_assert_eq!(off, !pair.axis.state().is_servo_on());
             pair.update();

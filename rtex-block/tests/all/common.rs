@@ -42,7 +42,7 @@ pub struct Pair {
 }
 
 pub fn limits() -> Limits {
-    Limits::new(NonZeroU16::new(LIMIT).unwrap(), 60).with_ready(100).with_inactive(12)
+    Limits::new(NonZeroU16::new(LIMIT).unwrap(), 60).with_ready(Some(100)).with_inactive(12)
 }
 
 impl Pair {
@@ -90,9 +90,9 @@ impl Pair {
             assert_eq!(off, !self.axis.state().is_servo_on(), "{}", self.axis.state());
         }
         self.received = if self.wide {
-            Response32::parse_strict(&self.drive.hear(&command.emit()).unwrap()).into()
+            self.drive.hear(&command.emit()).map_or(Heard::Nothing, |block| Response32::parse_strict(&block).into())
         } else {
-            Response::parse_strict(&self.drive.hear(&main).unwrap()).into()
+            self.drive.hear(&main).map_or(Heard::Nothing, |block| Response::parse_strict(&block).into())
         };
     }
 
@@ -130,6 +130,16 @@ impl Pair {
         self.until("free", |pair| pair.axis.can_ask());
         self.axis.ask(request).unwrap();
         self.outcome()
+    }
+
+    /// The data of the answer on a copy of the pair: what follows is not disturbed.
+    pub fn clone_ask(&self, request: NonCyclicCommand) -> Option<i32> {
+        let Self { axis, drive, counter, sent, received, wide, now } = *self;
+        let mut copy = Self { axis, drive, counter, sent, received, wide, now };
+        match copy.ask(request) {
+            Progress::Done { value } => value.data(),
+            _ => None,
+        }
     }
 
     pub fn run<T: core::fmt::Debug>(&mut self, mut receive: impl FnMut(&mut Axis) -> Progress<T>) -> Progress<T> {

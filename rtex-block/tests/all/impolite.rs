@@ -4,7 +4,8 @@ use crate::common::{CODES, LIMIT, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks};
 use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{
-    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, Heard, MoveStage, Progress, StopReason,
+    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, Heard, MoveStage, Progress, StopCategory,
+    StopReason,
 };
 use rtex_block::{
     Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Response,
@@ -249,7 +250,7 @@ fn servo_active_that_does_as_it_likes() {
     }
     // Stopped for another reason, the drive stays active: that is reported beside the reason.
     let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new().with_servo_off_late(100));
-    pair.axis.stop(StopReason::Requested);
+    pair.axis.stop(StopCategory::Zero);
     (0..12).for_each(|_| pair.update());
     assert!(!pair.axis.disobeys());
     (0..4).for_each(|_| pair.update());
@@ -324,7 +325,10 @@ fn cmd_error_during_a_motion() {
     }
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x0021))));
-    assert_eq!(pair.axis.take_move(), Some(Progress::Failed { error: Failure::ServoOff }));
+    assert_eq!(
+        pair.axis.take_move(),
+        Some(Progress::Failed { error: Failure::Stopped(StopReason::CommandError(ErrorCode(0x0021))) })
+    );
 }
 
 /// Blocks of another drive in this one's place are named, and so is a memory that holds no responses.

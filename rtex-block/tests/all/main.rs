@@ -15,14 +15,18 @@ mod caller;
 mod common;
 mod drive;
 mod drive_bytes;
+mod endings;
 mod fresh;
 mod hostile;
 mod impolite;
 mod laws;
 mod log;
 mod master;
+mod places_in_time;
 mod procedures;
 mod ring;
+mod runner;
 #[cfg(feature = "serde")]
 mod serde;
 mod setpoints;
+mod stops;

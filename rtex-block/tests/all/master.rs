@@ -6,7 +6,7 @@ use crate::common::{CODES, LIMIT, limits};
 use rtex_block::device::{Drive, DriveConfig, Fault};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Led, Master, MasterConfig, MoveStage,
-    Order, Ring, RingFailure, SameMacId, SetupError, Slave, StopPolicy, StopReason,
+    Ring, RingFailure, SameMacId, SetupError, Slave, StopCategory, StopReason,
 };
 use rtex_block::pack::SizeMismatch;
 use rtex_block::timing::{A6N, Periods, TimerSystem};
@@ -78,7 +78,7 @@ impl Bench {
     }
 
     fn update(&mut self) {
-        self.master.exchange_words16(&self.rx, &mut self.tx, 0).unwrap();
+        self.master.exchange_words(&self.rx, &mut self.tx, 0).unwrap();
         for place in 0..2 {
             if self.cut[place] {
                 self.drives[place].framing_error();
@@ -157,15 +157,13 @@ fn from_reset_to_running() {
 #[test]
 fn slaves_that_are_not_in_the_table() {
     let turned = [table()[1], table()[0]];
-    for (order, fault) in [(Order::Ring, Some(ControlError::SlaveInfoMismatch)), (Order::Any, None)] {
-        let mut bench = Bench::new(config(BlockSize::Bytes16).with_order(order), ADDRESSES.map(axis));
-        bench.master.control(Asic::Initial, None);
-        bench.master.control(Asic::Ready, Some(&turned));
-        assert_eq!(bench.master.error(), fault);
-        bench.master.clear();
-        assert_eq!(bench.master.error(), fault);
-        assert_eq!(bench.master.led(700) == Led::Red, fault.is_some());
-    }
+    let mut bench = Bench::new(config(BlockSize::Bytes16), ADDRESSES.map(axis));
+    bench.master.control(Asic::Initial, None);
+    bench.master.control(Asic::Ready, Some(&turned));
+    let fault = Some(ControlError::SlaveInfoMismatch);
+    assert_eq!(bench.master.error(), fault);
+    bench.master.clear();
+    assert_eq!((bench.master.error(), bench.master.led(700)), (fault, Led::Red));
 }
 
 #[test]
@@ -174,16 +172,16 @@ fn memories_of_another_size() {
     let before = bench.master;
     let mut words = [0x1234; 15];
     let refused = Err(SizeMismatch { bytes: 32, words: 15 });
-    assert_eq!(bench.master.exchange_words16(&bench.rx, &mut words, 0), refused);
-    assert_eq!(bench.master.exchange_words16(&words, &mut bench.tx, 0), refused);
-    assert!(bench.master.exchange_words32(&[0; 9], &mut [0; 8], 0).is_err());
-    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 64], 0).is_err());
+    assert_eq!(bench.master.exchange_words(&bench.rx, &mut words, 0), refused);
+    assert_eq!(bench.master.exchange_words(&words, &mut bench.tx, 0), refused);
+    assert!(bench.master.exchange_words(&[0_u32; 9], &mut [0; 8], 0).is_err());
+    assert!(bench.master.exchange_words(&[0_u8; 32], &mut [0; 64], 0).is_err());
     assert_eq!((bench.master, words), (before, [0x1234; 15]));
-    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 32], 0).is_ok());
+    assert!(bench.master.exchange_words(&[0_u8; 32], &mut [0; 32], 0).is_ok());
     let mut wide = Bench::new(config(BlockSize::Bytes32), ADDRESSES.map(axis));
-    assert!(wide.master.exchange_bytes(&[0; 32], &mut [0; 32], 0).is_err());
+    assert!(wide.master.exchange_words(&[0_u8; 32], &mut [0; 32], 0).is_err());
     let mut tx = [0xff; 64];
-    wide.master.exchange_bytes(&[0; 64], &mut tx, 0).unwrap();
+    wide.master.exchange_words(&[0_u8; 64], &mut tx, 0).unwrap();
     // Sub_Chk is always set, in a NOP too.
     assert_eq!((tx[16], tx[48]), (0x80, 0x80));
 }
@@ -216,10 +214,10 @@ fn the_receive_watchdog() {
         bench.master.ring().all_are(AxisState::On)
     });
     for _ in 0..2 {
-        bench.master.exchange_words16(&bench.rx, &mut bench.tx, 0).unwrap();
+        bench.master.exchange_words(&bench.rx, &mut bench.tx, 0).unwrap();
         assert_eq!(bench.state(0), AxisState::On);
     }
-    bench.master.exchange_words16(&bench.rx, &mut bench.tx, 0).unwrap();
+    bench.master.exchange_words(&bench.rx, &mut bench.tx, 0).unwrap();
     assert_eq!(bench.master.error(), Some(ControlError::Timeout));
     for place in 0..2 {
         assert_eq!(bench.state(place), AxisState::Stopped(StopReason::ReceiveTimeout));
@@ -236,8 +234,8 @@ fn the_receive_watchdog() {
 }
 
 /// Axis 1 is moving at 300 units an update period when axis 0 has an alarm.
-fn alarm_beside(mode: ActiveCode, policy: StopPolicy) -> Bench {
-    let mut second = axis(17).with_stop(policy);
+fn alarm_beside(mode: ActiveCode, stop: Option<StopCategory>, deceleration: u32) -> Bench {
+    let mut second = axis(17).with_stop(stop).with_deceleration(deceleration);
     second.mode = mode;
     let mut bench = Bench::running([axis(4), second]);
     if mode == ActiveCode::ProfilePosition {
@@ -267,18 +265,18 @@ fn alarm_beside(mode: ActiveCode, policy: StopPolicy) -> Bench {
 #[test]
 fn an_axis_stops_at_once_unless_it_was_told_otherwise() {
     for mode in [ActiveCode::CyclicPosition, ActiveCode::CyclicVelocity, ActiveCode::ProfilePosition] {
-        let bench = alarm_beside(mode, StopPolicy::AtOnce);
+        let bench = alarm_beside(mode, Some(StopCategory::Zero), 1);
         assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
         assert!(CommandBlock::of(&bench.block(1)).unwrap().is_servo_off());
     }
     // A torque cannot be slowed down.
-    let bench = alarm_beside(ActiveCode::CyclicTorque, StopPolicy::Decelerate { per_update: 1 });
+    let bench = alarm_beside(ActiveCode::CyclicTorque, Some(StopCategory::One), 1);
     assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 }
 
 #[test]
 fn an_axis_slows_down() {
-    let mut bench = alarm_beside(ActiveCode::CyclicPosition, StopPolicy::Decelerate { per_update: 40 });
+    let mut bench = alarm_beside(ActiveCode::CyclicPosition, Some(StopCategory::One), 40);
     let position = |bench: &Bench| CommandBlock::of(&bench.block(1)).unwrap().command_data1();
     let mut steps = Vec::new();
     let mut last = position(&bench);
@@ -292,20 +290,20 @@ fn an_axis_slows_down() {
     assert_eq!(steps[..6], [220, 180, 140, 100, 60, 20]);
     assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 
-    let mut bench = alarm_beside(ActiveCode::CyclicVelocity, StopPolicy::Decelerate { per_update: 200_000 });
+    let mut bench = alarm_beside(ActiveCode::CyclicVelocity, Some(StopCategory::One), 200_000);
     assert_eq!(position(&bench), 400_000);
     bench.update();
     assert_eq!(position(&bench), 200_000);
     bench.update();
     assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 
-    let mut bench = alarm_beside(ActiveCode::ProfilePosition, StopPolicy::Decelerate { per_update: 1 });
+    let mut bench = alarm_beside(ActiveCode::ProfilePosition, Some(StopCategory::One), 1);
     assert_eq!(bench.block(1)[3] & 0x40, 0x40);
     bench.until("stopped", |bench| bench.state(1) == AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
     let status = bench.master.ring().axes()[1].status();
     assert!(status.contains(StatusFlags::SERVO_ACTIVE) && !status.contains(StatusFlags::IN_PROGRESS));
     // Too slow: the limit ends it.
-    let mut bench = alarm_beside(ActiveCode::CyclicPosition, StopPolicy::Decelerate { per_update: 0 });
+    let mut bench = alarm_beside(ActiveCode::CyclicPosition, Some(StopCategory::One), 1);
     let from = (0..100).find(|_| {
         bench.update();
         bench.state(1) == AxisState::Stopped(StopReason::OtherAxis { place: 0 })
@@ -316,10 +314,10 @@ fn an_axis_slows_down() {
 /// An axis may go on beside one that has an alarm, but not when the communication fails.
 #[test]
 fn an_axis_goes_on() {
-    let mut bench = alarm_beside(ActiveCode::CyclicPosition, StopPolicy::None);
+    let mut bench = alarm_beside(ActiveCode::CyclicPosition, None, 1);
     (0..50).for_each(|_| bench.update());
     assert_eq!(bench.state(1), AxisState::On);
-    let mut bench = Bench::running([axis(4), axis(17).with_stop(StopPolicy::None)]);
+    let mut bench = Bench::running([axis(4), axis(17).with_stop(None)]);
     bench.cut[0] = true;
     for _ in 0..LIMIT {
         assert_eq!(bench.state(1), AxisState::On);

@@ -92,7 +92,7 @@ fn what_has_ended_sends_nothing_more() {
     fn runs<T: PartialEq + Copy + core::fmt::Debug>(
         mode: ActiveCode,
         on: bool,
-        code: u8,
+        (code, commands): (u8, u32),
         mut receive: impl FnMut(&mut Axis) -> Progress<T>,
     ) {
         let config = AxisConfig::new(MacId::new(9).unwrap(), mode, 500_000, limits());
@@ -117,15 +117,16 @@ fn what_has_ended_sends_nothing_more() {
             end = end.or(Some(progress).filter(|progress| !progress.is_pending()));
             assert_eq!(end.unwrap_or(progress), progress);
         }
-        assert!(end.is_some() && sent == 1, "{code:#x}: {end:?} after {sent} commands");
+        assert!(end.is_some() && sent == commands, "{code:#x}: {end:?} after {sent} commands");
     }
     let mut home = Home::new(0xc8, 5);
-    runs(ActiveCode::ProfilePosition, true, 0x14, |axis| home.receive(axis));
+    runs(ActiveCode::ProfilePosition, true, (0x14, 1), |axis| home.receive(axis));
     let mut set = SetPosition::actual(77_777);
-    runs(ActiveCode::CyclicPosition, false, 0x24, |axis| set.receive(axis));
-    let mut restore = Restore::new(CODES.parameter_read);
+    runs(ActiveCode::CyclicPosition, false, (0x24, 1), |axis| set.receive(axis));
+    // The write, and the reading back.
     let list = [ParameterValue::new(Pr { class: 7, number: 25 }, 1)];
-    runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
+    let mut restore = Restore::new(CODES.parameter_read, &list);
+    runs(ActiveCode::CyclicPosition, false, (0x26, 2), |axis| restore.receive(axis));
 }
 
 /// The latch counts once it is complete; what was caught before it was armed does not.
@@ -289,21 +290,21 @@ fn texts_and_parameters() {
     }
     let pr = |class, number| Pr { class, number };
     let mut list = [pr(7, 25), pr(8, 1), pr(8, 4)].map(|pr| ParameterValue::new(pr, 0));
-    let mut backup = Backup::new(CODES.parameter_read);
-    assert_eq!(pair.run(|axis| backup.receive(axis, &mut list)), Progress::Done { value: () });
+    let mut backup = Backup::new(CODES.parameter_read, &mut list);
+    assert_eq!(pair.run(|axis| backup.receive(axis)), Progress::Done { value: () });
     assert_eq!(list.map(|parameter| parameter.value), [1, 1_000, 1_000]);
     list[1].value = 77;
-    let mut restore = Restore::new(CODES.parameter_read);
+    let mut restore = Restore::new(CODES.parameter_read, &list);
     assert_eq!(restore.place(), 0);
-    assert_eq!(pair.run(|axis| restore.receive(axis, &list)), Progress::Done { value: () });
-    let mut backup = Backup::new(CODES.parameter_read);
+    assert_eq!(pair.run(|axis| restore.receive(axis)), Progress::Done { value: () });
     let mut again = list.map(|parameter| ParameterValue { value: -1, ..parameter });
-    assert_eq!(pair.run(|axis| backup.receive(axis, &mut again)), Progress::Done { value: () });
+    let mut backup = Backup::new(CODES.parameter_read, &mut again);
+    assert_eq!(pair.run(|axis| backup.receive(axis)), Progress::Done { value: () });
     assert_eq!(again, list);
     // Read with the code for initial values it differs from what was written.
-    let mut restore = Restore::new(CODES.parameter_initial);
+    let mut restore = Restore::new(CODES.parameter_initial, &list);
     let differs = Progress::Failed { error: Failure::Differs(pr(8, 1)) };
-    assert_eq!(pair.run(|axis| restore.receive(axis, &list)), differs);
+    assert_eq!(pair.run(|axis| restore.receive(axis)), differs);
     assert_eq!(restore.place(), 1);
     // Ten of class 7 (25, 29 to 37), two of class 8, none of class 9.
     for (class, want) in [(7, Some(10)), (8, Some(2)), (9, None)] {
@@ -316,9 +317,10 @@ fn texts_and_parameters() {
         assert_eq!(counted, want);
     }
     // A parameter that does not exist.
-    let mut restore = Restore::new(CODES.parameter_read);
+    let list = [ParameterValue::new(pr(99, 0), 0)];
+    let mut restore = Restore::new(CODES.parameter_read, &list);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
-    assert_eq!(pair.run(|axis| restore.receive(axis, &[ParameterValue::new(pr(99, 0), 0)])), refused);
+    assert_eq!(pair.run(|axis| restore.receive(axis)), refused);
 }
 
 /// A drive whose parameters count only after a reset.

@@ -18,7 +18,7 @@ const OFF_WITHIN: u32 = LIMIT as u32 + 2;
 
 fn axis(number: u8) -> Axis {
     let limit = NonZeroU16::new(LIMIT).unwrap();
-    let limits = Limits::new(limit, 50).with_ready(200).with_inactive(10);
+    let limits = Limits::new(limit, 50).with_ready(Some(200)).with_inactive(10);
     Axis::new(AxisConfig::new(MacId::new(number).unwrap(), ActiveCode::CyclicPosition, 500_000, limits))
 }
 

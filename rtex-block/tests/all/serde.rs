@@ -54,7 +54,7 @@ fn names_and_pairs_hold_what_is_defined() {
     assert_eq!(serde_json::from_str::<Gear>("[3,2]").ok(), Gear::new(3, 2));
     refused::<Limits>(r#"{"echo":0,"ready":1,"active":1,"inactive":1,"answer":1,"stop":1,"command_errors":1}"#);
     let config = r#"{"mac_id":ID,"mode":"CyclicPosition","update_ns":500000,"gear":[1,1],
-        "over_speed":null,"max_speed":null,"max_torque":5,"stop":{"Decelerate":{"per_update":5}},
+        "over_speed":null,"max_speed":null,"max_torque":5,"stop":"Two","deceleration":5,
         "limits":{"echo":1,"ready":1,"active":1,"inactive":1,"answer":1,"stop":1,"command_errors":1}}"#;
     assert!(serde_json::from_str::<AxisConfig>(&config.replace("ID", "31")).is_ok());
     refused::<AxisConfig>(&config.replace("ID", "32"));

@@ -63,7 +63,7 @@ fn value(n: u32) -> ([u32; 1], [u32; 1]) {
     ([n], [!n])
 }
 
-/// Values 1 to 4 against so many readings, with four preemptions at most.
+/// Values 1 to 4 against this number of readings, with four preemptions at most.
 fn explore(gets: u32) {
     let mut builder = Builder::new();
     builder.preemption_bound = Some(4);

@@ -42,6 +42,8 @@ fn speed_is_known_after_two_samples_that_are_near_enough() {
         // The same sample again.
         (&[(0, 0), (0, 1_000), (0, 1_000)], true),
         (&[(0, 1_000), (0, 1_000)], false),
+        // Another angle at the same instant: one of the two is wrong.
+        (&[(0, 0), (0, 1_000), (1 << 20, 1_000)], false),
         // Faster than what the unit holds.
         (&[(0, 0), (0x4000_0000, 10)], false),
     ] {
@@ -85,6 +87,28 @@ fn the_bound_is_made_of_these_terms() {
     assert_eq!((bound((1 << 31) - 1, Acceleration(0)) == 1 << 31, bound(1 << 31, Acceleration(0))), (false, 1 << 31));
     assert_eq!(tracked(&[(7, 50)]).at(50, A_10_000), Estimate { angle: Angle::from_bits(7), bound: Angle::HALF });
     assert_eq!(Motion::UNKNOWN.at(0, A_10_000).bound, Angle::HALF);
+}
+
+/// The same far from the last sample, where times in ns fill their words: half a second and 62.5 µs make 0.125015625 s², and with
+/// 1 turn/s² as many turns, or 536,938,021; the count goes 8001 times into it.
+#[test]
+fn the_bound_holds_far_from_the_last_sample() {
+    let standing = tracked(&[(0, 0), (0, 62_500)]);
+    let [slow, fast] = [1, 3].map(|limit| {
+        let limit = Acceleration::from_turns_per_s2(limit).unwrap();
+        standing.at(62_500 + 500_000_000, limit).bound.to_bits()
+    });
+    assert!((541_034_533..541_150_000).contains(&slow), "{slow}");
+    assert!((1_614_910_575..1_615_200_000).contains(&fast), "{fast}");
+}
+
+/// The width of a count, rounded up, and a 2^-32 turn more by which an angle that is not a power of two is rounded down.
+#[test]
+fn a_count_is_as_wide_as_its_angles_are_apart() {
+    for (counts, width) in [(1 << 23, 512), (1 << 31, 2), (10_000, 429_498), (3, 1_431_655_767), (u32::MAX, 3)] {
+        let mut tracker = Tracker::new(counts, 100).unwrap();
+        assert_eq!(tracker.sample(Angle::ZERO, 0).count, width, "{counts}");
+    }
 }
 
 #[test]

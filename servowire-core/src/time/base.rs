@@ -44,14 +44,14 @@ impl<const BITS: u32> TimeBase<BITS> {
         32_u32.wrapping_sub(BITS)
     };
 
-    /// From a counter that counts with this rate and reads `counter` now, at 0 ns.
+    /// Starts at 0 ns, with a counter that counts at this rate and reads `counter` now.
     pub const fn new(rate: TickRate, counter: u32) -> Self {
         let mut time = Self { base_ns: 0, ticks: 0, rate };
         time.go_on(counter, 0);
         time
     }
 
-    /// The time since the start, in ns, and this is what the counter reads. It wraps after 584 years.
+    /// The time since the start, in ns, from a reading of the counter. It wraps after 584 years.
     ///
     /// # Errors
     /// [`ClockError::Backwards`], once: the next reading goes on from here, at the time of the last good one.
@@ -69,7 +69,7 @@ impl<const BITS: u32> TimeBase<BITS> {
         Ok(self.last_ns())
     }
 
-    /// The counter has to be read again within so many ns.
+    /// The longest time between two readings of the counter, ns.
     pub const fn read_within_ns(&self) -> u64 {
         self.rate.low_ns(u32::MAX >> Self::ABOVE >> 1)
     }

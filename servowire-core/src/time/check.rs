@@ -1,6 +1,7 @@
 use super::ClockError;
 
-/// Sees to it that a wait ends: checks each reading of a clock that somebody else has made, and bounds the looks at one that stands.
+/// Makes sure that a wait ends: checks every reading of a clock that comes from elsewhere, and limits the readings of one that stands
+/// still.
 ///
 /// A loop that waits for a time never ends on a clock that stands, or was set back, or is a counter of 32 bits that wraps before
 /// that time comes. With the check in it, it does:
@@ -20,15 +21,15 @@ use super::ClockError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCheck {
     last_ns: u64,
-    /// The reading that was last seen twice, and how often more.
+    /// The reading that was last repeated, and how often.
     stood_ns: u64,
     looks: u32,
     max_looks: u32,
 }
 
 impl ClockCheck {
-    /// A clock that gives the same reading again in more than `max_looks` looks counts as standing: choose more than a fast processor
-    /// can make in a tick.
+    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor makes in a
+    /// tick.
     pub const fn new(max_looks: u32) -> Self {
         Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
     }
@@ -42,7 +43,7 @@ impl ClockCheck {
     ///
     /// # Errors
     /// [`ClockError::Backwards`] if it is before the last one, once: the next one is compared with this one.
-    /// [`ClockError::Stopped`] if it was the same too often, until it changes.
+    /// [`ClockError::Stopped`] if it was repeated too often, until it changes.
     #[inline]
     pub const fn check(&mut self, now_ns: u64) -> Result<u64, ClockError> {
         if now_ns > self.last_ns {

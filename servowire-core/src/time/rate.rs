@@ -28,10 +28,14 @@ const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has
 /// assert_eq!(TickRate::new(32_768), Err(ClockError::TooCoarse { hz: 32_768, limit_hz: 1_000_000 }));
 /// ```
 ///
-/// A constant that is too low does not compile:
+/// A constant that is too low does not compile, nor does a tick of no time:
 ///
-/// ```compile_fail
+/// ```compile_fail,E0080
 /// let _ = servowire_core::TickRate::of::<999_999>();
+/// ```
+///
+/// ```compile_fail,E0080
+/// let _ = servowire_core::TickRate::of_ratio::<0, 1_000_000>();
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -83,9 +87,9 @@ impl TickRate {
         Self { whole: (ns / denom) as u32, fraction: fraction as u32 }
     }
 
-    /// How long so many ticks last, ns, rounded down; modulo 2^64, which is 584 years.
+    /// The duration of `ticks`, ns, rounded down; modulo 2^64, which is 584 years.
     ///
-    /// For a counter of 64 bits that is all there is to do. For one that wraps there is [`TimeBase`](super::TimeBase).
+    /// A counter of 64 bits needs nothing else. For one that wraps use [`TimeBase`](super::TimeBase).
     #[inline]
     pub const fn ns(self, ticks: u64) -> u64 {
         let [low, high] = words(ticks);

@@ -14,6 +14,7 @@ use super::input::Input;
 use super::recording::{Change, Line};
 use super::table::{Lines, cell, titles};
 use crate::fault::{At, Fault};
+use crate::time::Time;
 
 /// Rows looked at for the names of the analysers and the length of a bit.
 const SAMPLE: usize = 4096;
@@ -38,12 +39,12 @@ pub struct Analyzer {
     /// Picoseconds.
     bit: f64,
     /// The first time, where times are dates.
-    origin: Option<i64>,
+    origin: Option<Time>,
     /// What is drawn and not given yet, the earliest first.
-    drawn: BinaryHeap<Reverse<(i64, u64, u16, bool)>>,
+    drawn: BinaryHeap<Reverse<(Time, u64, u16, bool)>>,
     sequence: u64,
     begun: bool,
-    now: i64,
+    now: Time,
     /// Rows that could not be read, and the first of them.
     bad: u64,
     first_bad: Option<(u64, String)>,
@@ -66,7 +67,7 @@ struct Columns {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Row {
     name: String,
-    start: i64,
+    start: Time,
     duration: Option<i64>,
     byte: u8,
     delimiter: bool,
@@ -122,7 +123,7 @@ impl Analyzer {
             drawn: BinaryHeap::new(),
             sequence: 0,
             begun: false,
-            now: 0,
+            now: Time::ZERO,
             bad: 0,
             first_bad: None,
             over: false,
@@ -159,8 +160,8 @@ impl Analyzer {
         if let Some(middle) = durations.get(durations.len() / 2).filter(|middle| **middle > 0) {
             return Some(*middle as f64 / DRAWN_BITS);
         }
-        let starts: Vec<i64> = self.waiting.iter().map(|(_, row)| row.start).collect();
-        let mut apart: Vec<i64> = starts.iter().zip(starts.iter().skip(1)).map(|(a, b)| b.saturating_sub(*a)).collect();
+        let starts: Vec<Time> = self.waiting.iter().map(|(_, row)| row.start).collect();
+        let mut apart: Vec<i64> = starts.iter().zip(starts.iter().skip(1)).map(|(a, b)| *b - *a).collect();
         apart.retain(|apart| *apart > 0);
         apart.sort_unstable();
         // Neither the least, which may be a mistake, nor one with a pause.
@@ -198,7 +199,7 @@ impl Analyzer {
         let start = match moment(start) {
             Some(time) => time,
             None => match cell::date(&text(start)) {
-                Some(time) => time.saturating_sub(*self.origin.get_or_insert(time)),
+                Some(time) => time.since(*self.origin.get_or_insert(time)),
                 None => return Err(format!("{:?} is not a time", text(start))),
             },
         };
@@ -213,7 +214,13 @@ impl Analyzer {
                 !matches!(text(framing).to_lowercase().as_str(), "error" | "true" | "1")
             }
         });
-        Ok(Some(Row { name, start, duration: duration.and_then(moment), byte, delimiter }))
+        Ok(Some(Row {
+            name,
+            start,
+            duration: duration.and_then(moment).map(|duration| duration - Time::ZERO),
+            byte,
+            delimiter,
+        }))
     }
 
     /// Draws a byte; what is earlier than it can be given.
@@ -234,23 +241,23 @@ impl Analyzer {
         for at in 0..FIELD_BITS {
             let next = bits >> at & 1 == 1;
             if next != level {
-                self.edge(row.start.saturating_add((at as f64 * self.bit) as i64), channel, next);
+                self.edge(row.start + ((at as f64 * self.bit) as i64), channel, next);
             }
             level = next;
         }
         if !level {
-            self.edge(row.start.saturating_add((FIELD_BITS as f64 * self.bit) as i64), channel, true);
+            self.edge(row.start + ((FIELD_BITS as f64 * self.bit) as i64), channel, true);
         }
         Ok(())
     }
 
-    fn edge(&mut self, time: i64, channel: u16, level: bool) {
+    fn edge(&mut self, time: Time, channel: u16, level: bool) {
         self.drawn.push(Reverse((time, self.sequence, channel, level)));
         self.sequence += 1;
     }
 
     /// Gives what is earlier than `time`.
-    fn give(&mut self, time: i64, changes: &mut Vec<Change>) {
+    fn give(&mut self, time: Time, changes: &mut Vec<Change>) {
         while let Some(Reverse((at, _, channel, level))) = self.drawn.peek().copied().filter(|edge| edge.0.0 < time) {
             self.drawn.pop();
             changes.push(Change { time: at, channel, level });
@@ -296,13 +303,13 @@ impl Line for Analyzer {
             };
             let Some((line, row)) = row else {
                 self.over = true;
-                self.give(i64::MAX, changes);
+                self.give(Time::MAX, changes);
                 self.now = changes.last().map_or(self.now, |last| last.time.max(self.now));
                 break;
             };
             if !std::mem::replace(&mut self.begun, true) {
                 // The lines rest before their first byte.
-                self.now = row.start.saturating_sub((3.0 * FIELD_BITS as f64 * self.bit) as i64);
+                self.now = row.start - ((3.0 * FIELD_BITS as f64 * self.bit) as i64);
                 let time = self.now;
                 changes.extend((0..self.channels.len()).map(|channel| Change {
                     time,
@@ -326,7 +333,7 @@ impl Line for Analyzer {
         Ok(!self.over)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.now
     }
 }

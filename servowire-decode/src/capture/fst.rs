@@ -11,6 +11,7 @@ use super::hints::Guard;
 use super::input::{Input, SeekRead};
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
+use crate::time::Time;
 
 /// The file is read in so many parts, so that not all of it is in memory.
 const PARTS: u64 = 64;
@@ -56,7 +57,7 @@ pub struct Fst {
     next: u64,
     end: u64,
     step: u64,
-    reached: i64,
+    reached: Time,
 }
 
 impl Fst {
@@ -110,18 +111,18 @@ impl Fst {
             next: header.start_time,
             end: header.end_time,
             step,
-            reached: 0,
+            reached: Time::ZERO,
         })
     }
 }
 
 /// A stamp in picoseconds.
-fn picoseconds(stamp: u64, exponent: i32) -> Option<i64> {
+fn picoseconds(stamp: u64, exponent: i32) -> Option<Time> {
     let power = exponent + 12;
     let factor = 10_u128.checked_pow(power.unsigned_abs())?;
     let time =
         if power >= 0 { u128::from(stamp).checked_mul(factor)? } else { (u128::from(stamp) + factor / 2) / factor };
-    i64::try_from(time).ok()
+    i128::try_from(time).ok().map(Time::from_ps)
 }
 
 impl Line for Fst {
@@ -177,11 +178,11 @@ impl Line for Fst {
         });
         changes.append(&mut new);
         self.next = until.saturating_add(1);
-        self.reached = picoseconds(until, exponent).unwrap_or(i64::MAX);
+        self.reached = picoseconds(until, exponent).unwrap_or(Time::MAX);
         Ok(self.next <= self.end)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.reached
     }
 }

@@ -12,6 +12,7 @@ use super::input::Input;
 use super::recording::{Change, Line};
 use super::table::cell::Threshold;
 use crate::fault::{At, Fault};
+use crate::time::Time;
 
 /// The longest preamble.
 const LONGEST: usize = 1 << 12;
@@ -255,8 +256,8 @@ impl Line for Isf {
         Ok(!samples.is_empty())
     }
 
-    fn reached(&self) -> i64 {
-        (self.start + self.count as f64 * self.period).round() as i64
+    fn reached(&self) -> Time {
+        Time::from_ps((self.start + self.count as f64 * self.period).round() as i128)
     }
 }
 

@@ -11,6 +11,7 @@ use pcap_file::{DataLink, PcapError};
 
 use super::input::Input;
 use crate::fault::{At, Fault};
+use crate::time::Time;
 
 /// What a pcapng file begins with.
 pub(super) const MAGIC: &[u8] = b"\x0a\x0d\x0d\x0a";
@@ -39,11 +40,14 @@ enum Reader {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
     /// When, in picoseconds.
-    pub time: i64,
+    pub time: Time,
     /// Link type of its interface.
     pub link: DataLink,
     /// To the capturing side (`Some(true)`) or from it, where the file says so.
     pub inbound: Option<bool>,
+    /// Whether the file says that its bytes end with their frame check sequence. Most network cards take it off, and most files
+    /// say nothing.
+    pub has_fcs: bool,
     /// Its bytes.
     pub bytes: Vec<u8>,
 }
@@ -91,12 +95,14 @@ impl Pcapng {
             // The reader gives the file's units of time as if they were nanoseconds.
             let units = packet.timestamp.as_nanos();
             let (time, link) = (picoseconds(units, interface), interface.linktype);
+            let has_fcs = |option: &_| matches!(option, InterfaceDescriptionOption::IfFcsLen(length) if *length > 0);
+            let has_fcs = interface.options.iter().any(has_fcs);
             let time = time.ok_or_else(|| self.fault("its time cannot be"))?;
             let bytes = match packet.data {
                 Cow::Owned(bytes) => bytes,
                 Cow::Borrowed(bytes) => bytes.to_vec(),
             };
-            return Ok(Some(Packet { time, link, inbound, bytes }));
+            return Ok(Some(Packet { time, link, inbound, has_fcs, bytes }));
         }
     }
 
@@ -110,9 +116,10 @@ impl Pcapng {
             Some(Ok(packet)) => packet.into_owned(),
         };
         self.packets += 1;
-        let time = packet.timestamp.as_nanos().checked_mul(1000).and_then(|time| i64::try_from(time).ok());
+        let time =
+            packet.timestamp.as_nanos().checked_mul(1000).and_then(|time| i128::try_from(time).ok().map(Time::from_ps));
         let time = time.ok_or_else(|| self.fault("its time cannot be"))?;
-        Ok(Some(Packet { time, link, inbound: None, bytes: packet.data.into_owned() }))
+        Ok(Some(Packet { time, link, inbound: None, has_fcs: false, bytes: packet.data.into_owned() }))
     }
 
     fn fault(&self, what: &str) -> Fault {
@@ -120,7 +127,7 @@ impl Pcapng {
     }
 }
 
-fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option<i64> {
+fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option<Time> {
     let resolution = interface.options.iter().find_map(|option| match option {
         InterfaceDescriptionOption::IfTsResol(resolution) => Some(*resolution),
         _ => None,
@@ -130,7 +137,7 @@ fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option
     let second = 1_000_000_000_000u128;
     let per_second =
         if resolution & 0x80 == 0 { 10u128.checked_pow(exponent)? } else { 1u128.checked_shl(exponent)? };
-    i64::try_from(units.checked_mul(second)?.checked_div(per_second)?).ok()
+    i128::try_from(units.checked_mul(second)?.checked_div(per_second)?).ok().map(Time::from_ps)
 }
 
 fn say(error: &PcapError) -> String {

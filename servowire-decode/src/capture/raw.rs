@@ -4,7 +4,7 @@ use super::input::Input;
 use super::recording::{Change, Line};
 use super::samples::{Samples, little_endian};
 use crate::fault::{At, Fault};
-use crate::time::Clock;
+use crate::time::{Clock, Time};
 
 /// How a file holds a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,7 +189,7 @@ impl Line for Raw {
         Some(Ok(Samples::new(block, first, before == 1, self.clock)))
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.clock.time(self.samples)
     }
 }

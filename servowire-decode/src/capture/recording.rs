@@ -3,12 +3,13 @@
 use super::input::Input;
 use super::samples::Samples;
 use crate::fault::Fault;
+use crate::time::Time;
 
 /// A channel takes a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Change {
     /// When, in picoseconds of the capture's own time (negative before its trigger).
-    pub time: i64,
+    pub time: Time,
     /// Index into [`Line::channels`].
     pub channel: u16,
     /// The level from here on.
@@ -19,9 +20,9 @@ pub struct Change {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hole {
     /// Where the recording stops.
-    pub from: i64,
+    pub from: Time,
     /// Where it goes on.
-    pub to: i64,
+    pub to: Time,
 }
 
 /// A recording of lines.
@@ -42,7 +43,7 @@ pub trait Line {
     }
 
     /// The time up to which the recording was read, in picoseconds.
-    fn reached(&self) -> i64;
+    fn reached(&self) -> Time;
 
     /// The hole in the recording before what was read last, if there is one.
     fn hole(&mut self) -> Option<Hole> {

@@ -13,7 +13,7 @@ use std::path::Path;
 use super::input::Input;
 use super::recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
-use crate::time;
+use crate::time::{self, Time};
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
@@ -29,8 +29,8 @@ pub struct SaleaeBinary {
     rates: bool,
     chunks: u64,
     level: bool,
-    end: i64,
-    now: Option<i64>,
+    end: Time,
+    now: Option<Time>,
     announced: u64,
     read: u64,
     at: u64,
@@ -78,7 +78,7 @@ impl SaleaeBinary {
             rates: version == 1,
             chunks: 1,
             level: true,
-            end: 0,
+            end: Time::ZERO,
             now: None,
             announced: 0,
             read: 0,
@@ -148,7 +148,7 @@ impl SaleaeBinary {
             return Err(self.input.fault(at, "transition is not at a time"));
         };
         if let Some(before) = self.now.filter(|before| now < *before) {
-            let what = format!("time goes back from {} s to {} s", before as f64 / 1e12, now as f64 / 1e12);
+            let what = format!("time goes back from {} s to {} s", before.ps() as f64 / 1e12, now.ps() as f64 / 1e12);
             return Err(self.input.fault(at, what));
         }
         self.read += 1;
@@ -178,8 +178,8 @@ impl Line for SaleaeBinary {
         Ok(!self.over)
     }
 
-    fn reached(&self) -> i64 {
-        let now = self.now.unwrap_or(0);
+    fn reached(&self) -> Time {
+        let now = self.now.unwrap_or_default();
         if self.over && self.read == self.announced { self.end.max(now) } else { now }
     }
 

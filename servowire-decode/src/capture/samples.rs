@@ -1,6 +1,6 @@
 //! A block of packed samples, as a decoder takes it that needs no edges one by one.
 
-use crate::time::Clock;
+use crate::time::{Clock, Time};
 
 /// Samples of one channel, eight a byte, the oldest in bit 0.
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +88,7 @@ impl<'a> Samples<'a> {
 
     /// All changes, by time.
     #[inline]
-    pub fn changes(self) -> impl Iterator<Item = (i64, bool)> + 'a {
+    pub fn changes(self) -> impl Iterator<Item = (Time, bool)> + 'a {
         let (mut at, mut level) = (self.first, self.before);
         std::iter::from_fn(move || {
             let next = self.change(at, level)?;
@@ -112,13 +112,13 @@ mod tests {
     use proptest::prelude::*;
 
     /// One sample after the other.
-    fn plain(bytes: &[u8], before: bool) -> Vec<(i64, bool)> {
+    fn plain(bytes: &[u8], before: bool) -> Vec<(Time, bool)> {
         let mut level = before;
         let mut out = Vec::new();
         for at in 0..8 * bytes.len() {
             let next = bytes[at / 8] >> (at % 8) & 1 == 1;
             if next != level {
-                out.push((at as i64 * 1_000_000, next));
+                out.push((Time::from_ps(at as i128 * 1_000_000), next));
             }
             level = next;
         }
@@ -134,7 +134,7 @@ mod tests {
         ) {
             let samples = Samples::new(&bytes, 64, before, Clock::new(1_000_000)).turned(inverted);
             let want: Vec<_> =
-                plain(&bytes, before).iter().map(|(time, level)| (time + 64_000_000, *level != inverted)).collect();
+                plain(&bytes, before).iter().map(|(time, level)| (*time + 64_000_000, *level != inverted)).collect();
             prop_assert_eq!(samples.changes().collect::<Vec<_>>(), want);
         }
 

@@ -1,11 +1,9 @@
 //! `sigrok-cli -O bits`, `-O hex` and `-O ascii`: a line of samples for each channel, round after round.
 
-use std::io::{BufRead, Read};
-
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
-use crate::time::{self, Clock};
+use crate::time::{self, Clock, Time};
 
 /// Longer lines are none of this format.
 const LONGEST: usize = 1 << 20;
@@ -71,11 +69,7 @@ impl SigrokText {
     fn next_line(&mut self) -> Result<Option<String>, Fault> {
         let mut text = Vec::new();
         let at = At::Line(self.line + 1);
-        let got = self.input.by_ref().take(LONGEST as u64).read_until(b'\n', &mut text);
-        let got = got.map_err(|e| self.input.io_fault(at, &e))?;
-        if got == LONGEST {
-            return Err(self.input.fault(at, format!("a line of more than {LONGEST} characters")));
-        }
+        let got = self.input.line(&mut text, at, LONGEST, || format!("a line of more than {LONGEST} characters"))?;
         self.line += 1;
         Ok((got > 0).then(|| String::from_utf8_lossy(&text).trim_end_matches(['\n', '\r']).to_owned()))
     }
@@ -175,7 +169,7 @@ impl Line for SigrokText {
         Ok(more)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.clock.time(self.samples.iter().copied().min().unwrap_or(0))
     }
 }
@@ -192,9 +186,9 @@ mod tests {
         let mut changes = Vec::new();
         while file.read(&mut changes).unwrap() {}
         let of = |channel| changes.iter().filter(move |change| change.channel == channel);
-        let said = |channel| of(channel).map(|change| (change.time / 1_000_000, change.level)).collect::<Vec<_>>();
+        let said = |channel| of(channel).map(|change| (change.time.ps() / 1_000_000, change.level)).collect::<Vec<_>>();
         assert_eq!(said(0), [(0, true), (1, false), (3, true)]);
         assert_eq!(said(1), [(0, true), (2, false), (5, true)]);
-        assert_eq!(file.reached(), 6_000_000);
+        assert_eq!(file.reached().ps(), 6_000_000);
     }
 }

@@ -9,13 +9,12 @@ pub(super) mod cell;
 mod heading;
 
 use std::collections::VecDeque;
-use std::io::{BufRead, Read};
 
 use super::hints::Hints;
 use super::input::Input;
 use super::recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
-use crate::time::{Clock, SECOND};
+use crate::time::{Clock, SECOND, Time};
 use cell::{Cell, Threshold};
 pub(super) use heading::titles;
 use heading::{Heading, Times};
@@ -40,14 +39,14 @@ pub struct Table {
     waiting: Waiting,
     clock: Times,
     /// Time of the first row, where times are absolute.
-    origin: Option<i64>,
-    now: Option<i64>,
+    origin: Option<Time>,
+    now: Option<Time>,
     rows: u64,
     /// Rows that could not be read, and the first of them.
     bad: u64,
     first_bad: Option<(u64, String)>,
     /// Since when there have been no data.
-    since: Option<i64>,
+    since: Option<Time>,
     hole: Option<Hole>,
     over: bool,
     /// The last row comes first: all changes have to be known before the first is given.
@@ -82,15 +81,11 @@ impl Lines {
     pub(super) fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
         text.clear();
         let at = At::Line(self.line + 1);
-        let mut limited = self.input.by_ref().take(LONGEST as u64);
-        let got = limited.read_until(b'\n', text).map_err(|e| self.input.io_fault(at, &e))?;
-        if got == 0 {
+        let what = || format!("a line of more than {LONGEST} characters: not a table");
+        if self.input.line(text, at, LONGEST, what)? == 0 {
             return Ok(false);
         }
         self.line += 1;
-        if got == LONGEST {
-            return Err(self.input.fault(at, format!("a line of more than {LONGEST} characters: not a table")));
-        }
         while text.last().is_some_and(|last| matches!(last, b'\n' | b'\r')) {
             text.pop();
         }
@@ -168,7 +163,7 @@ impl Table {
             }
         };
         // Each channel keeps a level from where it takes the one that is later in the file.
-        let begin = self.now.map_or(0, |now| -now);
+        let begin = -self.now.unwrap_or_default();
         let mut later: Vec<Option<bool>> = vec![None; self.columns.len()];
         for Change { time, channel, level } in changes {
             if let Some(before) = later.get_mut(usize::from(channel)).and_then(|known| known.replace(level)) {
@@ -204,7 +199,7 @@ impl Table {
     }
 
     /// The time of a row.
-    fn time(&mut self, cells: &[&[u8]]) -> Result<i64, String> {
+    fn time(&mut self, cells: &[&[u8]]) -> Result<Time, String> {
         let text = |index: usize| String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
         let time = match self.clock {
             Times::Column { index, divisor } => {
@@ -213,9 +208,9 @@ impl Table {
             Times::Dates { index } => {
                 let time =
                     cell::date(&text(index)).ok_or_else(|| format!("{:?} is not a date and time", text(index)))?;
-                time.saturating_sub(*self.origin.get_or_insert(time))
+                time.since(*self.origin.get_or_insert(time))
             }
-            Times::Steps { start, period } => start.saturating_add((self.rows as f64 * period).round() as i64),
+            Times::Steps { start, period } => start + ((self.rows as f64 * period).round() as i64),
             Times::Rate(rate) => Clock::new(rate).time(self.rows),
         };
         Ok(if self.backwards { -time } else { time })
@@ -249,7 +244,7 @@ impl Table {
         }
         let time = self.time(&cells)?;
         if let Some(before) = self.now.filter(|before| time < *before) {
-            let (now, before) = (time as f64 / SECOND as f64, before as f64 / SECOND as f64);
+            let (now, before) = (time.ps() as f64 / SECOND as f64, before.ps() as f64 / SECOND as f64);
             return Err(format!("time goes back from {before} s to {now} s"));
         }
         let levels = self.columns.iter().map(|column| self.level(column, &cells)).collect::<Result<Vec<_>, _>>()?;
@@ -401,8 +396,8 @@ impl Line for Table {
         Ok(!self.over)
     }
 
-    fn reached(&self) -> i64 {
-        self.now.unwrap_or(0)
+    fn reached(&self) -> Time {
+        self.now.unwrap_or_default()
     }
 
     fn hole(&mut self) -> Option<Hole> {

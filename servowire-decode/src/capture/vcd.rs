@@ -13,6 +13,7 @@ use memchr::memchr_iter;
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
+use crate::time::Time;
 use codes::{Code, Codes};
 use header::Header;
 use tick::Tick;
@@ -34,7 +35,7 @@ pub struct Vcd {
     channels: Vec<String>,
     codes: Codes,
     tick: Tick,
-    now: i64,
+    now: Time,
     /// Time of the file's last time stamp in its own unit.
     stamp: u64,
     /// Words to skip up to `$end`.
@@ -65,7 +66,7 @@ impl Vcd {
             channels,
             codes,
             tick: Tick::new(tick),
-            now: 0,
+            now: Time::ZERO,
             stamp: 0,
             skipping: false,
             ended: false,
@@ -355,7 +356,7 @@ impl Line for Vcd {
         }
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.now
     }
 }

@@ -5,6 +5,7 @@ use std::io;
 
 use crate::event::{Direction, Event, Place, Value, Verdict};
 use crate::sink::{Sink, Tally};
+use crate::time::Time;
 
 /// Bits of proof in the sound frames of a protocol: what of a frame is fixed or checked.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -35,17 +36,16 @@ pub(super) struct Evidence {
     weights: Weights,
     /// The sum, in bits.
     pub(super) score: i64,
-    /// Sound requests, sound answers to them, sound answers alone, answers missing.
+    /// Sound requests, sound answers to them, sound answers alone.
     pub(super) requests: u32,
     pub(super) answers: u32,
     pub(super) alone: u32,
-    pub(super) silences: u32,
     /// All frames by their verdict.
     pub(super) tally: Tally,
     /// Where sound frames begin, in picoseconds, and what they hold.
-    pub(super) starts: Vec<(i64, u64)>,
+    pub(super) starts: Vec<(Time, u64)>,
     /// Up to when the line was heard.
-    pub(super) until: i64,
+    pub(super) until: Time,
 }
 
 impl Evidence {
@@ -56,10 +56,9 @@ impl Evidence {
             requests: 0,
             answers: 0,
             alone: 0,
-            silences: 0,
             tally: Tally::default(),
             starts: Vec::new(),
-            until: i64::MAX,
+            until: Time::MAX,
         }
     }
 
@@ -69,10 +68,10 @@ impl Evidence {
 
     /// Whether most of what sounds here sounds there too, within `near` picoseconds and as long as both were heard.
     pub(super) fn is_part_of(&self, other: &Self, near: i64) -> bool {
-        let heard = |(start, content): &&(i64, u64)| {
-            let at = other.starts.partition_point(|(there, _)| *there < start - near);
+        let heard = |(start, content): &&(Time, u64)| {
+            let at = other.starts.partition_point(|(there, _)| *there < *start - near);
             let there = other.starts.get(at..).unwrap_or_default();
-            there.iter().take_while(|(there, _)| *there <= start + near).any(|(_, same)| same == content)
+            there.iter().take_while(|(there, _)| *there <= *start + near).any(|(_, same)| same == content)
         };
         let own = self.starts.partition_point(|(start, _)| *start <= other.until);
         let both = self.starts.iter().take(own).filter(heard).count();
@@ -101,10 +100,7 @@ impl Sink for Evidence {
                 self.weights.alone
             }
             (Verdict::Ok, None, _) => 0,
-            (Verdict::Refused(_), _, _) if event.verdict.is_silence() => {
-                self.silences += 1;
-                0
-            }
+            (Verdict::Refused(_), _, _) if event.verdict.is_silence() => 0,
             (Verdict::Refused(refusal), _, delay) => match (refusal.class, delay) {
                 ("rejected", _) => REJECTED,
                 ("crc", Some(_)) => ONLY_THE_CHECK,

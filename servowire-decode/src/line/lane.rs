@@ -7,22 +7,23 @@ use super::receive::{EdgeReceiver, Rates};
 use super::start_stop::StartStop;
 use crate::capture::Hole;
 use crate::capture::samples::Samples;
-use crate::event::{Event, Place, Verdict};
+use crate::event::{Event, Verdict};
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// A channel and which way up it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Tap {
+pub(crate) struct Tap {
     /// Index of the channel.
-    pub channel: u16,
+    pub(crate) channel: u16,
     /// Whether it idles low.
-    pub inverted: bool,
+    pub(crate) inverted: bool,
 }
 
 /// Turns the levels of one idle-high line into events.
 pub trait LineDecoder {
     /// The line takes a level.
-    fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()>;
+    fn change(&mut self, time: Time, level: bool, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The next samples: the same as their changes.
     fn samples(&mut self, samples: Samples<'_>, out: &mut dyn Sink) -> io::Result<()> {
@@ -33,20 +34,20 @@ pub trait LineDecoder {
     }
 
     /// The line has not changed until `time`.
-    fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;
+    fn reach(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The recording has a hole: nothing is known of the line there.
     fn hole(&mut self, hole: Hole, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The capture ends at `time`.
-    fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;
+    fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
     /// What was measured of the line.
     fn rates(&self) -> Rates;
 }
 
 /// Decodes a start-stop protocol.
-pub struct StartStopLine<P> {
+pub(crate) struct StartStopLine<P> {
     receiver: EdgeReceiver,
     protocol: P,
     weights: Weights,
@@ -54,7 +55,7 @@ pub struct StartStopLine<P> {
     /// The level at the beginning was given.
     begun: bool,
     /// The first changes, as long as it is not known where the first field begins.
-    opening: Vec<(i64, bool)>,
+    opening: Vec<(Time, bool)>,
 }
 
 /// Changes from which the first field is found at most.
@@ -67,14 +68,14 @@ const STARTS: u32 = 18;
 /// The last level of a recording is taken to last. If a frame does not hold so, it was cut off.
 struct Held<'a> {
     out: &'a mut dyn Sink,
-    end: i64,
+    end: Time,
     /// What a frame is then.
     cut: &'a Verdict,
 }
 
 impl Sink for Held<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        let lasts = matches!(event.place, Place::Time { end, .. } if end > self.end);
+        let lasts = event.place.end().is_some_and(|end| end > self.end);
         let refused = !event.verdict.is_ok() && !event.verdict.is_silence();
         if event.verdict == Verdict::cut_off() || lasts && refused {
             return self.out.event(&Event { fields: Vec::new(), verdict: self.cut.clone(), ..event.clone() });
@@ -97,16 +98,16 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         Ok(())
     }
 
-    fn take(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn take(&mut self, time: Time, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         if self.receiver.change(time, level) { self.give(out) } else { Ok(()) }
     }
 
     /// Nothing more is known from `time` on; `cut`: what becomes of a frame that is not over.
-    fn end(&mut self, time: i64, cut: &Verdict, out: &mut dyn Sink) -> io::Result<()> {
+    fn end(&mut self, time: Time, cut: &Verdict, out: &mut dyn Sink) -> io::Result<()> {
         if !self.opening.is_empty() {
             self.open(out)?;
         }
-        let mut out = Held { out, end: time.saturating_add(self.bit), cut };
+        let mut out = Held { out, end: time + self.bit, cut };
         if self.receiver.finish(time) {
             self.give(&mut out)?;
         }
@@ -116,7 +117,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     /// Whether the line is at work when the recording begins, so that the first falling edge need not be a start bit.
     fn begins_inside(&self) -> bool {
         match self.opening.as_slice() {
-            [(begin, true), (fall, _), ..] => fall - begin < i64::from(P::CONTENT_BITS + 3) * self.bit,
+            [(begin, true), (fall, _), ..] => *fall - *begin < i64::from(P::CONTENT_BITS + 3) * self.bit,
             _ => true,
         }
     }
@@ -125,9 +126,9 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     fn open(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let opening = std::mem::take(&mut self.opening);
         let whole = 2 * i64::from(P::CONTENT_BITS + 2) * self.bit;
-        let falls = |(_, level): &&(i64, bool)| !level;
-        let first = opening.iter().skip(1).find(falls).map_or(0, |(time, _)| *time);
-        let starts = opening.iter().skip(1).filter(falls).filter(|(time, _)| time - first < whole).count() as u32;
+        let falls = |(_, level): &&(Time, bool)| !level;
+        let first = opening.iter().skip(1).find(falls).map_or(Time::ZERO, |(time, _)| *time);
+        let starts = opening.iter().skip(1).filter(falls).filter(|(time, _)| *time - first < whole).count() as u32;
         let (mut best, mut most) = (0, i64::MIN);
         for skipped in 0..starts.min(STARTS) {
             let mut evidence = Evidence::new(self.weights);
@@ -136,7 +137,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
             for (time, level) in &opening {
                 trial.take(*time, *level, &mut evidence)?;
             }
-            let end = opening.last().map_or(0, |(time, _)| *time).saturating_add(OPENED * self.bit);
+            let end = opening.last().map_or(Time::ZERO, |(time, _)| *time) + OPENED * self.bit;
             trial.finish(end, &mut evidence)?;
             if evidence.score > most {
                 (best, most) = (skipped, evidence.score);
@@ -154,7 +155,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
 }
 
 impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
-    fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn change(&mut self, time: Time, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         if !self.begun {
             self.begun = true;
             self.protocol.begin(time);
@@ -162,7 +163,7 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
             return Ok(());
         }
         let Some((last, _)) = self.opening.last() else { return self.take(time, level, out) };
-        let over = self.opening.len() > 1 && time - last > OPENED * self.bit || self.opening.len() >= OPENING;
+        let over = self.opening.len() > 1 && time - *last > OPENED * self.bit || self.opening.len() >= OPENING;
         if over {
             self.open(out)?;
             return self.take(time, level, out);
@@ -177,9 +178,9 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
         Ok(())
     }
 
-    fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn reach(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         if let [_, .., (last, _)] = self.opening.as_slice() {
-            if time - last <= OPENED * self.bit {
+            if time - *last <= OPENED * self.bit {
                 return Ok(());
             }
             self.open(out)?;
@@ -194,7 +195,7 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
         Ok(())
     }
 
-    fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         self.end(time, &Verdict::cut_off(), out)
     }
 
@@ -206,7 +207,7 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
 /// The wires of a lane as one idle-high line: a wire that is at work is low, so that both together are a half-duplex
 /// line.
 #[derive(Debug, Clone)]
-pub struct Wires {
+pub(crate) struct Wires {
     taps: Vec<Tap>,
     levels: Vec<Option<bool>>,
     level: Option<bool>,
@@ -214,18 +215,18 @@ pub struct Wires {
 
 impl Wires {
     /// One tap, or that of the requests and that of the answers.
-    pub fn new(taps: &[Tap]) -> Self {
+    pub(crate) fn new(taps: &[Tap]) -> Self {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
 
     /// Nothing is known of the levels any more.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.levels.fill(None);
         self.level = None;
     }
 
     /// The level of the line after a change of a channel, where it changes.
-    pub fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
+    pub(crate) fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
         for (tap, own) in self.taps.iter().zip(&mut self.levels) {
             if tap.channel == channel {
                 *own = Some(level != tap.inverted);

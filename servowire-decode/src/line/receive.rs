@@ -7,6 +7,8 @@
 use super::spikes::{Edge, Spikes};
 use super::start_stop::LineField;
 
+use crate::time::Time;
+
 /// How far a speaker's bit may be from the nominal one: one part in this many.
 const OFF: f64 = 0.065;
 /// Steps of the search for a bit length, to each side.
@@ -25,7 +27,7 @@ const MOST_EDGES: usize = 512;
 
 /// Receives fields of one line. Levels are given as on an idle-high line.
 #[derive(Debug, Clone)]
-pub struct EdgeReceiver {
+pub(crate) struct EdgeReceiver {
     bit: f64,
     content_bits: u32,
     spikes: Spikes,
@@ -99,7 +101,7 @@ impl Rates {
 
 impl EdgeReceiver {
     /// For fields of `content_bits`, 8 or 16, of bits of `bit` picoseconds.
-    pub fn new(bit: f64, content_bits: u32) -> Self {
+    pub(crate) fn new(bit: f64, content_bits: u32) -> Self {
         Self {
             bit,
             content_bits,
@@ -117,17 +119,17 @@ impl EdgeReceiver {
 
     /// The capture begins inside a field: so many falling edges are passed over before the first start bit.
     #[must_use]
-    pub fn beginning_at(self, skipped: u32) -> Self {
+    pub(crate) fn beginning_at(self, skipped: u32) -> Self {
         Self { skipped, ..self }
     }
 
     /// What was measured so far.
-    pub fn rates(&self) -> Rates {
+    pub(crate) fn rates(&self) -> Rates {
         self.rates
     }
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
-    pub fn change(&mut self, time: i64, level: bool) -> bool {
+    pub(crate) fn change(&mut self, time: Time, level: bool) -> bool {
         if let Some(edge) = self.spikes.plain_change(time, level) {
             self.edge(edge);
         } else {
@@ -139,33 +141,33 @@ impl EdgeReceiver {
     }
 
     /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
-    pub fn reach(&mut self, time: i64) -> bool {
+    pub(crate) fn reach(&mut self, time: Time) -> bool {
         for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge);
         }
         let Some(last) = self.burst.last() else { return !self.fields.is_empty() };
         let over = if last.level { self.longest_high() } else { f64::from(self.field_bits()) * 2.0 };
-        if (time.saturating_sub(last.time)) as f64 > over * self.bit {
+        if (time - last.time) as f64 > over * self.bit {
             self.close();
         }
         !self.fields.is_empty()
     }
 
     /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
-    pub fn finish(&mut self, time: i64) -> bool {
-        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)).into_iter().flatten() {
+    pub(crate) fn finish(&mut self, time: Time) -> bool {
+        for edge in self.spikes.reach(time + (self.bit * 2.0) as i64).into_iter().flatten() {
             self.edge(edge);
         }
         let open = self.burst.last().is_some_and(|last| !last.level);
         self.close();
-        if open && self.fields.last().is_some_and(|field| field.end > time.saturating_add(self.bit as i64)) {
+        if open && self.fields.last().is_some_and(|field| field.end > time + self.bit as i64) {
             self.fields.pop();
         }
         !self.fields.is_empty()
     }
 
     /// The fields that are complete.
-    pub fn take(&mut self) -> std::vec::Drain<'_, LineField> {
+    pub(crate) fn take(&mut self) -> std::vec::Drain<'_, LineField> {
         self.fields.drain(..)
     }
 
@@ -189,7 +191,7 @@ impl EdgeReceiver {
     }
 
     fn edge(&mut self, edge: Edge) {
-        let pause = self.burst.last().map_or(0, |last| edge.time.saturating_sub(last.time));
+        let pause = self.burst.last().map_or(0, |last| edge.time - last.time);
         if !edge.level && pause > self.rest {
             self.close();
         } else if self.burst.len() >= MOST_EDGES {
@@ -236,7 +238,7 @@ impl EdgeReceiver {
     /// Edges up to the first pause in which somebody else may have begun.
     fn speech(&self, edges: &[Edge]) -> usize {
         let bit = self.heard.first().copied().unwrap_or(self.bit);
-        let mut start = edges.first().map_or(0, |edge| edge.time);
+        let mut start = edges.first().map_or(Time::ZERO, |edge| edge.time);
         let last = ((f64::from(self.field_bits()) - 1.0) * bit) as i64;
         let other = ((f64::from(self.field_bits()) + OTHER_SPEAKER) * bit) as i64;
         for (at, edge) in edges.iter().enumerate().skip(1) {
@@ -405,7 +407,7 @@ impl EdgeReceiver {
     fn each(&self, edges: &[Edge], bit: f64, mut take: impl FnMut(f64, bool)) {
         let last = f64::from(self.field_bits()) - 0.6;
         let per = 1.0 / bit;
-        let mut start = edges.first().map_or(0, |edge| edge.time);
+        let mut start = edges.first().map_or(Time::ZERO, |edge| edge.time);
         let mut first = true;
         for edge in edges.iter().skip(1) {
             let place = (edge.time - start) as f64 * per;
@@ -445,7 +447,7 @@ fn nearest(number: f64) -> f64 {
 }
 
 /// Bits of a line from `start` on.
-fn line_bits(edges: &[Edge], start: i64, bit: f64) -> u128 {
+fn line_bits(edges: &[Edge], start: Time, bit: f64) -> u128 {
     let per = 1.0 / bit;
     let place = |edge: &Edge| nearest((edge.time - start) as f64 * per).clamp(0.0, 128.0) as u32;
     let below = |at: u32| 1_u128.checked_shl(at).map_or(u128::MAX, |bit| bit - 1);

@@ -1,5 +1,7 @@
 //! Runs too short to be a bit, taken out of a line.
 
+use crate::time::Time;
+
 /// Shorter runs are spikes, in bits: above a sample at four samples a bit, below a bit with jitter at both ends.
 const SHORTEST_RUN: f64 = 0.375;
 
@@ -10,7 +12,7 @@ const TORN_BIT: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
     /// When, in picoseconds.
-    pub(crate) time: i64,
+    pub(crate) time: Time,
     /// The level from here on.
     pub(crate) level: bool,
     /// Spikes dropped since the edge before.
@@ -29,12 +31,12 @@ pub(crate) struct Spikes {
     solid: Option<bool>,
     /// The present level and since when.
     level: bool,
-    since: i64,
+    since: Time,
     /// Edges of the cluster, and the time in it at the level opposite to the solid one.
     edges: u32,
     other: i64,
     /// When the cluster began.
-    begun: i64,
+    begun: Time,
     dropped: u32,
 }
 
@@ -45,13 +47,23 @@ impl Spikes {
     /// For bits of `bit` picoseconds.
     pub(crate) fn new(bit: f64) -> Self {
         let shortest = (bit * SHORTEST_RUN) as i64;
-        Self { bit, shortest, solid: None, level: true, since: 0, edges: 0, other: 0, begun: 0, dropped: 0 }
+        Self {
+            bit,
+            shortest,
+            solid: None,
+            level: true,
+            since: Time::ZERO,
+            edges: 0,
+            other: 0,
+            begun: Time::ZERO,
+            dropped: 0,
+        }
     }
 
     /// The same as [`change`](Self::change) where the change before was an edge and nothing else, as nearly always.
     #[inline]
-    pub(crate) fn plain_change(&mut self, time: i64, level: bool) -> Option<Edge> {
-        let is_plain = self.edges == 1 && level != self.level && time.saturating_sub(self.since) >= self.shortest;
+    pub(crate) fn plain_change(&mut self, time: Time, level: bool) -> Option<Edge> {
+        let is_plain = self.edges == 1 && level != self.level && (time - self.since) >= self.shortest;
         is_plain.then(|| {
             let edge = self.edge(self.since, self.level);
             (self.solid, self.begun) = (Some(self.level), time);
@@ -62,7 +74,7 @@ impl Spikes {
 
     /// The line changes to `level`; the edges before it that are known to last.
     #[inline]
-    pub(crate) fn change(&mut self, time: i64, level: bool) -> Edges {
+    pub(crate) fn change(&mut self, time: Time, level: bool) -> Edges {
         let edge = self.reach(time);
         match self.solid {
             None => {
@@ -71,7 +83,7 @@ impl Spikes {
             }
             Some(solid) if level != self.level => {
                 if self.edges > 0 && self.level != solid {
-                    self.other = self.other.saturating_add(time.saturating_sub(self.since));
+                    self.other = self.other.saturating_add(time - self.since);
                 }
                 if self.edges == 0 {
                     self.begun = time;
@@ -86,9 +98,9 @@ impl Spikes {
 
     /// The line has not changed until `time`.
     #[inline]
-    pub(crate) fn reach(&mut self, time: i64) -> Edges {
+    pub(crate) fn reach(&mut self, time: Time) -> Edges {
         let Some(solid) = self.solid else { return [None; 2] };
-        if self.edges == 0 || time.saturating_sub(self.since) < self.shortest {
+        if self.edges == 0 || (time - self.since) < self.shortest {
             return [None; 2];
         }
         if self.edges == 1 {
@@ -108,7 +120,7 @@ impl Spikes {
         if self.level != solid {
             self.dropped = self.dropped.saturating_add(count / 2);
             self.solid = Some(self.level);
-            return [Some(self.edge(self.since.saturating_sub(other), self.level)), None];
+            return [Some(self.edge(self.since - other, self.level)), None];
         }
         let whole = (other as f64 / self.bit).round();
         if (other as f64) < TORN_BIT * self.bit {
@@ -116,26 +128,26 @@ impl Spikes {
             return [None; 2];
         }
         self.dropped = self.dropped.saturating_add(count / 2 - 1);
-        let after = self.begun.saturating_add((whole * self.bit) as i64).min(self.since);
+        let after = (self.begun + ((whole * self.bit) as i64)).min(self.since);
         [Some(self.edge(self.begun, !solid)), Some(self.edge(after, solid))]
     }
 
     /// The last change of the line and the level since.
-    pub(crate) fn last_change(&self) -> Option<(i64, bool)> {
+    pub(crate) fn last_change(&self) -> Option<(Time, bool)> {
         self.solid.map(|_| (self.since, self.level))
     }
 
     /// The last change of the line and the level since, where no spike is about.
-    pub(crate) fn settled(&self) -> Option<(i64, bool)> {
+    pub(crate) fn settled(&self) -> Option<(Time, bool)> {
         (self.solid == Some(self.level) && self.edges == 0 && self.dropped == 0).then_some((self.since, self.level))
     }
 
     /// The last change was at `time`, and the level since has lasted.
-    pub(crate) fn settle(&mut self, time: i64, level: bool) {
+    pub(crate) fn settle(&mut self, time: Time, level: bool) {
         (self.solid, self.level, self.since, self.edges, self.other) = (Some(level), level, time, 0, 0);
     }
 
-    fn edge(&mut self, time: i64, level: bool) -> Edge {
+    fn edge(&mut self, time: Time, level: bool) -> Edge {
         Edge { time, level, spikes: std::mem::take(&mut self.dropped) }
     }
 }
@@ -144,12 +156,12 @@ impl Spikes {
 mod tests {
     use super::*;
 
-    fn clean(changes: &[(i64, bool)], end: i64) -> Vec<(i64, bool, u32)> {
+    fn clean(changes: &[(i128, bool)], end: i128) -> Vec<(i128, bool, u32)> {
         let mut spikes = Spikes::new(100.0);
         let mut out: Vec<Edge> =
-            changes.iter().flat_map(|&(time, level)| spikes.change(time, level)).flatten().collect();
-        out.extend(spikes.reach(end).into_iter().flatten());
-        out.iter().map(|edge| (edge.time, edge.level, edge.spikes)).collect()
+            changes.iter().flat_map(|&(time, level)| spikes.change(Time::from_ps(time), level)).flatten().collect();
+        out.extend(spikes.reach(Time::from_ps(end)).into_iter().flatten());
+        out.iter().map(|edge| (edge.time.ps(), edge.level, edge.spikes)).collect()
     }
 
     #[test]

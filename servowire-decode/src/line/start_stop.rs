@@ -3,6 +3,7 @@
 use std::io;
 
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// A field of a start-stop line with its place in the capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,9 +13,9 @@ pub struct LineField {
     /// Whether the delimiter was read as 1.
     pub delimiter: bool,
     /// The edge of the start bit, in picoseconds.
-    pub start: i64,
+    pub start: Time,
     /// The end of the delimiter at the speaker's rate.
-    pub end: i64,
+    pub end: Time,
     /// Spikes that were dropped before it or in it.
     pub spikes: u32,
     /// For the first field of a speaker: the bits of the line from its start bit on, as long as he speaks, the first in
@@ -28,11 +29,11 @@ pub trait StartStop {
     const CONTENT_BITS: u32;
 
     /// The capture begins, at `start`.
-    fn begin(&mut self, start: i64);
+    fn begin(&mut self, start: Time);
 
     /// The next field of the line.
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The recording ends, at `end`.
-    fn finish(&mut self, end: i64, out: &mut dyn Sink) -> io::Result<()>;
+    fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()>;
 }

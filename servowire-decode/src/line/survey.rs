@@ -10,6 +10,7 @@ use crate::codec::Codec;
 use crate::protocols::meant;
 use crate::recognition::Recognition;
 use crate::settings::Settings;
+use crate::time::Time;
 
 /// Edges of a channel that are looked at.
 const SAMPLE: usize = 3000;
@@ -21,7 +22,7 @@ pub(super) const FEWEST: usize = 5;
 const CLOSE: f64 = 0.5;
 
 /// The edges of a channel, by time.
-pub(super) type Edges = [(i64, bool)];
+pub(super) type Edges = [(Time, bool)];
 
 /// A protocol at a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,8 +94,8 @@ impl Candidates {
     pub(super) fn new(protocol: Option<&'static dyn Codec>, settings: Settings, pair: Option<[u16; 2]>) -> Self {
         let rated = |protocol: &'static dyn Codec| {
             let rates: Vec<u32> = match settings.line.bit_rate {
-                Some(rate) if !protocol.rates().is_empty() && !protocol.is_clocked() => vec![rate],
-                _ => protocol.rates().to_vec(),
+                Some(rate) if !protocol.rates.is_empty() && !protocol.clocked => vec![rate],
+                _ => protocol.rates.to_vec(),
             };
             rates.into_iter().map(move |rate| Speech { protocol, rate })
         };
@@ -171,13 +172,13 @@ impl Candidates {
 
     /// What a protocol makes of one channel, or of two as one line.
     pub(super) fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges]) -> (Evidence, Rates) {
-        let mut evidence = Evidence::new(speech.protocol.weights());
+        let mut evidence = Evidence::new(speech.protocol.weights);
         let Some(mut decoder) = speech.protocol.line(speech.rate, &self.settings) else {
             return (evidence, Rates::default());
         };
         let mut wires = Wires::new(taps);
         let mut at = vec![0_usize; channels.len()];
-        let mut end = 0;
+        let mut end = Time::ZERO;
         let mut count = 0;
         // The next edge of all channels.
         while let Some((k, (time, level))) = channels
@@ -212,7 +213,7 @@ impl Candidates {
         &self,
         mut readings: Vec<Found>,
         judged: &[u16],
-        edges: &dyn Fn(u16) -> Vec<(i64, bool)>,
+        edges: &dyn Fn(u16) -> Vec<(Time, bool)>,
     ) -> Vec<Found> {
         self.join(&mut readings, edges);
         self.join_unnamed(&mut readings, judged, edges);
@@ -231,10 +232,10 @@ impl Candidates {
     }
 
     /// Answers of HIPERFACE DSL say nothing by themselves: they are looked for on every channel that is nothing else.
-    fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(i64, bool)>) {
+    fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| {
             let evidence = &found.evidence;
-            !found.speech.protocol.answers_alone() && evidence.requests > 8 && evidence.alone * 4 < evidence.requests
+            !found.speech.protocol.answers_alone && evidence.requests > 8 && evidence.alone * 4 < evidence.requests
         };
         for asking in readings.clone().into_iter().filter(asks) {
             let own = asking.taps.clone();
@@ -246,7 +247,7 @@ impl Candidates {
             for channel in judged.iter().filter(other) {
                 for inverted in [false, true] {
                     let taps: Vec<Tap> = own.iter().copied().chain([Tap { channel: *channel, inverted }]).collect();
-                    let lines: Vec<Vec<(i64, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
+                    let lines: Vec<Vec<(Time, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
                     let lines: Vec<&Edges> =
                         lines.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
                     let (evidence, rates) = self.trial(asking.speech, &taps, &lines);
@@ -266,7 +267,7 @@ impl Candidates {
     }
 
     /// Requests alone on one channel and their answers on another.
-    fn join(&self, readings: &mut Vec<Found>, edges: &dyn Fn(u16) -> Vec<(i64, bool)>) {
+    fn join(&self, readings: &mut Vec<Found>, edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| found.evidence.requests > 0 && found.evidence.answers * 4 < found.evidence.requests;
         let answers = |found: &Found| found.evidence.alone > found.evidence.requests;
         let mut pairs = Vec::new();
@@ -276,7 +277,7 @@ impl Candidates {
                     continue;
                 }
                 let taps: Vec<Tap> = asking.taps.iter().chain(&answering.taps).copied().collect();
-                let channels: Vec<Vec<(i64, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
+                let channels: Vec<Vec<(Time, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
                 let channels: Vec<&Edges> =
                     channels.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
                 let (evidence, rates) = self.trial(answering.speech, &taps, &channels);
@@ -312,7 +313,7 @@ fn may_run_at(edges: &Edges, bit: f64) -> bool {
     let (mut short, mut fitting, mut all) = (0_u32, 0_u32, 0_u32);
     for pair in edges.windows(2).take(1024) {
         let [(from, _), (to, _)] = pair else { continue };
-        let bits = to.saturating_sub(*from) as f64 / bit;
+        let bits = (*to - *from) as f64 / bit;
         all += 1;
         short += u32::from(bits < 0.375);
         fitting += u32::from((0.45..3.6).contains(&bits));
@@ -325,7 +326,7 @@ pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
     let (mut high, mut low) = (0_i64, 0_i64);
     for pair in edges.windows(2) {
         let [(from, level), (to, _)] = pair else { continue };
-        let length = to.saturating_sub(*from);
+        let length = *to - *from;
         if length > 20 * bit {
             let sum = if *level { &mut high } else { &mut low };
             *sum = sum.saturating_add(length);
@@ -340,7 +341,7 @@ pub(super) fn seen_rate(edges: &Edges) -> Option<f64> {
     let mut lengths: Vec<f64> = edges
         .windows(2)
         .filter_map(|pair| match pair {
-            [(from, _), (to, _)] => Some(to.saturating_sub(*from) as f64),
+            [(from, _), (to, _)] => Some((*to - *from) as f64),
             _ => None,
         })
         .filter(|length| *length > 0.0)

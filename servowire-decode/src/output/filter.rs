@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use crate::event::{Direction, Event, Place, Value};
+use crate::time::Time;
 
 /// What the user wants to see; what is left empty lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Filter {
     kinds: Vec<String>,
     address: Option<i64>,
-    from: Option<i64>,
-    to: Option<i64>,
+    from: Option<Time>,
+    to: Option<Time>,
     /// Only what is refused.
     pub(super) errors: bool,
     /// By line: whether the last request passed by its address.
@@ -26,7 +27,7 @@ const REST: i64 = 10_000_000_000;
 impl Filter {
     /// `kinds`: the whole name or its last word, in any case; `address`: of an encoder, drive or device; `times`: the
     /// first, and the one from which on nothing is shown, in picoseconds; `errors`: only what is refused.
-    pub fn new(kinds: Vec<String>, address: Option<i64>, times: (Option<i64>, Option<i64>), errors: bool) -> Self {
+    pub fn new(kinds: Vec<String>, address: Option<i64>, times: (Option<Time>, Option<Time>), errors: bool) -> Self {
         let (from, to) = times;
         Self { kinds, address, from, to, errors, passed: BTreeMap::new() }
     }
@@ -37,8 +38,8 @@ impl Filter {
     }
 
     /// Whether nothing of interest can come any more once a recording was read up to `time`.
-    pub(super) fn is_over(&self, time: i64) -> bool {
-        self.to.is_some_and(|to| time > to.saturating_add(REST))
+    pub(super) fn is_over(&self, time: Time) -> bool {
+        self.to.is_some_and(|to| time > to + REST)
     }
 
     /// Whether an event of line `lane` is asked for; of those that are, only the refused ones may be shown.
@@ -88,7 +89,8 @@ mod tests {
     use super::*;
     use crate::event::{Field, Verdict};
 
-    fn event(direction: Direction, kind: &'static str, address: Option<i64>, start: i64) -> Event {
+    fn event(direction: Direction, kind: &'static str, address: Option<i64>, start: i128) -> Event {
+        let start = Time::from_ps(start);
         let fields = address.map(|address| Field::number("EA", address)).into_iter().collect();
         Event::new(Place::Time { start, end: start + 10 }, Some(direction), kind, fields, Verdict::Ok)
     }
@@ -116,9 +118,9 @@ mod tests {
 
     #[test]
     fn times_from_and_to() {
-        let mut filter = Filter { from: Some(100), to: Some(200), ..Filter::default() };
+        let mut filter = Filter { from: Some(Time::from_ps(100)), to: Some(Time::from_ps(200)), ..Filter::default() };
         let takes = [85, 95, 150, 199, 200].map(|start| filter.takes(0, &event(Direction::Answer, "x", None, start)));
         assert_eq!(takes, [false, true, true, true, false]);
-        assert!(!filter.is_over(200) && filter.is_over(10_000_000_201));
+        assert!(!filter.is_over(Time::from_ps(200)) && filter.is_over(Time::from_ps(10_000_000_201)));
     }
 }

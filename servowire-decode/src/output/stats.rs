@@ -7,6 +7,7 @@ use serde_json::{Value as Json, json};
 
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
+use crate::time::Time;
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
@@ -29,10 +30,10 @@ struct Figures {
     kinds: BTreeMap<String, u64>,
     refused: BTreeMap<&'static str, u64>,
     /// Start of the last frame of the side that keeps the cycle.
-    last_start: Option<(Option<Direction>, i64)>,
+    last_start: Option<(Option<Direction>, Time)>,
     cycle: Spread,
     delay: Spread,
-    position: Option<(i64, Position)>,
+    position: Option<(Time, Position)>,
     /// Positions in frames without a time.
     untimed: u64,
     largest: u64,
@@ -42,7 +43,7 @@ struct Figures {
 
 #[derive(Debug, Clone, Copy)]
 struct Jump {
-    time: i64,
+    time: Time,
     from: i64,
     to: i64,
     moved: i64,
@@ -145,7 +146,7 @@ impl Figures {
     }
 
     /// The cycle is that of the requests; on a line without them, that of the frames there are.
-    fn keep_cycle(&mut self, direction: Option<Direction>, start: i64) {
+    fn keep_cycle(&mut self, direction: Option<Direction>, start: Time) {
         match self.last_start {
             Some((side, last)) if side == direction => self.cycle.add(start - last),
             Some(_) if direction == Some(Direction::Request) => self.cycle = Spread::default(),
@@ -155,7 +156,7 @@ impl Figures {
         self.last_start = Some((direction, start));
     }
 
-    fn follow(&mut self, time: i64, position: Position, limit: Option<u64>) {
+    fn follow(&mut self, time: Time, position: Position, limit: Option<u64>) {
         // Single-turn and multi-turn positions are not compared with each other.
         let before = self.position.replace((time, position)).filter(|(_, before)| before.span == position.span);
         let Some((_, before)) = before else { return };
@@ -199,7 +200,7 @@ impl<W: Write> Stats<W> {
         } else if let Some(limit) = self.limit {
             writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
             for Jump { time, from, to, moved } in &f.listed {
-                writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", *time as f64 / 1e6)?;
+                writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", time.us())?;
             }
         }
         Ok(())

@@ -50,7 +50,7 @@ impl<W: Write> Csv<W> {
     fn heading(&mut self, origin: &Origin) -> io::Result<()> {
         if self.names.is_none() {
             let mut names: Vec<&'static str> = Vec::new();
-            let of_lanes = origin.lanes.iter().flat_map(|lane| lane.protocol.fields().iter().copied());
+            let of_lanes = origin.lanes.iter().flat_map(|lane| lane.protocol.fields.iter().copied());
             let of_events = self.held.iter().flat_map(|event| event.fields.iter().map(|field| field.name));
             for name in of_lanes.chain(of_events) {
                 if !names.contains(&name) {
@@ -72,10 +72,10 @@ impl<W: Write> Csv<W> {
         let out = &mut self.out;
         out.write_field(&origin.file)?;
         out.write_field(lane.map_or("", |lane| &lane.channel))?;
-        out.write_field(lane.map_or("", |lane| lane.protocol.title()))?;
+        out.write_field(lane.map_or("", |lane| lane.protocol.title))?;
         match event.place {
             Place::Line(line) => [line.to_string(), String::new(), String::new()],
-            Place::Time { start, end } => [String::new(), microseconds(start), microseconds(end)],
+            Place::Time { start, end } => [String::new(), microseconds(start.ps()), microseconds(end.ps())],
         }
         .iter()
         .try_for_each(|field| out.write_field(field))?;
@@ -88,7 +88,7 @@ impl<W: Write> Csv<W> {
         out.write_field(event.position.map_or_else(String::new, |position| position.counts.to_string()))?;
         let turns = event.position.and_then(|position| position.turns());
         out.write_field(turns.map_or_else(String::new, |turns| turns.to_string()))?;
-        out.write_field(event.delay.map_or_else(String::new, microseconds))?;
+        out.write_field(event.delay.map_or_else(String::new, |delay| microseconds(delay.into())))?;
         match &event.verdict {
             Verdict::Ok => ["ok", "", "", ""].iter().try_for_each(|field| out.write_field(field))?,
             Verdict::Refused(refusal) => {
@@ -112,7 +112,7 @@ impl<W: Write> Csv<W> {
 }
 
 /// Picoseconds as microseconds, exactly.
-fn microseconds(time: i64) -> String {
+fn microseconds(time: i128) -> String {
     let sign = if time < 0 { "-" } else { "" };
     let time = time.unsigned_abs();
     format!("{sign}{}.{:06}", time / 1_000_000, time % 1_000_000)

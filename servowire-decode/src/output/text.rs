@@ -122,7 +122,7 @@ impl Columns {
         self.text.clear();
         self.pieces.clear();
         let _ = match place {
-            Place::Time { start, .. } => write!(self.text, "{:>11.3} us", start as f64 / 1e6),
+            Place::Time { start, .. } => write!(self.text, "{:>11.3} us", start.us()),
             Place::Line(number) => write!(self.text, "line {number:>5}"),
         };
     }
@@ -265,7 +265,7 @@ fn verdict_text(line: &mut String, verdict: &Verdict) {
                 let _ = write!(line, " bit {bit}");
             }
             if let Some(time) = refusal.time {
-                let _ = write!(line, " at {:.3} us", time as f64 / 1e6);
+                let _ = write!(line, " at {:.3} us", time.us());
             }
             let _ = write!(line, ": {}", refusal.reason);
             if let Some(cause) = &refusal.cause {

@@ -8,6 +8,7 @@ use vcd::{IdCode, TimescaleUnit, VarType, Writer};
 use super::printer::Lane;
 use crate::capture::Change;
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
+use crate::time::Time;
 
 /// An event comes after the edges it was made of; edges wait so long for it, in picoseconds.
 const WINDOW: i64 = 2_000_000_000;
@@ -25,10 +26,10 @@ pub struct VcdOut {
     /// Levels that are to be written, in the order of time.
     levels: VecDeque<Change>,
     /// Strings that are to be written, by time and as they came.
-    texts: BTreeMap<(i64, u64), (IdCode, String)>,
+    texts: BTreeMap<(Time, u64), (IdCode, String)>,
     sequence: u64,
     /// Time of the capture that is 0 in the file.
-    origin: Option<i64>,
+    origin: Option<Time>,
     written: Option<u64>,
 }
 
@@ -70,7 +71,7 @@ impl VcdOut {
             writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
             let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
             let (frame, verdict) = (string("frame")?, string("verdict")?);
-            let names = lane.protocol.fields();
+            let names = lane.protocol.fields;
             let fields = names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
             writer.upscope()?;
             self.strings.push(Strings { frame, verdict, names, fields });
@@ -78,7 +79,7 @@ impl VcdOut {
         writer.enddefinitions()
     }
 
-    fn wait(&mut self, time: i64, code: IdCode, text: String) {
+    fn wait(&mut self, time: Time, code: IdCode, text: String) {
         self.texts.insert((time, self.sequence), (code, text));
         self.sequence += 1;
     }
@@ -86,14 +87,14 @@ impl VcdOut {
     /// A level of the capture.
     pub(super) fn change(&mut self, change: &Change) -> io::Result<()> {
         if self.origin.is_none() {
-            self.origin = Some(change.time.min(0));
+            self.origin = Some(change.time.min(Time::ZERO));
             let strings = self.strings.clone();
             for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
                 self.wait(change.time, code, NOTHING.to_owned());
             }
         }
         self.levels.push_back(*change);
-        self.flush_before(change.time.saturating_sub(WINDOW))
+        self.flush_before(change.time - WINDOW)
     }
 
     /// A decoded frame of a line.
@@ -120,7 +121,7 @@ impl VcdOut {
         }
     }
 
-    fn flush_before(&mut self, time: i64) -> io::Result<()> {
+    fn flush_before(&mut self, time: Time) -> io::Result<()> {
         loop {
             let level = self.levels.front().map(|change| change.time).filter(|at| *at < time);
             let text = self.texts.first_key_value().map(|((at, _), _)| *at).filter(|at| *at < time);
@@ -146,8 +147,8 @@ impl VcdOut {
     }
 
     /// Goes on to a time. An event older than the window is shown late rather than out of order.
-    fn stamp(&mut self, time: i64) -> io::Result<()> {
-        let nanoseconds = (time.saturating_sub(self.origin.unwrap_or(0)).max(0) as u64 + 500) / 1000;
+    fn stamp(&mut self, time: Time) -> io::Result<()> {
+        let nanoseconds = ((time.since(self.origin.unwrap_or_default()).ps().max(0) + 500) / 1000) as u64;
         if self.written.is_none_or(|written| written < nanoseconds) {
             self.written = Some(nanoseconds);
             let mut digits = itoa::Buffer::new();
@@ -161,7 +162,7 @@ impl VcdOut {
 
     /// Writes what is left.
     pub(super) fn finish(&mut self) -> io::Result<()> {
-        self.flush_before(i64::MAX)?;
+        self.flush_before(Time::MAX)?;
         self.writer.flush()
     }
 }

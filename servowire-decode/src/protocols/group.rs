@@ -2,8 +2,9 @@
 
 use std::fmt::Display;
 
-use crate::event::{Event, Field, Place, Refusal};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Refusal, Span};
 use crate::line::start_stop::LineField;
+use crate::time::Time;
 
 use super::plausible::{joined, two_masters};
 
@@ -16,9 +17,9 @@ pub(super) fn too_wide(error: impl Display, single_turn: u8, multi_turn: u8) -> 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group<T, const N: usize> {
     contents: [T; N],
-    starts: [i64; N],
+    starts: [Time; N],
     len: usize,
-    pub(super) end: i64,
+    pub(super) end: Time,
     /// The first field whose delimiter read 0.
     pub(super) broken: Option<u8>,
     spikes: u32,
@@ -30,8 +31,8 @@ pub(super) struct Group<T, const N: usize> {
 
 impl<T: Copy + Default, const N: usize> Default for Group<T, N> {
     fn default() -> Self {
-        let (contents, starts) = ([T::default(); N], [0; N]);
-        Self { contents, starts, len: 0, end: 0, broken: None, spikes: 0, raw: 0, line: None }
+        let (contents, starts) = ([T::default(); N], [Time::ZERO; N]);
+        Self { contents, starts, len: 0, end: Time::ZERO, broken: None, spikes: 0, raw: 0, line: None }
     }
 }
 
@@ -63,8 +64,26 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
     }
 
     /// When each field began.
-    pub(super) fn starts(&self) -> &[i64] {
+    pub(super) fn starts(&self) -> &[Time] {
         self.starts.get(..self.len).unwrap_or_default()
+    }
+
+    /// Where content bits `first` to `last` are, counted from 0 through the contents of all fields.
+    pub(super) fn span(&self, first: u32, last: u32) -> Option<Span> {
+        let width = 8 * size_of::<T>() as u32;
+        // A field as its speaker sent it, with start bit and delimiter.
+        let field = self.end - *self.starts().last()?;
+        let at = |bit: u32, after: u32| {
+            let within = 1 + bit % width;
+            let start = *self.starts().get((bit / width) as usize)?;
+            Some((bit / width * (width + 2) + within, start + field * i64::from(within + after) / i64::from(width + 2)))
+        };
+        let ((first, start), (last, end)) = (at(first, 0)?, at(last, 1)?);
+        let place = match self.place() {
+            Place::Time { .. } => Place::Time { start, end },
+            line @ Place::Line(_) => line,
+        };
+        Some(Span { first, last, place })
     }
 
     /// Number of fields.
@@ -76,7 +95,7 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         self.len == 0
     }
 
-    pub(super) fn start(&self) -> i64 {
+    pub(super) fn start(&self) -> Time {
         self.starts().first().copied().unwrap_or_default()
     }
 
@@ -118,12 +137,12 @@ pub(super) fn silence(
     kind: &'static str,
     what: &str,
     timeout: i64,
-    now: i64,
+    now: Time,
     asked: bool,
     nobody: &str,
 ) -> Event {
     let after = match place {
-        Place::Time { end, .. } if asked => now.saturating_sub(end),
+        Place::Time { end, .. } if asked => now - end,
         _ => timeout,
     };
     let cause = if after < BRIEF {
@@ -131,5 +150,15 @@ pub(super) fn silence(
     } else {
         format!("only the request is on the line: {nobody}, A and B exchanged, or not its bit rate")
     };
-    Event::silence(place, kind, what, timeout, (now, asked), &cause)
+    let (place, reason) = match place {
+        Place::Time { end: start, .. } => {
+            let end = (start + timeout).min(now);
+            let within = (end - start) as f64 / 1e6;
+            (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
+        }
+        Place::Line(_) if asked => (place, format!("no {what} before the next request")),
+        Place::Line(_) => (place, format!("no {what} before the log ends")),
+    };
+    let refusal = Refusal { cause: Some(cause), ..Refusal::new(NO_RESPONSE, reason) };
+    Event::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
 }

@@ -17,7 +17,7 @@ use nikon_aformat::{
 
 use crate::bundled;
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Event, Place, Verdict};
 use crate::line::evidence::Weights;
 use crate::line::lane::{LineDecoder, StartStopLine};
@@ -25,6 +25,7 @@ use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::{CUT, CUT_BITS, LOST, SURELY_CUT_BITS, slipped_bit};
 use crate::settings::{Settings, Widths};
 use crate::sink::Sink;
+use crate::time::Time;
 use describe::Encoder;
 use frames::Frames;
 
@@ -32,43 +33,32 @@ use frames::Frames;
 pub(super) struct Nikon;
 
 impl Codec for Nikon {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "nikon",
-            title: "A-format",
-            about: "Nikon A-format",
-            needs: "A-format is decoded from edges or samples of the line, or from a log of words",
-        }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        describe::FIELDS
-    }
-
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &bundled::NIKON
-    }
-
-    fn rates(&self) -> &'static [u32] {
+    fn facts(&self) -> &'static Facts {
         const {
-            &[
-                BitRate::Mbit2_5.bits_per_second(),
-                BitRate::Mbit4.bits_per_second(),
-                BitRate::Mbit6_67.bits_per_second(),
-                BitRate::Mbit8.bits_per_second(),
-                BitRate::Mbit16.bits_per_second(),
-            ]
+            &Facts {
+                name: "nikon",
+                title: "A-format",
+                about: "Nikon A-format",
+                needs: "A-format is decoded from edges or samples of the line, or from a log of words",
+                fields: describe::FIELDS,
+                rates: &[
+                    BitRate::Mbit2_5.bits_per_second(),
+                    BitRate::Mbit4.bits_per_second(),
+                    BitRate::Mbit6_67.bits_per_second(),
+                    BitRate::Mbit8.bits_per_second(),
+                    BitRate::Mbit16.bits_per_second(),
+                ],
+                // Sync and frame code, CRC-3; sync code, fixed bit, echo and CRC-8.
+                weights: Weights { request: 6, answer: 22, alone: 14 },
+                captures: &bundled::NIKON,
+                ..Facts::NONE
+            }
         }
-    }
-
-    /// Sync and frame code, CRC-3; sync code, fixed bit, echo and CRC-8.
-    fn weights(&self) -> Weights {
-        Weights { request: 6, answer: 22, alone: 14 }
     }
 
     fn line(&self, rate: u32, settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         let bit = 1e12 / f64::from(rate.max(1));
-        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.weights())))
+        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.facts().weights)))
     }
 
     fn log(&self, settings: &Settings, _: &[Burst]) -> Option<Box<dyn LogDecoder>> {
@@ -97,15 +87,7 @@ struct Pending {
     replies: u32,
 }
 
-impl Pending {
-    /// When it ended; none in a log without times.
-    fn end(&self) -> Option<i64> {
-        match self.place {
-            Place::Time { end, .. } => Some(end),
-            Place::Line(_) => None,
-        }
-    }
-}
+impl Pending {}
 
 /// Finds requests and replies among the frames of a line.
 #[derive(Debug, Clone)]
@@ -113,9 +95,9 @@ pub struct Decoder {
     bit: i64,
     encoder: Encoder,
     /// Begin of the capture, until the first group has been seen.
-    begin: Option<i64>,
+    begin: Option<Time>,
     /// Until when the rest of a reply may come in which the capture began.
-    cut_until: Option<i64>,
+    cut_until: Option<Time>,
     open: Frames,
     pending: Option<Pending>,
 }
@@ -135,7 +117,7 @@ impl Decoder {
 
     /// Whether the open group is over before a frame that begins at `start`, and may be the first one of what it
     /// `begins`.
-    fn is_over(&self, start: i64, begins: Kind) -> bool {
+    fn is_over(&self, start: Time, begins: Kind) -> bool {
         let pause = start - self.open.end;
         // The frames of a reply follow each other: after anything else a new one begins.
         if begins == Kind::Response && self.open.kind() != Kind::Response && 2 * pause > 3 * self.bit {
@@ -192,13 +174,13 @@ impl Decoder {
         let asked = pending.map(|pending| pending.request);
         if let Some(pending) = pending.filter(|pending| !pending.request.command().is_multi_response()) {
             self.pending = None;
-            return self.answer(group, asked, pending.end());
+            return self.answer(group, asked, pending.place.end());
         }
         let first = pending.filter(|pending| pending.replies == 1);
-        self.answer(group, asked, first.and_then(|pending| pending.end()))
+        self.answer(group, asked, first.and_then(|pending| pending.place.end()))
     }
 
-    fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<i64>) -> Event {
+    fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<Time>) -> Event {
         let delay = asked_end.map(|end| group.start() - end);
         let expected = expected(group, asked);
         let result = match (group.broken, expected) {
@@ -217,7 +199,7 @@ impl Decoder {
     }
 
     /// No reply came until `now`; `asked`: when somebody asked again.
-    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             Some(pending) if pending.replies == 0 => {
                 let timeout = REPLY_TIMEOUT_BITS * self.bit;
@@ -293,7 +275,7 @@ fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 16;
 
-    fn begin(&mut self, start: i64) {
+    fn begin(&mut self, start: Time) {
         self.cut_until = None;
         self.begin = Some(start);
     }
@@ -310,7 +292,7 @@ impl StartStop for Decoder {
         if self.open.len() >= whole { self.close(out) } else { Ok(()) }
     }
 
-    fn finish(&mut self, end: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()> {
         if !self.open.is_empty() {
             let recent = end - self.open.end <= PAUSE_BITS * self.bit;
             let short = match self.open.kind() {
@@ -325,7 +307,7 @@ impl StartStop for Decoder {
             }
             self.close(out)?;
         }
-        match self.pending.and_then(|pending| pending.end()) {
+        match self.pending.and_then(|pending| pending.place.end()) {
             // Its reply may have come later.
             Some(asked) if end - asked < REPLY_TIMEOUT_BITS * self.bit => self.pending = None,
             _ => self.give_up(end, false, out)?,
@@ -347,7 +329,10 @@ impl LogDecoder for Decoder {
             let line = Some(burst.line);
             self.open.line = line;
             let content = word.reverse_bits();
-            self.field(&LineField { content, delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 }, out)?;
+            self.field(
+                &LineField { content, delimiter: true, start: Time::ZERO, end: Time::ZERO, spikes: 0, bits: 0 },
+                out,
+            )?;
         }
         if self.open.is_empty() {
             self.open.line = None;
@@ -362,6 +347,6 @@ impl LogDecoder for Decoder {
     }
 
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        self.give_up(0, false, out)
+        self.give_up(Time::ZERO, false, out)
     }
 }

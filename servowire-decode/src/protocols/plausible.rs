@@ -1,6 +1,7 @@
 //! What is sound and yet hardly true, said beside an `ok`; and what was done to a frame that is not.
 
 use crate::event::{Place, Position};
+use crate::time::Time;
 
 /// Turns a second that no servo motor makes: 30,000 a minute.
 const FASTEST: f64 = 500.0;
@@ -11,7 +12,7 @@ const CALM: u32 = 8;
 /// Follows the position of an encoder.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {
-    last: Option<(i64, Position)>,
+    last: Option<(Time, Position)>,
     calm: u32,
 }
 
@@ -19,7 +20,7 @@ impl Motion {
     /// The next position; what is strange about it.
     pub(super) fn note(&mut self, place: Place, position: Position) -> Option<String> {
         let Place::Time { start: time, .. } = place else { return None };
-        let same = |before: &(i64, Position)| {
+        let same = |before: &(Time, Position)| {
             (before.1.span, before.1.per_turn) == (position.span, position.per_turn) && time > before.0
         };
         let before = self.last.replace((time, position)).filter(same)?;
@@ -90,7 +91,7 @@ mod tests {
     fn notes(counts: &[i64]) -> Vec<usize> {
         let mut motion = Motion::default();
         let noted = |(k, counts): (usize, &i64)| {
-            let start = k as i64 * 125_000_000;
+            let start = Time::from_ps(k as i128 * 125_000_000);
             let position = Position { counts: *counts, span: Some(1 << 16), per_turn: Some(1000) };
             motion.note(Place::Time { start, end: start + 1 }, position).map(|_| k)
         };

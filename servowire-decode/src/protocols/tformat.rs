@@ -14,7 +14,7 @@ use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::bundled;
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Direction, Event, Verdict};
 use crate::line::evidence::Weights;
 use crate::line::lane::{LineDecoder, StartStopLine};
@@ -22,6 +22,7 @@ use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::CUT;
 use crate::settings::{Settings, Widths};
 use crate::sink::Sink;
+use crate::time::Time;
 use describe::Encoder;
 use frame::{ANSWER_TIMEOUT, Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
@@ -29,35 +30,26 @@ use frame::{ANSWER_TIMEOUT, Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 pub(super) struct Tformat;
 
 impl Codec for Tformat {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "tformat",
-            title: "T-Format",
-            about: "Tamagawa T-Format",
-            needs: "T-Format is decoded from edges or samples of the line, or from a log of bytes",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "tformat",
+                title: "T-Format",
+                about: "Tamagawa T-Format",
+                needs: "T-Format is decoded from edges or samples of the line, or from a log of bytes",
+                fields: describe::FIELDS,
+                rates: &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()],
+                // 9 of 256 control fields; with the echo and the check field of the answer.
+                weights: Weights { request: 4, answer: 24, alone: 16 },
+                captures: &bundled::TFORMAT,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        describe::FIELDS
-    }
-
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &bundled::TFORMAT
-    }
-
-    fn rates(&self) -> &'static [u32] {
-        const { &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()] }
-    }
-
-    /// 9 of 256 control fields; with the echo and the check field of the answer.
-    fn weights(&self) -> Weights {
-        Weights { request: 4, answer: 24, alone: 16 }
     }
 
     fn line(&self, rate: u32, settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         let bit = 1e12 / f64::from(rate.max(1));
-        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.weights())))
+        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.facts().weights)))
     }
 
     fn log(&self, settings: &Settings, _: &[Burst]) -> Option<Box<dyn LogDecoder>> {
@@ -80,17 +72,17 @@ pub struct Decoder {
     bit: i64,
     encoder: Encoder,
     /// Begin of the capture, until the first frame has been seen.
-    begin: Option<i64>,
+    begin: Option<Time>,
     /// Until when the rest of a frame is passed over in which the capture began.
-    skip: Option<i64>,
+    skip: Option<Time>,
     /// Until when another piece of that frame may come.
-    cut_until: Option<i64>,
+    cut_until: Option<Time>,
     /// The end of what was passed over.
-    skipped: i64,
+    skipped: Time,
     open: Frame,
     pending: Option<Pending>,
     /// Until when a frame may answer a request that was before the capture, as long as none was sound.
-    early: Option<i64>,
+    early: Option<Time>,
     /// A frame that may be a request or such an answer: what follows tells.
     unclear: Option<Frame>,
 }
@@ -104,7 +96,7 @@ impl Decoder {
             begin: None,
             skip: None,
             cut_until: None,
-            skipped: 0,
+            skipped: Time::ZERO,
             open: Frame::default(),
             pending: None,
             early: None,
@@ -113,7 +105,7 @@ impl Decoder {
     }
 
     /// Whether the open frame is over before a field that begins at `start`.
-    fn is_over(&self, start: i64) -> bool {
+    fn is_over(&self, start: Time) -> bool {
         let pause = start - self.open.end;
         if pause > FIELD_TIMEOUT_BITS * self.bit {
             return true;
@@ -183,7 +175,7 @@ impl Decoder {
             // The encoder refuses a damaged request with an ID 3 frame.
             (None, None) => AllData::parse(frame.contents()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
         };
-        let delay = pending.end().map(|end| frame.start() - end);
+        let delay = pending.place.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);
         let mut event = self.encoder.answer(frame, asked, result, delay);
         if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, pending.request) {
@@ -254,7 +246,7 @@ impl Decoder {
     }
 
     /// The answer did not come until `now`; `asked`: when somebody asked again.
-    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match (self.unclear.take(), self.pending.take()) {
             // Nobody answers an answer.
             (Some(frame), Some(Pending { request: Some(request), .. })) => {
@@ -288,7 +280,7 @@ impl Decoder {
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 8;
 
-    fn begin(&mut self, start: i64) {
+    fn begin(&mut self, start: Time) {
         (self.skip, self.cut_until) = (None, None);
         self.begin = Some(start);
         self.early = Some(start + LATE_ANSWER);
@@ -307,7 +299,7 @@ impl StartStop for Decoder {
             self.skip = None;
         }
         if self.open.is_empty() {
-            let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
+            let due = self.pending.and_then(|pending| pending.place.end()).map(|end| end + ANSWER_TIMEOUT);
             if due.is_some_and(|due| field.start > due) {
                 self.give_up(field.start, true, out)?;
             }
@@ -319,7 +311,7 @@ impl StartStop for Decoder {
         if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }
 
-    fn finish(&mut self, end: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()> {
         if !self.open.is_empty() {
             let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
             let request = self.pending.is_none()
@@ -332,8 +324,8 @@ impl StartStop for Decoder {
             }
             self.close(out)?;
         }
-        match self.pending.and_then(|pending| pending.end()) {
-            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, false, out),
+        match self.pending.and_then(|pending| pending.place.end()) {
+            Some(asked) if end > asked + ANSWER_TIMEOUT => self.give_up(end, false, out),
             // Its answer may have come later.
             _ => {
                 self.pending = None;
@@ -353,7 +345,7 @@ impl LogDecoder for Decoder {
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
         let asks = burst.direction == Some(Direction::Request);
         if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
-            self.give_up(0, true, out)?;
+            self.give_up(Time::ZERO, true, out)?;
         }
         if is_answer && self.pending.is_none() {
             return self.take(burst.line, rest, out);
@@ -379,6 +371,6 @@ impl LogDecoder for Decoder {
     }
 
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        self.give_up(0, false, out)
+        self.give_up(Time::ZERO, false, out)
     }
 }

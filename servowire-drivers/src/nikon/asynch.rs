@@ -1,23 +1,12 @@
 //! Waits by giving the time back. Every future may be dropped at any point: the next call waits until the line is free. Whether
 //! a request that changes the encoder has had its effect is not known then.
 
-use core::convert::Infallible;
-use core::ops::ControlFlow;
+use nikon_aformat::RequestFrame;
+use servowire_core::run_async as run;
 
-use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
-};
-use nikon_aformat::{
-    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
-};
-use servowire_core::{ClockError, Machine, Procedure, run_async as run};
-
-use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
-use crate::exchange;
-use crate::quiet::{self, Settle};
-use crate::race::race;
-use crate::{Error, Timer};
+use super::Frame;
+use crate::Timer;
+use crate::race::{self, race};
 
 /// What sends and receives frames.
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
@@ -44,13 +33,14 @@ driver!(awaited, Timer, async);
 /// The frame that comes until a time, or an error of the port.
 async fn take<F: FramePort>(
     port: &mut F,
-    _: &mut quiet::Line,
+    line: &mut quiet::Line,
     timer: &mut impl Timer,
     until_ns: u64,
-) -> Result<Option<Result<Frame, F::Error>>, ClockError> {
-    race(port.take(), timer.wait_until(until_ns)).await
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
+    let what = race(port.take(), sleep(line, timer, until_ns)).await?;
+    Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
-async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    timer.wait_until(until_ns).await
+async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
 }

@@ -1,21 +1,11 @@
 //! Waits by spinning.
 
-use core::convert::Infallible;
-use core::ops::ControlFlow;
+use nikon_aformat::RequestFrame;
+use servowire_core::run;
 
-use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
-};
-use nikon_aformat::{
-    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
-};
-use servowire_core::{ClockError, Machine, Procedure, run};
-
-use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
-use crate::exchange;
-use crate::quiet::{self, Settle, spin};
-use crate::{Clock, Error};
+use super::Frame;
+use crate::Clock;
+use crate::quiet::spin;
 
 /// What sends and receives frames.
 pub trait FramePort {
@@ -37,12 +27,13 @@ pub trait FramePort {
 driver!(spun, Clock);
 
 /// The frame that comes until a time, or an error of the port.
+#[inline(always)]
 fn take<F: FramePort>(
     port: &mut F,
     line: &mut quiet::Line,
     clock: &mut impl Clock,
     until_ns: u64,
-) -> Result<Option<Result<Frame, F::Error>>, ClockError> {
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
     spin(line, clock, until_ns, || port.take().transpose())
 }
 

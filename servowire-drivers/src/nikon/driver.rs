@@ -2,6 +2,21 @@
 
 macro_rules! driver {
     ($wait:ident, $clock:path $(, $asynch:tt)?) => {
+        use core::convert::Infallible;
+
+        use nikon_aformat::bus::Addresses;
+        use nikon_aformat::master::{
+            BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
+        };
+        use nikon_aformat::{
+            Doubt, EncoderAddress, Evidence, Operation, Policy, Request, Resolution, Response, Sample,
+        };
+        use servowire_core::{ClockError, Machine, Procedure};
+
+        use super::{LOST, Released, hear, longest_ns, silence_ns};
+        use crate::quiet::{self, Heard, Settle};
+        use crate::{Error, exchange};
+
         /// Why a call of a [`Driver`] failed.
         pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
 
@@ -162,15 +177,21 @@ macro_rules! driver {
                 self.state.sent(now_ns);
                 let mut progress = transaction.progress();
                 loop {
-                    let until_ns = match exchange::next(progress, &mut self.state, &mut self.clock)? {
-                        ControlFlow::Continue(until_ns) => until_ns,
-                        ControlFlow::Break(outcome) => {
-                            return outcome.map(|value| (transaction, value)).map_err(Error::Protocol);
+                    let until_ns = match progress {
+                        Progress::Pending { until_ns } => until_ns,
+                        Progress::Done { value, ready_ns } => {
+                            self.state.clean(ready_ns);
+                            return Ok((transaction, value));
+                        }
+                        Progress::Failed { error, ready_ns } => {
+                            let now_ns = self.state.now_ns(&mut self.clock)?;
+                            self.state.failed(ready_ns, now_ns);
+                            return Err(Error::Protocol(error));
                         }
                     };
-                    let frame = $wait!(take(&mut self.port, &mut self.state, &mut self.clock, until_ns))?;
-                    let now_ns = self.state.now_ns(&mut self.clock)?;
-                    progress = match frame {
+                    let (port, state, clock) = (&mut self.port, &mut self.state, &mut self.clock);
+                    let Heard { what, now_ns } = $wait!(take(port, state, clock, until_ns))?;
+                    progress = match what {
                         Some(frame) => hear(&mut transaction, frame.map_err(Error::Io)?, now_ns),
                         None => transaction.poll(now_ns),
                     };
@@ -182,9 +203,9 @@ macro_rules! driver {
                 let mut until_ns = self.state.now_ns(&mut self.clock)?;
                 let mut settling = self.state.settle(until_ns);
                 loop {
-                    let heard = $wait!(take(&mut self.port, &mut self.state, &mut self.clock, until_ns))?;
-                    let now_ns = self.state.now_ns(&mut self.clock)?;
-                    match settling.next(heard.is_some(), now_ns) {
+                    let (port, state, clock) = (&mut self.port, &mut self.state, &mut self.clock);
+                    let Heard { what, now_ns } = $wait!(take(port, state, clock, until_ns))?;
+                    match settling.next(what.is_some(), now_ns) {
                         Settle::Quiet => return Ok(()),
                         Settle::Never => return Err(Error::NeverQuiet),
                         Settle::Until(ns) => until_ns = ns,

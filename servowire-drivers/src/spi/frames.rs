@@ -15,7 +15,7 @@ use crate::{Clock, Direction};
 /// A port of A-format frames made of an SPI. It knows when each frame ended, by its place among the samples.
 ///
 /// `send` sends the frames in one transfer and then samples the window, so it lasts as long as the whole exchange. A request has at
-/// most four frames: with 8 samples a bit and no gaps `tx` needs 75 bytes. The window is all of `rx`: the wait for the answer and
+/// most five frames: with 8 samples a bit and no gaps `tx` needs 93 bytes. The window is all of `rx`: the wait for the answer and
 /// 54 or 72 bits, for each encoder that answers.
 ///
 /// The async futures of the SPI have to stop the transfer when they are dropped.

@@ -2,6 +2,19 @@
 
 macro_rules! driver {
     ($wait:ident, [$($uart:path),+], $clock:path $(, $asynch:tt)?) => {
+        use servowire_core::{ClockError, Procedure};
+        use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
+        use tformat::{
+            Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+        };
+
+        use super::tuning::{Tuned, Tuning};
+        use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns};
+        use crate::direction::Switch;
+        use crate::quiet::{self, Heard, Settle};
+        use crate::sending::Sending;
+        use crate::{Direction, Error, PinTooSlow, exchange};
+
         /// Why a call of a [`Driver`] failed.
         pub type Failure<U, D> = Error<<U as ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
@@ -81,13 +94,13 @@ macro_rules! driver {
                 $wait!(self.run(&mut Reset::clear_errors()))
             }
 
-            /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+            /// ID D: the byte at `address` of `page`, which is looked at before and after.
             ///
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn read_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
             ) -> Result<u8, Failure<U, D>> {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
@@ -99,7 +112,7 @@ macro_rules! driver {
             /// [`Error`]: whether the byte was written is not known then. Read it.
             pub $($asynch)? fn write_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
                 data: u8,
             ) -> Result<u8, Failure<U, D>> {
@@ -117,19 +130,14 @@ macro_rules! driver {
                 mut detection: Detection,
                 mut set_rate: impl FnMut(&mut U, BitRate) -> Result<(), U::Error>,
             ) -> Result<AllData, Failure<U, D>> {
-                let now_ns = self.state.now_ns(&mut self.clock)?;
-                let exchange = $($asynch)? |Tuned { request, line }, not_before_ns| {
-                    $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
-                    self.direction.check(line.turn_around_ns)?;
-                    self.line = line;
-                    set_rate(&mut self.uart, line.rate).map_err(Error::Io)?;
-                    self.state.set_silence_ns(silence_ns(&line));
-                    let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
-                    exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
+                let tune = |driver: &mut Self, Tuned { request, line }| {
+                    driver.direction.check(line.turn_around_ns)?;
+                    driver.line = line;
+                    driver.state.set_silence_ns(silence_ns(&line));
+                    set_rate(&mut driver.uart, line.rate).map_err(Error::Io)?;
+                    Ok(request)
                 };
-                let ended = $wait!(run(&mut Tuning(&mut detection), now_ns, exchange))?;
-                self.state.keep(ended.ready_ns);
-                ended.outcome.map_err(Error::Protocol)
+                $wait!(self.drive(&mut Tuning(&mut detection), tune))
             }
 
             /// A procedure of several transactions at the driver's rate: does what its steps ask for. [`Detection`] has a
@@ -142,9 +150,18 @@ macro_rules! driver {
             where
                 P: Procedure<Request = Request, Response = Response, Error = tformat::Error>,
             {
+                $wait!(self.drive(procedure, |_, request| Ok(request)))
+            }
+
+            $($asynch)? fn drive<P: Procedure<Response = Response, Error = tformat::Error>>(
+                &mut self,
+                procedure: &mut P,
+                mut tune: impl FnMut(&mut Self, P::Request) -> Result<Request, Failure<U, D>>,
+            ) -> Result<P::Value, Failure<U, D>> {
                 let now_ns = self.state.now_ns(&mut self.clock)?;
                 let exchange = $($asynch)? |request, not_before_ns| {
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
+                    let request = tune(self, request)?;
                     let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
                 };
@@ -162,17 +179,23 @@ macro_rules! driver {
                 $wait!(self.settle())?;
                 let start_ns = $wait!(self.send(request))?;
                 let mut transaction = Transaction::start(request, self.line, start_ns);
-                let mut progress = transaction.progress();
-                let mut bytes = [0; MAX_BYTES];
+                let (mut progress, mut bytes) = (transaction.progress(), [0; MAX_BYTES]);
                 loop {
-                    let until_ns = match exchange::next(progress, &mut self.state, &mut self.clock)? {
-                        ControlFlow::Continue(until_ns) => until_ns,
-                        ControlFlow::Break(outcome) => return outcome.map_err(|error| refused(error, self.late_ns)),
+                    let until_ns = match progress {
+                        Progress::Pending { until_ns } => until_ns,
+                        Progress::Done { value, ready_ns } => {
+                            self.state.clean(ready_ns);
+                            return Ok(value);
+                        }
+                        Progress::Failed { error, ready_ns } => {
+                            let now_ns = self.state.now_ns(&mut self.clock)?;
+                            self.state.failed(ready_ns, now_ns);
+                            return Err(refused(error, self.late_ns));
+                        }
                     };
-                    let read =
-                        $wait!(read(&mut self.uart, &mut bytes, &mut self.state, &mut self.clock, until_ns))?;
-                    let now_ns = self.state.now_ns(&mut self.clock)?;
-                    progress = match read {
+                    let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);
+                    let Heard { what, now_ns } = $wait!(read(uart, &mut bytes, state, clock, until_ns))?;
+                    progress = match what {
                         Some(count) => {
                             let heard = bytes.get(..count.map_err(Error::Io)?).filter(|heard| !heard.is_empty());
                             transaction.hear(heard.ok_or(Error::Closed)?, now_ns)
@@ -188,12 +211,12 @@ macro_rules! driver {
                 let mut settling = self.state.settle(until_ns);
                 loop {
                     let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);
-                    let heard = $wait!(read(uart, &mut [0; MAX_BYTES], state, clock, until_ns))?;
-                    if matches!(heard, Some(Ok(0))) {
+                    let Heard { what, now_ns } =
+                        $wait!(read(uart, &mut [0; MAX_BYTES], state, clock, until_ns))?;
+                    if matches!(what, Some(Ok(0))) {
                         return Err(Error::Closed);
                     }
-                    let now_ns = state.now_ns(clock)?;
-                    match settling.next(heard.is_some(), now_ns) {
+                    match settling.next(what.is_some(), now_ns) {
                         Settle::Quiet => return Ok(()),
                         Settle::Never => return Err(Error::NeverQuiet),
                         Settle::Until(ns) => until_ns = ns,
@@ -205,13 +228,12 @@ macro_rules! driver {
             $($asynch)? fn send(&mut self, request: Request) -> Result<u64, Failure<U, D>> {
                 let (line, frame) = (self.line, request.emit());
                 self.late_ns = 0;
-                let mut sending =
-                    Sending::begin(&mut self.direction, &mut self.clock, &mut self.state, times(&line, frame.fields()))
-                        .map_err(Error::Pin)?;
+                let mut sending = Sending::begin(&mut self.direction, &mut self.clock, &mut self.state, &line)
+                    .map_err(Error::Pin)?;
                 if let Some(ns) = sending.lead_until_ns(line.driver_lead_ns)? {
                     $wait!(sleep(sending.line, sending.clock, ns))?;
                 }
-                sending.line.begin(longest_ns(&line, request));
+                sending.line.begin(longest_ns(&line, &frame));
                 let mut fields = frame.as_bytes();
                 while !fields.is_empty() {
                     let piece = sending.piece(fields);

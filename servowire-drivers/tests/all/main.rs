@@ -28,11 +28,15 @@ mod polls;
 mod refusals;
 #[cfg(all(feature = "tformat", feature = "nikon"))]
 mod sampler;
+mod second;
 
 #[cfg(all(feature = "tformat", feature = "nikon", feature = "rtex"))]
 mod clock;
+mod contract;
 #[cfg(feature = "tformat")]
 mod direction;
+#[cfg(feature = "tformat")]
+mod hard;
 #[cfg(all(feature = "nikon", feature = "async"))]
 mod nikon_asynch;
 #[cfg(feature = "nikon")]

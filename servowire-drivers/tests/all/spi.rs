@@ -47,8 +47,12 @@ fn tformat_at_an_spi() {
             assert!((sent.end_ns..sent.end_ns + 3_000).contains(&bench.off_at_ns), "before the encoder answers");
         }
         let address = ::tformat::Address::new(5).unwrap();
-        assert_eq!(encoder.write_eeprom(tformat::Page::truncate(0), address, 0x5a), Ok(0x5a), "{msb_first} {per_bit}");
-        assert_eq!(encoder.read_eeprom(tformat::Page::truncate(0), address), Ok(0x5a));
+        assert_eq!(
+            encoder.write_eeprom(::tformat::Page::truncate(0), address, 0x5a),
+            Ok(0x5a),
+            "{msb_first} {per_bit}"
+        );
+        assert_eq!(encoder.read_eeprom(::tformat::Page::truncate(0), address), Ok(0x5a));
         assert_eq!(bench.borrow().truth().clashes(), 0);
     }
 }

@@ -233,17 +233,17 @@ fn block(bench: &Bench, worst: Worst, request: Request) -> Ended {
     let line = Line::new(bench.0.borrow().board.rate);
     let pin = DirectionPin::new(bench.clone(), worst);
     let mut encoder = blocking::Driver::new(bench.clone(), pin, bench.clone(), line)?;
-    told(encoder.transact(request).unwrap_err(), encoder.late_ns())
+    Ok(told(encoder.transact(request).unwrap_err(), encoder.late_ns()))
 }
 
 /// A caller whose exchange fails is told.
-fn told(error: Error<ErrorKind, core::convert::Infallible, tformat::Error, tformat::Doubt>, late_ns: u64) -> Ended {
+fn told(error: Error<ErrorKind, core::convert::Infallible, tformat::Error, tformat::Doubt>, late_ns: u64) -> u64 {
     match error {
         Error::DriverLate { by_ns } => assert_eq!(by_ns, late_ns),
         Error::Protocol(_) => assert_eq!(late_ns, 0),
         other => panic!("{other:?}"),
     }
-    Ok(late_ns)
+    late_ns
 }
 
 /// Requests, and the bytes that they are, by the tables of the drivers that are known.
@@ -439,7 +439,7 @@ mod asynch {
             let driver = asynch::Driver::new(bench.clone(), pin, Looks(bench.clone()), Line::new(board.rate));
             if let Ok(mut encoder) = driver {
                 let ended = run(encoder.transact(request), polls);
-                let late_ns = ended.map(|ended| told(ended.unwrap_err(), encoder.late_ns()).unwrap());
+                let late_ns = ended.map(|ended| told(ended.unwrap_err(), encoder.late_ns()));
                 dropped += u32::from(late_ns.is_none());
                 judge(&bench, bytes, late_ns, &format!("case {case}, {polls} polls"));
             }

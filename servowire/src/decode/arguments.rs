@@ -12,7 +12,7 @@ use servowire_decode::codec::Codec;
 use servowire_decode::output::filter::Filter;
 use servowire_decode::protocols::CODECS;
 use servowire_decode::settings::{Options, Rtex, Settings, Widths};
-use servowire_decode::time;
+use servowire_decode::time::{self, Time};
 
 use crate::units::{bit_rate, frequency};
 
@@ -28,8 +28,7 @@ impl ValueEnum for Meant {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, about) =
-            self.0.map_or(("auto", "Whatever the capture holds"), |codec| (codec.names().name, codec.names().about));
+        let (name, about) = self.0.map_or(("auto", "Whatever the capture holds"), |codec| (codec.name, codec.about));
         Some(PossibleValue::new(name).help(about))
     }
 }
@@ -40,16 +39,9 @@ pub(crate) struct Named(Format);
 
 impl ValueEnum for Named {
     fn value_variants<'a>() -> &'a [Self] {
-        static ALL: [Named; Format::ALL.len()] = {
-            let mut all = [Named(Format::Vcd); Format::ALL.len()];
-            let mut at = 0;
-            while at < all.len() {
-                all[at] = Named(Format::ALL[at].0);
-                at += 1;
-            }
-            all
-        };
-        &ALL
+        static ALL: LazyLock<[Named; Format::ALL.len()]> =
+            LazyLock::new(|| Format::ALL.map(|(format, ..)| Named(format)));
+        ALL.as_slice()
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
@@ -128,10 +120,10 @@ pub(crate) struct FilterArgs {
     pub(super) address: Option<u16>,
     /// Only frames from this time of the capture on, as 20us, 1.5ms or 2s.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
-    pub(super) from: Option<i64>,
+    pub(super) from: Option<Time>,
     /// Only frames before this time.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
-    pub(super) to: Option<i64>,
+    pub(super) to: Option<Time>,
     /// Only what is refused.
     #[arg(long)]
     pub(super) errors: bool,
@@ -224,14 +216,14 @@ pub(crate) struct RtexArgs {
     pub(super) mac_id: Option<u8>,
 }
 
-/// A time of the capture in ps.
-fn moment(text: &str) -> Result<i64, String> {
+/// A time of the capture.
+fn moment(text: &str) -> Result<Time, String> {
     time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, as 20us, 1.5ms or 2s"))
 }
 
 /// A period in ns.
 fn period(text: &str) -> Result<u32, String> {
-    match time::duration(text).map(|time| (time + 500) / 1000) {
+    match time::duration(text).map(|time| (time.ps() + 500) / 1000) {
         Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
         _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
     }

@@ -14,7 +14,8 @@ use tformat::{
 };
 
 use super::Watch;
-use super::link::{Fault, Link};
+use super::fault::Fault;
+use super::link::Link;
 use super::port::{self, Port};
 use super::relay::{self, Said};
 use crate::terminal;

@@ -4,43 +4,14 @@
 //! So the own echo is known by its content and by its place, and a request goes out only when the line has been read empty.
 
 use std::io;
-use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use servowire_core::{Ended, Procedure};
 use tformat::{Request, Response};
 
+use super::fault::Fault;
 use super::port::Port;
-
-/// Why something could not be done.
-#[derive(Debug, thiserror::Error)]
-pub enum Fault {
-    /// A port could not be opened; it is named.
-    #[error("{0}")]
-    Port(String),
-    /// A file could not be read or written; it is named.
-    #[error("{0}")]
-    File(String),
-    /// What was to be said could not be.
-    #[error("the output cannot be written: {0}")]
-    Output(io::Error),
-    /// The port failed.
-    #[error("the port is gone or refuses: {0}")]
-    Io(#[from] io::Error),
-    /// Nobody has answered well, not even once.
-    #[error("{0}: is the encoder's power on, is {1} Mbit/s its rate, are A and B the right way round?")]
-    Nobody(tformat::Error, f64),
-    /// The answer was refused, or there was none.
-    #[error("{0}")]
-    Encoder(#[from] tformat::Error),
-    /// The request came back, and nothing else.
-    #[error("only the own request came back: no encoder is there, it has no power, or A and B are swapped")]
-    OnlyEcho,
-    /// The input is not what it has to be.
-    #[error("{0}")]
-    Input(String),
-}
 
 /// The encoder at the other end of a port.
 #[derive(Debug)]
@@ -51,18 +22,6 @@ pub struct Link<P> {
     began: Instant,
     /// An answer may still be on its way.
     owed: bool,
-}
-
-impl Fault {
-    /// A fault of this file.
-    pub fn file(path: &Path) -> impl Fn(io::Error) -> Self {
-        move |error| Self::File(format!("{}: {error}", path.display()))
-    }
-
-    /// Whether it names what has failed itself; all others are of the port.
-    pub const fn names_itself(&self) -> bool {
-        matches!(self, Self::Port(_) | Self::File(_) | Self::Output(_))
-    }
 }
 
 impl<P: Port> Link<P> {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use serialport::{ClearBuffer, SerialPort, SerialPortType};
 use tformat::BitRate;
 
-use super::link::Fault;
+use super::fault::Fault;
 
 /// A serial port, or in tests a pseudo-terminal.
 pub trait Port: Read + Write {

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use tformat::{Error, Request, Response};
 
-use super::link::{Fault, Link};
+use super::fault::Fault;
+use super::link::Link;
 use super::port::Port;
 
 /// How long a read waits, and so how fast the end is seen. After such a pause a request that has begun is given up.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tformat::device::Device;
 use tformat::{Abm, Abs, BitRate, Resolution};
 
-use super::link::Fault;
+use super::fault::Fault;
 use super::port::Port;
 use super::relay::Echo;
 

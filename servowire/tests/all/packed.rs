@@ -14,6 +14,7 @@ use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Origin, Printer};
 use servowire_decode::recognition::Note;
 use servowire_decode::settings::Settings;
+use servowire_decode::time::Time;
 
 /// Samples that are given as edges only.
 struct Edges(Raw);
@@ -27,7 +28,7 @@ impl Line for Edges {
         self.0.read(changes)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.0.reached()
     }
 }

@@ -12,7 +12,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use serialport::{SerialPort, TTYPort};
-use servowire::talk::link::{Fault, Link};
+use servowire::talk::fault::Fault;
+use servowire::talk::link::Link;
 use servowire::talk::{relay, simulate};
 use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
 use tformat::device::Device;

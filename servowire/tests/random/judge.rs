@@ -10,6 +10,7 @@ use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Lane, Origin, Printer};
 use servowire_decode::recognition::Note;
 use servowire_decode::settings::Settings;
+use servowire_decode::time::Time;
 
 use super::speech::Expect;
 use super::wire::Capture;
@@ -19,7 +20,7 @@ struct Memory {
     names: Vec<String>,
     changes: Vec<Change>,
     at: usize,
-    end: i64,
+    end: Time,
 }
 
 impl Line for Memory {
@@ -34,7 +35,7 @@ impl Line for Memory {
         Ok(self.at < self.changes.len())
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         if self.at == self.changes.len() { self.end } else { self.changes[self.at].time }
     }
 }
@@ -79,11 +80,15 @@ pub struct Outcome {
 pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let mut changes: Vec<Change> = Vec::new();
     for (channel, line) in (0_u16..).zip(&capture.channels) {
-        changes.extend(line.edges.iter().map(|(time, level)| Change { time: *time, channel, level: *level }));
+        changes.extend(line.edges.iter().map(|(time, level)| Change {
+            time: Time::from_ps((*time).into()),
+            channel,
+            level: *level,
+        }));
     }
     changes.sort_by_key(|change| change.time);
     let names = capture.channels.iter().map(|channel| channel.name.clone()).collect();
-    let memory = Memory { names, changes, at: 0, end: capture.end };
+    let memory = Memory { names, changes, at: 0, end: Time::from_ps(capture.end.into()) };
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
     let notes = |note: &Note| said.borrow_mut().push_str(&format!("{note}\n"));
@@ -113,7 +118,7 @@ pub fn judge(capture: &Capture, inside: bool) -> Outcome {
     for due in &capture.due {
         let name = due.channels.join(" + ");
         let Some((_, events)) =
-            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title() == due.kind.name())
+            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title == due.kind.name())
         else {
             blame(format!("{name} is not found as {}", due.kind.name()), &mut outcome);
             continue;

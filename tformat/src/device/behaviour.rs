@@ -91,13 +91,21 @@ impl Behaviour {
         }
     }
 
-    /// The combination with this number, for tests that walk them all: each bit is one switch, above bit 9 comes the
-    /// response delay (3.0, 3.2, 1.7 or 9 us).
+    /// The combination with this number, for tests that walk them all, and around again beyond [`NUMBERED`](Self::NUMBERED):
+    /// each switch with each other, and of the response delay 3.0, 3.2, 1.7 and 9 us.
     pub const fn numbered(number: u16) -> Self {
         const fn bit(number: u16, at: u32) -> bool {
             number >> at & 1 == 1
         }
+        // Three kinds of data while busy; the others are powers of two.
+        let busy_data = match number % 3 {
+            0 => BusyData::Zeros,
+            1 => BusyData::Ones,
+            _ => BusyData::Cell,
+        };
+        let number = number / 3;
         Self {
+            busy_data,
             reset_interval: if bit(number, 0) { Interval::EndToStart } else { Interval::StartToStart },
             others_restart_count: !bit(number, 1),
             damage_restarts_count: !bit(number, 2),
@@ -105,14 +113,9 @@ impl Behaviour {
             silent_while_storing: bit(number, 4),
             page_select_is_busy: bit(number, 5),
             absent_page: if bit(number, 6) { AbsentPage::Wrapped } else { AbsentPage::Ignored },
-            busy_data: match (bit(number, 7), bit(number, 8)) {
-                (false, _) => BusyData::Zeros,
-                (true, false) => BusyData::Ones,
-                (true, true) => BusyData::Cell,
-            },
-            answers_wrong_sink: bit(number, 9),
-            answers_delimiter_error: !bit(number, 9),
-            leaves_status_zero: bit(number, 8),
+            answers_wrong_sink: bit(number, 7),
+            answers_delimiter_error: !bit(number, 8),
+            leaves_status_zero: bit(number, 9),
             response_delay_ns: match number >> 10 & 3 {
                 0 => 3_000,
                 1 => 3_200,
@@ -122,8 +125,8 @@ impl Behaviour {
         }
     }
 
-    /// Combinations that [`numbered`](Self::numbered) gives.
-    pub const NUMBERED: u16 = 1 << 12;
+    /// Combinations that [`numbered`](Self::numbered) gives: 3 kinds of data, ten switches, 4 delays.
+    pub const NUMBERED: u16 = 3 << 12;
 
     servowire_core::builder! {
         with_response_delay_ns: response_delay_ns, u32;
@@ -144,5 +147,21 @@ impl Behaviour {
 impl Default for Behaviour {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    /// Each combination once: no two are the same, and there are as many as the switches make.
+    #[test]
+    fn every_combination_is_there() {
+        let shown = |number| std::format!("{:?}", Behaviour::numbered(number));
+        let all: HashSet<_> = (0..Behaviour::NUMBERED).map(shown).collect();
+        assert_eq!(all.len(), 3 * 1024 * 4);
+        assert_eq!(Behaviour::numbered(0), Behaviour::new());
+        assert_eq!(Behaviour::numbered(Behaviour::NUMBERED), Behaviour::new());
     }
 }

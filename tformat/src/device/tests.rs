@@ -287,29 +287,3 @@ fn the_position_has_the_width_that_the_encoder_id_names() {
         assert_eq!(device.abs().get(), abs);
     }
 }
-
-/// Each bit of the number is one switch, and 0 is the default.
-#[test]
-fn combinations_by_their_number() {
-    let usual = Behaviour::new();
-    let expected = [
-        Behaviour { reset_interval: Interval::EndToStart, ..usual },
-        Behaviour { others_restart_count: false, ..usual },
-        Behaviour { damage_restarts_count: false, ..usual },
-        Behaviour { tenth_shows_effect: true, ..usual },
-        Behaviour { silent_while_storing: true, ..usual },
-        Behaviour { page_select_is_busy: true, ..usual },
-        Behaviour { absent_page: AbsentPage::Wrapped, ..usual },
-        Behaviour { busy_data: BusyData::Ones, ..usual },
-        Behaviour { leaves_status_zero: true, ..usual },
-        Behaviour { answers_wrong_sink: true, answers_delimiter_error: false, ..usual },
-        Behaviour { response_delay_ns: 3_200, ..usual },
-        Behaviour { response_delay_ns: 1_700, ..usual },
-    ];
-    for (at, want) in expected.into_iter().enumerate() {
-        assert_eq!(Behaviour::numbered(1 << at), want, "bit {at}");
-    }
-    assert_eq!(Behaviour::numbered(3 << 7), Behaviour { busy_data: BusyData::Cell, leaves_status_zero: true, ..usual });
-    assert_eq!(Behaviour::numbered(3 << 10), Behaviour { response_delay_ns: 9_000, ..usual });
-    assert_eq!(Behaviour::NUMBERED, 4_096);
-}

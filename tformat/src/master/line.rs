@@ -60,6 +60,12 @@ impl Line {
         with_sampling_ns: sampling_ns, u32;
     }
 
+    /// Whether a response can come at all: it has to begin after the turn-around and before the time-out, and its fields last
+    /// as long as fields do.
+    pub(super) const fn leaves_time(&self) -> bool {
+        self.turn_around_ns <= self.response_timeout_ns && self.field_timeout_ns >= self.rate.fields_ns(1)
+    }
+
     /// By how much the end time that the master is told may lie after the end of the byte on the line, in ns: a bit less than
     /// the turn-around, 1.2 us at 2.5 Mbit/s and 0.6 us at 5 Mbit/s by default.
     ///

@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::message::CF3;
 use crate::request::Request;
 use crate::resolution::Resolution;
-use crate::response::{Response, expected_fields};
+use crate::response::Response;
 
 /// A response with all checks passed, and when its position was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -76,6 +76,9 @@ pub struct Transaction {
     request: Request,
     frame: Frame,
     line: Line,
+    /// The control field of the request and of its response, and how many fields that has.
+    cf: u8,
+    fields: u8,
     start_ns: u64,
     /// The end of the request's last bit.
     asked_ns: u64,
@@ -92,23 +95,30 @@ pub struct Transaction {
     /// End of the last byte.
     heard_ns: u64,
     until_ns: u64,
+    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
+    /// listened to any longer.
+    latest_ns: u64,
     end: Option<(Result<Exchange, Error>, u64)>,
 }
 
 impl Transaction {
     /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
+    ///
+    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
         let frame = request.emit();
         let asked_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
         let field_ns = u64::from(line.rate.fields_ns(1));
-        let until_ns = asked_ns
-            .saturating_add(line.response_timeout_ns.into())
-            .saturating_add(line.hand_over_ns.into())
-            .saturating_add(field_ns);
+        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
+        let waited_ns = asked_ns.saturating_add(wait_ns);
+        let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
+        let id = request.data_id();
         Self {
             request,
             frame,
             line,
+            cf: id.control_field().get(),
+            fields: id.response_fields(),
             start_ns,
             asked_ns,
             earliest_ns: asked_ns.saturating_add(line.turn_around_ns.into()).saturating_add(field_ns),
@@ -118,8 +128,9 @@ impl Transaction {
             echo_fault: None,
             refused: None,
             heard_ns: asked_ns,
-            until_ns,
-            end: None,
+            until_ns: waited_ns.saturating_add(field_ns),
+            latest_ns: waited_ns.saturating_add(fields_ns),
+            end: if line.leaves_time() { None } else { Some((Err(Error::Line), start_ns)) },
         }
     }
 
@@ -155,7 +166,7 @@ impl Transaction {
             (None, Some(error)) if self.len == 0 => self.finish(Err(error)),
             (None, _) if self.len > 0 => {
                 let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
-                self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns()).max(self.until_ns);
+                self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns).max(self.until_ns);
             }
             (None, _) => {}
         }
@@ -203,15 +214,6 @@ impl Transaction {
         u64::from(self.line.rate.fields_ns(1)).saturating_mul(fields as u64)
     }
 
-    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
-    /// listened to any longer.
-    fn latest_ns(&self) -> u64 {
-        let Line { response_timeout_ns, hand_over_ns, field_timeout_ns, .. } = self.line;
-        let fields_ns = u64::from(field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
-        let begun_ns = self.asked_ns.saturating_add(response_timeout_ns.into());
-        begun_ns.saturating_add(hand_over_ns.into()).saturating_add(fields_ns)
-    }
-
     /// One byte more, which ended at `ended_ns` at the latest; these came after it in the same block.
     fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
         if ended_ns < self.earliest_ns {
@@ -242,11 +244,11 @@ impl Transaction {
     /// Fields of the response that begins with the first byte there is.
     const fn expected(&self) -> u8 {
         let [cf, ..] = self.received;
-        expected_fields(self.request.data_id(), cf)
+        if cf == CF3 { DataId::ReadAll.response_fields() } else { self.fields }
     }
 
     const fn begins_a_response(&self, byte: u8) -> bool {
-        byte == self.request.data_id().control_field().get() || byte == CF3
+        byte == self.cf || byte == CF3
     }
 
     /// Whether this byte after the first shows that the first was the end of an echo: in place of SF there is a control field,
@@ -270,15 +272,15 @@ impl Transaction {
     fn judge(&mut self, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
         while self.len > 0 && self.len >= self.expected() {
             let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-            // A response to a write repeats it.
-            if heard == self.frame.as_bytes() && after.first().is_some_and(|next| self.begins_a_response(*next)) {
+            // A response to a write repeats it: the first of two is the echo.
+            if heard == self.frame.as_bytes() && is_sound(&Response::parse(self.request, after)) {
                 self.echoed = self.frame.fields();
                 self.len = 0;
                 return;
             }
             let fresh = ended_ns.saturating_sub(self.fields_ns(heard.len().saturating_sub(1))) >= self.earliest_ns;
             match Response::parse(self.request, heard) {
-                outcome @ (Ok(_) | Err(Error::Rejected { .. })) if fresh => {
+                outcome if fresh && is_sound(&outcome) => {
                     let began_ns = ended_ns.saturating_sub(self.fields_ns(heard.len()));
                     let sampled_ns = self.asked_ns.saturating_add(self.line.sampling_ns.into());
                     let outcome = outcome.map(|response| Exchange { response, sampled_ns, began_ns });
@@ -333,15 +335,16 @@ impl Transaction {
 
     /// Ends. After an error the line is free when the longest response, begun as late as it may, is over.
     fn finish(&mut self, outcome: Result<Exchange, Error>) {
-        let ready_ns = match outcome {
-            Ok(_) => self.heard_ns,
-            Err(_) => {
-                let latest_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
-                latest_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS)).max(self.heard_ns)
-            }
-        };
+        let over_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
+        let drained_ns = over_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS));
+        let ready_ns = if outcome.is_ok() { self.heard_ns } else { drained_ns.max(self.heard_ns) };
         self.end = Some((outcome, ready_ns));
     }
+}
+
+/// Whether a response came whole, a refusal too.
+const fn is_sound(outcome: &Result<Response, Error>) -> bool {
+    matches!(outcome, Ok(_) | Err(Error::Rejected { .. }))
 }
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });

@@ -1,6 +1,7 @@
 use super::reset::mismatch;
 use super::{Reset, Step};
 use crate::error::{Error, ErrorClass};
+use crate::message::SingleTurn;
 use crate::request::Request;
 use crate::response::Response;
 use crate::status::StatusField;
@@ -77,7 +78,7 @@ impl Witness {
     }
 
     /// What the reset wants, and the second reading however it ends: 18 ms later, as long as an encoder may store.
-    fn act<T, S>(&mut self, step: Step<S>, ready_ns: u64) -> Step<T> {
+    fn act<T>(&mut self, step: Step<SingleTurn>, ready_ns: u64) -> Step<T> {
         let act = match step {
             Step::Send { request, not_before_ns } => {
                 self.sent = self.sent.saturating_add(1);

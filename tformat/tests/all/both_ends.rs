@@ -5,9 +5,9 @@ use core::convert::Infallible;
 use nrz_line::{Format, Receiver, Wave};
 use proptest::prelude::*;
 use servowire_core::{Ended, Procedure};
-use tformat::device::{Device, Fault};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Transaction};
-use tformat::{Abm, Abs, Adf, Almc, BitRate, DataId, Error, Page, Request, Response, Window};
+use tformat::device::{Behaviour, Device, Fault};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, SingleTurnZero, Transaction};
+use tformat::{Abm, Abs, Adf, Almc, BitRate, DataId, Error, Page, Request, Resolution, Response, Window};
 
 fn encoder() -> Device<6> {
     let mut device = Device::new(0x17, BitRate::Mbit2_5);
@@ -76,6 +76,44 @@ fn resets_do_what_the_table_says() {
     let (done, _) = run(Reset::clear_turns_and_lose_multi_turn_reference(), &mut device, now_ns);
     assert!(done.is_ok());
     assert_eq!((device.almc().bits(), device.abm().get()), (0, 0));
+}
+
+/// A master that sent some of the ten and was dropped, a controller that starts again: what the encoder has counted stays, or
+/// does not, and it stores in silence, or does not. One more attempt says what is so: with any response of it lost, and any
+/// three.
+#[test]
+fn a_zero_after_any_past() {
+    let (mut ends, resolution) = ([0; 4], Resolution::new(23, 16).unwrap());
+    for number in (0..Behaviour::NUMBERED).step_by(if cfg!(miri) { 1_001 } else { 7 }) {
+        let (sent_before, lost) = (number % 10, 1 + number / 10 % 14);
+        let mut device = encoder();
+        device.set_behaviour(Behaviour::numbered(number));
+        let mut now_ns = 100_000;
+        for _ in 0..sent_before {
+            now_ns = transact(&mut device, Request::SetSingleTurnZero, now_ns + 50_000).ready_ns;
+        }
+        assert_eq!(device.effects(), 0);
+        let (before, mut exchange) = (device.abs(), 0);
+        let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
+        let Ok(ended) = servowire_core::run(&mut zero, now_ns + 50_000, |request, not_before_ns| {
+            exchange += 1;
+            let ended = transact(&mut device, request, not_before_ns);
+            let hidden = exchange == lost || number % 3 == 0 && (lost..lost + 3).contains(&exchange);
+            let outcome = if hidden { Err(Error::NoResponse { echo: false }) } else { ended.outcome };
+            Ok::<_, Infallible>(Ended { outcome, ..ended })
+        });
+        let case =
+            format!("{number}: {sent_before} before, {lost} lost, {:?}, effects {}", ended.outcome, device.effects());
+        let set = device.effects() > 0;
+        assert!(device.effects() <= 1 && set == (device.abs() != before), "{case}");
+        ends[match ended.outcome {
+            Ok(_) => usize::from(set) - 1,
+            Err(Error::NotDone { .. }) => 1 + usize::from(set) * 9,
+            Err(Error::EffectUnknown { .. }) => 2,
+            Err(_) => 3 + usize::from(set) * 9,
+        }] += 1;
+    }
+    assert!(ends[0] > 0 && ends[1] > 0, "{ends:?}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events for each test: 100,000 unless it is set.
 
+use std::collections::BTreeMap;
+
 use crate::bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_core::Procedure;
@@ -50,17 +52,18 @@ impl Ends {
 
     fn print(&self, name: &str) {
         println!("{name}: {} done, {} unknown, {} not done", self.done, self.unknown, self.not_done);
-        assert!(self.done > 0 && self.not_done > 0, "{self:?}");
+        assert!(self.done > 0 && self.unknown > 0, "{self:?}");
     }
 }
 
-/// Law 5: one effect at the most, and the end says whether there was one.
+/// Law 5: one effect at the most, and the end says whether there was one. Any other error is that of the first exchange: nothing
+/// was sent that has an effect.
 fn done_once_at_most<T>(end: &Result<T, Error>, effects: u32, seed: u64) {
     assert!(effects <= 1, "{effects} effects, seed {seed}");
     match end {
         Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
         Err(Error::EffectUnknown { .. }) => {}
-        Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
+        Err(error) => assert_eq!(effects, 0, "{error}, seed {seed}"),
     }
 }
 
@@ -90,10 +93,11 @@ fn hostile_transactions() {
     });
 }
 
-/// Law 5: one zero at the most, and the three ends mean what they say.
+/// Law 5: one zero at the most, and the three ends mean what they say, whatever an attempt that was dropped has left in the
+/// encoder.
 #[test]
 fn hostile_zero_presets() {
-    zeros("zero presets", |bench, seed| {
+    zeros("zero presets", Request::SetSingleTurnZero, |bench, seed| {
         bench.device.set_position(Abs::truncate(0x1000 + seed as u32 % 0x1000), Abm::truncate(3));
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(23, 16).unwrap(), 10);
         bench.run(&mut zero)
@@ -103,7 +107,7 @@ fn hostile_zero_presets() {
 /// Law 5 for ID C that is read back, with a shaft that trembles on the boundary of a turn.
 #[test]
 fn hostile_turn_zeros() {
-    zeros("turn zeros", |bench, seed| {
+    zeros("turn zeros", Request::ResetTurnsAndErrors, |bench, seed| {
         bench.trembles = seed % 2 == 0;
         bench.device.set_position(Abs::truncate(0x7f_ffff), Abm::truncate(0x10 + seed as u32 % 0x1000));
         let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(Resolution::new(23, 16).unwrap(), 1);
@@ -111,21 +115,30 @@ fn hostile_turn_zeros() {
     });
 }
 
-/// A zero that is read back, in every scenario.
-fn zeros<T>(name: &str, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
+/// A zero that is read back, in every scenario. In two of three runs up to nine requests of an attempt went before that nobody
+/// saw the end of.
+fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
     let mut ends = Ends::default();
     runs(name, |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
+        bench.device.set_position(Abs::truncate(0x1000), Abm::truncate(0x100));
+        for _ in 0..if seed % 3 == 0 { 0 } else { 1 + seed % 9 } {
+            let at_ns = bench.ready_ns + 41_000;
+            bench.wait(at_ns);
+            let _ = bench.exchange(request, at_ns);
+        }
+        let earlier = bench.device.effects();
         let end = set(&mut bench, seed);
         // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
         if bench.forged_requests + bench.misread == 0 {
-            done_once_at_most(&end, bench.device.effects(), seed);
+            done_once_at_most(&end, bench.device.effects() - earlier, seed);
             ends.count(&end);
         }
         bench
     });
     ends.print(name);
+    assert!(ends.not_done > 0, "{ends:?}");
 }
 
 /// Law 5 for ID C and ID 8 alone: two attempts in a row, the second after whatever became of the first. Ten responses are no proof, but
@@ -179,28 +192,29 @@ fn hostile_error_resets() {
     });
 }
 
-/// A write, to the page register too, is sent again only after the cell was read, was not busy, and held something else.
-fn repeated_on_evidence_only(
-    written: &mut Vec<Request>,
-    request: Request,
-    outcome: Result<Response, Error>,
-    seed: u64,
-) {
-    let frame = request.emit();
-    let [0x32, address, data, _] = *frame.as_bytes() else { return };
-    if written.contains(&request) {
-        let got = outcome.map(|response| response.emit().as_bytes().to_vec());
-        let evidence = matches!(got.as_deref(), Ok([0xea, at, holds, _]) if *at == address && *holds != data);
-        assert!(evidence, "seed {seed}: {request} is sent again after {outcome:?}");
-    }
-    written.push(request);
-}
-
 /// An access of which each repetition is looked at.
 struct Watched {
     access: EepromAccess,
-    written: Vec<Request>,
+    /// What each cell was said to hold since it was last written to; `None` if nothing was said.
+    held: BTreeMap<u8, Option<u8>>,
     seed: u64,
+}
+
+impl Watched {
+    /// A write, to the page register too, is sent again only after the cell was read, was not busy, and held something else.
+    fn send(&mut self, request: Request) {
+        let [0x32, address, data, _] = *request.emit().as_bytes() else { return };
+        let held = self.held.insert(address, None);
+        let evidence = held.is_none_or(|held| held.is_some_and(|held| held != data));
+        assert!(evidence, "seed {}: {request} is sent again", self.seed);
+    }
+
+    fn heard(&mut self, response: Response) {
+        // With the busy flag the address is another one.
+        if let [0xea, address, holds, _] = *response.emit().as_bytes() {
+            self.held.entry(address).and_modify(|held| *held = Some(holds));
+        }
+    }
 }
 
 impl Procedure for Watched {
@@ -211,15 +225,17 @@ impl Procedure for Watched {
 
     fn start(&mut self, now_ns: u64) -> Step<u8> {
         let step = self.access.start(now_ns);
-        let Step::Send { request, .. } = step else { panic!("an access begins with a request") };
-        self.written = vec![request];
+        assert!(matches!(step, Step::Send { .. }), "an access begins with a request");
         step
     }
 
     fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
+        if let Ok(response) = outcome {
+            self.heard(response);
+        }
         let step = self.access.receive(outcome, ready_ns);
         if let Step::Send { request, .. } = step {
-            repeated_on_evidence_only(&mut self.written, request, outcome, self.seed);
+            self.send(request);
         }
         step
     }
@@ -240,7 +256,7 @@ fn hostile_eeprom_writes() {
             let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
         }
         let access = EepromAccess::write(Page::truncate(page as u8), address, data, EEPROM_POLLING);
-        let end = bench.run(&mut Watched { access, written: Vec::new(), seed });
+        let end = bench.run(&mut Watched { access, held: BTreeMap::new(), seed });
         if bench.forged_requests > 0 {
             return bench;
         }
@@ -260,6 +276,7 @@ fn hostile_eeprom_writes() {
         ends.count(&end);
         bench
     });
+    assert!(ends.not_done > 0, "{ends:?}");
     ends.print("EEPROM writes");
 }
 

@@ -10,6 +10,7 @@
 
 mod attacks;
 mod bench;
+mod blocks;
 mod both_ends;
 mod laws;
 #[cfg(feature = "serde")]

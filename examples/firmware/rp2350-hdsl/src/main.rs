@@ -1,29 +1,31 @@
-//! A HIPERFACE DSL receiver on an RP2350 at 150 MHz: PIO and DMA move samples, core 1 feeds them (the front end), core 0 is the link
-//! and prints positions. Not tried on silicon.
+//! A HIPERFACE DSL receiver on an RP2350 at 150 MHz: PIO and DMA are the line, core 0 is the link, core 1 uses the position. The whole
+//! image runs in an emulator with its peripherals; it was not tried on silicon.
 #![no_std]
 #![no_main]
 
 mod console;
+mod frame;
 mod front_end;
-mod line;
+mod link;
 mod program;
+mod ram;
 
-use core::sync::atomic::{Ordering, fence};
+use core::sync::atomic::{AtomicU32, Ordering};
 
+use cortex_m::singleton;
 use hal::clocks::init_clocks_and_plls;
-use hal::dma::DMAExt;
 use hal::gpio::{FunctionPio0, FunctionUart, Pin, Pins, PullUp};
 use hal::multicore::{Multicore, Stack};
 use hal::pac::Peripherals;
 use hal::pio::PIOExt;
 use hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use hal::{Clock, Sio, Watchdog, fugit::RateExtU32};
-use hdsl::Dialect;
 use hdsl::master::Master;
+use hdsl::{Dialect, EvidenceCell};
 use panic_halt as _;
 use rp235x_hal as hal;
 
-use front_end::{ANSWERED, FrontEnd, SAMPLES};
+use front_end::FrontEnd;
 
 /// What the boot ROM wants to see.
 #[unsafe(link_section = ".start_block")]
@@ -34,6 +36,9 @@ const CRYSTAL_HZ: u32 = 12_000_000;
 const CONSOLE_BAUD: u32 = 1_000_000;
 
 static CORE1_STACK: Stack<1024> = Stack::new();
+
+/// How often the link was begun anew because this program was late.
+pub static LATE: AtomicU32 = AtomicU32::new(0);
 
 #[hal::entry]
 fn main() -> ! {
@@ -51,42 +56,33 @@ fn main() -> ! {
             UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
             clocks.peripheral_clock.freq(),
         )
-        .expect("9.4 clocks a sample");
+        .expect("a rate that the UART has");
     let _: Pin<_, FunctionPio0, _> = pins.gpio2.into_function();
     let _: Pin<_, FunctionPio0, _> = pins.gpio3.into_function();
     let _: Pin<_, FunctionPio0, PullUp> = pins.gpio4.into_function().into_pull_type();
-    let (mut pio, machine, ..) = p.PIO0.split(&mut p.RESETS);
-    let (tx, rx) = front_end::start(&mut pio, machine);
-    let dma = p.DMA.split(&mut p.RESETS);
-    let front_end = FrontEnd::new(dma.ch0, tx, rx);
+    let (pio, player, sampler, ..) = p.PIO0.split(&mut p.RESETS);
+    p.RESETS.reset().modify(|_, w| w.dma().clear_bit());
+    while p.RESETS.reset_done().read().dma().bit_is_clear() {}
+    let mut front_end = FrontEnd::new(pio, p.DMA, (player, sampler));
+
+    let timer = hal::Timer::new_timer0(p.TIMER0, &mut p.RESETS, &clocks);
+    let now_ns = move || timer.get_counter().ticks() * 1_000;
+    let cell = singleton!(: EvidenceCell = EvidenceCell::new()).expect("called once");
+    let (mut feedback, reader) = cell.split();
 
     let mut multicore = Multicore::new(&mut p.PSM, &mut p.PPB, &mut sio.fifo);
     if let [_, core1] = multicore.cores() {
         let stack = CORE1_STACK.take().expect("called once");
-        core1.spawn(stack, move || front_end.run()).expect("core 1");
+        core1.spawn(stack, move || console::run(uart, reader, now_ns)).expect("core 1");
     }
 
-    let timer = hal::Timer::new_timer0(p.TIMER0, &mut p.RESETS, &clocks);
-    let now_ns = || timer.get_counter().ticks() * 1_000;
-    let mut master = Master::new(Dialect::SICK);
-    let mut console = console::Console::new(uart);
     loop {
-        let transmission = master.transmission();
-        // A head has 26 bits.
-        let head = transmission.head.bits().bits() as u32;
-        sio.fifo.write_blocking(head | if transmission.answered { ANSWERED } else { 0 });
-        // A piece of the console's work, while the frame is on the line.
-        console.step(&master, now_ns());
-        // Core 1 says that the answer is there, or that there is none.
-        sio.fifo.read_blocking();
-        // Late by the way through the FIFO and up to a microsecond: little beside the frame of 25 us.
-        let end_ns = now_ns();
-        fence(Ordering::Acquire);
-        let mut samples = [0; hdsl::sampling::WINDOW];
-        for (bytes, word) in samples.chunks_exact_mut(4).zip(&SAMPLES) {
-            bytes.copy_from_slice(&word.load(Ordering::Relaxed).to_be_bytes());
-        }
-        // It fails for too few samples only, and they are all there.
-        let _ = master.hear(&samples, end_ns);
+        let mut master = Master::new(Dialect::SICK);
+        master.set_stuffing(frame::RUNNING.stuffing());
+        let first = master.transmission();
+        let mut line = front_end.start(first.head);
+        let _ = link::run(&mut line, &mut master, &mut feedback, &first, now_ns());
+        front_end = line.stop();
+        LATE.store(LATE.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 }

@@ -1,45 +1,51 @@
-//! The PIO program: one state machine sends, releases the line for one bit, and samples it, two clocks a sample.
+//! The two PIO programs: one plays the line, one samples it, both at 75 MHz, two clocks of 150 MHz each.
 
-use pio::{PioVersion, Program, SideSet, Wrap};
+use pio::{Instruction, InstructionOperands, JmpCondition, PioVersion, Program, SetDestination, SideSet, Wrap};
 
-/// Samples in a bit of 9.375 Mbit/s: 75 MHz, two clocks of 150 MHz each.
-pub const SAMPLES_PER_BIT: u32 = 8;
-/// Samples by which the last one of a message is made longer, on the way through the instructions that follow it.
-pub const HELD: u32 = 3;
-
-/// Takes words: how many samples to send - 1, the samples, the first in bit 0, and how many samples to take - 1, or 0 for none.
+/// Plays pairs of DI (bit 0 of a pair) and DE (bit 1), the first pair in the low bits of a word. It knows nothing of frames: what it
+/// plays comes by DMA and has no end, so a bit is 16 clocks long whatever the processor does.
 ///
-/// Automatic pull and push, 32 bits; out to the right, in to the left. It starts at `begin`, which is the wrap, and goes on at `send`.
-/// The number of samples must not be a multiple of 32.
-///
-/// The instructions are encoded here, so that they can be found in the image and run in another emulator.
+/// The instructions of both programs are encoded here, so that they can be found in the image and run in another emulator.
 #[used]
-static CODE: [u16; 12] = [
-    0x7001, // send:   out pins, 1    side 1
-    0x1040, //         jmp x-- send   side 1
-    0x7160, //         out null, 32   side 1 [1]    what is left of the last word is thrown away
-    0x7020, //         out x, 32      side 1        how many to take
-    0x102a, //         jmp !x more    side 1
-    0xb142, //         mov y, y       side 1 [1]    the last sample has been held for six clocks by now
-    0xaf42, //         mov y, y       side 0 [15]   released for one bit
-    0x4001, // take:   in pins, 1     side 0
-    0x0047, //         jmp x-- take   side 0
-    0x6020, // begin:  out x, 32      side 0        waits for the next message, driver off; then on at send
-    0x7020, // more:   out x, 32      side 1        the next message follows without a pause: six clocks again
-    0x1000, //         jmp send       side 1
+static PLAY: [u16; 1] = [
+    0x6102, // play: out pins, 2 [1]
 ];
 
-const SEND: u8 = 0;
-/// Where it starts.
-pub const BEGIN: u8 = 9;
+/// Waits until the first window begins, then takes a sample each two clocks without an end, 32 in a word, the first in bit 31.
+#[used]
+static SAMPLE: [u16; 2] = [
+    0x0f40, // wait:   jmp x-- wait [15]   a bit
+    0x4101, // sample: in pins, 1 [1]
+];
 
-/// The program.
-pub fn program() -> Program<32> {
+/// The player.
+pub fn play() -> Program<32> {
+    program(&PLAY, Wrap { source: 0, target: 0 })
+}
+
+/// The sampler. X says for how many bits it waits, less one.
+pub fn sample() -> Program<32> {
+    program(&SAMPLE, Wrap { source: 1, target: 1 })
+}
+
+fn program(code: &[u16], wrap: Wrap) -> Program<32> {
     Program {
-        code: CODE.into_iter().collect(),
+        code: code.iter().copied().collect(),
         origin: None,
-        wrap: Wrap { source: BEGIN, target: SEND },
-        side_set: SideSet::new(false, 1, false),
+        wrap,
+        side_set: SideSet::default(),
         version: PioVersion::V0,
     }
+}
+
+/// X of the sampler, which waits for so many bits.
+pub const fn wait_bits(bits: u8) -> Instruction {
+    let operands = InstructionOperands::SET { destination: SetDestination::X, data: bits - 1 };
+    Instruction { operands, delay: 0, side_set: None }
+}
+
+/// `jmp address`.
+pub const fn jump(address: u8) -> Instruction {
+    let operands = InstructionOperands::JMP { condition: JmpCondition::Always, address };
+    Instruction { operands, delay: 0, side_set: None }
 }

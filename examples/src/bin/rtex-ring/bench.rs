@@ -102,7 +102,7 @@ impl Bench {
 
     /// The NC interrupt: reads the reception memory and writes the transmission memory.
     pub(crate) fn exchange(&mut self) -> Result<(), SizeMismatch> {
-        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * u64::from(self.periods.update_ns))
+        self.master.exchange_words(&self.rx, &mut self.tx, self.now * u64::from(self.periods.update_ns))
     }
 
     /// An update period: the exchange, then the frame goes round. What a silent drive has said last stays in the memory.
@@ -114,9 +114,9 @@ impl Bench {
         {
             let was_active = fitted.drive.is_active();
             let mut block = [0; 16];
-            pack::from_words32(tx, &mut block)?;
+            pack::from_words(tx, &mut block)?;
             if let Some(response) = fitted.drive.hear(&block) {
-                pack::to_words32(&response, rx)?;
+                pack::to_words(&response, rx)?;
             }
             if was_active && !fitted.drive.is_active() {
                 fitted.off_at = Some(self.now);

@@ -35,7 +35,7 @@ Usage: rtex-ring [--swapped] [OUT.svg]
 /// Unchanged echoes that count as a time-out: 4 ms.
 const ECHO_LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
-const LIMITS: Limits = Limits::new(ECHO_LIMIT, 100).with_ready(400);
+const LIMITS: Limits = Limits::new(ECHO_LIMIT, 100).with_ready(Some(400));
 
 /// Update periods of motion before the drive goes silent, of recording after it, and until the program ends.
 const BEFORE: u64 = 2_000;

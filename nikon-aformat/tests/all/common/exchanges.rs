@@ -1,6 +1,6 @@
 //! Single transactions and buses on the hostile line, and the laws that they keep.
 
-use nikon_aformat::bus::Addresses;
+use nikon_aformat::bus::{Addresses, Outcome};
 use nikon_aformat::device::{Device, Encoders, Fault};
 use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
 use nikon_aformat::{
@@ -190,23 +190,13 @@ fn longest_ns(rate: BitRate, frames: u64) -> u64 {
     frames * frame_ns(rate) + (frames - 1) * idle_ns(rate)
 }
 
-/// Law 4: no encoder speaks at `ready_ns` or later that began in time, which for the last of `places` on a bus is as many
-/// longest responses and pauses later. A request that the line repeats is answered twice.
-fn line_is_free<const N: usize>(
-    bench: &Bench<N>,
-    id: Id,
-    asked: Asked,
-    at_ns: u64,
-    ready_ns: u64,
-    places: u64,
-    seed: u64,
-) {
+/// Law 4: no encoder speaks at `ready_ns` or later that began in time, which is until `last_ns`. A request that the line
+/// repeats is answered twice.
+fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, asked: Asked, last_ns: u64, ready_ns: u64, seed: u64) {
     let truth = bench.world.truth();
     if truth.transmission(id).is_none_or(|sent| sent.end_ns > sent.sent_ns) {
         return;
     }
-    let places_ns = (places - 1) * (longest_ns(bench.rate, asked.frames) + between_ns(bench.rate));
-    let last_ns = at_ns + frame_ns(bench.rate) + TIMEOUT_NS + places_ns;
     let in_time = |t: &&Transmission| {
         t.answers == Some(id)
             && t.start_ns <= last_ns
@@ -298,7 +288,7 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
             Progress::Pending { .. } => unreachable!(),
         };
         if known && believed == Verdict::Fresh {
-            line_is_free(&bench, id, asked, at_ns, ready_ns, 1, seed);
+            line_is_free(&bench, id, asked, at_ns + frame_ns(rate) + TIMEOUT_NS, ready_ns, seed);
         }
         at_ns = bench.world.now_ns().max(ready_ns) + turn % 7 * 100;
         bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));
@@ -342,8 +332,17 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
                 Progress::Failed { error, .. } => panic!("seed {seed}: {error}"),
             }
         };
-        // Law 2: before the time of the last place is over, nobody who was asked is given up.
-        let last_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * longest_ns(rate, what.frames) + 7 * between_ns(rate);
+        // Law 2: nobody who was asked is given up before the time of the last place is over; after a response it is over when
+        // each of those who were not heard could have had its turn.
+        let turn_ns = longest_ns(rate, what.frames) + between_ns(rate);
+        // A damaged one may be whole enough: one that was longer, say.
+        let heard = |t: &&Transmission| t.delivered > 0 && is_answer(&bench, t, what);
+        let first_ns =
+            bench.world.truth().answers(id).filter(heard).map(|t| t.start_ns + what.frames * frame_ns(rate)).min();
+        let silent = |ea: &EncoderAddress| matches!(transaction.bus().of(*ea), Outcome::Missing | Outcome::NotAsked);
+        let turns_ns = EncoderAddress::ALL.iter().filter(|ea| silent(ea)).count() as u64 * turn_ns;
+        let place_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * turn_ns - between_ns(rate);
+        let last_ns = first_ns.map_or(place_ns, |end_ns| place_ns.min(end_ns + turns_ns));
         let missing = transaction.bus().missing();
         assert!(
             missing.is_empty() || bench.world.now_ns() > last_ns,
@@ -375,7 +374,7 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
                     "seed {seed} turn {turn}: {ea} lost, {lost:?}"
                 );
             }
-            line_is_free(&bench, id, what, at_ns, ready_ns, 8, seed);
+            line_is_free(&bench, id, what, last_ns - longest_ns(rate, what.frames), ready_ns, seed);
         }
         at_ns = bench.world.now_ns().max(ready_ns);
         bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));

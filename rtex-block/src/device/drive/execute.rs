@@ -1,6 +1,7 @@
 //! Execution of non-cyclic commands.
 
 use super::Drive;
+use super::job::{Job, Outcome};
 use crate::device::behaviour::Quirks;
 use crate::device::literals::{
     ALARM, APOS, ASPD, HOMING, HOMING_ACTUAL, HOMING_COMMAND, HOMING_LATCH, IPOS, LATCH_COMP1, LATCH_COMP2, LPOS1,
@@ -13,26 +14,6 @@ use crate::device::parameters::{FEED_FORWARD, Parameters};
 use crate::device::profile::Generator;
 use crate::device::wire::{Execution, Request, error, pair};
 use crate::error_code::Alarm;
-
-/// A command that is being executed, or was and is still held by the master.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) struct Job {
-    request: Request,
-    busy: u16,
-    outcome: Outcome,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-enum Outcome {
-    Value(i32),
-    /// A monitor value, read anew for every response.
-    Live(u16),
-    /// Attributes of the alarm that is being issued, which is the index echo.
-    Attributes(Alarm),
-    Failed,
-}
 
 type Outcomes = Result<Outcome, u16>;
 
@@ -183,7 +164,7 @@ impl Drive {
                 self.latches = [None; 2];
             }
             kind if kind == homing && active => {
-                self.homed = false;
+                self.homed &= self.behaviour.does(Quirks::HOMED_THROUGH_HOMING);
                 self.homing = true;
                 self.motion.home(self.config.homing_distance);
             }

@@ -1,12 +1,15 @@
 //! Requests of an axis, in the main and in the sub block.
 
 use super::Axis;
+use super::asking::{Quiet, Slot};
+use crate::control::ControlBits;
 use crate::error_code::ErrorCode;
 use crate::header::MacId;
 use crate::master::handshake::Handshake;
+use crate::master::profile_move::MoveStage;
 use crate::master::progress::Progress;
 use crate::master::servo_off::ActiveCode;
-use crate::master::state::AskError;
+use crate::master::state::{AskError, StopReason};
 use crate::master::sub_handshake::SubHandshake;
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
@@ -14,50 +17,6 @@ use crate::response::Response;
 use crate::status::StatusFlags;
 use crate::sub::{SubCode, SubCommand, SubResponse};
 use crate::type_code::{Nibble, TypeCode, homing};
-
-/// A request on its way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) enum Service {
-    Idle,
-    Asking {
-        handshake: Handshake,
-        /// It must be over before the servo is switched on.
-        servo_off: bool,
-    },
-    /// The outcome is known; the normal command is out until its echo is seen.
-    Releasing {
-        left: u32,
-    },
-}
-
-/// The same for the sub block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) enum SubService {
-    Idle,
-    Asking(SubHandshake),
-    Releasing { left: u32 },
-}
-
-impl Service {
-    /// What is asked at present.
-    pub(super) const fn request(&self) -> Option<NonCyclicCommand> {
-        match self {
-            Self::Asking { handshake, .. } => Some(handshake.request()),
-            Self::Idle | Self::Releasing { .. } => None,
-        }
-    }
-
-    pub(super) const fn is_busy(&self) -> bool {
-        !matches!(self, Self::Idle)
-    }
-
-    /// Whether what is asked must be over before the servo is switched on.
-    pub(super) const fn needs_servo_off(&self) -> bool {
-        matches!(self, Self::Asking { servo_off: true, .. })
-    }
-}
 
 /// Resets, and the homing types that set a position. `unknown`: the other homing types too, but for the one that reads.
 const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
@@ -75,15 +34,14 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
 /// The drive goes on with the block before, so this is no answer: the request is in the next block again, and may be under way
 /// already.
 fn is_thrown_away(response: &Response) -> bool {
-    matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
+    response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
 }
 
 impl Axis {
     /// Sends a non-cyclic command and holds it until it is answered; see [`take_outcome`](Self::take_outcome).
     ///
-    /// In between the normal command goes out, until its echo is seen or the time for an answer is over. Where the echo was not
-    /// seen, the drive may not have noticed that there is a new request: its answers do not count until it was, and the
-    /// request times out.
+    /// In between the normal command goes out until it has come back for a whole turn of the counter: what an old block says is no
+    /// answer to the next request. Until then the axis is busy.
     ///
     /// A homing type other than those that are confirmed may give the axis new coordinates. In CP the set-point would stay in
     /// the old ones, so with the servo on it is refused there; latches have [`ask_latch`](Self::ask_latch).
@@ -125,22 +83,32 @@ impl Axis {
         self.begin(Handshake::alarm_attributes(mac_id, cyclic, type_code, limit), false)
     }
 
+    /// Sends a homing command in CV at speed 0 with the servo on, where no position is commanded.
+    pub(in crate::master) fn ask_rebasing(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
+        let still = self.wire.mode == ActiveCode::CyclicVelocity && (self.wire.value, self.setpoint) == (0, 0);
+        if self.mode != ActiveCode::CyclicVelocity || !still {
+            return Err(AskError::ServoOn);
+        }
+        let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
+        self.begin(handshake.ok_or(AskError::NotARequest)?, false)
+    }
+
     /// Whether a request can be sent now.
     pub fn can_ask(&self) -> bool {
-        !self.service.is_busy() && !self.is_moving()
+        self.main.slot.asking().is_none() && self.main.quiet.is_kept() && !self.is_moving()
     }
 
     /// Update periods until the present request times out; the whole limit if none is under way.
     pub(in crate::master) const fn answer_left(&self) -> u32 {
-        match &self.service {
-            Service::Asking { handshake, .. } => handshake.left(),
-            Service::Idle | Service::Releasing { .. } => self.config.limits.answer,
+        match self.main.slot.asking() {
+            Some(handshake) => handshake.left(),
+            None => self.config.limits.answer,
         }
     }
 
     /// The outcome of the last request, once.
     pub const fn take_outcome(&mut self) -> Option<Progress<NonCyclicResponse>> {
-        self.outcome.take()
+        self.main.slot.take()
     }
 
     /// Sends a sub-command (32-byte mode) and holds it until it is answered; it runs beside everything else.
@@ -148,18 +116,17 @@ impl Axis {
     /// # Errors
     /// [`AskError::Busy`], or [`AskError::NotARequest`] for the normal sub-command.
     pub fn ask_sub(&mut self, code: SubCode, type_code: u8, index: u16) -> Result<(), AskError> {
-        if self.sub != SubService::Idle {
+        if self.sub.slot.asking().is_some() || !self.sub.quiet.is_kept() {
             return Err(AskError::Busy);
         }
         let handshake = SubHandshake::new(code, type_code, index, self.config.limits.answer);
-        self.sub = SubService::Asking(handshake.ok_or(AskError::NotARequest)?);
-        self.sub_outcome = None;
+        self.sub.slot = Slot::Asking(handshake.ok_or(AskError::NotARequest)?);
         Ok(())
     }
 
     /// The outcome of the last sub-command, once.
     pub const fn take_sub_outcome(&mut self) -> Option<Progress<SubResponse>> {
-        self.sub_outcome.take()
+        self.sub.slot.take()
     }
 
     fn begin(&mut self, handshake: Handshake, servo_off: bool) -> Result<(), AskError> {
@@ -170,70 +137,76 @@ impl Axis {
         if active && servo_off {
             return Err(AskError::ServoOn);
         }
-        self.service = Service::Asking { handshake, servo_off };
-        self.outcome = None;
+        (self.main.slot, self.main.needs_servo_off) = (Slot::Asking(handshake), servo_off);
         Ok(())
     }
 
     /// Requests and profile motion.
-    pub(super) fn serve(&mut self, response: Option<&Response>) {
-        let response = response.filter(|response| !is_thrown_away(response));
-        if let Some(profile) = &mut self.profile {
-            let _ = profile.receive(response);
+    pub(super) fn serve(&mut self, on_time: Option<&Response>) {
+        let response = on_time.filter(|response| !is_thrown_away(response));
+        if let Some(response) = response {
+            self.main.quiet.hear(response.code.noncyclic_bits() == 0);
         }
-        let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
-        self.unreleased &= !released;
-        // Echoes tell requests of one kind apart by their index, and not by their data.
-        let heard = response.filter(|_| !self.unreleased);
-        match &mut self.service {
-            Service::Idle => {}
-            Service::Asking { handshake, .. } => {
-                let progress = handshake.receive(heard);
-                if !progress.is_pending() {
-                    self.outcome = Some(progress);
-                    self.service = Service::Releasing { left: self.config.limits.answer };
-                }
+        if self.is_moving() {
+            self.serve_motion(response);
+        }
+        if let Slot::Asking(handshake) = &mut self.main.slot {
+            let progress = handshake.receive(response);
+            if !progress.is_pending() {
+                (self.main.slot, self.main.quiet) = (Slot::Ended(progress), Quiet::BROKEN);
             }
-            Service::Releasing { left } => match left.checked_sub(1) {
-                Some(less) if !released => *left = less,
-                _ => {
-                    self.unreleased = !released;
-                    self.service = Service::Idle;
-                }
-            },
+        }
+    }
+
+    /// A motion begins after a turn of the normal code, like a request.
+    fn serve_motion(&mut self, response: Option<&Response>) {
+        let Some(profile) = &mut self.profile else { return };
+        if self.control.intersects(ControlBits::HARD_STOP.union(ControlBits::SMOOTH_STOP)) {
+            profile.break_off(Some(StopReason::Requested), true, true);
+        }
+        // An old block tells neither the beginning nor, by itself, the end.
+        let falls = response.is_some_and(|response| !response.status.contains(StatusFlags::IN_PROGRESS));
+        let counts = match profile.stage() {
+            MoveStage::Preparing => self.main.quiet.is_kept(),
+            MoveStage::Moving => !falls || self.main.fell,
+            MoveStage::Starting | MoveStage::Ended => true,
+        };
+        self.main.fell = falls;
+        let heard = response.filter(|_| counts);
+        if !profile.receive(heard).is_pending() {
+            self.main.quiet = Quiet::BROKEN;
         }
     }
 
     /// The sub-command; a drive that answers without sub block leaves it pending.
     pub(super) fn serve_sub(&mut self, response: Option<&SubResponse>) {
         let response = response.filter(|sub| !sub.error_code().is_some_and(ErrorCode::discards_block));
-        let released = response.is_some_and(|r| r.code.get() == 0);
-        self.sub_unreleased &= !released;
-        let heard = response.filter(|_| !self.sub_unreleased);
-        match &mut self.sub {
-            SubService::Idle => {}
-            SubService::Asking(handshake) => {
-                let progress = handshake.receive(heard);
-                if !progress.is_pending() {
-                    self.sub_outcome = Some(progress);
-                    self.sub = SubService::Releasing { left: self.config.limits.answer };
-                }
-            }
-            SubService::Releasing { left } => match left.checked_sub(1) {
-                Some(less) if !released => *left = less,
-                _ => {
-                    self.sub_unreleased = !released;
-                    self.sub = SubService::Idle;
-                }
-            },
+        if let Some(response) = response {
+            self.sub.quiet.hear(response.code.get() == 0);
         }
+        if let Slot::Asking(handshake) = &mut self.sub.slot {
+            let progress = handshake.receive(response);
+            if !progress.is_pending() {
+                (self.sub.slot, self.sub.quiet) = (Slot::Ended(progress), Quiet::BROKEN);
+            }
+        }
+    }
+
+    /// Bytes 8-15: the request, the motion, or the normal command with its feed-forward.
+    pub(super) fn noncyclic(&self, feed_forward: i32) -> NonCyclicCommand {
+        let command = match (self.main.slot.asking(), &self.profile) {
+            (Some(handshake), _) => handshake.request(),
+            (None, Some(profile)) => profile.request(),
+            (None, None) => NonCyclicCommand::IDLE,
+        };
+        command.with_feed_forward(feed_forward)
     }
 
     /// Bytes 16-31, with Sub_Command_Data2 and 3.
     pub(super) fn sub_command(&self, [data2, data3]: [i32; 2]) -> SubCommand {
-        let asked = match &self.sub {
-            SubService::Asking(handshake) => handshake.command(),
-            SubService::Idle | SubService::Releasing { .. } => SubCommand::IDLE,
+        let asked = match self.sub.slot.asking() {
+            Some(handshake) => handshake.command(),
+            None => SubCommand::IDLE,
         };
         SubCommand { data2, data3, ..asked }
     }

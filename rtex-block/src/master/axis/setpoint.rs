@@ -2,6 +2,7 @@
 
 use super::Axis;
 use crate::control::ControlBits;
+use crate::master::echo::{Arrival, TURN};
 use crate::master::profile_move::{CommandEnded, ProfileMove};
 use crate::master::progress::Progress;
 use crate::master::servo_off::ActiveCode;
@@ -26,33 +27,54 @@ impl Axis {
         self.max_step
     }
 
-    /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0.
+    /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0; back in the mode of
+    /// the last block it is what that said.
     ///
-    /// With the servo on let the axis stand first: the actual position is one or two update periods old when it becomes the
+    /// With the servo on the axis has to stand: the actual position is one or two update periods old when it becomes the
     /// command position. A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
     ///
     /// # Errors
     /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] on the way from off to on or
-    /// back; the mode is kept then.
+    /// back and during a stop, [`SetpointError::NotStanding`]; the mode is kept then.
     pub fn set_mode(&mut self, mode: ActiveCode) -> Result<(), SetpointError> {
-        match self.state {
-            AxisState::SwitchingOn | AxisState::Stopping(_) | AxisState::SwitchingOff => {
-                return Err(SetpointError::NotOn);
-            }
-            AxisState::On if self.is_moving() || self.status().contains(StatusFlags::IN_PROGRESS) => {
-                return Err(SetpointError::Busy);
-            }
-            _ => {}
-        }
-        if self.service.request().is_some() {
+        let is_on = match self.state {
+            AxisState::SwitchingOn | AxisState::SwitchingOff => return Err(SetpointError::NotOn),
+            AxisState::Stopping(_) | AxisState::Held(_) => return Err(SetpointError::NotOn),
+            AxisState::On => true,
+            AxisState::Starting | AxisState::Off | AxisState::Stopped(_) => false,
+        };
+        if self.main.slot.asking().is_some()
+            || is_on && (self.is_moving() || self.status().contains(StatusFlags::IN_PROGRESS))
+        {
             return Err(SetpointError::Busy);
         }
-        if mode != self.mode {
-            self.mode = mode;
-            self.feed_forward = [0; 3];
-            self.rest();
+        if mode == self.mode {
+            return Ok(());
+        }
+        let back = is_on && mode == self.wire.mode;
+        if is_on && !back && !self.stands(mode) {
+            return Err(SetpointError::NotStanding);
+        }
+        self.mode = mode;
+        self.feed_forward = [0; 3];
+        self.rest();
+        if back {
+            self.setpoint = self.wire.value;
         }
         Ok(())
+    }
+
+    /// Whether the axis stands, as far as it can be told, for a change to this mode.
+    fn stands(&self, mode: ActiveCode) -> bool {
+        let commanded = match self.wire.mode {
+            ActiveCode::CyclicPosition => self.wire.step == 0,
+            ActiveCode::CyclicVelocity => self.wire.value == 0,
+            ActiveCode::ProfilePosition | ActiveCode::CyclicTorque => true,
+        };
+        // The actual position becomes the command position some periods after it was one.
+        let drift = self.wire.step.unsigned_abs().saturating_mul(TURN.into());
+        let known = self.arrival == Arrival::OnTime && drift <= self.max_step;
+        commanded && (mode != ActiveCode::CyclicPosition || known)
     }
 
     /// Control bits other than Servo_On, which the state decides.
@@ -89,11 +111,12 @@ impl Axis {
     /// [`SetpointError`]; the position before is kept then.
     pub fn set_position(&mut self, position: i32) -> Result<(), SetpointError> {
         self.must_be_on()?;
-        if self.mode != ActiveCode::CyclicPosition {
+        // The first position after a change of the mode is that of the axis.
+        if self.mode != ActiveCode::CyclicPosition || self.wire.mode != self.mode {
             return Err(SetpointError::Mode);
         }
         // From the position that was sent last: several calls in one update period do not add up.
-        let step = step(self.before, position);
+        let step = step(self.wire.value, position);
         if step.unsigned_abs() > self.max_step {
             return Err(SetpointError::Step { step });
         }
@@ -141,7 +164,7 @@ impl Axis {
         if self.mode != ActiveCode::ProfilePosition {
             return Err(SetpointError::Mode);
         }
-        if self.is_moving() || self.service.is_busy() {
+        if self.is_moving() || self.main.slot.asking().is_some() {
             return Err(SetpointError::Busy);
         }
         within(speed, self.config.max_speed)?;
@@ -168,16 +191,20 @@ impl Axis {
         self.profile.as_ref()
     }
 
-    /// How far the profile motion is; once it has ended this gives its end and forgets it.
+    /// How far the profile motion is; once it has ended this gives its end and forgets it. It is done when the axis has stayed on
+    /// for a turn of the counter after In_Progress went to 0: the reason why a motion was broken off may be shown later than that.
     pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let progress = self.profile?.progress();
+        if matches!(progress, Progress::Done { .. }) && !self.main.quiet.is_kept() {
+            return Some(Progress::Pending { left: self.config.limits.answer });
+        }
         if !progress.is_pending() {
             self.profile = None;
         }
         Some(progress)
     }
 
-    pub(super) fn is_moving(&self) -> bool {
+    pub(in crate::master) fn is_moving(&self) -> bool {
         self.profile.is_some_and(|profile| profile.progress().is_pending())
     }
 

@@ -1,8 +1,9 @@
 //! What a drive tells about its alarms.
 
-use super::Ask;
+use super::ask::{Ask, procedure};
 use crate::error_code::Alarm;
 use crate::master::axis::Axis;
+use crate::master::echo::Arrival;
 use crate::master::progress::{Failure, Progress};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
 use crate::noncyclic_response::NonCyclicResponse;
@@ -10,38 +11,42 @@ use crate::status::StatusFlags;
 use crate::type_code::TypeCode;
 
 /// Reads the alarm history, from the latest entry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct AlarmHistory {
+#[derive(Debug)]
+pub struct AlarmHistory<'a> {
     ask: Ask,
     type_code: TypeCode,
-    index: u16,
+    entries: &'a mut [Alarm],
+    place: u16,
+    end: Option<Progress<()>>,
 }
 
-impl AlarmHistory {
-    /// With the type code of the history as the drive's manual gives it; the index counts from 1.
-    pub const fn new(type_code: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, type_code, index: 1 }
+procedure!(AlarmHistory<'a>, ());
+
+impl<'a> AlarmHistory<'a> {
+    /// With the type code of the history as the drive's manual gives it, whose index counts from 1; fills `entries` from the latest
+    /// alarm. Main and sub code 0 are an empty entry.
+    pub const fn new(type_code: TypeCode, entries: &'a mut [Alarm]) -> Self {
+        Self { ask: Ask::NEW, type_code, entries, place: 0, end: None }
     }
 
-    /// To be called once in every update period; fills `entries` from the latest alarm. Main and sub code 0 are an empty
-    /// entry.
-    pub fn receive(&mut self, axis: &mut Axis, entries: &mut [Alarm]) -> Progress<()> {
-        let Some(place) = entries.get_mut(usize::from(self.index).saturating_sub(1)) else {
+    const fn reset(&mut self) {
+        (self.ask, self.place) = (Ask::NEW, 0);
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<()> {
+        let Some(entry) = self.entries.get_mut(usize::from(self.place)) else {
             return Progress::Done { value: () };
         };
-        let request = NonCyclicCommand::Alarm(Arguments { type_code: self.type_code, index: self.index, data: 0 });
-        match self.ask.receive(axis, request) {
-            Progress::Done { value: NonCyclicResponse::Alarm(results) } => {
-                *place = results.alarm().alarm;
-                self.index = self.index.saturating_add(1);
-                Progress::Pending { left: axis.answer_left() }
+        let index = self.place.saturating_add(1);
+        let request = NonCyclicCommand::Alarm(Arguments { type_code: self.type_code, index, data: 0 });
+        self.ask.receive(axis, request).and_then(|response| {
+            // An alarm request is done with an alarm response.
+            if let NonCyclicResponse::Alarm(results) = response {
+                *entry = results.alarm().alarm;
             }
-            // Never: an alarm request is done with an alarm response.
-            Progress::Done { .. } => Progress::Failed { error: Failure::TimedOut },
-            Progress::Pending { left } => Progress::Pending { left },
-            Progress::Failed { error } => Progress::Failed { error },
-        }
+            self.place = index;
+            Progress::Pending { left: axis.answer_left() }
+        })
     }
 }
 
@@ -88,31 +93,36 @@ pub enum ClearableIf {
     Unset(u32),
 }
 
-/// Reads the attributes of the alarm that is being issued (Index 0).
+/// Reads the attributes of the alarm that is being issued (Index 0). A drive without an alarm refuses, or answers as its manual says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlarmAttributes {
     ask: Ask,
     type_code: TypeCode,
+    end: Option<Progress<Attributes>>,
 }
+
+procedure!(AlarmAttributes, Attributes);
 
 impl AlarmAttributes {
     /// With the type code of the attributes as the drive's manual gives it.
     pub const fn new(type_code: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, type_code }
+        Self { ask: Ask::NEW, type_code, end: None }
     }
 
-    /// To be called once in every update period. A drive without an alarm refuses, or answers as its manual says.
-    pub fn receive(&mut self, axis: &mut Axis) -> Progress<Attributes> {
-        match self.ask.receive_with(axis, |axis| axis.ask_alarm_attributes(self.type_code)) {
-            Progress::Done { value: NonCyclicResponse::Alarm(results) } => Progress::Done {
+    const fn reset(&mut self) {
+        self.ask = Ask::NEW;
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<Attributes> {
+        let progress = self.ask.receive_with(axis, |axis| axis.ask_alarm_attributes(self.type_code));
+        progress.and_then(|response| match response {
+            NonCyclicResponse::Alarm(results) => Progress::Done {
                 value: Attributes { alarm: results.index, bits: u32::from_le_bytes(results.data.to_le_bytes()) },
             },
             // Never: an alarm request is done with an alarm response.
-            Progress::Done { .. } => Progress::Failed { error: Failure::TimedOut },
-            Progress::Pending { left } => Progress::Pending { left },
-            Progress::Failed { error } => Progress::Failed { error },
-        }
+            _ => Progress::Failed { error: Failure::TimedOut },
+        })
     }
 }
 
@@ -131,12 +141,17 @@ pub enum Clearing {
 /// Clears the alarm and looks whether it is gone: the answer to "can this alarm be cleared?" for which no attribute has to be
 /// known.
 ///
+/// The command is sent once, and Alarm of the blocks received after its answer decides, not the answer alone.
+/// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
+/// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all.
+///
 /// An axis with an alarm is stopped; after the alarm [`Axis::clear`](Axis::clear) makes it start again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClearAlarm {
     ask: Ask,
     type_code: TypeCode,
+    limit: u32,
     left: u32,
     /// Good blocks up to the last call.
     good: Option<u64>,
@@ -145,28 +160,23 @@ pub struct ClearAlarm {
     end: Option<Progress<Clearing>>,
 }
 
+procedure!(ClearAlarm, Clearing);
+
 impl ClearAlarm {
     /// With the type code that clears the present alarm as the drive's manual gives it (Index 0); Alarm has `limit` update
     /// periods to go to 0 after the answer.
     pub const fn new(type_code: TypeCode, limit: u32) -> Self {
-        Self { ask: Ask { asked: false }, type_code, left: limit, good: None, answer: None, end: None }
+        Self { ask: Ask::NEW, type_code, limit, left: limit, good: None, answer: None, end: None }
     }
 
-    /// To be called once in every update period.
-    ///
-    /// The command is sent once, and Alarm of the blocks received after its answer decides, not the answer alone.
-    /// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
-    /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all. Once done or failed it stays so.
-    pub fn receive(&mut self, axis: &mut Axis) -> Progress<Clearing> {
-        let progress = self.end.unwrap_or_else(|| self.next(axis));
-        self.end = progress.ended();
-        progress
+    const fn reset(&mut self) {
+        (self.ask, self.left, self.good, self.answer) = (Ask::NEW, self.limit, None, None);
     }
 
     fn next(&mut self, axis: &mut Axis) -> Progress<Clearing> {
         let good = axis.counters().good();
-        // Status_Flags are those of the last good block, which may be old.
-        let is_fresh = self.good.replace(good).is_some_and(|last| last != good);
+        // Status_Flags are those of the last block on time, which may be old.
+        let is_fresh = self.good.replace(good).is_some_and(|last| last != good) && axis.arrival() == Arrival::OnTime;
         let alarm = axis.status().contains(StatusFlags::ALARM);
         if is_fresh && !alarm && !self.ask.asked {
             return Progress::Done { value: Clearing::Cleared };

@@ -1,15 +1,18 @@
 //! Position set and homing by the drive.
 
-use super::Ask;
+use super::ask::{Ask, procedure};
 use crate::master::axis::Axis;
+use crate::master::config::StopCategory;
+use crate::master::echo::{Arrival, TURN};
 use crate::master::progress::{Failure, Progress};
 use crate::master::servo_off::ActiveCode;
+use crate::master::state::{AskError, AxisState, StopReason};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
 use crate::status::StatusFlags;
 use crate::type_code::{Nibble, homing, monitor};
 
 /// A homing command outside latch mode.
-const fn command(type_code: u8, setting_data: i32) -> NonCyclicCommand {
+pub(super) const fn command(type_code: u8, setting_data: i32) -> NonCyclicCommand {
     NonCyclicCommand::Homing {
         type_code,
         latch_sel1: Nibble::ZERO,
@@ -20,6 +23,10 @@ const fn command(type_code: u8, setting_data: i32) -> NonCyclicCommand {
 }
 
 /// Sets a position of the drive (homing types 21h and 22h), once, and reads it back. Only with the servo off.
+///
+/// `Done` carries the position as read back: a motor that is free may have turned since. The command is never sent twice. If its
+/// answer does not come, the position read back decides: `Done` if it is the one to be set, otherwise [`Failure::TimedOut`], and the
+/// effect is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SetPosition {
@@ -31,33 +38,30 @@ pub struct SetPosition {
     end: Option<Progress<i32>>,
 }
 
+procedure!(SetPosition, i32);
+
 impl SetPosition {
     /// Sets the actual position (21h), command units; read back as APOS.
     pub const fn actual(position: i32) -> Self {
-        Self { ask: Ask { asked: false }, type_code: homing::SET_ACTUAL_POSITION, position, set: None, end: None }
+        Self { ask: Ask::NEW, type_code: homing::SET_ACTUAL_POSITION, position, set: None, end: None }
     }
 
     /// Sets the command position (22h), command units; read back as IPOS, which follows the motor while the servo is off.
     pub const fn command(position: i32) -> Self {
-        Self { ask: Ask { asked: false }, type_code: homing::SET_COMMAND_POSITION, position, set: None, end: None }
+        Self { ask: Ask::NEW, type_code: homing::SET_COMMAND_POSITION, position, set: None, end: None }
     }
 
-    /// To be called once in every update period. `Done` carries the position as read back: a motor that is free may have
-    /// turned since.
-    ///
-    /// The command is never sent twice. If its answer does not come, the position read back decides: `Done` if it is the one
-    /// to be set, otherwise [`Failure::TimedOut`], and the effect is not known. Once done or failed it stays so.
-    pub fn receive(&mut self, axis: &mut Axis) -> Progress<i32> {
-        let progress = self.end.unwrap_or_else(|| self.next(axis));
-        self.end = progress.ended();
-        progress
+    const fn reset(&mut self) {
+        (self.ask, self.set) = (Ask::NEW, None);
     }
 
     fn next(&mut self, axis: &mut Axis) -> Progress<i32> {
         let Some(set) = self.set else {
             match self.ask.receive(axis, command(self.type_code, self.position)) {
                 Progress::Done { .. } => self.set = Some(Ok(())),
-                Progress::Failed { error: Failure::TimedOut } => self.set = Some(Err(Failure::TimedOut)),
+                Progress::Failed { error: Failure::TimedOut } => {
+                    (self.set, self.ask) = (Some(Err(Failure::TimedOut)), Ask::NEW);
+                }
                 Progress::Failed { error } => return Progress::Failed { error },
                 Progress::Pending { .. } => {}
             }
@@ -67,17 +71,14 @@ impl SetPosition {
             homing::SET_ACTUAL_POSITION => monitor::APOS,
             _ => monitor::IPOS,
         };
-        match self.ask.receive(axis, NonCyclicCommand::Monitor(Arguments { type_code, index: 0, data: 0 })) {
-            Progress::Done { value } => match (set, value.data()) {
-                (Ok(()), Some(value)) => Progress::Done { value },
-                (Err(_), Some(value)) if value == self.position => Progress::Done { value },
-                (Err(error), _) => Progress::Failed { error },
-                // Never: a monitor request is done with a monitor response, which has data.
-                (Ok(()), None) => Progress::Failed { error: Failure::TimedOut },
-            },
-            Progress::Pending { left } => Progress::Pending { left },
-            Progress::Failed { error } => Progress::Failed { error },
-        }
+        let read = NonCyclicCommand::Monitor(Arguments { type_code, index: 0, data: 0 });
+        self.ask.receive(axis, read).and_then(|response| match (set, response.data()) {
+            (Ok(()), Some(value)) => Progress::Done { value },
+            (Err(_), Some(value)) if value == self.position => Progress::Done { value },
+            (Err(error), _) => Progress::Failed { error },
+            // Never: a monitor request is done with a monitor response, which has data.
+            (Ok(()), None) => Progress::Failed { error: Failure::TimedOut },
+        })
     }
 }
 
@@ -86,65 +87,94 @@ impl SetPosition {
 /// Only in PP, where the drive generates the position command. In CP the host does: the drive would take up new coordinates
 /// between two set-points, and the next one, still in the old ones, would be a jump by the whole offset. In CV and CT nobody
 /// watches In_Progress, as the drive generates no position command. How a drive homes there is not in the documents at hand.
+///
+/// `Done` when Homing_Complete is 1 and In_Progress is 0 for a turn of the counter, the axis on all the time, and at least one of
+/// the two was different since the command went out: Homing_Complete may be left from an earlier homing. Broken off it fails with
+/// the reason of the axis. If it does not end in time the axis is stopped (category 1) for
+/// [`HomingTimeout`](StopReason::HomingTimeout). The command is never sent twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Home {
     ask: Ask,
     type_code: u8,
+    limit: u32,
     left: u32,
     accepted: bool,
     /// Homing_Complete was 0, or In_Progress 1: what it says now is not left from an earlier homing.
     fresh: bool,
+    /// Blocks on time that show standstill before it begins, and its end.
+    blocks: u8,
     end: Option<Progress<()>>,
 }
 
+procedure!(Home, ());
+
 impl Home {
-    /// A homing of this type; the drive has `limit` update periods after it has accepted the command.
+    /// A homing of this type; the drive has `limit` update periods after it has accepted the command, and another motion as many
+    /// before it to end.
     pub const fn new(type_code: u8, limit: u32) -> Self {
-        Self { ask: Ask { asked: false }, type_code, left: limit, accepted: false, fresh: false, end: None }
+        let ask = Ask::NEW;
+        Self { ask, type_code, limit, left: limit, accepted: false, fresh: false, blocks: 0, end: None }
     }
 
-    /// To be called once in every update period. `Done` when Homing_Complete is 1 and In_Progress is 0, and at least one of
-    /// them was different since the command was accepted: Homing_Complete may be left from an earlier homing. Once done or
-    /// failed it stays so: the command is never sent twice.
-    pub fn receive(&mut self, axis: &mut Axis) -> Progress<()> {
-        let progress = self.end.unwrap_or_else(|| self.next(axis));
-        self.end = progress.ended();
-        progress
+    const fn reset(&mut self) {
+        *self = Self::new(self.type_code, self.limit);
     }
 
     fn next(&mut self, axis: &mut Axis) -> Progress<()> {
-        if axis.mode() != ActiveCode::ProfilePosition {
-            return Progress::Failed { error: Failure::Mode };
+        match axis.state() {
+            AxisState::On if axis.mode() != ActiveCode::ProfilePosition => {
+                return Progress::Failed { error: Failure::Mode };
+            }
+            AxisState::On => {}
+            AxisState::Stopped(reason) | AxisState::Stopping(reason) | AxisState::Held(reason) => {
+                return Progress::Failed { error: Failure::Stopped(reason) };
+            }
+            _ => return Progress::Failed { error: Failure::ServoOff },
         }
         let status = axis.status();
         let [complete, moves] =
             [StatusFlags::HOMING_COMPLETE, StatusFlags::IN_PROGRESS].map(|flag| status.contains(flag));
-        if moves && !self.ask.asked && !self.accepted {
+        let on_its_way = self.ask.asked || self.accepted;
+        if !on_its_way && self.for_a_turn(axis, !moves) < TURN {
             // The end of another motion would look like that of this one.
-            return self.wait();
+            return self.wait(axis);
         }
-        self.fresh |= (self.ask.asked || self.accepted) && (moves || !complete);
+        self.fresh |= on_its_way && (moves || !complete);
         if !self.accepted {
-            match self.ask.receive(axis, command(self.type_code, 0)) {
-                Progress::Done { .. } => self.accepted = true,
-                Progress::Pending { left } => return Progress::Pending { left },
-                Progress::Failed { error } => return Progress::Failed { error },
+            let answer = self.ask.receive(axis, command(self.type_code, 0));
+            if answer == (Progress::Failed { error: Failure::TimedOut }) {
+                // It may be under way.
+                axis.stop_for(StopReason::HomingTimeout, StopCategory::One);
             }
+            return answer.and_then(|_| {
+                (self.accepted, self.blocks, self.left) = (true, 0, self.limit);
+                Progress::Pending { left: self.left }
+            });
         }
-        if self.fresh && complete && !moves {
+        if self.for_a_turn(axis, self.fresh && complete && !moves) > TURN {
             return Progress::Done { value: () };
         }
-        self.wait()
+        self.wait(axis)
     }
 
-    const fn wait(&mut self) -> Progress<()> {
-        match self.left.checked_sub(1) {
-            Some(left) => {
-                self.left = left;
-                Progress::Pending { left }
-            }
-            None => Progress::Failed { error: Failure::TimedOut },
+    /// Blocks on time in a row of which that is so.
+    fn for_a_turn(&mut self, axis: &Axis, is_so: bool) -> u8 {
+        if axis.arrival() == Arrival::OnTime {
+            self.blocks = if is_so { self.blocks.saturating_add(1) } else { 0 };
         }
+        self.blocks
+    }
+
+    fn wait(&mut self, axis: &mut Axis) -> Progress<()> {
+        if let Some(left) = self.left.checked_sub(1) {
+            self.left = left;
+            return Progress::Pending { left };
+        }
+        if !self.accepted {
+            return Progress::Failed { error: Failure::NotSent(AskError::Busy) };
+        }
+        axis.stop_for(StopReason::HomingTimeout, StopCategory::One);
+        Progress::Failed { error: Failure::TimedOut }
     }
 }

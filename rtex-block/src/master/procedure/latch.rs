@@ -1,6 +1,6 @@
 //! Positions that the drive catches at a trigger.
 
-use super::Ask;
+use super::ask::{Ask, procedure};
 use crate::execution::LatchFlags;
 use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
@@ -32,6 +32,9 @@ enum Stage {
 }
 
 /// Arms latch 1, latch 2 or both, and waits for their positions. SX-DSV02310, "Latch mode".
+///
+/// The state is read (type 50h) before arming, and after it again and again. A position counts only with its Latch_Comp,
+/// and only if that was 0 before arming or at any time since: what an earlier latch has left is not the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latch {
@@ -39,12 +42,16 @@ pub struct Latch {
     arm: u8,
     selections: [Nibble; 2],
     wanted: [bool; 2],
+    limit: u32,
     left: u32,
     stage: Stage,
     /// Latch_Comp was seen at 0, so 1 is not left from an earlier latch.
     fresh: [bool; 2],
     caught: [Option<i32>; 2],
+    end: Option<Progress<Caught>>,
 }
+
+procedure!(Latch, Caught);
 
 impl Latch {
     /// Latch 1: arms with the type code `arm` and the trigger `selection` (Latch_Sel1), both as the drive's manual gives them;
@@ -63,9 +70,23 @@ impl Latch {
         Self::new(arm, selections, [true; 2], limit)
     }
 
-    const fn new(arm: u8, selections: [Nibble; 2], wanted: [bool; 2], left: u32) -> Self {
-        let ask = Ask { asked: false };
-        Self { ask, arm, selections, wanted, left, stage: Stage::Before, fresh: [false; 2], caught: [None; 2] }
+    const fn new(arm: u8, selections: [Nibble; 2], wanted: [bool; 2], limit: u32) -> Self {
+        Self {
+            ask: Ask::NEW,
+            arm,
+            selections,
+            wanted,
+            limit,
+            left: limit,
+            stage: Stage::Before,
+            fresh: [false; 2],
+            caught: [None; 2],
+            end: None,
+        }
+    }
+
+    const fn reset(&mut self) {
+        *self = Self::new(self.arm, self.selections, self.wanted, self.limit);
     }
 
     /// What was caught so far.
@@ -74,11 +95,7 @@ impl Latch {
         Caught { latch1, latch2 }
     }
 
-    /// To be called once in every update period.
-    ///
-    /// The state is read (type 50h) before arming, and after it again and again. A position counts only with its Latch_Comp,
-    /// and only if that was 0 before arming or at any time since: what an earlier latch has left is not the answer.
-    pub fn receive(&mut self, axis: &mut Axis) -> Progress<Caught> {
+    fn next(&mut self, axis: &mut Axis) -> Progress<Caught> {
         let Some(left) = self.left.checked_sub(1) else { return Progress::Failed { error: Failure::TimedOut } };
         self.left = left;
         let pending = Progress::Pending { left };

@@ -1,6 +1,6 @@
 //! Parameters of a drive: read all, write all and read back.
 
-use super::Ask;
+use super::ask::{Ask, procedure};
 use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
@@ -27,84 +27,94 @@ impl ParameterValue {
 servowire_core::one_line!(ParameterValue { Self { pr, value } => "{} = {}", pr, value; });
 
 /// Reads a list of parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Backup {
+#[derive(Debug)]
+pub struct Backup<'a> {
     ask: Ask,
     read: TypeCode,
+    list: &'a mut [ParameterValue],
     place: usize,
-}
-
-impl Backup {
-    /// With the type code for reading as the drive's manual gives it.
-    pub const fn new(read: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, read, place: 0 }
-    }
-
-    /// To be called once in every update period; fills in the values.
-    pub fn receive(&mut self, axis: &mut Axis, list: &mut [ParameterValue]) -> Progress<()> {
-        let Some(ParameterValue { pr, value }) = list.get_mut(self.place) else { return Progress::Done { value: () } };
-        let request = NonCyclicCommand::Parameter(Arguments { type_code: self.read, index: pr.index(), data: 0 });
-        match self.ask.receive(axis, request) {
-            Progress::Done { value: response } => {
-                *value = response.data().unwrap_or(0);
-                self.place = self.place.saturating_add(1);
-                Progress::Pending { left: axis.answer_left() }
-            }
-            Progress::Pending { left } => Progress::Pending { left },
-            Progress::Failed { error } => Progress::Failed { error },
-        }
-    }
-}
-
-/// Writes a list of parameters, each one read back and compared. Nothing is written twice.
-///
-/// Writing is not storing: what must survive a power cycle is stored with a command of its own, and some parameters are
-/// valid only after a reset.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Restore {
-    ask: Ask,
-    read: TypeCode,
-    place: usize,
-    written: bool,
     end: Option<Progress<()>>,
 }
 
-impl Restore {
+procedure!(Backup<'a>, ());
+
+impl<'a> Backup<'a> {
+    /// With the type code for reading as the drive's manual gives it; fills in the values of the list.
+    pub const fn new(read: TypeCode, list: &'a mut [ParameterValue]) -> Self {
+        Self { ask: Ask::NEW, read, list, place: 0, end: None }
+    }
+
+    const fn reset(&mut self) {
+        (self.ask, self.place) = (Ask::NEW, 0);
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<()> {
+        let Some(parameter) = self.list.get_mut(self.place) else { return Progress::Done { value: () } };
+        self.ask.receive(axis, request(self.read, parameter.pr, 0)).and_then(|response| {
+            // A parameter request is done with a parameter response, which has data.
+            parameter.value = response.data().unwrap_or(parameter.value);
+            self.place = self.place.saturating_add(1);
+            Progress::Pending { left: axis.answer_left() }
+        })
+    }
+}
+
+const fn request(type_code: TypeCode, pr: Pr, data: i32) -> NonCyclicCommand {
+    NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data })
+}
+
+/// Writes a list of parameters, each one read back and compared. Nothing is written twice: where the answer to a write does not
+/// come, what is read back decides.
+///
+/// Writing is not storing: what must survive a power cycle is stored with a command of its own, and some parameters are
+/// valid only after a reset. [`Failure::Differs`] names the parameter that did not take its value; after any other failure the
+/// parameter at [`place`](Self::place) may have either value.
+#[derive(Debug)]
+pub struct Restore<'a> {
+    ask: Ask,
+    read: TypeCode,
+    list: &'a [ParameterValue],
+    place: usize,
+    /// How the write of the present parameter was answered.
+    written: Option<Result<(), Failure>>,
+    end: Option<Progress<()>>,
+}
+
+procedure!(Restore<'a>, ());
+
+impl<'a> Restore<'a> {
     /// With the type code for reading as the drive's manual gives it.
-    pub const fn new(read: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, read, place: 0, written: false, end: None }
+    pub const fn new(read: TypeCode, list: &'a [ParameterValue]) -> Self {
+        Self { ask: Ask::NEW, read, list, place: 0, written: None, end: None }
     }
 
-    /// To be called once in every update period. [`Failure::Differs`] names the parameter that did not take its value;
-    /// after any other failure the parameter at [`place`](Self::place) may have either value. Once done or failed it stays so.
-    pub fn receive(&mut self, axis: &mut Axis, list: &[ParameterValue]) -> Progress<()> {
-        let progress = self.end.unwrap_or_else(|| self.next(axis, list));
-        self.end = progress.ended();
-        progress
+    const fn reset(&mut self) {
+        (self.ask, self.place, self.written) = (Ask::NEW, 0, None);
     }
 
-    fn next(&mut self, axis: &mut Axis, list: &[ParameterValue]) -> Progress<()> {
-        let Some(ParameterValue { pr, value }) = list.get(self.place).copied() else {
+    fn next(&mut self, axis: &mut Axis) -> Progress<()> {
+        let Some(&ParameterValue { pr, value }) = self.list.get(self.place) else {
             return Progress::Done { value: () };
         };
-        let (type_code, data) = if self.written { (self.read, 0) } else { (parameter::WRITE, value) };
-        let request = NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data });
-        match self.ask.receive(axis, request) {
-            Progress::Done { value: response } => {
-                if self.written {
-                    if response.data() != Some(value) {
-                        return Progress::Failed { error: Failure::Differs(pr) };
-                    }
-                    self.place = self.place.saturating_add(1);
+        let pending = Progress::Pending { left: axis.answer_left() };
+        let Some(written) = self.written else {
+            match self.ask.receive(axis, request(parameter::WRITE, pr, value)) {
+                Progress::Done { .. } => self.written = Some(Ok(())),
+                Progress::Failed { error: Failure::TimedOut } => {
+                    (self.written, self.ask) = (Some(Err(Failure::TimedOut)), Ask::NEW);
                 }
-                self.written = !self.written;
-                Progress::Pending { left: axis.answer_left() }
+                Progress::Failed { error } => return Progress::Failed { error },
+                Progress::Pending { .. } => {}
             }
-            Progress::Pending { left } => Progress::Pending { left },
-            Progress::Failed { error } => Progress::Failed { error },
-        }
+            return pending;
+        };
+        self.ask.receive(axis, request(self.read, pr, 0)).and_then(|response| {
+            if response.data() != Some(value) {
+                return Progress::Failed { error: written.err().unwrap_or(Failure::Differs(pr)) };
+            }
+            (self.place, self.written) = (self.place.saturating_add(1), None);
+            pending
+        })
     }
 
     /// Place in the list of the parameter that is written at present.

@@ -1,6 +1,6 @@
 //! What a cell of a table says.
 
-use crate::time;
+use crate::time::{self, Time};
 
 /// A cell of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,10 +41,11 @@ pub(super) fn number(text: &[u8], comma: bool) -> Option<f64> {
 }
 
 /// A time in parts of a second (`divisor` of them) in picoseconds.
-pub(crate) fn time(text: &str, divisor: i64) -> Option<i64> {
+pub(crate) fn time(text: &str, divisor: i64) -> Option<Time> {
     let text = text.trim();
     if let Some(time) = time::from_decimal(text) {
-        return Some(if divisor == 1 { time } else { time.saturating_add(time.signum() * divisor / 2) / divisor });
+        let (time, divisor) = (time.ps(), i128::from(divisor));
+        return Some(Time::from_ps((time + time.signum() * (divisor / 2)) / divisor));
     }
     if text.contains(',') {
         return self::time(&text.replace(',', "."), divisor);
@@ -52,9 +53,11 @@ pub(crate) fn time(text: &str, divisor: i64) -> Option<i64> {
     None
 }
 
-/// `2022-06-24T18:51:08.852112100+00:00` in picoseconds of a day count that wraps after some weeks, which is longer than
-/// any capture.
-pub(crate) fn date(text: &str) -> Option<i64> {
+/// The first of January 1970 in that count of days.
+const EPOCH: i64 = 719_469;
+
+/// `2022-06-24T18:51:08.852112100+00:00`, since 1970 on the clock of the place.
+pub(crate) fn date(text: &str) -> Option<Time> {
     let (day, clock) = text.trim().split_once(['T', ' '])?;
     let mut parts = day.splitn(3, '-').map(str::parse::<i64>);
     let (year, month, day) = (parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?);
@@ -69,11 +72,14 @@ pub(crate) fn date(text: &str) -> Option<i64> {
     let mut parts = clock.splitn(3, ':');
     let (hours, minutes): (i64, i64) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
     let seconds = time::from_decimal(parts.next()?)?;
-    if !(0..24).contains(&hours) || !(0..60).contains(&minutes) || !(0..61 * time::SECOND).contains(&seconds) {
+    if !(0..24).contains(&hours)
+        || !(0..60).contains(&minutes)
+        || !(0..61 * i128::from(time::SECOND)).contains(&seconds.ps())
+    {
         return None;
     }
-    // 64 days of picoseconds fit.
-    Some(((days % 64) * 86_400 + hours * 3600 + minutes * 60) * time::SECOND + seconds)
+    let before = (days - EPOCH) * 86_400 + hours * 3600 + minutes * 60;
+    Some(Time::from_ps(i128::from(before) * i128::from(time::SECOND) + seconds.ps()))
 }
 
 /// Makes levels of voltages.
@@ -118,12 +124,16 @@ mod tests {
 
     #[test]
     fn times_in_all_units() {
+        let time = |text, divisor| time(text, divisor).map(Time::ps);
         assert_eq!(time("0.000016460", 1), Some(16_460_000));
         assert_eq!(time("16.46", 1_000_000), Some(16_460_000));
         assert_eq!(time("-1,5", 1_000), Some(-1_500_000_000));
         let [a, b] =
             ["2022-06-24T18:51:08.852112100+00:00", "2022-06-24T18:51:09.852112100Z"].map(|t| date(t).unwrap());
         assert_eq!(b - a, 1_000_000_000_000);
+        // Seconds since 1970, of that date and of the day after a leap day.
+        assert_eq!(a.ps(), 1_656_096_668_852_112_100_000);
+        assert_eq!(date("2000-03-01 00:00:00").map(Time::ps), Some(951_868_800_000_000_000_000));
         assert_eq!(time("oops", 1), None);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::cell::{self, Cell};
-use crate::time;
+use crate::time::{self, Time};
 
 /// More lines without numbers are no heading.
 pub(super) const LONGEST: usize = 512;
@@ -16,7 +16,7 @@ pub(super) enum Times {
     /// By a column of dates.
     Dates { index: usize },
     /// One after the other, in picoseconds.
-    Steps { start: i64, period: f64 },
+    Steps { start: Time, period: f64 },
     /// At a sample rate.
     Rate(u64),
 }
@@ -195,7 +195,8 @@ impl Heading {
             };
             if let (Some(start), Some(period)) = (after("t0="), after("tInc=")) {
                 if let (Ok(start), Ok(period)) = (start.parse::<f64>(), period.parse::<f64>()) {
-                    self.fixed = Some(Times::Steps { start: (start * 1e12) as i64, period: period * 1e12 });
+                    self.fixed =
+                        Some(Times::Steps { start: Time::from_ps((start * 1e12) as i128), period: period * 1e12 });
                     return;
                 }
             }
@@ -226,7 +227,7 @@ impl Heading {
     fn steps(cells: &[String]) -> Option<Times> {
         let mut numbers = cells.iter().rev().filter_map(|cell| cell::number(cell.as_bytes(), false));
         let (period, start) = (numbers.next()?, numbers.next()?);
-        Some(Times::Steps { start: (start * 1e12) as i64, period: period * 1e12 })
+        Some(Times::Steps { start: Time::from_ps((start * 1e12) as i128), period: period * 1e12 })
     }
 
     /// Where nothing says which column is the time: the first that grows from one row to the next, with another beside it.
@@ -309,15 +310,15 @@ impl Heading {
         if self.split(first).get(index).is_some_and(|cell| is_date(cell)) {
             return Some((Times::Dates { index }, false));
         }
-        let stamps: Vec<i64> = rows.iter().filter_map(|(_, row)| stamp(row)).collect();
+        let stamps: Vec<Time> = rows.iter().filter_map(|(_, row)| stamp(row)).collect();
         let pairs =
-            |is: fn(i64, i64) -> bool| stamps.windows(2).filter(|pair| matches!(pair, [a, b] if is(*a, *b))).count();
+            |is: fn(Time, Time) -> bool| stamps.windows(2).filter(|pair| matches!(pair, [a, b] if is(*a, *b))).count();
         // A row or two may be mistaken.
         let falls = stamps.len() > 8 && pairs(|a, b| a > b) > 2 * pairs(|a, b| a < b);
         let times = match (stamps.first(), stamps.last()) {
             // Stamps with too few digits: the rows are taken at equal distances.
             (Some(first), Some(last)) if 4 * pairs(|a, b| a == b) > stamps.len() && stamps.len() > 64 => {
-                Times::Steps { start: *first, period: (last - first) as f64 / (stamps.len() - 1) as f64 }
+                Times::Steps { start: *first, period: (*last - *first) as f64 / (stamps.len() - 1) as f64 }
             }
             _ => Times::Column { index, divisor },
         };

@@ -10,7 +10,7 @@ use hdsl::Window;
 use crate::event::Place;
 use crate::line::receive::Rates;
 use crate::line::spikes::Spikes;
-use crate::time::Clock;
+use crate::time::{Clock, Time};
 
 /// Samples of a bit on a grid of samples.
 pub(super) const SAMPLES: u64 = 8;
@@ -45,7 +45,7 @@ pub(super) struct Bits {
     inverse: i64,
     inverse_of: i64,
     /// Where the grid has the last edge, and the level since.
-    last: Option<(i64, bool)>,
+    last: Option<(Time, bool)>,
     /// 64 bits each, the first in bit 0.
     words: Vec<u64>,
     /// Number of the first bit in `words`, a multiple of 64, and of the one after the last.
@@ -65,7 +65,7 @@ pub(super) struct Bits {
 pub(super) struct Mark {
     /// Number of the bit that begins there.
     pub(super) bit: u64,
-    pub(super) time: i64,
+    pub(super) time: Time,
     /// Up to the next mark all edges lie on a grid of samples.
     pub(super) grid: Option<Grid>,
 }
@@ -140,7 +140,7 @@ impl Bits {
     }
 
     #[inline]
-    pub(super) fn change(&mut self, time: i64, level: bool) {
+    pub(super) fn change(&mut self, time: Time, level: bool) {
         if self.last.is_none() {
             self.last = Some((time, level));
             self.mark(time);
@@ -154,17 +154,17 @@ impl Bits {
     }
 
     /// The line has not changed until `time`: what is certain of it becomes bits.
-    pub(super) fn reach(&mut self, time: i64) {
+    pub(super) fn reach(&mut self, time: Time) {
         for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge.time, edge.level, edge.spikes);
         }
     }
 
     /// The capture ends at `time`; the last level is held for some bits so that what it began can be read.
-    pub(super) fn finish(&mut self, time: i64, hold: f64) {
-        self.reach(time.saturating_add(self.length() as i64));
+    pub(super) fn finish(&mut self, time: Time, hold: f64) {
+        self.reach(time + self.length() as i64);
         if let Some((since, level)) = self.last {
-            let until = time.max(since.saturating_add((hold * self.length()) as i64));
+            let until = time.max(since + (hold * self.length()) as i64);
             let count = ((until - since) as f64 / self.length()).round().max(0.0) as u64;
             self.push(level, count.min(PAUSE));
             self.last = None;
@@ -172,11 +172,11 @@ impl Bits {
     }
 
     #[inline]
-    fn edge(&mut self, time: i64, level: bool, spikes: u32) {
+    fn edge(&mut self, time: Time, level: bool, spikes: u32) {
         self.heard.edges += 1;
         self.heard.spikes += u64::from(spikes);
         let Some((since, before)) = self.last else { return };
-        let run = time.saturating_sub(since);
+        let run = time - since;
         let longest = (PAUSE as i64 + 50) * self.nominal;
         if run >= longest {
             self.pause(time, before, level);
@@ -206,13 +206,13 @@ impl Bits {
         self.mark(time);
     }
 
-    fn mark(&mut self, time: i64) {
+    fn mark(&mut self, time: Time) {
         self.marks.push(Mark { bit: self.end, time, grid: None });
     }
 
     /// An edge after a pause.
     #[cold]
-    fn pause(&mut self, time: i64, before: bool, level: bool) {
+    fn pause(&mut self, time: Time, before: bool, level: bool) {
         self.paused = Some(self.end + PAUSE);
         self.push(before, PAUSE);
         self.last = Some((time, level));
@@ -286,7 +286,7 @@ impl Bits {
     }
 
     /// When a bit begins.
-    pub(super) fn time(&self, at: u64) -> i64 {
+    pub(super) fn time(&self, at: u64) -> Time {
         let is_after = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
         let mut mark = self.asked.get().min(self.marks.len());
         while !is_after(mark + 1) {
@@ -296,7 +296,7 @@ impl Bits {
             mark -= 1;
         }
         self.asked.set(mark);
-        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return 0 };
+        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return Time::ZERO };
         if let Some(grid) = grid.filter(|_| bit < at) {
             let edge = self.last_edge(bit, at);
             time = grid.clock.time(grid.sample + (edge - bit) * SAMPLES);

@@ -6,7 +6,10 @@ use std::io;
 use std::ops::Range;
 
 use hdsl::frame::{ANSWER_BITS, H_FRAME_BITS, Head, ParsedHead};
-use hdsl::inspect::{Chain, Expected, FRONT_BITS, FoundHead, PERFECT, head_damage, inspect, score};
+use hdsl::inspect::{
+    CarriedDisparity, Chain, Expected, FRONT_BITS, FoundHead, HeadRules, PERFECT, find_head, head_damage, inspect,
+    score,
+};
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::Delay;
 use hdsl::{
@@ -15,11 +18,9 @@ use hdsl::{
 };
 
 use super::bits::Bits;
-use super::disparity::Carried;
-use super::head::{self, Heads};
 use super::refused::{event, refusal};
 use super::said::Said;
-use crate::event::{Direction, Field, NO_RESPONSE, Place};
+use crate::event::{Direction, Field, NO_RESPONSE, Place, Span};
 use crate::sink::Sink;
 
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
@@ -68,11 +69,11 @@ pub(super) struct Decoder {
     requests: Responder,
     request: Option<Request>,
     nibbles: Vec<u8>,
-    heads: Heads,
+    heads: HeadRules,
     /// The last frame carried a nibble; the number of its head, if the one before did not.
     talks: bool,
     lone: Option<u64>,
-    carried: Carried,
+    carried: CarriedDisparity,
     /// The answer before, if it is good and no frame lies between: its number too.
     chain: Option<(Chain, u64)>,
     breaks: Vec<Break>,
@@ -98,10 +99,10 @@ impl Decoder {
             requests: Responder::new(),
             request: None,
             nibbles: Vec::new(),
-            heads: Heads::default(),
+            heads: HeadRules::default(),
             talks: false,
             lone: None,
-            carried: Carried::default(),
+            carried: CarriedDisparity::default(),
             chain: None,
             breaks: Vec::new(),
             failed: None,
@@ -141,7 +142,7 @@ impl Decoder {
     fn take_from(&mut self, bits: &mut Bits, need: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.next + need <= bits.end() {
             let at = self.next;
-            let Some(found) = head::find(bits, at) else {
+            let Some(found) = find_head(bits.window(at)) else {
                 self.next += 1;
                 continue;
             };
@@ -173,7 +174,7 @@ impl Decoder {
         let wrong = self.heads.check(found.head, bits.window(at.start), self.at);
         let from = at.start.saturating_sub(FRONT_BITS.into());
         let front = Window::from_bits(bits.load(from), (at.start - from) as u32).unwrap_or(Window::EMPTY);
-        let trailer = self.head.is_some() && self.heads.trailer(front);
+        let trailer = self.head.is_some() && self.heads.is_end_damaged(front);
         let place = bits.place(at);
         let damaged = wrong.is_some() && self.delay.is_some();
         let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
@@ -182,8 +183,13 @@ impl Decoder {
         }
         self.lone = (talks && !self.talks).then(|| self.said.next());
         self.talks = talks;
-        let mut event =
-            event(place, Direction::Request, "H-frame", master(found.head, symbol), wrong.map_or(Ok(()), Err));
+        let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
+        let event = event(place, Direction::Request, "H-frame", master(found.head, symbol), wrong);
+        // All of it is in the last word, PARA.
+        let mut event = event.locate(|name| {
+            let coded = matches!(name, "SYMBOL" | "FIRST" | "MSYNC") && found.len >= 10;
+            coded.then(|| Span::even(place, found.len, found.len - 10, found.len - 1))
+        });
         event.fields.extend(trailer.then(|| Field::text("note", TRAILER)));
         self.said.push(event);
         self.message_out(symbol, place);
@@ -207,9 +213,15 @@ impl Decoder {
             for k in 1..=missing {
                 let due = last + k * apart / (missing + 1);
                 self.lose(1);
-                let refused = head::damage(head_damage(bits.window(due.saturating_sub(3))));
+                let damage = head_damage(bits.window(due.saturating_sub(3)));
                 let place = bits.place(due..due + u64::from(Head::BITS));
-                self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), Err(refused)));
+                self.said.push(event(
+                    place,
+                    Direction::Request,
+                    "H-frame",
+                    Vec::new(),
+                    Err((damage.name(), damage.to_string())),
+                ));
             }
         } else {
             self.apart = Some(apart);
@@ -355,7 +367,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
                 at = bits.end();
                 break;
             }
-            if let Some(found) = head::find(bits, at) {
+            if let Some(found) = find_head(bits.window(at)) {
                 at += u64::from(found.len) + 1;
                 break;
             }

@@ -2,8 +2,8 @@
 
 use nikon_aformat::inspect::LineCause;
 use nikon_aformat::{
-    Alm, Body, Command, Data, Doubt, EncoderStatus, Error, Evidence, Expected, Operation, Policy, Request, Resolution,
-    Response, Tolerated, TypeWord,
+    Alm, Body, Command, Data, Doubt, EncoderStatus, Error, Evidence, Expected, Layout, Operation, Policy, Request,
+    Resolution, Response, Tolerated, TypeWord,
 };
 
 use super::frames::Frames;
@@ -11,6 +11,7 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::protocols::group::{self, too_wide};
 use crate::protocols::plausible::Motion;
 use crate::settings::Widths;
+use crate::time::Time;
 
 /// The fields an event may have.
 pub(super) const FIELDS: &[&str] = &[
@@ -48,7 +49,52 @@ pub(super) fn request(group: &Frames, result: Result<Request, Error>) -> Event {
     fields.extend(group.spikes());
     let names: &[&str] = if group.len() > 1 { &["CDF", "MDF", "MDF", "MDF", "MDF"] } else { &["CDF"] };
     let kind = result.map_or("request", |request| request.command().name());
-    Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()))
+    let event = Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()));
+    event.locate(|name| {
+        let (first, last) = place_in_request(result.ok()?.operation, name)?;
+        group.span(first, last)
+    })
+}
+
+/// The content bits of a field of a request: the byte of a memory data frame stands behind its sync and frame code.
+fn place_in_request(operation: Operation, name: &str) -> Option<(u32, u32)> {
+    let (first, last) = match (operation, name) {
+        (_, "EA") => return Some((5, 7)),
+        (Operation::EepromReadBank { .. }, "bank") | (Operation::EepromRead { .. }, "address") => (1, 1),
+        (Operation::EepromReadBank { .. }, "address") => (2, 2),
+        (Operation::EepromWrite { .. } | Operation::EepromWriteBank { .. }, "data") => (1, 2),
+        (Operation::EepromWrite { .. }, "address") | (Operation::EepromWriteBank { .. }, "bank") => (3, 3),
+        (Operation::EepromWriteBank { .. }, "address") => (4, 4),
+        (_, "ID" | "coefficient") => (1, 3),
+        _ => return None,
+    };
+    Some((16 * first + 5, 16 * last + 12))
+}
+
+/// The content bits of a field of a reply; the data begin behind the 16 of the information field.
+fn place_in_reply(layout: Layout, name: &str) -> Option<(u32, u32)> {
+    let data = |first: u32, bits: u32| Some((16 + first, 15 + first + bits));
+    let abs = u32::from(layout.abs_bits());
+    match (layout, name) {
+        (_, "EA") => Some((3, 5)),
+        (_, "CRC") => Some((16 * u32::from(layout.frames()) - 8, 16 * u32::from(layout.frames()) - 1)),
+        (Layout::Abs17, "ES") => Some((6, 6)),
+        (_, "ES") => Some((12, 15)),
+        (Layout::Abs17, "ABS") => Some((7, 23)),
+        (Layout::Abs24High, "ABS") => data(0, 24),
+        (_, "ABS") => data(0, abs),
+        (Layout::Status, "ALM") | (_, "data") => data(0, 16),
+        (_, "ALM") => data(24, 16),
+        (_, "PM-ALM") | (Layout::EepromBank, "bank") | (Layout::Eeprom, "address") => data(16, 8),
+        (Layout::EepromBank, "address") => data(24, 8),
+        (Layout::Temperature, "temperature") => data(0, 10),
+        (_, "temperature") => data(24, 10),
+        (_, "ID") => data(0, 24),
+        (_, "coefficient") => data(0, 19),
+        (_, "velocity") => data(abs, 32),
+        (_, "acceleration") => data(56, 16),
+        _ => None,
+    }
 }
 
 fn arguments(operation: Operation, fields: &mut Vec<Field>) {
@@ -118,7 +164,11 @@ impl Encoder {
         let kind = expected.map_or("reply", |expected| expected.command().name());
         let names = &["IF", "data", "data", "data", "data", "data"];
         let verdict = verdict(group, names, result.err());
-        let mut event = Event::new(group.place(), Some(Direction::Answer), kind, fields, verdict);
+        let event = Event::new(group.place(), Some(Direction::Answer), kind, fields, verdict);
+        let mut event = event.locate(|name| {
+            let (first, last) = place_in_reply(result.ok()?.layout(), name)?;
+            group.span(first, last)
+        });
         event.position = position;
         event.delay = delay;
         event
@@ -129,7 +179,7 @@ impl Encoder {
         match response.body {
             Body::Abs17 { es_any, .. } => {
                 let set = if es_any { vec!["any"] } else { Vec::new() };
-                fields.push(Field { name: "ES", value: Value::Flags { raw: es_any.into(), digits: 1, set } });
+                fields.push(Field::new("ES", Value::Flags { raw: es_any.into(), digits: 1, set }));
             }
             Body::Full { es, .. } => fields.push(Field::flags("ES", &es, 1)),
         }
@@ -169,7 +219,7 @@ impl Encoder {
     fn data(&mut self, response: Response, fields: &mut Vec<Field>) {
         fields.extend(response.alm().map(|alm| Field::flags("ALM", &alm, 4)));
         let degrees = response.temperature().map(|value| f64::from(value.milli_celsius()) / 1000.0);
-        fields.extend(degrees.map(|value| Field { name: "temperature", value: Value::Decimal { value, unit: "C" } }));
+        fields.extend(degrees.map(|value| Field::new("temperature", Value::Decimal { value, unit: "C" })));
         fields.extend(response.velocity().map(|velocity| Field::number("velocity", velocity)));
         match response.data() {
             Some(Data::Status { pm_alm, .. }) if pm_alm.bits() != 0 => fields.push(Field::flags("PM-ALM", &pm_alm, 2)),
@@ -208,7 +258,7 @@ impl Encoder {
 }
 
 /// No reply came to the request at `place` until `now`.
-pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64, asked: bool) -> Event {
+pub(super) fn silence(request: Request, place: Place, timeout: i64, now: Time, asked: bool) -> Event {
     let kind = request.command().name();
     let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
     Event { fields: vec![Field::number("EA", request.ea.get())], ..silence }

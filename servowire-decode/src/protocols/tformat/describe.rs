@@ -12,6 +12,7 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::protocols::group::{self, too_wide};
 use crate::protocols::plausible::Motion;
 use crate::settings::Widths;
+use crate::time::Time;
 
 /// The fields an event may have.
 pub(super) const FIELDS: &[&str] =
@@ -28,7 +29,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
     }
     fields.extend(frame.spikes());
     let names = id.map_or(&["CF"][..], |id| id.layout().request);
-    event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()))
+    located(event(frame, Direction::Request, id, fields, verdict(frame, names, result.err())), frame, names)
 }
 
 /// What is known of the encoder.
@@ -80,7 +81,8 @@ impl Encoder {
         fields.extend(note);
         fields.extend(frame.spikes());
         let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().response);
-        let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
+        let event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
+        let mut event = located(event, frame, names);
         event.position = position;
         event.delay = delay;
         event
@@ -194,13 +196,23 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
 }
 
 /// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
-pub(super) fn silence(request: Request, place: Place, now: i64, asked: bool) -> Event {
+pub(super) fn silence(request: Request, place: Place, now: Time, asked: bool) -> Event {
     let kind = kind(Some(request.data_id()));
     group::silence(place, kind, "answer", ANSWER_TIMEOUT, now, asked, "no encoder")
 }
 
 fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Field>, verdict: Verdict) -> Event {
     Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
+}
+
+/// With the places of its fields, which have these `names` on the line: ABS is ABS0 to ABS2.
+fn located(event: Event, frame: &Frame, names: &[&str]) -> Event {
+    event.locate(|name| {
+        let part = |known: &&str| known.trim_end_matches(|digit: char| digit.is_ascii_digit()) == name;
+        let first = names.iter().position(part)? as u32;
+        let last = names.iter().rposition(part)? as u32;
+        frame.span(8 * first, 8 * last + 7)
+    })
 }
 
 /// The data ID as it displays itself, written once and not for every frame.
@@ -217,7 +229,7 @@ fn effect(id: DataId) -> Option<Field> {
 
 fn address(adf: Adf) -> Field {
     let set = if adf.busy() { vec!["busy"] } else { Vec::new() };
-    Field { name: "ADF", value: Value::Flags { raw: adf.bits().into(), digits: 2, set } }
+    Field::new("ADF", Value::Flags { raw: adf.bits().into(), digits: 2, set })
 }
 
 fn bytes(frame: &Frame) -> Field {

@@ -6,6 +6,7 @@ use crate::event::Place;
 use crate::line::start_stop::LineField;
 use crate::protocols::group::Group;
 use crate::protocols::plausible;
+use crate::time::Time;
 
 /// More fields without a pause are no frame.
 pub(super) const MOST_FIELDS: usize = 16;
@@ -25,7 +26,14 @@ impl Frame {
         let mut frame = Self::default();
         frame.line = Some(line);
         for &byte in bytes {
-            let field = LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 };
+            let field = LineField {
+                content: byte.into(),
+                delimiter: true,
+                start: Time::ZERO,
+                end: Time::ZERO,
+                spikes: 0,
+                bits: 0,
+            };
             frame.push(byte, &field, 0);
         }
         frame
@@ -76,7 +84,7 @@ impl Frame {
     pub(super) fn line(&self, bit: i64) -> Option<Window> {
         let mut bits = u128::MAX;
         for (byte, start) in self.contents().iter().zip(self.starts()) {
-            let at = (start - self.start() + bit / 2) / bit.max(1);
+            let at = (*start - self.start() + bit / 2) / bit.max(1);
             let ten = 1 << 9 | u128::from(*byte) << 1;
             let clear = u32::try_from(at).ok().and_then(|at| 0x3ff_u128.checked_shl(at));
             if let (Some(clear), Ok(at)) = (clear, u32::try_from(at)) {
@@ -84,7 +92,7 @@ impl Frame {
             }
         }
         if let Some(at) = self.broken.and_then(|field| self.starts().get(usize::from(field))) {
-            let at = (at - self.start() + bit / 2) / bit.max(1) + 9;
+            let at = (*at - self.start() + bit / 2) / bit.max(1) + 9;
             bits &= !u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0);
         }
         let len = ((self.end - self.start()) / bit.max(1)).clamp(0, 128);
@@ -101,18 +109,10 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// When it ended; none in a log without times.
-    pub(super) fn end(&self) -> Option<i64> {
-        match self.place {
-            Place::Time { end, .. } => Some(end),
-            Place::Line(_) => None,
-        }
-    }
-
     /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins or for
     /// something else.
     pub(super) fn is_asked_again(&self, frame: &Frame) -> bool {
-        let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
+        let late = self.place.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
         let other = self.request.is_some_and(|request| frame.data_id().is_ok_and(|id| id != request.data_id()));
         (late || other)
             && frame.broken.is_none()

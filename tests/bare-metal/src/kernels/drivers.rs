@@ -26,7 +26,7 @@ kernels! {
 
     /// An A-format position with the blocking driver: request, four frames one by one, all checks; a look at the clock for each.
     fn drivers_nikon_position(answer: &Frames) -> Option<nikon_aformat::Sample> {
-        let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+        let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(7_200), WIDTHS, SLOW);
         master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)).ok()
     } over [ABS40];
 
@@ -45,7 +45,7 @@ kernels! {
 
     /// The same of the A-format driver, a bus in its cycle among them.
     fn drivers_nikon_silence(call: &u8) -> bool {
-        let mut master = nikon::blocking::Driver::new(Port::new(&[]), steps(3_600), WIDTHS, SLOW);
+        let mut master = nikon::blocking::Driver::new(Port::new(&[]), steps(7_200), WIDTHS, SLOW);
         let ea = EncoderAddress::truncate(*call);
         match *call {
             0 => master.read_abs40(ea).is_err(),

@@ -7,7 +7,7 @@ use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, Checked, CommandCounter, ControlError, ControlPhase, EchoWatch, Expected,
-    Handshake, Heard, Inputs, Led, Limits, Order, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave,
+    Handshake, Heard, Inputs, Led, Limits, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave,
     SlaveInfo, Turn, compare, led,
 };
 use rtex_block::position::{self, Gear};
@@ -160,13 +160,13 @@ kernels! {
     /// A block into 32-bit words.
     fn rtex_words32(block: &[u8; 16]) -> Option<[u32; 4]> {
         let mut words = [0; 4];
-        pack::to_words32(block, &mut words).ok().map(|()| words)
+        pack::to_words(block, &mut words).ok().map(|()| words)
     } over [NORMAL];
 
     /// A block from 16-bit words.
     fn rtex_from_words16(words: &[u16; 8]) -> Option<[u8; 16]> {
         let mut block = [0; 16];
-        pack::from_words16(words, &mut block).ok().map(|()| block)
+        pack::from_words(words, &mut block).ok().map(|()| block)
     } over [[0x20c5, 0x00c1, 1_000, 0, 10_000, 0, 0xff9c, 0xffff]];
 
     /// A block from a stream.
@@ -196,7 +196,7 @@ kernels! {
     /// An update period of one axis: response in, command out.
     fn rtex_axis((axis, received): &(Axis, Heard)) -> Command32 {
         let mut axis = *axis;
-        axis.hear(Turn::Valid(COUNTER), received, 1_000_000);
+        axis.hear(Turn::Valid(COUNTER), received, 500_000);
         let _ = axis.set_position(1_010);
         axis.transmission(Turn::Valid(COUNTER))
     } over [(AXIS, Heard::Main(RESPONSE)), (AXIS, Heard::Nothing)];
@@ -233,7 +233,7 @@ kernels! {
 
     /// The slaves found against the table.
     fn rtex_slaves(found: &[Slave; 4]) -> SlaveInfo {
-        compare(&SLAVES, found, Order::Any)
+        compare(&SLAVES, found)
     } over [SLAVES];
 
     /// Periods from the drive's parameters.

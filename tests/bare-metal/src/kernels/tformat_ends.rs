@@ -122,21 +122,28 @@ kernels! {
         encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
         encoder.raise_alarms(Almc::CE);
         encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
-        let mut now_ns = 0;
-        sent.iter().fold(None, |reply, byte| {
+        let (mut reply, mut now_ns) = (None, 0);
+        for byte in sent.iter() {
             now_ns += 4_000;
-            encoder.hear(&[*byte], now_ns).or(reply)
-        })
+            if let Some(sent) = encoder.hear(&[*byte], now_ns) {
+                reply = Some(sent);
+            }
+        }
+        reply
     } over SENT;
 
     /// A new encoder receives a request bit by bit and answers.
     fn tformat_device_bit(row: &Flip) -> Option<Transmission> {
         let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
-        let mut now_ns = 0;
-        (0..row.line.len()).filter_map(|at| row.line.get(at)).fold(None, |reply, level| {
+        let (mut reply, mut now_ns) = (None, 0);
+        // Not by `fold`, which copies what it has so far for every bit.
+        for level in (0..row.line.len()).filter_map(|at| row.line.get(at)) {
             now_ns += 400;
-            encoder.hear_bit(level, now_ns).or(reply)
-        })
+            if let Some(sent) = encoder.hear_bit(level, now_ns) {
+                reply = Some(sent);
+            }
+        }
+        reply
     } over FLIPS;
 
     /// What is wrong with line bits.

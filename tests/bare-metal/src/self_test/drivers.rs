@@ -64,7 +64,7 @@ fn nikon() -> Tally {
         &NIKON,
         |row| row.0,
         |(_, answer, want)| {
-            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(7_200), WIDTHS, SLOW);
             match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
                 Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),

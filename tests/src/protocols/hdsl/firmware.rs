@@ -194,7 +194,7 @@ fn link_registers(frame: &LinkFrame, bench: &Bench, noise: bool) -> Verdict {
     let unsure = if noise { min << 32 | min << 16 } else { 0 };
     same("ONLINE_STATUS", &Hex(online.0 & !unsure), &Hex(bytes::<6>(map, Register::OnlineStatusD) & !unsure))?;
     same("ACC_ERR_CNT", errors, &map.get::<1>(Register::AccErrCnt)[0])?;
-    same("align_phase", phase, &(bench.master.stage() as u8))?;
+    same("align_phase", phase, &(bench.map.stage() as u8))?;
     same("VPOS, VPOSCRC", vpos, &Hex(bytes::<7>(map, Register::VPos)))?;
     same("SAFE_SUM", sum, &Hex(bytes::<1>(map, Register::SafeSum)))?;
     same("STATUS2, VPOS2, VPOSCRC2", safe2, &Hex(bytes::<8>(map, Register::Status2)))

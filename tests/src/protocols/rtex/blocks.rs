@@ -145,14 +145,14 @@ pub(super) fn packing(rows: &[Row]) -> Vec<Verdict> {
         let want32: Vec<u32> = row.words32.iter().map(|w| w.0 as u32).collect();
         let want16: Vec<u16> = row.words16.iter().map(|w| w.0 as u16).collect();
         let (mut words32, mut words16, mut back) = (vec![0; want32.len()], vec![0; want16.len()], vec![0; bytes.len()]);
-        same("sizes agree", &Ok(()), &pack::to_words32(bytes, &mut words32))?;
-        same("sizes agree", &Ok(()), &pack::to_words16(bytes, &mut words16))?;
+        same("sizes agree", &Ok(()), &pack::to_words(bytes, &mut words32))?;
+        same("sizes agree", &Ok(()), &pack::to_words(bytes, &mut words16))?;
         same("words32", &want32, &words32)?;
         same("words16", &want16, &words16)?;
-        same("sizes agree", &Ok(()), &pack::from_words32(&want32, &mut back))?;
+        same("sizes agree", &Ok(()), &pack::from_words(&want32, &mut back))?;
         same("hex from words32", bytes, &back)?;
         back.fill(0);
-        same("sizes agree", &Ok(()), &pack::from_words16(&want16, &mut back))?;
+        same("sizes agree", &Ok(()), &pack::from_words(&want16, &mut back))?;
         same("hex from words16", bytes, &back)
     })
 }

@@ -4,8 +4,8 @@ use core::fmt::Display;
 use core::num::NonZeroU16;
 
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, ProfileMove, Progress, StopReason,
-    SubHandshake, Turn,
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, ProfileMove, Progress, StopCategory,
+    StopReason, SubHandshake, Turn,
 };
 use rtex_block::position::Gear;
 use rtex_block::{
@@ -215,7 +215,7 @@ pub(super) fn axis(rows: &[Row]) -> Vec<Verdict> {
         };
         let LimitKeys { echo, command_errors, wait, ready, inactive } = row.limits;
         let limits = Limits::new(echo, wait).with_command_errors(command_errors);
-        let limits = limits.with_ready(ready).with_inactive(inactive);
+        let limits = limits.with_ready(Some(ready)).with_inactive(inactive);
         let gear = Gear::new(row.gear.0, row.gear.1).ok_or_else(|| unreadable("gear with 0"))?;
         let config = AxisConfig::new(mac_id(row.mac_id)?, mode, row.update_ns, limits).with_gear(gear);
         let mut axis = Axis::new(config);
@@ -247,7 +247,7 @@ fn act(axis: &mut Axis, action: Action) -> Verdict {
         Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
-        Action::Stop => axis.stop(StopReason::Requested),
+        Action::Stop => axis.stop(StopCategory::Zero),
         Action::SetPosition(at) => axis.set_position(at).map_err(|e| refused(&e))?,
         Action::RefusedPosition(at) => same("the position is refused", &true, &axis.set_position(at).is_err())?,
         Action::SetRate(rate) => axis.set_rate(rate).map_err(|e| refused(&e))?,
@@ -277,6 +277,7 @@ fn state(state: AxisState) -> String {
         AxisState::On => "on".to_owned(),
         AxisState::SwitchingOff => "switching_off".to_owned(),
         AxisState::Stopping(reason) => format!("stopping:{}", stopped(reason)),
+        AxisState::Held(reason) => format!("held:{}", stopped(reason)),
         AxisState::Stopped(reason) => format!("stopped:{}", stopped(reason)),
     }
 }

@@ -1,3 +1,5 @@
+#![allow(clippy::unnecessary_wraps, reason = "outcomes as a procedure is told them")]
+
 use super::*;
 use crate::address::Adf;
 use std::vec::Vec;

@@ -73,6 +73,24 @@ fn settings_are_independent() {
     assert_eq!((changed.rate, changed.echo, times), (BitRate::Mbit2_5, true, [1, 2, 3, 4, 5, 6]));
 }
 
+/// A time-out before the turn-around, and fields shorter than fields are: no response could ever be taken.
+#[test]
+fn absurd_lines_are_refused() {
+    let absurd = Progress::Failed { error: Error::Line, ready_ns: 7 };
+    for (line, fails) in [
+        (LINE.with_response_timeout_ns(1_599), true),
+        (LINE.with_response_timeout_ns(1_600), false),
+        (LINE.with_turn_around_ns(10_001), true),
+        (LINE.with_turn_around_ns(10_000), false),
+        (LINE.with_field_timeout_ns(3_999), true),
+        (LINE.with_field_timeout_ns(4_000), false),
+    ] {
+        let mut transaction = Transaction::start(Request::ReadSingleTurn, line, 7);
+        assert_eq!(transaction.progress() == absurd, fails, "{line:?}");
+        assert_eq!(transaction.hear(&RESPONSE, 60_000) == absurd, fails, "{line:?}");
+    }
+}
+
 /// The own request does not shorten the wait for the response: 4 us, 10 us, a field, 5.599 us to hand it over.
 #[test]
 fn an_echo_leaves_the_time_out_as_it_is() {

@@ -1,11 +1,12 @@
 //! Answers of a link that runs: their words, the running disparity between them, their V-frames.
 
+use hdsl::frame::ANSWER_BITS;
 use hdsl::inspect::{Chain, Expected, inspect};
 use hdsl::{AlignmentStage, Answer, EncoderByte, Error, Rule, VFrame, Window};
 
 use super::super::refused::{Refused, event, position, refusal};
 use super::{Break, Decoder};
-use crate::event::{Direction, Field, Place};
+use crate::event::{Direction, Field, Place, Span};
 
 const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
 const TAIL: &str =
@@ -34,7 +35,19 @@ impl Decoder {
         };
         let sound = verdict.is_ok();
         let verdict = verdict.and_then(|()| self.follow(parameter.is_ok_and(EncoderByte::vsync)));
-        let mut event = event(place, Direction::Answer, "answer", self.fields(answer), verdict);
+        let event = event(place, Direction::Answer, "answer", self.fields(answer), verdict);
+        let mut event = event.locate(|name| {
+            let (first, last) = match name {
+                "VERT" => (0, 9),
+                "SYMBOL" | "VSYNC" => (10, 19),
+                "PIPE" => (20, 29),
+                // The switch bit comes after it.
+                "DD" => (30, 49),
+                "SEC" => (51, 60),
+                _ => return None,
+            };
+            Some(Span::even(place, ANSWER_BITS.into(), first, last))
+        });
         let shown = self.tracker.registers();
         if self.tracker.stage() == AlignmentStage::Check && !shown.pos_flag {
             event.fields.push(Field::hex("POS", shown.pos, 10));

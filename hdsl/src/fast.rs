@@ -1,0 +1,337 @@
+//! The fast position for control: the second differences of the acceleration channel integrated twice from the safe positions
+//! on, and compared with each of them.
+//!
+//! A receiver's registers POS and VEL follow the vendors' rules, with their faults; see
+//! [`PositionTracker`](crate::PositionTracker).
+
+use crate::acceleration::DeltaDelta;
+use crate::doubt::Doubt;
+use crate::encoder_id::{EncoderId, PositionBits};
+use crate::evidence::{Evidence, Sample};
+
+/// Speeds are below this, in steps a frame: two of them can be added.
+const FASTEST: i64 = 1 << 30;
+/// H-frames of a V-frame.
+const V_FRAME: u32 = 8;
+
+/// What the safe positions have shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Known {
+    Nothing,
+    /// The position at the sampling edge before this V-frame.
+    Position,
+    /// Position and speed.
+    Speed,
+    /// Another safe position has agreed.
+    Confirmed,
+}
+
+/// Acceleration words that are missing.
+///
+/// If word k is estimated, wrong by d, then n frames later the position is wrong by n d. The caller knows how large d can be:
+/// the largest acceleration and what was estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Missing {
+    words: u8,
+    /// Sum of n over these words: frames from each of them to now, its own included.
+    frames: u32,
+    /// Sum of the sizes of the estimates, in steps a frame².
+    estimated: u32,
+    /// Sum of n times the size.
+    way: u32,
+}
+
+impl Missing {
+    const NONE: Self = Self { words: 0, frames: 0, estimated: 0, way: 0 };
+
+    fn add(&mut self, estimate: i16) {
+        self.words = self.words.saturating_add(1);
+        self.estimated = self.estimated.saturating_add(estimate.unsigned_abs().into());
+    }
+
+    /// Another frame is integrated.
+    fn drift(&mut self) {
+        self.frames = self.frames.saturating_add(self.words.into());
+        self.way = self.way.saturating_add(self.estimated);
+    }
+
+    /// The position at the sampling edge before this V-frame, eight frames ago, turned out; `since` are the words missing since then.
+    fn position_known(&mut self, since: &Self) {
+        let before = u32::from(self.words.saturating_sub(since.words));
+        self.frames = before.saturating_mul(V_FRAME).saturating_add(since.frames);
+        let estimated = self.estimated.saturating_sub(since.estimated);
+        self.way = estimated.saturating_mul(V_FRAME).saturating_add(since.way);
+    }
+}
+
+/// The fast position of a link, and whether it may be used.
+///
+/// In each H-frame it takes the acceleration word, after the last H-frame of a V-frame the safe position. The first safe position
+/// gives the position, the second one the speed, and the third one has to agree. A missing word is estimated; one alone is made
+/// good by the next safe position but one at the latest, several by the one after that.
+///
+/// ```
+/// use hdsl::{DeltaDelta, Doubt, EncoderId, FastPosition, Policy};
+/// let id = EncoderId::try_from(0x00153)?; // 32 bits
+/// let mut fast = FastPosition::new(id)?;
+/// for safe in [1000, 1000, 1000] {
+///     for _ in 0..8 {
+///         fast.step(Some(DeltaDelta::ZERO));
+///     }
+///     assert_eq!(fast.evidence(0, 0).at(0, Policy::new(0)), Err(Doubt::Alignment));
+///     fast.align(Some(safe));
+/// }
+/// fast.step(DeltaDelta::new(7));
+/// let sample = fast.evidence(25, 0).at(0, Policy::new(0))?;
+/// assert_eq!((sample.position(), sample.velocity(), sample.frame()), (1007, 7, 25));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FastPosition {
+    id: EncoderId,
+    bits: PositionBits,
+    /// Modulo 2^64; the low bits count.
+    position: u64,
+    /// Steps a frame.
+    velocity: i32,
+    /// The last accelerations, the newest at `at`.
+    recent: [i16; 8],
+    at: u8,
+    known: Known,
+    /// It was confirmed, and nothing but missing words has happened since.
+    followed: bool,
+    missing: Missing,
+    /// Those in this V-frame.
+    missing_here: Missing,
+    /// Whether words of the V-frame before are missing.
+    missing_before: bool,
+    /// Missing words in a row up to now.
+    in_a_row: u32,
+    /// `position` at the sampling edge before this V-frame.
+    begin: u64,
+}
+
+impl FastPosition {
+    /// Before the first word of a link.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedEncoder`](crate::Error::UnsupportedEncoder).
+    pub const fn new(id: EncoderId) -> Result<Self, crate::Error> {
+        match id.check() {
+            Ok(bits) => Ok(Self::start(id, bits)),
+            Err(error) => Err(error),
+        }
+    }
+
+    pub(crate) const fn start(id: EncoderId, bits: PositionBits) -> Self {
+        Self {
+            id,
+            bits,
+            position: 0,
+            velocity: 0,
+            recent: [0; 8],
+            at: 0,
+            known: Known::Nothing,
+            followed: false,
+            missing: Missing::NONE,
+            missing_here: Missing::NONE,
+            missing_before: false,
+            in_a_row: 0,
+            begin: 0,
+        }
+    }
+
+    /// Takes the acceleration of one H-frame; `None` if it cannot be used.
+    #[inline]
+    pub fn step(&mut self, value: Option<DeltaDelta>) {
+        let value = match value {
+            Some(value) => {
+                self.in_a_row = 0;
+                value.get()
+            }
+            None => self.without_value(),
+        };
+        self.at = self.at.wrapping_add(1) & 7;
+        if let Some(newest) = self.recent.get_mut(usize::from(self.at)) {
+            *newest = value;
+        }
+        self.velocity = self.velocity.wrapping_add(value.into());
+        self.position = self.position.wrapping_add_signed(self.velocity.into());
+        if self.missing.words != 0 {
+            self.missing.drift();
+            self.missing_here.drift();
+        }
+    }
+
+    /// The estimate in the place of a value: last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol Design), with `last`
+    /// the value before and d0..d4 its five newest differences.
+    #[cold]
+    fn without_value(&mut self) -> i16 {
+        self.in_a_row = self.in_a_row.saturating_add(1);
+        let value = |age: u8| {
+            let place = usize::from(self.at.wrapping_sub(age) & 7);
+            i32::from(self.recent.get(place).copied().unwrap_or(0))
+        };
+        // The differences put in.
+        let last = value(0);
+        let sum = (1..6)
+            .zip([8, 4, 2, 1, 1])
+            .fold(last.wrapping_mul(16), |sum: i32, (age, weight)| sum.wrapping_sub(value(age).wrapping_mul(weight)));
+        let estimate = last.wrapping_add(sum >> 5).clamp(DeltaDelta::MIN.get().into(), DeltaDelta::MAX.get().into());
+        let estimate = i16::try_from(estimate).unwrap_or(0);
+        self.missing.add(estimate);
+        self.missing_here.add(estimate);
+        estimate
+    }
+
+    /// After the last H-frame of a V-frame: its safe position, `None` if it brought none. That is the position at the sampling
+    /// edge before the V-frame, 40 bits.
+    pub fn align(&mut self, safe: Option<u64>) {
+        if let Some(safe) = safe {
+            self.compare(safe);
+        } else {
+            // Not compared for a while: what it knows has to be confirmed again.
+            self.known = if self.known >= Known::Speed { Known::Speed } else { Known::Nothing };
+            self.missing_before = self.missing.words != 0;
+        }
+        self.missing_before |= self.missing_here.words != 0;
+        self.missing_here = Missing::NONE;
+        self.begin = self.position;
+    }
+
+    fn compare(&mut self, safe: u64) {
+        // How far the position was off eight frames ago.
+        let error = self.signed(safe.wrapping_sub(self.begin));
+        let (all, here) = (self.missing.words, self.missing_here.words);
+        let before = core::mem::take(&mut self.missing_before);
+        if self.known >= Known::Speed && all == here {
+            // No word was missing by then.
+            if error != 0 {
+                self.lose(error);
+            } else if all == 0 {
+                (self.known, self.followed) = (Known::Confirmed, true);
+            }
+            return;
+        }
+        // Since how many frames, at the sampling edge before this V-frame, the speed was off by what it is off now.
+        let frames = match self.known {
+            Known::Nothing => None,
+            Known::Position => (here == 0 && !before).then_some(V_FRAME),
+            Known::Speed | Known::Confirmed => {
+                (all == 1).then_some(self.missing.frames.saturating_sub(V_FRAME)).filter(|n| *n <= V_FRAME)
+            }
+        };
+        let Some(frames) = frames else {
+            // The position is known from here on.
+            self.position = self.position.wrapping_add_signed(error);
+            self.missing.position_known(&self.missing_here);
+            (self.known, self.missing_before) = (Known::Position, false);
+            return;
+        };
+        let Some(velocity) = self.speed(error, frames) else { return self.lose(error) };
+        let change = i64::from(velocity).wrapping_sub(self.velocity.into());
+        self.velocity = velocity;
+        // In the eight frames since it went on drifting.
+        self.position = self.position.wrapping_add_signed(error.wrapping_add(change.wrapping_mul(8)));
+        self.missing = Missing::NONE;
+        self.known = Known::Speed;
+    }
+
+    /// The real speed if it was off for `frames` frames and the position has got `error` from that. A speed of up to a sixteenth
+    /// of the range a frame is told exactly, for eight frames of it are half a range.
+    fn speed(&self, error: i64, frames: u32) -> Option<i32> {
+        let way = self.signed_of(i64::from(self.velocity).wrapping_mul(frames.into()).wrapping_add(error));
+        let speed = divide(way, frames)?;
+        if speed.unsigned_abs() > FASTEST.unsigned_abs() { None } else { i32::try_from(speed).ok() }
+    }
+
+    /// A word that was wrong has passed its checks, or a frame is lost: only the position is known now.
+    fn lose(&mut self, error: i64) {
+        self.position = self.position.wrapping_add_signed(error);
+        self.missing.position_known(&self.missing_here);
+        (self.known, self.followed) = (Known::Position, false);
+    }
+
+    /// Frames went by of which nothing is known.
+    pub const fn interrupt(&mut self) {
+        self.known = Known::Nothing;
+        self.followed = false;
+    }
+
+    /// Missing words in a row up to now: ACC_ERR_CNT without its limit.
+    pub const fn missing_in_a_row(&self) -> u32 {
+        self.in_a_row
+    }
+
+    /// What there is to say after the last H-frame, the number of which is `frame` and whose sampling edge was at `sampled_ns`.
+    ///
+    /// What is given without a doubt is the truth as long as the real speed stays below a sixteenth of the range a frame (that
+    /// is above 300 000 revolutions a minute for an encoder that counts one turn), and below 2^30 steps a frame.
+    pub const fn evidence(&self, frame: u32, sampled_ns: u64) -> Evidence {
+        let sixteenth = 1_i64.wrapping_shl(self.bits.get().saturating_sub(4) as u32);
+        let limit = if sixteenth < FASTEST { sixteenth } else { FASTEST };
+        let velocity = self.velocity as i64;
+        let doubt = if velocity < limit.wrapping_neg() || velocity >= limit {
+            Some(Doubt::Speed)
+        } else if self.in_a_row > 0 {
+            Some(Doubt::Estimated)
+        } else if self.missing.words > 0 || !matches!(self.known, Known::Confirmed) {
+            Some(Doubt::Alignment)
+        } else {
+            None
+        };
+        let sample = Sample {
+            position: self.id.position(self.position),
+            velocity: self.velocity,
+            bound: 0,
+            frame,
+            steps_per_turn: 0,
+            sampled_ns,
+        };
+        let followed = self.followed && !matches!(doubt, Some(Doubt::Speed));
+        let (words, frames, way) = (self.missing.words, self.missing.frames, self.missing.way);
+        Evidence { doubt, sample, missing: if followed { Some(words) } else { None }, frames, way }
+    }
+
+    /// Whether a register map shows what may be used.
+    pub(crate) fn is_at(&self, position: u64, velocity: i32) -> bool {
+        let agrees = self.signed(position.wrapping_sub(self.position)) == 0 && velocity == self.velocity;
+        agrees && self.evidence(0, 0).doubt.is_none()
+    }
+
+    /// A difference of positions as a number with a sign.
+    const fn signed(&self, difference: u64) -> i64 {
+        let unused = 64_u32.saturating_sub(self.bits.get() as u32);
+        i64::from_le_bytes(difference.wrapping_shl(unused).to_le_bytes()).wrapping_shr(unused)
+    }
+
+    const fn signed_of(&self, difference: i64) -> i64 {
+        self.signed(u64::from_le_bytes(difference.to_le_bytes()))
+    }
+}
+
+/// A way of less than 2^40 divided by 1 to 8 frames; `None` if something remains.
+///
+/// The inverse of an odd divisor modulo 2^64 makes the quotient at once; where it is too large there is none. (A division of 64 bits
+/// takes hundreds of instructions.)
+const fn divide(way: i64, frames: u32) -> Option<i64> {
+    let (halvings, inverse) = match frames {
+        1 => (0, 1),
+        2 => (1, 1),
+        3 => (0, 0xaaaa_aaaa_aaaa_aaab_u64),
+        4 => (2, 1),
+        5 => (0, 0xcccc_cccc_cccc_cccd),
+        6 => (1, 0xaaaa_aaaa_aaaa_aaab),
+        7 => (0, 0x6db6_db6d_b6db_6db7),
+        8 => (3, 1),
+        _ => return None,
+    };
+    let quotient = (way >> halvings).wrapping_mul(i64::from_le_bytes(inverse.to_le_bytes()));
+    if quotient.wrapping_mul(frames as i64) == way && quotient.unsigned_abs() < 1 << 40 { Some(quotient) } else { None }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,234 @@
+//! Rules that hold from frame to frame of a link: what all heads so far did is a rule, and the head that breaks it was damaged.
+
+use nrz_line::Window;
+
+use super::head::{HeadFault, ends_with_trailer, head_fault, is_coded_for_balance};
+use crate::frame::ParsedHead;
+use crate::parameter::MasterSymbol;
+
+/// Heads after which what all of them did is a rule.
+const RULE: u8 = 16;
+
+/// What is wrong with a head after those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum BrokenRule {
+    /// The head itself is wrong.
+    Fault(HeadFault),
+    /// No byte is coded like this on a balanced line.
+    Balance,
+    /// FIRST.
+    First,
+    /// MSYNC.
+    Msync,
+}
+
+servowire_core::one_line!(BrokenRule {
+    Self::Fault(fault) => "{}", fault;
+    Self::Balance => "no byte is coded like this on a balanced line: bits of the head were flipped";
+    Self::First => "FIRST does not go with the symbol, or with the frames before";
+    Self::Msync => "MSYNC changes within a V-frame, or does not from one to the next";
+});
+
+impl BrokenRule {
+    /// The class of the check, for statistics.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fault(HeadFault::UndefinedSymbol { .. }) => "undefined_symbol",
+            Self::Fault(HeadFault::Reserved) => "reserved",
+            Self::Balance => "disparity",
+            Self::First => "first",
+            Self::Msync => "msync",
+        }
+    }
+}
+
+/// How often a rule was kept.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+struct Kept(u8);
+
+impl Kept {
+    /// Whether the rule holds: until it is one, everything does.
+    fn holds(&mut self, kept: bool) -> bool {
+        if kept {
+            self.0 = self.0.saturating_add(1).min(2 * RULE);
+            return true;
+        }
+        let rule = self.0 >= RULE;
+        // What breaks it three times in a row makes it none.
+        self.0 = if rule { self.0.saturating_sub(RULE / 2) } else { 0 };
+        !rule
+    }
+}
+
+/// What the heads of a link did so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct HeadRules {
+    /// Heads in a row that were coded for a balanced line.
+    balanced: Kept,
+    /// Whether the frame before was answered: with its TRAILER the count of the line begins anew.
+    answered: bool,
+    /// Frames in a row with FIRST.
+    first: Kept,
+    /// Frames in a row that end with TRAILER and stuffing.
+    ended: Kept,
+    /// MSYNC of this V-frame, and for how many frames it went by the rule.
+    msync: Option<bool>,
+    steady: Kept,
+}
+
+impl HeadRules {
+    /// What is wrong with the head at the beginning of `line`; `at`: its place in the V-frame, 0..=7, if that is known.
+    pub fn check(&mut self, head: ParsedHead, line: Window, at: Option<u8>) -> Option<BrokenRule> {
+        let symbol = head.byte.symbol().ok();
+        let (balanced, first, msync) =
+            (self.is_balanced(head, line), self.is_first(head, symbol), self.goes_with_v_frame(head, at));
+        self.answered = symbol.is_some_and(MasterSymbol::is_answered);
+        let broken = [(balanced, BrokenRule::Balance), (first, BrokenRule::First), (msync, BrokenRule::Msync)];
+        let broken = broken.into_iter().find(|(holds, _)| !holds).map(|(_, rule)| rule);
+        head_fault(head).map(BrokenRule::Fault).or(broken)
+    }
+
+    /// Whether what stands in front of a head, as [`ends_with_trailer`] takes it, is damaged.
+    pub fn is_end_damaged(&mut self, front: Window) -> bool {
+        !self.ended.holds(ends_with_trailer(front))
+    }
+
+    /// In a free-running link the count of the line is 0 before each head that follows an answered frame.
+    fn is_balanced(&mut self, head: ParsedHead, line: Window) -> bool {
+        head.extra_bits > 0 || !self.answered || self.balanced.holds(is_coded_for_balance(head, line))
+    }
+
+    /// FIRST is 0 during start-up, then 1, but for masters that send it in the frames after a pulse only.
+    fn is_first(&mut self, head: ParsedHead, symbol: Option<MasterSymbol>) -> bool {
+        match symbol {
+            None => true,
+            Some(MasterSymbol::Data(_) | MasterSymbol::Idle | MasterSymbol::Init) => {
+                self.first.holds(head.byte.first())
+            }
+            Some(_) => !head.byte.first(),
+        }
+    }
+
+    /// MSYNC is the same in the eight frames of a V-frame and changes from one to the next.
+    fn goes_with_v_frame(&mut self, head: ParsedHead, at: Option<u8>) -> bool {
+        let said = head.byte.msync();
+        let Some(at) = at else {
+            self.msync = None;
+            return true;
+        };
+        let due = self.msync.map_or(said, |before| before != (at == 0));
+        let holds = self.steady.holds(said == due);
+        // A stray one does not change what is due.
+        self.msync = Some(if holds { said } else { due });
+        holds
+    }
+}
+
+/// Whether an encoder carries the running disparity from one answer to the next, which no document says: the line tells.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct CarriedDisparity {
+    kept: u32,
+    broken: u32,
+}
+
+impl CarriedDisparity {
+    /// Answers that have to go on from each other before it is taken for a rule.
+    const LEAST: u32 = 8;
+    /// Of so many one may not.
+    const OF: u32 = 8;
+
+    /// Two answers followed each other; `goes_on` as by [`Chain::goes_on_in`](super::Chain::goes_on_in).
+    pub fn note(&mut self, goes_on: bool) {
+        let count = if goes_on { &mut self.kept } else { &mut self.broken };
+        *count = count.saturating_add(1);
+        if self.kept.saturating_add(self.broken) > 4096 {
+            (self.kept, self.broken) = (self.kept / 2, self.broken / 2);
+        }
+    }
+
+    /// Whether nearly all answers so far went on.
+    pub const fn is_rule(self) -> bool {
+        self.kept >= Self::LEAST && self.kept >= self.broken.saturating_mul(Self::OF)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Head;
+    use crate::line_code::LineDisparity;
+    use crate::parameter::ParameterByte;
+
+    #[test]
+    fn disparity_is_a_rule_where_most_answers_keep_it() {
+        let mut carried = CarriedDisparity::default();
+        (0..7).for_each(|_| carried.note(true));
+        assert!(!carried.is_rule());
+        carried.note(true);
+        assert!(carried.is_rule());
+        carried.note(false);
+        assert!(carried.is_rule());
+        carried.note(false);
+        assert!(!carried.is_rule());
+        // An encoder that begins anew with each answer is right by chance half of the time.
+        let mut anew = CarriedDisparity::default();
+        (0..10_000).for_each(|k| anew.note(k % 2 == 0));
+        assert!(!anew.is_rule());
+    }
+
+    #[test]
+    fn a_rule_is_broken_after_sixteen_that_kept_it_and_given_up_after_three_that_did_not() {
+        let mut kept = Kept::default();
+        assert!((0..15).all(|_| kept.holds(true)));
+        assert!(kept.holds(false), "15 are no rule");
+        assert!((0..16).all(|_| kept.holds(true)));
+        assert!(!kept.holds(false) && kept.holds(false), "16 are one, and only just");
+        assert!((0..100).all(|_| kept.holds(true)));
+        assert_eq!([false; 4].map(|it| kept.holds(it)), [false, false, false, true]);
+    }
+
+    /// A head as a master sends it on a balanced line.
+    fn head(symbol: MasterSymbol, first: bool, msync: bool) -> (ParsedHead, Window) {
+        let byte = ParameterByte::of(symbol);
+        let byte = if first { byte.with_first() } else { byte };
+        let byte = if msync { byte.with_msync() } else { byte };
+        let line = Head::new(byte, None, LineDisparity::ZERO).bits();
+        (Head::parse(line).unwrap(), line)
+    }
+
+    #[test]
+    fn first_msync_and_balance_are_followed() {
+        let mut rules = HeadRules::default();
+        let mut check = |first: bool, msync: bool, at: u8| {
+            let (head, line) = head(MasterSymbol::Idle, first, msync);
+            rules.check(head, line, Some(at))
+        };
+        for frame in 0..40_u8 {
+            assert_eq!(check(true, frame / 8 % 2 == 1, frame % 8), None);
+        }
+        assert_eq!(check(true, false, 0), Some(BrokenRule::Msync), "the sixth V-frame has MSYNC 1");
+        assert_eq!(check(true, true, 1), None);
+        assert_eq!(check(false, true, 2), Some(BrokenRule::First));
+        // The same byte, coded as after a line that was not balanced: a head with all fixed bits in place.
+        let byte = ParameterByte::of(MasterSymbol::Idle).with_first().with_msync();
+        let other = [2, -2, 6].map(LineDisparity::new);
+        let strange = other.map(|before| Head::new(byte, None, before).bits());
+        let strange: std::vec::Vec<_> =
+            strange.into_iter().filter(|line| *line != Head::new(byte, None, LineDisparity::ZERO).bits()).collect();
+        assert!(!strange.is_empty(), "another count of the line is coded in another way");
+        for line in strange {
+            assert_eq!(rules.check(Head::parse(line).unwrap(), line, Some(3)), Some(BrokenRule::Balance));
+        }
+    }
+
+    #[test]
+    fn a_trailer_that_is_missing_after_many_is_damage() {
+        let mut rules = HeadRules::default();
+        let good = Window::from_bits(0b11_0000, 6).unwrap();
+        let bad = Window::from_bits(0b10_0000, 6).unwrap();
+        assert!(!rules.is_end_damaged(bad));
+        assert!((0..16).all(|_| !rules.is_end_damaged(good)));
+        assert!(rules.is_end_damaged(bad));
+    }
+}

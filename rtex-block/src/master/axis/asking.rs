@@ -1,0 +1,86 @@
+//! Requests on their way.
+
+use crate::master::echo::TURN;
+use crate::master::handshake::Handshake;
+use crate::master::progress::Progress;
+use crate::master::sub_handshake::SubHandshake;
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::sub::SubResponse;
+
+/// For how many blocks the normal code has come back. A whole turn of the counter lies between two requests, so what an old block
+/// says is no answer to the next one: the echoes tell requests of one kind apart by their index, and not by their data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Quiet(u8);
+
+impl Quiet {
+    /// From the end of a request or a motion on.
+    pub(super) const BROKEN: Self = Self(0);
+
+    /// Whether the normal code has come back for a turn.
+    #[inline]
+    pub(super) const fn is_kept(self) -> bool {
+        self.0 >= TURN
+    }
+
+    /// A block on time, with the normal code or another one.
+    #[inline]
+    pub(super) const fn hear(&mut self, is_normal: bool) {
+        if !self.is_kept() {
+            self.0 = if is_normal { self.0.saturating_add(1) } else { 0 };
+        }
+    }
+}
+
+/// A request of one block: it is on its way, or its outcome waits to be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Slot<H, T> {
+    Empty,
+    Asking(H),
+    Ended(Progress<T>),
+}
+
+impl<H: Copy, T: Copy> Slot<H, T> {
+    pub(super) const fn asking(&self) -> Option<&H> {
+        match self {
+            Self::Asking(handshake) => Some(handshake),
+            Self::Empty | Self::Ended(_) => None,
+        }
+    }
+
+    /// The outcome, once.
+    pub(super) const fn take(&mut self) -> Option<Progress<T>> {
+        let Self::Ended(progress) = *self else { return None };
+        *self = Self::Empty;
+        Some(progress)
+    }
+}
+
+/// The request in the main block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Main {
+    pub(super) slot: Slot<Handshake, NonCyclicResponse>,
+    /// It must be over before the servo is switched on.
+    pub(super) needs_servo_off: bool,
+    pub(super) quiet: Quiet,
+    /// In_Progress was 0 in the last block of a motion.
+    pub(super) fell: bool,
+}
+
+/// The request in the sub block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Sub {
+    pub(super) slot: Slot<SubHandshake, SubResponse>,
+    pub(super) quiet: Quiet,
+}
+
+impl Main {
+    pub(super) const NONE: Self = Self { slot: Slot::Empty, needs_servo_off: false, quiet: Quiet::BROKEN, fell: false };
+}
+
+impl Sub {
+    pub(super) const NONE: Self = Self { slot: Slot::Empty, quiet: Quiet::BROKEN };
+}

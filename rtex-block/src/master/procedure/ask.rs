@@ -1,0 +1,123 @@
+//! What all procedures have in common.
+
+use crate::master::axis::Axis;
+use crate::master::progress::{Failure, Progress};
+use crate::master::state::AskError;
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::noncyclic_response::NonCyclicResponse;
+
+/// What a [runner](crate::master::Run) runs: the inherent methods of a procedure, which have the same names.
+pub trait Procedure {
+    /// What it is made for.
+    type Value;
+
+    /// Begins anew, after the exchange of an update period.
+    fn start(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
+
+    /// To be called after every later exchange, until it has ended.
+    fn receive(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
+}
+
+/// One request of a procedure: sent as soon as the axis takes it, then awaited. Both waits have the limit of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Ask {
+    pub(super) asked: bool,
+    waited: u32,
+}
+
+impl Ask {
+    pub(super) const NEW: Self = Self { asked: false, waited: 0 };
+
+    /// The answer to `request`, when it is there.
+    pub(super) fn receive(&mut self, axis: &mut Axis, request: NonCyclicCommand) -> Progress<NonCyclicResponse> {
+        self.receive_with(axis, |axis| axis.ask(request))
+    }
+
+    /// The answer to what `send` asks for, when it is there.
+    pub(super) fn receive_with(
+        &mut self,
+        axis: &mut Axis,
+        send: impl FnOnce(&mut Axis) -> Result<(), AskError>,
+    ) -> Progress<NonCyclicResponse> {
+        let pending = Progress::Pending { left: axis.answer_left() };
+        if self.asked {
+            let Some(outcome) = axis.take_outcome() else { return pending };
+            *self = Self::NEW;
+            return outcome;
+        }
+        let sent = if axis.can_ask() { send(axis) } else { Err(AskError::Busy) };
+        match sent {
+            Ok(()) => self.asked = true,
+            Err(AskError::Busy) if axis.is_moving() => {}
+            Err(AskError::Busy) if self.waited < axis.config().limits.answer => {
+                self.waited = self.waited.saturating_add(1);
+            }
+            Err(error) => return Progress::Failed { error: Failure::NotSent(error) },
+        }
+        pending
+    }
+}
+
+/// `start` and `receive` of a procedure with a `next`, which gives what an update period has brought, a `reset`, and an `end`.
+macro_rules! procedure {
+    ($procedure:ident $(<$life:lifetime>)?, $value:ty) => {
+        impl $(<$life>)? $procedure $(<$life>)? {
+            /// Begins anew, after the exchange of an update period.
+            pub fn start(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
+                self.reset();
+                self.end = None;
+                self.receive(axis)
+            }
+
+            /// To be called after the exchange of every later update period. Once done or failed it stays so.
+            pub fn receive(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
+                let progress = match self.end {
+                    Some(end) => end,
+                    None => self.next(axis),
+                };
+                self.end = progress.ended();
+                progress
+            }
+        }
+
+        impl $(<$life>)? $crate::master::procedure::Procedure for $procedure $(<$life>)? {
+            type Value = $value;
+
+            fn start(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
+                self.start(axis)
+            }
+
+            fn receive(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
+                self.receive(axis)
+            }
+        }
+    };
+}
+pub(super) use procedure;
+
+/// One request, with its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Request {
+    ask: Ask,
+    request: NonCyclicCommand,
+    end: Option<Progress<NonCyclicResponse>>,
+}
+
+procedure!(Request, NonCyclicResponse);
+
+impl Request {
+    /// Of anything that [`Axis::ask`] sends.
+    pub const fn new(request: NonCyclicCommand) -> Self {
+        Self { ask: Ask::NEW, request, end: None }
+    }
+
+    const fn reset(&mut self) {
+        self.ask = Ask::NEW;
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<NonCyclicResponse> {
+        self.ask.receive(axis, self.request)
+    }
+}

@@ -1,0 +1,90 @@
+//! New coordinates while the servo is on.
+
+use super::ask::{Ask, procedure};
+use super::homing::command;
+use crate::master::axis::Axis;
+use crate::master::progress::{Failure, Progress};
+use crate::master::servo_off::ActiveCode;
+use crate::master::state::{AskError, AxisState, SetpointError};
+use crate::type_code::homing;
+
+/// Sets the actual position (21h) of an axis in CP **with the servo on**: the end of a homing that the host moves, towards a switch
+/// or a latch.
+///
+/// Dangerous, for the drive takes up other coordinates while the motor is energised: a command position in the old ones would be a
+/// jump by the whole offset. So the axis has to stand; it goes to CV at speed 0, where no position is commanded, and comes back to
+/// CP at the position in the new coordinates. In between nothing but the speed loop holds the motor: not for an axis that gravity
+/// moves. Whether a drive takes the command with the servo on is not in the documents at hand; it fails with
+/// [`Failure::Execution`] or [`Failure::CommandError`] then, and the axis is in CP again. After [`Failure::TimedOut`] the effect
+/// is not known; the command position is the actual one all the same. The command is never sent twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RebaseWithServoOn {
+    ask: Ask,
+    position: i32,
+    limit: u32,
+    left: u32,
+    /// How the command was answered.
+    answer: Option<Result<(), Failure>>,
+    end: Option<Progress<i32>>,
+}
+
+procedure!(RebaseWithServoOn, i32);
+
+impl RebaseWithServoOn {
+    /// The present position becomes `position`, command units; the changes of the mode have `limit` update periods each.
+    pub const fn new(position: i32, limit: u32) -> Self {
+        Self { ask: Ask::NEW, position, limit, left: limit, answer: None, end: None }
+    }
+
+    const fn reset(&mut self) {
+        *self = Self::new(self.position, self.limit);
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<i32> {
+        match axis.state() {
+            AxisState::On => {}
+            AxisState::Stopped(reason) | AxisState::Stopping(reason) | AxisState::Held(reason) => {
+                return Progress::Failed { error: Failure::Stopped(reason) };
+            }
+            _ => return Progress::Failed { error: Failure::ServoOff },
+        }
+        match (self.answer, axis.mode()) {
+            (None, ActiveCode::CyclicPosition) => self.change(axis, ActiveCode::CyclicVelocity),
+            (None, ActiveCode::CyclicVelocity) => self.set(axis),
+            (Some(answer), ActiveCode::CyclicVelocity) => {
+                let changed = self.change(axis, ActiveCode::CyclicPosition);
+                match (axis.mode(), answer) {
+                    (ActiveCode::CyclicPosition, Ok(())) => Progress::Done { value: axis.setpoint() },
+                    (ActiveCode::CyclicPosition, Err(error)) => Progress::Failed { error },
+                    _ => changed,
+                }
+            }
+            _ => Progress::Failed { error: Failure::Mode },
+        }
+    }
+
+    /// The mode changes as soon as the axis stands.
+    fn change(&mut self, axis: &mut Axis, mode: ActiveCode) -> Progress<i32> {
+        match (axis.set_mode(mode), self.left.checked_sub(1)) {
+            (Ok(()), _) => self.left = self.limit,
+            (Err(SetpointError::NotStanding | SetpointError::Busy), Some(left)) => self.left = left,
+            _ => return Progress::Failed { error: Failure::Mode },
+        }
+        Progress::Pending { left: self.left }
+    }
+
+    fn set(&mut self, axis: &mut Axis) -> Progress<i32> {
+        let request = command(homing::SET_ACTUAL_POSITION, self.position);
+        match self.ask.receive_with(axis, |axis| match axis.ask_rebasing(request) {
+            // The mode is not on its way yet.
+            Err(AskError::ServoOn) => Err(AskError::Busy),
+            sent => sent,
+        }) {
+            Progress::Done { .. } => self.answer = Some(Ok(())),
+            Progress::Failed { error } => self.answer = Some(Err(error)),
+            Progress::Pending { left } => return Progress::Pending { left },
+        }
+        Progress::Pending { left: self.left }
+    }
+}

@@ -1,0 +1,54 @@
+//! One contract for all drivers, call by call, blocking and as futures: over ports that do all that the documents of the HAL traits
+//! allow, with encoders that share nothing with the crates under test.
+
+#[cfg(feature = "nikon")]
+mod nikon;
+#[cfg(feature = "tformat")]
+mod tformat;
+
+use embedded_io::ErrorKind;
+
+/// What a port may report; a HAL chooses.
+const KINDS: [ErrorKind; 4] = [ErrorKind::Other, ErrorKind::InvalidData, ErrorKind::TimedOut, ErrorKind::Interrupted];
+
+/// A method of a port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Op {
+    Write,
+    Flush,
+    Ready,
+    Read,
+}
+
+/// Faults of a port: which method reports what when it is called for this time, counted from 0.
+#[derive(Debug, Clone, Default)]
+struct Faults {
+    plan: Vec<(Op, u32, ErrorKind)>,
+    calls: Vec<(Op, u32)>,
+}
+
+impl Faults {
+    fn one(op: Op, call: u32, kind: ErrorKind) -> Self {
+        Self { plan: vec![(op, call, kind)], calls: Vec::new() }
+    }
+
+    fn strike(&mut self, op: Op) -> Result<(), ErrorKind> {
+        let at = match self.calls.iter_mut().find(|(other, _)| *other == op) {
+            Some((_, calls)) => {
+                *calls += 1;
+                *calls - 1
+            }
+            None => {
+                self.calls.push((op, 1));
+                0
+            }
+        };
+        let fault = self.plan.iter().position(|(other, call, _)| (*other, *call) == (op, at));
+        fault.map_or(Ok(()), |fault| Err(self.plan.remove(fault).2))
+    }
+
+    /// Whether all has happened.
+    fn are_over(&self) -> bool {
+        self.plan.is_empty()
+    }
+}
