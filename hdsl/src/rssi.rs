@@ -156,22 +156,27 @@ pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -
         let edges = (samples ^ samples >> 1 ^ previous << 31) & of;
         previous = samples;
         if edges & (edges | 0x8080_8080).wrapping_sub(0x0101_0101) != 0 {
-            (_, ones) = several(0, ones, edges);
+            ones &= of_four(edges);
         }
     }
     ones
 }
 
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
+fn of_four(edges: u32) -> u8 {
+    let [a, b, c, d] = edges.to_le_bytes().map(usize::from);
+    ONES[a] & ONES[b] & ONES[c] & ONES[d]
+}
+
 /// Four bit times one of which has several edges. What is as bad as it can be does not become worse.
 #[cold]
 #[inline(never)]
-#[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
 fn several(seen: u32, ones: u8, edges: u32) -> (u32, u8) {
     if ones == 0 {
         return (seen | edges, 0);
     }
-    let [a, b, c, d] = edges.to_le_bytes().map(usize::from);
-    (seen | edges, ones & ONES[a] & ONES[b] & ONES[c] & ONES[d])
+    (seen | edges, ones & of_four(edges))
 }
 
 #[cfg(test)]

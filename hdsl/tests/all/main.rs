@@ -10,6 +10,7 @@ mod cable;
 mod complaints;
 mod dialects;
 mod encoder;
+mod events;
 mod golden;
 mod hostile;
 mod instant;

@@ -13,16 +13,16 @@ use hdsl::{Dialect, EncoderId, Error, MasterSymbol, Rule};
 const DIALECTS: [Dialect; 2] = [Dialect::SICK, Dialect::TI];
 
 /// Both ends, and the map beside the receiver.
-struct Desk {
-    master: Master,
-    map: Registers,
-    device: Device,
+pub(crate) struct Desk {
+    pub(crate) master: Master,
+    pub(crate) map: Registers,
+    pub(crate) device: Device,
     lines: Interrupts,
 }
 
 impl Desk {
     /// With a link that runs and events that were read.
-    fn new(dialect: Dialect, id: u32) -> Self {
+    pub(crate) fn new(dialect: Dialect, id: u32) -> Self {
         let device = Device::new(EncoderId::new(id).unwrap());
         let mut desk =
             Self { master: Master::new(dialect), map: Registers::new(&dialect), device, lines: Interrupts::empty() };
@@ -32,21 +32,21 @@ impl Desk {
         desk
     }
 
-    fn frame(&mut self) -> HFrame {
+    pub(crate) fn frame(&mut self) -> HFrame {
         let answer = self.device.set_position(0x8765_4321).hear(self.master.transmission().head.bits());
         let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 0);
         self.lines = self.map.apply(&report);
         report
     }
 
-    fn frames(&mut self, count: u32) {
+    pub(crate) fn frames(&mut self, count: u32) {
         for _ in 0..count {
             let _ = self.frame();
         }
     }
 
     /// Up to the frame that shows the V-frame that begins at the next boundary; all interrupt lines of the way.
-    fn v_frame(&mut self) -> Interrupts {
+    pub(crate) fn v_frame(&mut self) -> Interrupts {
         while self.master.frame() != 0 {
             let _ = self.frame();
         }
@@ -58,11 +58,11 @@ impl Desk {
         lines
     }
 
-    fn write(&mut self, address: u8, value: u8) {
+    pub(crate) fn write(&mut self, address: u8, value: u8) {
         self.map.write(&mut self.master, address, value).unwrap();
     }
 
-    fn byte(&self, address: u8) -> u8 {
+    pub(crate) fn byte(&self, address: u8) -> u8 {
         self.map.byte(address).unwrap()
     }
 }
