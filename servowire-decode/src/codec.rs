@@ -85,10 +85,10 @@ impl Deref for dyn Codec + '_ {
     }
 }
 
-/// Two are the same if what is known of them is.
+/// Two are the same if their names are.
 impl PartialEq for dyn Codec {
     fn eq(&self, other: &Self) -> bool {
-        self.facts() == other.facts()
+        self.name == other.name
     }
 }
 

@@ -14,7 +14,7 @@ pub const SECOND: i64 = 1_000_000_000_000;
 ///
 /// In memory it need not be aligned to more than eight bytes: edges with a level take 24.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(packed(8))]
+#[repr(C, packed(8))]
 pub struct Time(i128);
 
 impl Time {

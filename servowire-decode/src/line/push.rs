@@ -30,11 +30,29 @@ const MOST_TRIED: usize = 4096;
 /// A channel that was nothing is looked at again after so many times the edges it was judged by.
 const PATIENCE: u64 = 8;
 
+/// An edge of a channel that is not judged yet: its time, and in the lowest bit the level. There may be very many of them.
+#[derive(Debug, Clone, Copy)]
+struct Kept(i128);
+
+impl Kept {
+    fn new(time: Time, level: bool) -> Self {
+        Self(time.ps() << 1 | i128::from(level))
+    }
+
+    fn edge(self) -> (Time, bool) {
+        (Time::from_ps(self.0 >> 1), self.0 & 1 == 1)
+    }
+}
+
+fn edges_of(kept: &[Kept]) -> Vec<(Time, bool)> {
+    kept.iter().map(|kept| kept.edge()).collect()
+}
+
 /// What a channel is.
 #[derive(Debug, Clone)]
 enum State {
     /// Not judged yet.
-    Open(Vec<(Time, bool)>),
+    Open(Vec<Kept>),
     /// Part of a line that is decoded.
     Taken(usize),
     /// Nothing, or more of what is decoded already; looked at again after so many edges, if at all.
@@ -143,7 +161,7 @@ impl PushDecoder {
                 self.give(line, change, out)?;
             }
             State::Open(edges) => {
-                edges.push((change.time, change.level));
+                edges.push(Kept::new(change.time, change.level));
                 self.kept += 1;
                 self.due |= self.held.is_none() && edges.len() == ENOUGH;
             }
@@ -261,16 +279,16 @@ impl PushDecoder {
         for channel in &judged {
             let Some(State::Open(edges)) = self.states.get(usize::from(*channel)) else { continue };
             if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
-                self.busiest = Some((*channel, edges.iter().take(3000).copied().collect()));
+                self.busiest = Some((*channel, edges.iter().take(3000).map(|kept| kept.edge()).collect()));
             }
             if self.candidates.pair().is_none() {
-                readings.extend(self.candidates.read(*channel, edges));
+                readings.extend(self.candidates.read(*channel, &edges_of(edges)));
             }
         }
         readings.extend(self.said_pair());
         let states = &self.states;
         let edges = |channel: u16| match states.get(usize::from(channel)) {
-            Some(State::Open(edges)) => edges.clone(),
+            Some(State::Open(edges)) => edges_of(edges),
             _ => Vec::new(),
         };
         let all = self.candidates.lines(readings, &judged, &edges);
@@ -337,11 +355,11 @@ impl PushDecoder {
     fn said_pair(&self) -> Option<Found> {
         let channels = self.candidates.pair()?;
         let edges = |channel: u16| match self.states.get(usize::from(channel)) {
-            Some(State::Open(edges)) => Some(edges.as_slice()),
+            Some(State::Open(edges)) => Some(edges_of(edges)),
             _ => None,
         };
         let [requests, answers] = channels;
-        self.candidates.read_pair(channels, [edges(requests)?, edges(answers)?])
+        self.candidates.read_pair(channels, [&edges(requests)?, &edges(answers)?])
     }
 
     /// Lines that are good enough; the last chance is that of the best one. Behind them the channels that only repeat
@@ -401,7 +419,11 @@ impl PushDecoder {
         for tap in &found.taps {
             if let Some(state) = self.states.get_mut(usize::from(tap.channel)) {
                 if let State::Open(kept) = std::mem::replace(state, State::Taken(index)) {
-                    edges.extend(kept.into_iter().map(|(time, level)| Change { time, channel: tap.channel, level }));
+                    edges.extend(kept.into_iter().map(Kept::edge).map(|(time, level)| Change {
+                        time,
+                        channel: tap.channel,
+                        level,
+                    }));
                 }
             }
         }
@@ -423,7 +445,7 @@ impl PushDecoder {
             return None;
         }
         let settings = Settings { line: Options::default(), ..self.candidates.settings.clone() };
-        let other = Candidates::new(None, settings, None).read(tap.channel, edges)?;
+        let other = Candidates::new(None, settings, None).read(tap.channel, &edges_of(edges))?;
         (other.is_certain() && other.evidence.score > 2 * found.evidence.score).then_some(other)
     }
 

@@ -100,12 +100,11 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
         (_, "STATUS") => (3, 3),
         (Frame::Discovery(_), "devices") => (4, 5),
         (Frame::Discovery(_), "in") => (6, 7),
-        (Frame::Discovery(_), "out") => (8, 9),
+        (Frame::Discovery(_), "out") | (Frame::Sync(_), "delay") => (8, 9),
         (Frame::Param(_), "cycle_time") | (Frame::Sync(_), "time stamp") => (4, 7),
         (Frame::Param(_), "delay_burst") => (14, 14),
         (Frame::Param(_), "ipg") => (20, 23),
         (Frame::Param(_), "crc_mode") => (35, 35),
-        (Frame::Sync(_), "delay") => (8, 9),
         // Behind the output data come CRC and time stamp, behind a payload its check.
         (Frame::Master(_), "time stamp") => (len.checked_sub(2)?, len - 1),
         (Frame::Master(_), "data") => (2, len.checked_sub(4)?),

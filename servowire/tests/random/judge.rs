@@ -1,6 +1,7 @@
 //! Decodes a random capture without options and holds what comes out against what is due.
 
 use std::cell::RefCell;
+use std::fmt::Write as _;
 use std::io;
 
 use servowire_decode::capture::{Capture as Opened, Change, Line};
@@ -91,7 +92,9 @@ pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let memory = Memory { names, changes, at: 0, end: Time::from_ps(capture.end.into()) };
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
-    let notes = |note: &Note| said.borrow_mut().push_str(&format!("{note}\n"));
+    let notes = |note: &Note| {
+        let _ = writeln!(said.borrow_mut(), "{note}");
+    };
     let mut out = Output::new("x", &mut keep).with_notes(&notes);
     let opened = Opened::Edges(Box::new(memory));
     if let Err(stop) = servowire_decode::decode("x", opened, None, &Settings::default(), &mut out) {
