@@ -114,7 +114,7 @@ impl Asic {
                 self.state
             }
             map::SLAVES => AXES as u16,
-            map::SLAVES..map::RX => {
+            _ if (map::SLAVES..map::RX).contains(&address) => {
                 let place = (address - map::SLAVES) / 2 - 1;
                 DRIVES.get(place).map_or(0, |id| u16::from_le_bytes([*id, map::KIND_SERVO as u8]))
             }

@@ -14,6 +14,7 @@
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
     clippy::expect_used,
     clippy::indexing_slicing,
     clippy::std_instead_of_core,
@@ -125,7 +126,7 @@ fn driver() -> Result<Rtex, Box<dyn Error>> {
     };
     let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal).with_watchdog(Some(limits.echo));
     let master = Master::new(config, ids.map(|mac_id| Slave { mac_id, kind: map::KIND_SERVO }), ids.map(axis))?;
-    let clock: Clock = || Asic::with(|asic| asic.now_ns());
+    let clock: Clock = || Asic::with(Asic::now_ns);
     Ok(Driver::new(Mnm1221::new(Bus), clock, master, &FRAMES))
 }
 
@@ -136,7 +137,7 @@ fn until(what: &str, mut done: impl FnMut(&mut Shared) -> bool) -> Result<(), Bo
             _ = shared.driver.control();
             done(shared)
         }) {
-            println!("{:8.1} ms  {what}", Asic::with(|asic| asic.now_ns()) as f64 / 1e6);
+            println!("{:8.1} ms  {what}", Asic::with(Asic::now_ns) as f64 / 1e6);
             return Ok(());
         }
         // `wfi` on a chip.
@@ -156,7 +157,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     while critical(|shared| shared.driver.control()).map_err(|error| error.to_string())? != ControlPhase::Running {
         Asic::with(Asic::idle);
     }
-    println!("{:8.1} ms  the communication runs", Asic::with(|asic| asic.now_ns()) as f64 / 1e6);
+    println!("{:8.1} ms  the communication runs", Asic::with(Asic::now_ns) as f64 / 1e6);
 
     until("all servos on", |Shared { driver, .. }| {
         _ = driver.ring_mut().switch_on();
@@ -170,7 +171,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         axes.iter().zip(&TARGETS).all(|(axis, target)| axis.setpoint() == target.load(Ordering::Relaxed))
     })?;
     // The main loop judges a position when it uses it: two periods old at the most, and the frame before.
-    let now_ns = Asic::with(|asic| asic.now_ns());
+    let now_ns = Asic::with(Asic::now_ns);
     let sample = first.at(now_ns, Policy::new(1_600_000))?;
     println!("{:8.1} ms  axis 0 is at {}", now_ns as f64 / 1e6, sample.position());
 
@@ -178,14 +179,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     TARGETS[1].store(8_000, Ordering::Relaxed);
     until("half way to the next", |shared| shared.driver.master().ring().axes()[0].setpoint() > 6_000)?;
     Asic::with(|asic| asic.silence(2));
-    println!("{:8.1} ms  drive {} goes silent", Asic::with(|asic| asic.now_ns()) as f64 / 1e6, DRIVES[2]);
+    println!("{:8.1} ms  drive {} goes silent", Asic::with(Asic::now_ns) as f64 / 1e6, DRIVES[2]);
     until("the communication has failed, all servos off", |_| Asic::with(|asic| asic.all_off()))?;
     let (failure, faults) = critical(|shared| (shared.driver.master().ring().failure(), shared.faults));
     let failure = failure.ok_or("nothing has failed")?;
     println!("{failure}, {faults} exchanges failed, {} frames", FRAMES.get());
     println!(
         "axis 0: {}",
-        first.at(Asic::with(|asic| asic.now_ns()) + 10_000_000, Policy::new(1_600_000)).unwrap_err()
+        first.at(Asic::with(Asic::now_ns) + 10_000_000, Policy::new(1_600_000)).unwrap_err()
     );
     Ok(())
 }
