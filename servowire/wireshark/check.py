@@ -271,7 +271,7 @@ def start_up(report, packets, masters, devices):
     ):
         a = int(address)
         same(f"slice of device {a}", [int(first), int(end)], [4 * a - 4, 4 * a])
-        want = SEND_AT[a] if devices <= 4 else TRIGGER + (a - 1) * SLOT - CABLE - (a - 1) * (TRANSIT + CABLE)
+        want = SEND_AT[a] if devices <= 4 else TRIGGER + (a - 1) * (SLOT - TRANSIT - CABLE)
         # The measured delays are a few ns off in each hop.
         if abs(int(at) - want) > (0 if devices <= 4 else 8 * a):
             fail(f"device {a} sends at {at} ns, {want} are planned")

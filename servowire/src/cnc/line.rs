@@ -7,7 +7,7 @@ use std::rc::Rc;
 use sorte_proto::device::{Action as Wish, Device, Path, PortId, Trigger};
 use sorte_proto::follow::InputSlice;
 use sorte_proto::master::{Action, Heard, Master, Outgoing};
-use sorte_proto::{DeviceFrame, Discovery, Link, MasterFrameView};
+use sorte_proto::{DeviceFrame, Discovery, Link, MasterFrameView, Preamble};
 
 use super::clock::Clock;
 use super::driver::Fault;
@@ -220,7 +220,7 @@ impl Line {
                     }
                 }
                 Event::StartUp { at: Place::Master { sof }, frame, preamble, hit, .. } => {
-                    self.returned(frame, sof, preamble, &hit);
+                    self.returned(frame, sof, preamble, &hit, record);
                 }
                 Event::StartUp { at: Place::Device(k), port, frame, preamble, hit } => {
                     self.passes(k, port, frame, preamble, hit, record);
@@ -370,11 +370,13 @@ impl Line {
     }
 
     /// A start-up frame is back at the master.
-    fn returned(&mut self, mut frame: Vec<u8>, sof: f64, preamble: usize, hit: &Hit) {
+    fn returned(&mut self, mut frame: Vec<u8>, sof: f64, preamble: usize, hit: &Hit, record: &mut Recorder) {
         self.wires.noise.pass(&mut frame);
         if hit.get() {
             garble(&mut frame);
         }
+        let form = [Preamble::Long, Preamble::Middle].into_iter().find(|form| form.bytes().len() == preamble);
+        record.start_up(sof as u64, form.unwrap_or(Preamble::Short), &frame, true);
         let captured = sof + capture_ns(preamble) + self.wires.capture_jitter();
         // What the master refuses, it counts.
         let _: Result<_, _> = self.master.hear(&frame, captured.max(0.0).round() as u64);
