@@ -255,6 +255,29 @@ mod tests {
     use super::*;
     use crate::profile::stroke::geometry::nothing_is_covered;
 
+    /// DIR leads STEP by a microsecond, or by half of the time since the pulse before; each axis by itself.
+    #[test]
+    fn dir_changes_between_pulses() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps.vcd");
+        let mut wires = Wires::new(&path).unwrap();
+        let pulse = |axis, tick, direction| AxisPulse { axis, tick, direction };
+        for (axis, tick, direction) in [
+            (0, 5000, Direction::Reverse),
+            (1, 5500, Direction::Forward),
+            (0, 9000, Direction::Reverse),
+            (0, 10_400, Direction::Forward),
+            (1, 10_500, Direction::Reverse),
+        ] {
+            wires.add(&pulse(axis, tick, direction)).unwrap();
+        }
+        wires.finish().unwrap();
+        let text = fs::read_to_string(path).unwrap();
+        let times: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
+        let want = [0, 4000, 5000, 5500, 6000, 6500, 9000, 9500, 9700, 10_000, 10_400, 10_500, 11_400, 11_500];
+        assert_eq!(times, want.map(|time: u64| format!("#{time}")));
+    }
+
     #[test]
     fn labels_leave_the_curves_free() {
         let square = [[0, 0, 0], [80_000, 0, 0], [80_000, 80_000, -20_000], [0, 80_000, 0], [0, 0, 0]];
