@@ -204,7 +204,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         match (request, self.is_core()) {
             // What this reading returns means nothing.
             (ShortRequest::Read(register), true) => {
-                self.bus.read(register.address(), &mut [0]).map_err(BusError::Bus)?
+                self.bus.read(register.address(), &mut [0]).map_err(BusError::Bus)?;
             }
             (ShortRequest::Write(register, value), true) => {
                 self.bus.write(register.address(), &[value]).map_err(BusError::Bus)?;
