@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
 
     for frame in 0..290_u64 {
         // 100 turns per second: 302 steps in a frame.
-        let answer = encoder.set_position(302 * frame).hear(master.transmission().head.bits());
+        let answer = encoder.set_position(frame.wrapping_mul(302)).hear(master.transmission().head.bits());
         let mut bits = answer.map_or(u64::MAX, |answer| answer.bits);
         if frame == 260 {
             bits ^= 1 << 43;

@@ -213,6 +213,9 @@ impl FastPosition {
                 self.lose(error);
             } else if all == 0 {
                 (self.known, self.followed) = (Known::Confirmed, true);
+                if self.is_too_fast() {
+                    self.reduce();
+                }
             }
             return;
         }
@@ -238,6 +241,23 @@ impl FastPosition {
         self.position = self.position.wrapping_add_signed(error.wrapping_add(change.wrapping_mul(8)));
         self.missing = Missing::NONE;
         self.known = Known::Speed;
+    }
+
+    /// Whether the speed is beyond what a V-frame can tell.
+    const fn is_too_fast(&self) -> bool {
+        let sixteenth = 1_i64.wrapping_shl(self.bits.get().saturating_sub(4) as u32);
+        let limit = if sixteenth < FASTEST { sixteenth } else { FASTEST };
+        let velocity = self.velocity as i64;
+        velocity < limit.wrapping_neg() || velocity >= limit
+    }
+
+    /// A wrong word can leave a speed that is off by an eighth of the range, on which all safe positions agree.
+    #[cold]
+    fn reduce(&mut self) {
+        if let Some(velocity) = self.speed(0, V_FRAME) {
+            self.velocity = velocity;
+            (self.known, self.followed) = (Known::Speed, false);
+        }
     }
 
     /// The real speed if it was off for `frames` frames and the position has got `error` from that. A speed of up to a sixteenth
@@ -271,10 +291,7 @@ impl FastPosition {
     /// What is given without a doubt is the truth as long as the real speed stays below a sixteenth of the range a frame (that
     /// is above 300 000 revolutions a minute for an encoder that counts one turn), and below 2^30 steps a frame.
     pub const fn evidence(&self, frame: u32, sampled_ns: u64) -> Evidence {
-        let sixteenth = 1_i64.wrapping_shl(self.bits.get().saturating_sub(4) as u32);
-        let limit = if sixteenth < FASTEST { sixteenth } else { FASTEST };
-        let velocity = self.velocity as i64;
-        let doubt = if velocity < limit.wrapping_neg() || velocity >= limit {
+        let doubt = if self.is_too_fast() {
             Some(Doubt::Speed)
         } else if self.in_a_row > 0 {
             Some(Doubt::Estimated)

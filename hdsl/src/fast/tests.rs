@@ -272,3 +272,23 @@ fn divisions() {
     }
     assert_eq!((divide(0, 0), divide(9, 9)), (None, None));
 }
+
+/// A wrong word in the first frame of a V-frame, by an eighth of the range: all safe positions agree with the speed that comes of it.
+/// Nothing is given, and the position comes back.
+#[test]
+fn off_by_an_eighth_of_the_range() {
+    for bits in 11..=26 {
+        for eighths in [-1, 1, 3] {
+            let mut follow = Follow::new(bits, 0, 1 << (bits - 4));
+            for _ in 0..24 {
+                let _ = follow.frame(0, Event::Good);
+            }
+            follow.fast.velocity += eighths << (bits - 3);
+            for frame in 0..32 {
+                let sample = follow.frame(0, Event::Good);
+                assert_eq!(sample.is_ok(), frame >= 15, "{bits} {frame}");
+                assert!(sample.is_err() || follow.error(sample.unwrap()) == 0);
+            }
+        }
+    }
+}
