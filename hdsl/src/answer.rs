@@ -128,6 +128,20 @@ impl Answer {
         plain.is_data() && !self.pipe.or(self.secondary).is_byte_error()
     }
 
+    /// What is wrong with the words of an answer that is not [plain](Self::is_plain).
+    #[inline]
+    pub(crate) const fn bad_words(&self) -> BadWords {
+        let [high, low] = self.acceleration;
+        let mark = Some(Control::K29_7);
+        BadWords::NONE
+            .with(VERTICAL, self.vertical, mark)
+            .with(PARAMETER, self.parameter, None)
+            .with(PIPE, self.pipe, None)
+            .with(1 << 3, high, mark)
+            .with(1 << 4, low, mark)
+            .with(SECONDARY, self.secondary, None)
+    }
+
     /// Words that stand only in the other column than the running disparity asks for, a diagnostic.
     ///
     /// The disparity is unknown at the beginning, after a bad word, and until a word stands in one column only. Whether an
@@ -203,6 +217,39 @@ servowire_core::one_line!(Answer {
         answer.vertical(), answer.parameter_word(), answer.pipe(),
         answer.acceleration_words()[0], answer.acceleration_words()[1], answer.secondary();
 });
+
+/// The words of an answer as bits, in line order.
+pub(crate) const VERTICAL: u8 = 1;
+pub(crate) const PARAMETER: u8 = 1 << 1;
+pub(crate) const PIPE: u8 = 1 << 2;
+pub(crate) const ACCELERATION: u8 = 1 << 3 | 1 << 4;
+pub(crate) const SECONDARY: u8 = 1 << 5;
+
+/// Which words are no good, and which of the others are special characters that have no meaning in their channel. (Those of
+/// pipe and secondary channel all have one.)
+pub(crate) struct BadWords {
+    pub(crate) bad: u8,
+    pub(crate) special: u8,
+}
+
+impl BadWords {
+    const NONE: Self = Self { bad: 0, special: 0 };
+
+    const fn with(mut self, word: u8, entry: Entry, known: Option<Control>) -> Self {
+        if entry.is_byte_error() {
+            self.bad |= word;
+        } else if !entry.is_data() {
+            let known = match known {
+                Some(known) => entry.raw() == known as u8,
+                None => false,
+            };
+            if !known {
+                self.special |= word;
+            }
+        }
+        self
+    }
+}
 
 /// What an encoder puts into an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -175,11 +175,13 @@ impl FastPosition {
             let place = usize::from(self.at.wrapping_sub(age) & 7);
             i32::from(self.recent.get(place).copied().unwrap_or(0))
         };
-        let sum = (0..5_u8).zip([16, 8, 4, 2, 1]).fold(0_i32, |sum, (age, weight)| {
-            let difference = value(age).wrapping_sub(value(age.wrapping_add(1)));
-            sum.wrapping_add(difference.wrapping_mul(weight))
-        });
-        let estimate = DeltaDelta::clamp(i64::from(value(0)).wrapping_add(i64::from(sum >> 5))).get();
+        // The differences put in.
+        let last = value(0);
+        let sum = (1..6)
+            .zip([8, 4, 2, 1, 1])
+            .fold(last.wrapping_mul(16), |sum: i32, (age, weight)| sum.wrapping_sub(value(age).wrapping_mul(weight)));
+        let estimate = last.wrapping_add(sum >> 5).clamp(DeltaDelta::MIN.get().into(), DeltaDelta::MAX.get().into());
+        let estimate = i16::try_from(estimate).unwrap_or(0);
         self.missing.add(estimate);
         self.missing_here.add(estimate);
         estimate
@@ -241,13 +243,9 @@ impl FastPosition {
     /// The real speed if it was off for `frames` frames and the position has got `error` from that. A speed of up to a sixteenth
     /// of the range a frame is told exactly, for eight frames of it are half a range.
     fn speed(&self, error: i64, frames: u32) -> Option<i32> {
-        let frames = i64::from(frames);
-        let way = self.signed_of(i64::from(self.velocity).wrapping_mul(frames).wrapping_add(error));
-        let speed = way.checked_div(frames)?;
-        if speed.wrapping_mul(frames) != way || speed.unsigned_abs() > FASTEST.unsigned_abs() {
-            return None;
-        }
-        i32::try_from(speed).ok()
+        let way = self.signed_of(i64::from(self.velocity).wrapping_mul(frames.into()).wrapping_add(error));
+        let speed = divide(way, frames)?;
+        if speed.unsigned_abs() > FASTEST.unsigned_abs() { None } else { i32::try_from(speed).ok() }
     }
 
     /// A word that was wrong has passed its checks, or a frame is lost: only the position is known now.
@@ -313,6 +311,26 @@ impl FastPosition {
     const fn signed_of(&self, difference: i64) -> i64 {
         self.signed(u64::from_le_bytes(difference.to_le_bytes()))
     }
+}
+
+/// A way of less than 2^40 divided by 1 to 8 frames; `None` if something remains.
+///
+/// The inverse of an odd divisor modulo 2^64 makes the quotient at once; where it is too large there is none. (A division of 64 bits
+/// takes hundreds of instructions.)
+const fn divide(way: i64, frames: u32) -> Option<i64> {
+    let (halvings, inverse) = match frames {
+        1 => (0, 1),
+        2 => (1, 1),
+        3 => (0, 0xaaaa_aaaa_aaaa_aaab_u64),
+        4 => (2, 1),
+        5 => (0, 0xcccc_cccc_cccc_cccd),
+        6 => (1, 0xaaaa_aaaa_aaaa_aaab),
+        7 => (0, 0x6db6_db6d_b6db_6db7),
+        8 => (3, 1),
+        _ => return None,
+    };
+    let quotient = (way >> halvings).wrapping_mul(i64::from_le_bytes(inverse.to_le_bytes()));
+    if quotient.wrapping_mul(frames as i64) == way && quotient.unsigned_abs() < 1 << 40 { Some(quotient) } else { None }
 }
 
 #[cfg(test)]

@@ -54,9 +54,10 @@ use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
 use crate::frame::{BIT_RATE, Extra, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
-use crate::message::{Finished, Requester};
+use crate::message::Requester;
 use crate::parameter::{EncoderByte, MasterSymbol};
-use crate::sampling::{Alignment, SampledAnswer, TEST_PATTERN, WINDOW};
+use crate::rssi::Rssi;
+use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
@@ -64,8 +65,9 @@ use send::{trailer, transmission};
 /// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
 /// after it, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
-/// A free-running frame and a half, in ns.
-const FREE_RUNNING_NS: u32 = 17_280;
+/// Half a free-running frame in ns, and one and a half.
+const HALF_FRAME_NS: u32 = 5_760;
+const FREE_RUNNING_NS: u32 = 3 * HALF_FRAME_NS;
 /// The same time in ns, rounded up.
 const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE as u64);
 
@@ -100,8 +102,6 @@ pub struct Master {
     /// Blocks of stuffing after a frame of a running link that is free running, and `longest_ns` of it.
     stuffing: Stuffing,
     usual_ns: u32,
-    /// Number of the last H-frame that was heard.
-    number: u32,
     /// Steps of a turn for the angle in a sample; 0 if they are not known.
     steps_per_turn: u32,
     /// From the sampling edge at the master to the sampling in the encoder.
@@ -153,7 +153,6 @@ impl Master {
             longest_ns: u32::MAX,
             stuffing: Stuffing::MIN,
             usual_ns: FREE_RUNNING_NS,
-            number: u32::MAX,
             steps_per_turn: 0,
             latency_ns: 0,
             edge_ns: 0,
@@ -207,6 +206,11 @@ impl Master {
         self.sync.is_some_and(|sync| sync.is_on_pulse())
     }
 
+    /// In step with the external pulse, see [`Synchroniser::is_in_step`]; `false` when free running.
+    pub fn is_in_step(&self) -> bool {
+        self.sync.is_some_and(|sync| sync.is_in_step())
+    }
+
     /// Takes the samples of the answer, a byte a bit time with the first sample in bit 7, and ends the H-frame.
     ///
     /// For a frame without an answer the samples are not looked at. `end_ns` is when the [`WINDOW`] bit times were over, on
@@ -221,9 +225,10 @@ impl Master {
         }
         self.frame_ends(end_ns);
         Ok(match (self.state, self.alignment, samples.first_chunk()) {
-            (State::Start, ..) => self.learn(samples),
+            (State::Start | State::Learn | State::Check, _, Some(window)) => self.hear_window(window),
             (_, Some(alignment), Some(window)) if self.present.answered => {
-                self.end_sampled(alignment, alignment.read_window(window))
+                let (bits, rssi) = alignment.read_quarter(window, self.link.at() & 3);
+                self.end_measured(alignment, bits, rssi)
             }
             _ => self.end(u64::MAX, None),
         })
@@ -247,15 +252,31 @@ impl Master {
     pub fn hear_words(&mut self, samples: &[u32; WINDOW / 4], end_ns: u64) -> &HFrame {
         self.frame_ends(end_ns);
         match (self.state, self.alignment) {
-            (State::Start, _) => {
+            // The start-up has time.
+            (State::Start | State::Learn | State::Check, _) => {
                 let mut bytes = [0; WINDOW];
                 for (to, from) in bytes.chunks_exact_mut(4).zip(samples) {
                     to.copy_from_slice(&from.to_le_bytes());
                 }
-                self.learn(&bytes)
+                self.hear_window(&bytes)
             }
-            (_, Some(alignment)) if self.present.answered => self.end_sampled(alignment, alignment.read_words(samples)),
+            (_, Some(alignment)) if self.present.answered => {
+                let (bits, rssi) = alignment.read_quarter_words(samples, self.link.at() & 3);
+                self.end_measured(alignment, bits, rssi)
+            }
             _ => self.end(u64::MAX, None),
+        }
+    }
+
+    /// A frame with the test pattern.
+    fn hear_window(&mut self, samples: &[u8; WINDOW]) -> &HFrame {
+        match self.alignment {
+            Some(alignment) if self.state != State::Start => {
+                self.edges |= alignment.edges(samples);
+                let (bits, rssi) = alignment.read_quarter(samples, self.done & 3);
+                self.end_measured(alignment, bits, rssi)
+            }
+            _ => self.learn(samples),
         }
     }
 
@@ -275,12 +296,8 @@ impl Master {
     }
 
     #[inline]
-    fn end_sampled(&mut self, alignment: Alignment, read: SampledAnswer) -> &HFrame {
-        if matches!(self.state, State::Learn | State::Check) {
-            self.edges |= read.edges.edges();
-        }
-        let signal = SignalQuality { rssi: read.edges.rssi(), delay: alignment.delay, edges: self.edges };
-        self.end(read.bits, Some(signal))
+    fn end_measured(&mut self, alignment: Alignment, bits: u64, rssi: Rssi) -> &HFrame {
+        self.end(bits, Some(SignalQuality { rssi, delay: alignment.delay, edges: self.edges }))
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
@@ -324,7 +341,6 @@ impl Master {
             self.link.interrupt();
         }
         self.end_ns = end_ns;
-        self.number = self.number.wrapping_add(1);
     }
 
     /// When the encoder sampled in the last H-frame.
@@ -340,7 +356,6 @@ impl Master {
     }
 
     fn end(&mut self, bits: u64, signal: Option<SignalQuality>) -> &HFrame {
-        let bits = bits & (u64::MAX >> 3);
         self.h_frame.begin(self.state, signal);
         let outcome = self.receive(bits);
         if self.h_frame.was != State::Running || outcome.is_err() || self.detour {
@@ -395,7 +410,12 @@ impl Master {
         &self.h_frame
     }
 
+    #[inline]
     fn receive(&mut self, bits: u64) -> Result<(), RestartReason> {
+        if self.state == State::Running {
+            return self.run(bits);
+        }
+        let bits = bits & (u64::MAX >> 3);
         match self.state {
             State::Start if bits != TEST_PATTERN => {
                 return Err(RestartReason::Learn(if bits == u64::MAX >> 3 { Error::NoEdge } else { Error::Pattern }));
@@ -404,7 +424,7 @@ impl Master {
             State::Reset | State::Sync | State::Start | State::Learn | State::Check => {}
             State::IdReq => self.identify(bits).map_err(RestartReason::Identifier)?,
             State::WaitVsync => return self.wait_for_vsync(bits),
-            State::Running => return self.run(bits),
+            State::Running => return Ok(()),
         }
         self.done = self.done.saturating_add(1);
         if self.state.frames() == Some(self.done) {
@@ -425,6 +445,7 @@ impl Master {
 
     fn wait_for_vsync(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
+        self.h_frame.encoder = None;
         self.done = self.done.saturating_add(1);
         if answer.parameter().is_ok_and(EncoderByte::vsync) {
             (self.state, self.done) = (State::Running, 0);
@@ -437,18 +458,12 @@ impl Master {
 
     /// Begins the start-up again. Messages under way end.
     fn begin_again(&mut self) {
-        let was = self.h_frame.was;
         self.counters.restarts = self.counters.restarts.wrapping_add(1);
         (self.state, self.done) = (State::Reset, 0);
-        self.link = Link::new(&self.dialect, EncoderId::truncate(0), PositionBits::MAX);
+        // The link itself begins anew with the next identifier.
         self.encoder = None;
-        let finished = self.h_frame.finished;
-        let dropped = self.requester.drop_all();
-        self.h_frame = HFrame {
-            was,
-            signal: self.h_frame.signal,
-            finished: Finished { short: finished.short.or(dropped.short), long: finished.long.or(dropped.long) },
-            ..HFrame::START
-        };
+        self.h_frame.encoder = None;
+        self.requester.drop_into(&mut self.h_frame.finished);
+        self.h_frame.clear();
     }
 }

@@ -1,7 +1,6 @@
 //! The quality monitor: counts what is right and wrong on the link, and decides when it is lost.
 
-use crate::answer::Answer;
-use crate::symbol::{Control, Reading};
+use crate::answer::{ACCELERATION, Answer, BadWords, PARAMETER, PIPE, SECONDARY, VERTICAL};
 use crate::vframe::VFrame;
 
 /// What the quality monitor counts.
@@ -92,11 +91,14 @@ impl QualityMonitor {
 
     /// Counts an event. A lost link stays lost and its value 0.
     pub const fn count(&mut self, event: QualityEvent) {
+        self.add(self.rule.weight(event));
+    }
+
+    const fn add(&mut self, weight: i8) {
         if self.lost {
             return;
         }
-        // At most 15 + 1, at least 0 - 8.
-        let sum = i8::from_le_bytes([self.value]).saturating_add(self.rule.weight(event));
+        let sum = i8::from_le_bytes([self.value]).saturating_add(weight);
         self.lost = match self.rule {
             QualityRule::Sick => sum <= 0,
             QualityRule::Ti => sum < 0,
@@ -160,47 +162,46 @@ impl QualityMonitor {
         self.count(event);
     }
 
-    /// Bad words and special characters without a meaning, channel by channel.
+    /// Bad words and special characters without a meaning. All of it takes away, so that one sum is as good as one step each.
     #[cold]
     fn count_bad_words(&mut self, answer: &Answer) -> u8 {
         let ti = self.rule == QualityRule::Ti;
-        let unknown = |word: Reading, known: Option<Control>| {
-            word.is_special() && !word.is_byte_error() && known.is_none_or(|known| word.raw() != known as u8)
+        let BadWords { bad, special } = answer.bad_words();
+        let mut penalty = 0_u8;
+        let mut charge = |event, times: u32| {
+            let each = self.rule.weight(event).unsigned_abs();
+            penalty = penalty.saturating_add(each.saturating_mul(times.to_le_bytes()[0]));
         };
-        if ti && answer.vertical().is_byte_error() && !self.counted[0] {
+        if bad & VERTICAL != 0 && ti && !self.counted[0] {
             self.counted[0] = true;
-            self.count(QualityEvent::Safe1Error);
+            charge(QualityEvent::Safe1Error, 1);
         }
-        if unknown(answer.vertical(), Some(Control::K29_7)) {
-            self.count(QualityEvent::UnknownSpecial);
+        let unknown = special & (VERTICAL | PARAMETER | ACCELERATION);
+        if unknown != 0 {
+            // The firmware of the SDK counts specials of the acceleration once a frame, and not besides a bad word.
+            let most = match (ti, bad & ACCELERATION) {
+                (false, _) => 2,
+                (true, 0) => 1,
+                (true, _) => 0,
+            };
+            let others = (unknown & !ACCELERATION).count_ones();
+            charge(
+                QualityEvent::UnknownSpecial,
+                (unknown & ACCELERATION).count_ones().min(most).saturating_add(others),
+            );
         }
-        if unknown(answer.parameter_word(), None) {
-            self.count(QualityEvent::UnknownSpecial);
+        charge(QualityEvent::ParameterOrPipeWord, (bad & (PARAMETER | PIPE)).count_ones());
+        if bad & ACCELERATION != 0 {
+            charge(QualityEvent::AccelerationWord, 1);
         }
-        for word in [answer.parameter_word(), answer.pipe()] {
-            if word.is_byte_error() {
-                self.count(QualityEvent::ParameterOrPipeWord);
-            }
-        }
-        let damaged = answer.acceleration_words().iter().any(|word| word.is_byte_error());
-        let specials = answer.acceleration_words().into_iter().filter(|word| unknown(*word, Some(Control::K29_7)));
-        // The firmware of the SDK counts specials once a frame, and not besides a bad word.
-        let most = match (ti, damaged) {
-            (false, _) => 2,
-            (true, false) => 1,
-            (true, true) => 0,
-        };
-        for _ in specials.take(most) {
-            self.count(QualityEvent::UnknownSpecial);
-        }
-        if damaged {
-            self.count(QualityEvent::AccelerationWord);
-        }
-        if answer.secondary().is_byte_error() && !self.counted[1] {
+        if bad & SECONDARY != 0 && !self.counted[1] {
             self.counted[1] = true;
-            self.count(QualityEvent::Safe2Error);
+            charge(QualityEvent::Safe2Error, 1);
         }
-        answer.words().iter().map(|word| u8::from(word.is_byte_error())).fold(0, u8::wrapping_add)
+        if penalty != 0 {
+            self.add(i8::from_le_bytes([penalty]).saturating_neg());
+        }
+        bad.count_ones().to_le_bytes()[0]
     }
 
     /// Counts the safe blocks of a V-frame that is complete.

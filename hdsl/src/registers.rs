@@ -1,7 +1,8 @@
 //! The register map of the receiver: one byte an address, several bytes with the highest first.
 //!
-//! Addresses and bits are those of the Motor Control SDK (HDSL register list); where the SICK IP core differs, the
-//! register says so.
+//! A [`Registers`] has the addresses of the Motor Control SDK (HDSL register list) by either rule. The SICK IP core has its own: 40h
+//! registers, a bank with those of safe channel 2, POSTX and the flags of the online status beside them. An image of it becomes one
+//! of these with [`Registers::from_core`]; [`RemoteReceiver`] reaches either device by its own map.
 //!
 //! A [`Registers`] is an image of that map. Beside a [`Master`](crate::master::Master) it is kept up to date with
 //! [`Registers::apply`] and takes what an application writes with [`Registers::write`]. The image of a foreign receiver,
@@ -71,6 +72,10 @@ impl Registers {
         all.put(Register::PcAdd, [0x80, 0x00]);
         all.put(Register::PcOff, [0x80, 0x00]);
         all.put(Register::AccErrCntThresh, [0x1f]);
+        if dialect.registers == RegisterRule::Sick {
+            all.put(Register::MaxAcc, [0xff]);
+            all.put(Register::MaxDev, [0xff; 2]);
+        }
         all.restart();
         all
     }
@@ -86,6 +91,24 @@ impl Registers {
             v_frame: None,
             last_safe: Some(0),
         }
+    }
+
+    /// Registers of the SICK core, without those of the encoder.
+    pub const CORE_LEN: usize = 0x40;
+
+    /// An image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if that was read. The online
+    /// status is no register there; all its flags are clear here.
+    pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
+        let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
+        for (address, byte) in (0..).zip(drive) {
+            all.set_byte(address, *byte);
+        }
+        let Some([.., version, _, _, _, id, _, _, _, _, _, _, _, _, s0, s1, s2, s3, s4, s5, s6, s7]) = safe2 else {
+            return all;
+        };
+        all.put(Register::Version2, [*version, *id, *s0, *s1, *s2, *s3, *s4, *s5]);
+        all.put(Register::VPosCrc2, [*s6, *s7]);
+        all
     }
 
     /// All bytes.

@@ -21,22 +21,13 @@ impl Rssi {
     /// ```
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
     pub const fn of_edges(edges: u8) -> Self {
-        Self(RSSI[edges as usize])
+        Self::of_ones(ONES[edges as usize])
     }
 
-    /// As the table of the Motor Control SDK has it: there a longest gap of one or two sample periods counts as 12,
-    /// so that many edges look perfect.
-    ///
-    /// ```
-    /// use hdsl::rssi::Rssi;
-    /// // An edge before every sample.
-    /// assert_eq!((Rssi::of_edges(0xff).get(), Rssi::of_edges_ti(0xff).get()), (0, 12));
-    /// ```
-    pub const fn of_edges_ti(edges: u8) -> Self {
-        match longest_gap(edges) {
-            Some(1..=2) => Self::MAX,
-            _ => Self::of_edges(edges),
-        }
+    /// Half of it as so many ones: the smaller of two is both of them.
+    #[expect(clippy::cast_possible_truncation, reason = "at most six ones")]
+    pub(crate) const fn of_ones(ones: u8) -> Self {
+        Self(2_u8.wrapping_mul(ones.count_ones() as u8))
     }
 }
 
@@ -66,14 +57,18 @@ pub const fn longest_gap(edges: u8) -> Option<u8> {
     Some(longest.to_le_bytes()[0])
 }
 
+/// Of a bit time with one edge or none.
+const PERFECT: u8 = 0x3f;
+
+/// Half the RSSI of an edge byte, as so many ones.
 #[expect(clippy::indexing_slicing, clippy::cast_possible_truncation, reason = "runs at compile time")]
-static RSSI: [u8; 256] = {
+static ONES: [u8; 256] = {
     let mut table = [0; 256];
     let mut edges = 0;
     while edges < 256 {
         table[edges] = match longest_gap(edges as u8) {
-            None | Some(8..) => 12,
-            Some(gap) if gap > 2 => 2 * (gap - 2),
+            None | Some(8..) => PERFECT,
+            Some(gap) if gap > 2 => !(0xff << (gap - 2)),
             Some(_) => 0,
         };
         edges += 1;
@@ -87,26 +82,28 @@ static RSSI: [u8; 256] = {
 pub struct EdgeWatch {
     previous: bool,
     seen: u8,
-    lowest: Rssi,
+    /// Half the lowest RSSI, as so many ones.
+    ones: u8,
 }
 
 impl EdgeWatch {
     /// `previous` is the level of the sample before the first byte.
     pub const fn new(previous: bool) -> Self {
-        Self { previous, seen: 0, lowest: Rssi::MAX }
+        Self { previous, seen: 0, ones: PERFECT }
     }
 
     /// Takes the samples of one bit time.
-    pub fn step(&mut self, samples: u8) {
+    #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
+    pub const fn step(&mut self, samples: u8) {
         let edges = edges(self.previous, samples);
         self.previous = samples & 1 == 1;
         self.seen |= edges;
-        self.lowest = self.lowest.min(Rssi::of_edges(edges));
+        self.ones &= ONES[edges as usize];
     }
 
     /// The lowest RSSI of the bits so far.
     pub const fn rssi(self) -> Rssi {
-        self.lowest
+        Rssi::of_ones(self.ones)
     }
 
     /// Sample periods in which an edge was seen, by the bits of the register EDGES: bit n stands for period n.
@@ -120,13 +117,13 @@ impl EdgeWatch {
 pub(crate) struct WordWatch {
     previous: u32,
     seen: u32,
-    lowest: Rssi,
+    ones: u8,
 }
 
 impl WordWatch {
     /// `previous` are the samples before the first word.
     pub(crate) const fn after(previous: u32) -> Self {
-        Self { previous, seen: 0, lowest: Rssi::MAX }
+        Self { previous, seen: 0, ones: PERFECT }
     }
 
     /// Takes the samples of four bit times. Only edges in `of` count.
@@ -139,7 +136,7 @@ impl WordWatch {
             self.seen |= edges;
         } else {
             // What is seen goes through here too: a sum that has to be there at each word stays in a register.
-            (self.seen, self.lowest) = several(self.seen, self.lowest, edges);
+            (self.seen, self.ones) = several(self.seen, self.ones, edges);
         }
     }
 
@@ -147,15 +144,39 @@ impl WordWatch {
     pub(crate) const fn finish(self, bytes: u8) -> EdgeWatch {
         let [a, b, c, d] = self.seen.to_le_bytes();
         let last = self.previous.wrapping_shr(24_u32.wrapping_sub((bytes as u32).wrapping_mul(8)));
-        EdgeWatch { previous: last & 1 == 1, seen: a | b | c | d, lowest: self.lowest }
+        EdgeWatch { previous: last & 1 == 1, seen: a | b | c | d, ones: self.ones }
     }
 }
 
-/// Four bit times one of which has several edges: RSSI by the table.
+/// The lowest RSSI, as so many ones, of the bit times in four words after the one with the samples before them.
+#[inline(always)]
+pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -> u8 {
+    let (mut previous, mut ones) = (before, PERFECT);
+    for (samples, of) in words {
+        let edges = (samples ^ samples >> 1 ^ previous << 31) & of;
+        previous = samples;
+        if edges & (edges | 0x8080_8080).wrapping_sub(0x0101_0101) != 0 {
+            ones &= of_four(edges);
+        }
+    }
+    ones
+}
+
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
+fn of_four(edges: u32) -> u8 {
+    let [a, b, c, d] = edges.to_le_bytes().map(usize::from);
+    ONES[a] & ONES[b] & ONES[c] & ONES[d]
+}
+
+/// Four bit times one of which has several edges. What is as bad as it can be does not become worse.
 #[cold]
 #[inline(never)]
-fn several(seen: u32, lowest: Rssi, edges: u32) -> (u32, Rssi) {
-    (seen | edges, edges.to_le_bytes().into_iter().map(Rssi::of_edges).fold(lowest, Ord::min))
+fn several(seen: u32, ones: u8, edges: u32) -> (u32, u8) {
+    if ones == 0 {
+        return (seen | edges, 0);
+    }
+    (seen | edges, ones & of_four(edges))
 }
 
 #[cfg(test)]
@@ -165,13 +186,10 @@ mod tests {
     #[test]
     fn histogram_of_the_table() {
         let mut count = [0; 13];
-        let mut vendor = [0; 13];
         for edges in 0..=255 {
             count[usize::from(Rssi::of_edges(edges).get())] += 1;
-            vendor[usize::from(Rssi::of_edges_ti(edges).get())] += 1;
         }
         assert_eq!(count, [47, 0, 84, 0, 60, 0, 32, 0, 16, 0, 8, 0, 9]);
-        assert_eq!(vendor, [0, 0, 84, 0, 60, 0, 32, 0, 16, 0, 8, 0, 56]);
     }
 
     #[test]

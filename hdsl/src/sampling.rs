@@ -8,7 +8,7 @@ mod gather;
 use crate::error::Error;
 use crate::frame::ANSWER_BITS;
 use crate::ranged::ranged;
-use crate::rssi::{EdgeWatch, Rssi};
+use crate::rssi::{EdgeWatch, Rssi, edges, lowest};
 use gather::{Gather, Words};
 
 /// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
@@ -159,7 +159,13 @@ impl Alignment {
         };
         let index = SampleIndex::after_falling_edge(edge);
         let line = index.bits(samples);
-        let found = (0..=room).map_while(Delay::new).find(|delay| answer_at(line, *delay) == TEST_PATTERN);
+        // Shifted bit by bit.
+        let mut rest = line;
+        let found = (0..=room).map_while(Delay::new).find(|_| {
+            let found = low61(rest) == TEST_PATTERN;
+            rest >>= 1;
+            found
+        });
         found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.get() })
     }
 
@@ -193,6 +199,45 @@ impl Alignment {
     /// The same of words of four bytes each, the first byte in the low bits: for processors that load whole words only.
     pub fn read_words(self, samples: &[u32; WINDOW / 4]) -> SampledAnswer {
         Words::of_words(samples, self.delay).read(self)
+    }
+
+    /// EDGES: the sample periods of an answer in which there are edges.
+    pub(crate) fn edges(self, samples: &[u8; WINDOW]) -> u8 {
+        let from = usize::from(self.delay.get());
+        let answer = samples.iter().skip(from).take(ANSWER_BITS as usize);
+        let before = from.checked_sub(1).and_then(|at| samples.get(at)).copied().unwrap_or(0xff);
+        let fold = |(seen, before): (u8, u8), byte: &u8| (seen | edges(before & 1 == 1, *byte), *byte);
+        answer.fold((0, before), fold).0.reverse_bits()
+    }
+
+    /// The bits of an answer, and the RSSI of a quarter of them, 0..=3.
+    #[inline]
+    pub(crate) fn read_quarter(self, samples: &[u8; WINDOW], quarter: u8) -> (u64, Rssi) {
+        let at = usize::from(self.delay.get() & !3).saturating_add(usize::from(quarter).wrapping_mul(16));
+        let (before, from) = samples.split_at_checked(at).unwrap_or((&[], samples));
+        let words =
+            from.chunks_exact(4).map(|word| word.first_chunk().map_or(u32::MAX, |word| u32::from_be_bytes(*word)));
+        let before = before.last().map_or(u32::MAX, |byte| u32::from(*byte));
+        (Words::of_bytes(samples, self.delay).bits(self), self.quarter(before, words, quarter))
+    }
+
+    /// The same of words.
+    #[inline]
+    pub(crate) fn read_quarter_words(self, samples: &[u32; WINDOW / 4], quarter: u8) -> (u64, Rssi) {
+        let at = usize::from(self.delay.get() / 4).saturating_add(usize::from(quarter).wrapping_mul(4));
+        let (before, from) = samples.split_at_checked(at).unwrap_or((&[], samples));
+        let before = before.last().map_or(u32::MAX, |word| word.swap_bytes());
+        let words = from.iter().map(|word| word.swap_bytes());
+        (Words::of_words(samples, self.delay).bits(self), self.quarter(before, words, quarter))
+    }
+
+    #[inline(always)]
+    fn quarter(self, before: u32, words: impl Iterator<Item = u32>, quarter: u8) -> Rssi {
+        let eighths = u32::from(self.delay.get() & 3).wrapping_mul(8);
+        // The first bytes are before the answer, the last ones after it.
+        let begin = if quarter == 0 { u32::MAX.wrapping_shr(eighths) } else { u32::MAX };
+        let end = if quarter == 3 { u32::MAX.wrapping_shl(24_u32.wrapping_sub(eighths)) } else { u32::MAX };
+        Rssi::of_ones(lowest(before, words.zip([begin, u32::MAX, u32::MAX, end])))
     }
 
     /// The same of fewer bytes than a window has, which may be enough for a short delay.
@@ -232,9 +277,8 @@ fn short(samples: &[u8], delay: Delay) -> Error {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "masked to 61 bits")]
-fn answer_at(line: u128, delay: Delay) -> u64 {
-    const MASK: u64 = (1 << ANSWER_BITS) - 1;
-    (line >> delay.get()) as u64 & MASK
+const fn low61(line: u128) -> u64 {
+    line as u64 & (u64::MAX >> 3)
 }
 
 /// The samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
@@ -321,6 +365,12 @@ mod tests {
                     assert!(place.read(&samples[..from + 60]).is_err() && place.bits(&samples[..from + 60]).is_err());
                     let words = core::array::from_fn(|k| u32::from_le_bytes(*samples[4 * k..].first_chunk().unwrap()));
                     assert_eq!(place.read_words(&words), read);
+                    // A quarter of the signal at a time is all of it after four.
+                    let quarters = [0, 1, 2, 3].map(|quarter| place.read_quarter(&samples, quarter));
+                    assert_eq!(quarters, [0, 1, 2, 3].map(|quarter| place.read_quarter_words(&words, quarter)));
+                    let rssi = quarters.iter().map(|(_, rssi)| *rssi).min();
+                    assert_eq!(place.edges(&samples), watch.edges());
+                    assert_eq!((rssi, quarters.map(|(bits, _)| bits)), (Some(watch.rssi()), [bits; 4]));
                 }
             }
         }

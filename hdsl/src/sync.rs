@@ -12,11 +12,10 @@
 //! ```
 //!
 //! * [`ExtraWindow`] is the step from one frame to the next (HDSL Protocol Design);
-//! * [`Startup`] is the start-up arithmetic of the Motor Control SDK;
 //! * [`Synchroniser`] puts both together for any ES and corrects by the measured time between pulse and edge.
 
 use crate::error::Error;
-use crate::frame::{Extra, H_FRAME_BITS, STUFFING_BITS, Stuffing, edge_register};
+use crate::frame::{Extra, H_FRAME_BITS, STUFFING_BITS, Stuffing};
 use crate::ranged::ranged;
 
 /// Eighths of a bit in a stuffing block.
@@ -46,29 +45,6 @@ impl ExtraWindow {
         Self { edge, stuffing, window }
     }
 
-    /// The start state from the vendor's register values: EXTRA_SIZE is the number of bits less one here, also when
-    /// TIME_REST is 0.
-    ///
-    /// ```
-    /// use hdsl::frame::Stuffing;
-    /// use hdsl::sync::ExtraWindow;
-    /// // A pulse every 6001 cycles at 300 MHz: EXTRA_SIZE 7, EXTRA_EDGE F0h, so TIME_REST 4, 12 blocks, window 60.
-    /// let state = ExtraWindow::from_registers(7, 4, Stuffing::try_from(12)?, 60)?;
-    /// assert_eq!((state.extra().get(), state.extra().bits(), state.extra_edge()), (60, 8, 0xf0));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Error::ExtraOutOfRange`].
-    pub const fn from_registers(extra_size: u8, time_rest: u8, stuffing: Stuffing, window: i16) -> Result<Self, Error> {
-        let t = if time_rest == 0 { 8 } else { time_rest };
-        let edge = extra_size.saturating_mul(8).saturating_add(t);
-        match Extra::new(edge) {
-            Some(edge) => Ok(Self::new(edge, stuffing, window)),
-            None => Err(Error::ExtraOutOfRange { extra: extra_size as u32 }),
-        }
-    }
-
     /// The window of the frame.
     pub const fn extra(self) -> Extra {
         self.edge
@@ -82,21 +58,6 @@ impl ExtraWindow {
     /// TIME_EXTRA_WINDOW in eighths.
     pub const fn window(self) -> i16 {
         self.window
-    }
-
-    /// EXTRA_SIZE after a step.
-    pub const fn extra_size(self) -> u8 {
-        self.edge.get() / 8
-    }
-
-    /// TIME_REST after a step.
-    pub const fn time_rest(self) -> u8 {
-        self.edge.get() % 8
-    }
-
-    /// EXTRA_EDGE after a step.
-    pub const fn extra_edge(self) -> u8 {
-        edge_register(self.time_rest())
     }
 
     /// Edge and stuffing after a step of `adjust` eighths, before any check of the range.
@@ -139,113 +100,6 @@ impl Es {
     pub const ONE: Self = Self::MIN;
 }
 
-/// The clock of the vendor's core.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum CoreClock {
-    /// 225 MHz: 24 cycles a bit, 3 an eighth.
-    Mhz225,
-    /// 300 MHz: 32 cycles a bit, 4 an eighth.
-    Mhz300,
-}
-
-impl CoreClock {
-    /// Cycles an eighth of a bit.
-    pub const fn cycles_per_eighth(self) -> u32 {
-        match self {
-            Self::Mhz225 => 3,
-            Self::Mhz300 => 4,
-        }
-    }
-}
-
-/// What the start-up arithmetic of the Motor Control SDK makes of a pulse period.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct Startup {
-    /// Whole bits of the EXTRA window in every frame.
-    pub extra_size: u32,
-    /// Frames of a pulse group whose window has one bit more.
-    pub extra_remainder: u32,
-    /// Stuffing blocks in every frame.
-    pub stuffing: u32,
-    /// Frames of a pulse group with one block more.
-    pub stuffing_remainder: u32,
-    /// TIME_REST: eighths that are left, 0..=7.
-    pub time_rest: u8,
-    /// EXTRA_EDGE for TIME_REST.
-    pub extra_edge: u8,
-    /// Cycles of the period that the frames fill.
-    pub cycles_used: u32,
-    /// Cycles that are less than an eighth; the correction by the measured time takes care of them.
-    pub cycles_dropped: u32,
-}
-
-impl Startup {
-    /// Bits of a frame with the shortest window, 4 bits.
-    const SHORTEST: u32 = H_FRAME_BITS + 4;
-
-    /// Divides a pulse period, in cycles of the core, into `es` frames.
-    ///
-    /// ```
-    /// use hdsl::sync::{CoreClock, Es, Startup};
-    /// let start = Startup::new(6001, CoreClock::Mhz300, Es::ONE)?;
-    /// assert_eq!((start.extra_size, start.time_rest, start.stuffing), (7, 4, 12));
-    /// assert_eq!((start.extra_edge, start.cycles_used), (0xf0, 6000));
-    /// # Ok::<(), hdsl::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Error::PeriodTooShort`].
-    #[expect(clippy::arithmetic_side_effects, reason = "divisors are constants or an ES, which is not 0")]
-    pub fn new(period: u32, clock: CoreClock, es: Es) -> Result<Self, Error> {
-        let eighth = clock.cycles_per_eighth();
-        let bit = eighth * 8;
-        let es = u32::from(es.get()).max(1);
-        let shortest = Self::SHORTEST * es * bit;
-        let Some(left) = period.checked_sub(shortest) else {
-            return Err(Error::PeriodTooShort { missing: (shortest - period).div_ceil(bit) });
-        };
-        let rest = left % bit / eighth;
-        let add = left / bit;
-        let mut stuffing = add / 6;
-        let mut extra = add % 6 + 4 * es;
-        let most = u32::from(Stuffing::MAX.get()) * es;
-        if stuffing > most {
-            extra = extra.saturating_add((stuffing - most).saturating_mul(6));
-            stuffing = most;
-        }
-        let time_rest = rest.to_le_bytes()[0];
-        let cycles_dropped = left % bit % eighth;
-        Ok(Self {
-            extra_size: extra / es,
-            extra_remainder: extra % es,
-            stuffing: stuffing / es,
-            stuffing_remainder: stuffing % es,
-            time_rest,
-            extra_edge: edge_register(time_rest),
-            cycles_used: period - cycles_dropped,
-            cycles_dropped,
-        })
-    }
-
-    /// Refuses a period that the frames cannot fill.
-    ///
-    /// # Errors
-    /// [`Error::ExtraOutOfRange`] unless the window has 4..=9 bits.
-    pub const fn check(&self) -> Result<(), Error> {
-        if self.extra_size >= 4 && self.extra_size <= 9 {
-            Ok(())
-        } else {
-            Err(Error::ExtraOutOfRange { extra: self.extra_size })
-        }
-    }
-}
-
 /// What comes next on the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -259,7 +113,8 @@ pub struct Next {
 /// Keeps the sampling edge of every ES-th frame on the pulse.
 ///
 /// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a
-/// pulse, and what is less than an eighth is taken care of by the correction.
+/// pulse, and what is less than an eighth is taken care of by the correction. By how much the real period differs from the given
+/// one is learned, so that the edges stay where they belong while some pulses are not seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Synchroniser {
@@ -273,13 +128,30 @@ pub struct Synchroniser {
     frame: u8,
     /// Eighths times ES that are due; begins in the middle, so that the edges are at most half an eighth off.
     spread: u8,
+    /// How much later each pulse comes than the period says, in eighths / 256, and what of it is due when one is not seen.
+    learned: i16,
+    due: i16,
+    /// Pulses in a row that were close to their edges, and those in a row that were not seen.
+    close: u8,
+    unseen: u8,
 }
 
 impl Synchroniser {
     /// Largest correction in one frame, in eighths: as in the vendor's receiver.
     pub const MAX_CORRECTION: i16 = 6;
 
-    /// For a pulse every `period` eighths of a bit (13.333 ns each) and `es` frames for each of them.
+    /// In step: a pulse comes this close to its edge, in eighths: 93 ns. The vendor's receiver keeps 100 ns.
+    const CLOSE: i16 = 7;
+    /// Pulses in a row that have to.
+    const PULSES: u8 = 4;
+    /// Pulses that may be missing; then nobody knows where the edges are.
+    const UNSEEN: u8 = 8;
+    /// From the beginning of a frame to the end of the shortest EXTRA window from which every edge of the next frame can be had, a
+    /// correction either way included, and the longest one.
+    const FRAMES: [u32; 2] = [FRAME + 32, FRAME + 26 * 48 + 69];
+
+    /// For a pulse every `period` eighths of a bit (13.333 ns each) and `es` frames for each of them: frames of 896 to 2181
+    /// eighths.
     ///
     /// # Errors
     /// [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
@@ -288,16 +160,28 @@ impl Synchroniser {
         // An ES is not 0; that is said where it divides, so that no panic is reachable.
         let divisor = u32::from(es.get()).max(1);
         let (frame, remainder) = (period / divisor, period % divisor);
-        // Window of 25..=72 eighths: 4..=9 bits.
-        let Some(left) = frame.checked_sub(FRAME + 25) else {
-            return Err(Error::PeriodTooShort { missing: (FRAME + 25).abs_diff(frame).div_ceil(8) });
-        };
+        let [shortest, longest] = Self::FRAMES;
+        if frame < shortest {
+            return Err(Error::PeriodTooShort { missing: shortest.abs_diff(frame).div_ceil(8) });
+        }
+        // Windows of 25..=72 eighths: 4..=9 bits; the longest frames have all the stuffing there is.
+        let left = frame.saturating_sub(FRAME + 25);
         let refuse = Error::ExtraOutOfRange { extra: left / 8 };
+        if frame.saturating_add(u32::from(remainder != 0)) > longest {
+            return Err(refuse);
+        }
         let window = 25_u8.saturating_add((left % 48).to_le_bytes()[0]);
         let stuffing = u8::try_from(left / 48).ok().and_then(Stuffing::new).ok_or(refuse)?;
         let edge = Extra::new(window).ok_or(refuse)?;
         let state = ExtraWindow::new(edge, stuffing, i16::from(window));
-        Ok(Self { period, state, es, remainder: remainder.to_le_bytes()[0], frame: 0, spread: es.get() / 2 })
+        let spread = es.get() / 2;
+        let remainder = remainder.to_le_bytes()[0];
+        Ok(Self { period, state, es, remainder, frame: 0, spread, learned: 0, due: 128, close: 0, unseen: 0 })
+    }
+
+    /// In step with the pulse: the last four pulses came within 93 ns of their edges, and since then eight at most were not seen.
+    pub const fn is_in_step(&self) -> bool {
+        self.close >= Self::PULSES && self.unseen <= Self::UNSEEN
     }
 
     /// Eighths of a bit from pulse to pulse.
@@ -326,7 +210,7 @@ impl Synchroniser {
     ///
     /// `late` is time(pulse) - time(edge) in eighths, rounded, if the present frame is on a pulse and the pulse was
     /// seen: a later pulse makes the next edge later, by [`MAX_CORRECTION`](Self::MAX_CORRECTION) at most. Without
-    /// a pulse the frames run on with the period as it was given.
+    /// a pulse the frames run on with the period as it was given and what was learned of it.
     pub fn next(&mut self, late: Option<i16>) -> Next {
         self.spread = self.spread.saturating_add(self.remainder);
         let mut adjust = 0;
@@ -334,14 +218,37 @@ impl Synchroniser {
             self.spread = self.spread.saturating_sub(self.es.get());
             adjust = 1;
         }
-        let limit = Self::MAX_CORRECTION;
-        adjust = late.map_or(0, |late| late.clamp(limit.saturating_neg(), limit)).saturating_add(adjust);
+        if self.frame == 0 {
+            adjust = self.correction(late).saturating_add(adjust);
+        }
         // At the shortest and longest frames there is no block to give or take: the window stays within its range.
         while self.state.step(adjust).is_err() && adjust != 0 {
             adjust = adjust.saturating_sub(adjust.signum());
         }
         self.frame = if self.frame.saturating_add(1) >= self.es.get() { 0 } else { self.frame.saturating_add(1) };
         Next { stuffing: self.state.stuffing, extra: self.state.edge }
+    }
+
+    /// Eighths by which the next edge on a pulse has to come later: by what is measured, or by what is as a rule where nothing is.
+    fn correction(&mut self, late: Option<i16>) -> i16 {
+        let limit = Self::MAX_CORRECTION;
+        if let Some(late) = late {
+            let correction = late.clamp(limit.saturating_neg(), limit);
+            self.unseen = 0;
+            self.close =
+                if late.unsigned_abs() > Self::CLOSE.unsigned_abs() { 0 } else { self.close.saturating_add(1) };
+            if self.close > 1 {
+                self.learned =
+                    self.learned.saturating_add(correction.saturating_mul(256).saturating_sub(self.learned) / 64);
+            }
+            self.due = 128;
+            return correction;
+        }
+        self.unseen = self.unseen.saturating_add(1);
+        self.due = self.due.saturating_add(self.learned);
+        let correction = self.due >> 8;
+        self.due &= 0xff;
+        correction
     }
 }
 
@@ -389,8 +296,21 @@ mod tests {
     /// Runs `pulses` pulses of `period` (in tenths of an eighth) and gives the largest distance of an edge from its
     /// ideal place after the first `settle` pulses. `jitter` moves the measured pulse.
     fn worst(period: i64, es: u8, start: i64, pulses: i64, settle: i64, mut jitter: impl FnMut() -> i64) -> i64 {
+        worst_of(period / 10, period, es, start, pulses, settle, || Some(jitter()))
+    }
+
+    /// The same for a period that is given in eighths; pulses can be missing.
+    fn worst_of(
+        given: i64,
+        period: i64,
+        es: u8,
+        start: i64,
+        pulses: i64,
+        settle: i64,
+        mut jitter: impl FnMut() -> Option<i64>,
+    ) -> i64 {
         let es_ = Es::new(es).unwrap();
-        let mut sync = Synchroniser::new(u32::try_from(period / 10).unwrap(), es_).unwrap();
+        let mut sync = Synchroniser::new(u32::try_from(given).unwrap(), es_).unwrap();
         let mut edge = start;
         let mut worst = 0;
         for pulse in 0..pulses {
@@ -400,12 +320,13 @@ mod tests {
                     worst = worst.max((edge - ideal).abs());
                 }
                 assert_eq!(sync.is_on_pulse(), k == 0);
-                let late = ideal + jitter() - edge;
-                let late = (k == 0).then_some((late + 5).div_euclid(10) as i16);
+                let late = if k == 0 { jitter().map(|jitter| ideal + jitter - edge) } else { None };
+                let late = late.map(|late| (late + 5).div_euclid(10) as i16);
                 let before = sync.extra();
                 edge += 10 * distance(before, sync.next(late));
             }
         }
+        assert!(settle == 0 || sync.is_in_step());
         worst
     }
 
@@ -445,13 +366,72 @@ mod tests {
         }
     }
 
+    /// What is accepted is held, from the shortest frame to the longest, at any fraction of an eighth.
+    #[test]
+    fn every_period_that_is_accepted_is_held() {
+        for es in 1..=10_u8 {
+            let (low, high) = (864 * i64::from(es), 2190 * i64::from(es));
+            let periods = (low..low + 50 * i64::from(es)).chain(high - 30 * i64::from(es)..high);
+            for period in periods.step_by(crate::thin(61)) {
+                if Synchroniser::new(u32::try_from(period).unwrap(), Es::new(es).unwrap()).is_err() {
+                    continue;
+                }
+                for part in [0, 5] {
+                    let worst = worst(period * 10 + part, es, 37, 120, 60, || 0);
+                    assert!(worst <= 15, "{period} {es}: {worst}");
+                }
+            }
+        }
+    }
+
+    /// 200 ppm off, a pulse in twenty missing: within four eighths of a bit, 53 ns, once the difference is learned.
+    #[test]
+    fn a_frequency_is_learned() {
+        for (us10, es) in [(130, 1), (250, 2), (1250, 10)] {
+            for ppm in [-200, 200] {
+                let given = us10 * 15 / 2;
+                let mut pulse = 0_u32;
+                let seen = || {
+                    pulse = pulse.wrapping_add(1);
+                    (!pulse.is_multiple_of(20)).then_some(0)
+                };
+                let worst = worst_of(given, given * 10 + given * ppm / 100_000, es, 0, 2000, 400, seen);
+                assert!(worst <= 40, "{us10} {es} {ppm}: {worst}");
+            }
+        }
+    }
+
+    /// In step after four close pulses; out of it with one that is far off, and after eight that are not seen.
+    #[test]
+    fn in_step() {
+        let mut sync = Synchroniser::new(1500, Es::ONE).unwrap();
+        let mut after = |late| {
+            let _ = sync.next(late);
+            sync.is_in_step()
+        };
+        assert_eq!(
+            [0, -7, 7, 3, 8, 0, 0, 0, 0].map(|late| after(Some(late))),
+            [false, false, false, true, false, false, false, false, true]
+        );
+        assert_eq!([(); 9].map(|()| after(None)), [true, true, true, true, true, true, true, true, false]);
+        assert!(after(Some(0)));
+        assert!(!after(Some(-8)));
+        // Only frames on a pulse count.
+        let mut sync = Synchroniser::new(3000, Es::new(2).unwrap()).unwrap();
+        let steps = [(); 8].map(|()| {
+            let late = sync.is_on_pulse().then_some(0);
+            let _ = sync.next(late);
+            sync.is_in_step()
+        });
+        assert_eq!(steps, [false, false, false, false, false, false, true, true]);
+    }
+
     #[test]
     fn outside_the_range() {
-        assert!(matches!(Synchroniser::new(888, Es::ONE), Err(Error::PeriodTooShort { missing: 1 })));
-        assert!(Synchroniser::new(889, Es::ONE).is_ok());
-        assert!(Synchroniser::new(864 + 72 + 26 * 48, Es::ONE).is_ok());
-        assert!(Synchroniser::new(864 + 73 + 26 * 48, Es::ONE).is_err());
-        assert_eq!(Startup::new(1000, CoreClock::Mhz300, Es::ONE), Err(Error::PeriodTooShort { missing: 81 }));
+        assert!(matches!(Synchroniser::new(895, Es::ONE), Err(Error::PeriodTooShort { missing: 1 })));
+        assert!(Synchroniser::new(896, Es::ONE).is_ok());
+        assert!(Synchroniser::new(864 + 69 + 26 * 48, Es::ONE).is_ok());
+        assert!(Synchroniser::new(864 + 70 + 26 * 48, Es::ONE).is_err());
         assert_eq!((Es::new(0), Es::new(11)), (None, None));
     }
 }

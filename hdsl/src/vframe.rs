@@ -66,35 +66,35 @@ impl SafeBlock {
     }
 
     /// The byte of H-frame 0 as received: SUMMARY of channel 1, STATUS2 of channel 2.
-    pub const fn status(self) -> u8 {
+    pub const fn status(&self) -> u8 {
         let [status, ..] = self.bytes;
         status
     }
 
     /// VPOS or VPOS2 as received, good or not.
-    pub const fn raw_vpos(self) -> u64 {
+    pub const fn raw_vpos(&self) -> u64 {
         let [_, p4, p3, p2, p1, p0, ..] = self.bytes;
         u64::from_be_bytes([0, 0, 0, p4, p3, p2, p1, p0])
     }
 
     /// The CRC as received.
-    pub const fn raw_crc(self) -> u16 {
+    pub const fn raw_crc(&self) -> u16 {
         let [.., high, low] = self.bytes;
         u16::from_be_bytes([high, low])
     }
 
     /// Whether a word of the block was no good.
-    pub const fn has_byte_error(self) -> bool {
+    pub const fn has_byte_error(&self) -> bool {
         self.bad.is_some()
     }
 
     /// Whether the CRC of the bytes as received is right.
-    pub const fn crc_ok(self) -> bool {
+    pub const fn crc_ok(&self) -> bool {
         self.crc.finish() == self.raw_crc()
     }
 
     /// Whether words and CRC are good; whether the encoder has a position is another matter.
-    pub fn is_sound(self) -> bool {
+    pub fn is_sound(&self) -> bool {
         matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
@@ -105,7 +105,7 @@ impl SafeBlock {
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
     /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
     /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
-    pub const fn vpos(self) -> Result<u64, Error> {
+    pub const fn vpos(&self) -> Result<u64, Error> {
         if self.len != 8 {
             return Err(Error::Truncated { got: self.len as u16, want: 8 });
         }

@@ -260,3 +260,15 @@ fn encoders_that_it_cannot_follow() {
     assert!(FastPosition::new(EncoderId::truncate(0x00150)).is_err());
     assert!(FastPosition::new(EncoderId::truncate(0x001e3)).is_err());
 }
+
+/// Exact quotients and no others.
+#[test]
+fn divisions() {
+    for frames in 1..=8 {
+        for way in (-300..300).chain([(1 << 39) - 840, -(1 << 39), (1 << 40) / 840 * 840]) {
+            let exact = (way % i64::from(frames) == 0).then(|| way / i64::from(frames));
+            assert_eq!(divide(way, frames), exact, "{way} / {frames}");
+        }
+    }
+    assert_eq!((divide(0, 0), divide(9, 9)), (None, None));
+}

@@ -1,6 +1,6 @@
 //! The application's side of the receiver: positions to use, messages, settings.
 
-use super::{FREE_RUNNING_NS, Master, State};
+use super::{FREE_RUNNING_NS, HALF_FRAME_NS, Master, State};
 use crate::doubt::Doubt;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
@@ -15,7 +15,7 @@ impl Master {
         if self.linked().is_none() {
             return Evidence::doubtful(Doubt::NoLink);
         }
-        let mut evidence = self.link.fast(self.number, self.sampled_ns());
+        let mut evidence = self.link.fast(self.number(), self.sampled_ns());
         evidence.sample.steps_per_turn = self.steps_per_turn;
         evidence
     }
@@ -31,6 +31,12 @@ impl Master {
             (State::Running, None) => self.encoder,
             _ => None,
         }
+    }
+
+    /// Number of the last H-frame.
+    #[expect(clippy::cast_possible_truncation, reason = "modulo 2^32")]
+    const fn number(&self) -> u32 {
+        self.counters.frames.wrapping_sub(1) as u32
     }
 
     /// Steps of a turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
@@ -58,8 +64,9 @@ impl Master {
     /// A frame of which nobody tells is known by its time, if its end is told half a frame too late; then no fast position is given until
     /// three safe positions have come.
     pub fn skip(&mut self, frames: u8) {
-        self.number = self.number.wrapping_add(frames.into());
-        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(FREE_RUNNING_NS.into()));
+        self.counters.frames = self.counters.frames.wrapping_add(frames.into());
+        let frame_ns = self.longest_ns.saturating_sub(HALF_FRAME_NS);
+        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(frame_ns.into()));
         if self.state == State::Running {
             (0..frames.min(16)).for_each(|_| self.link.skip());
         }

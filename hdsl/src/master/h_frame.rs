@@ -18,7 +18,7 @@ use crate::vframe::VFrame;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SignalQuality {
-    /// RSSI of this answer.
+    /// RSSI of this answer. On a running link a receiver of samples looks at a quarter of its bits, at another one in each frame.
     pub rssi: Rssi,
     /// The delay of the cable, as learned at the start.
     pub delay: Delay,
@@ -91,16 +91,21 @@ impl HFrame {
         short_free: false,
     };
 
+    /// What a link brings, at its end.
+    pub(super) const fn clear(&mut self) {
+        self.quality = QualityMonitor::START;
+        self.acceleration = None;
+        self.acceleration_errors = 0;
+        self.pipe = None;
+        self.init = false;
+    }
+
     /// Clears what belongs to one frame.
     #[inline]
     pub(super) fn begin(&mut self, state: State, signal: Option<SignalQuality>) {
         self.was = state;
         self.signal = signal;
-        self.encoder = None;
-        self.acceleration = None;
         self.v_frame = None;
-        self.pipe = None;
-        self.init = false;
         self.finished = Finished { short: None, long: None };
     }
 
@@ -141,7 +146,7 @@ impl HFrame {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
-    /// H-frames.
+    /// H-frames, heard or told of.
     pub frames: u64,
     /// Restarts.
     pub restarts: u32,

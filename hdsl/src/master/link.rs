@@ -129,7 +129,8 @@ impl Master {
     /// The firmware of the SDK counts TEST2 one H-frame after the V-frame.
     #[inline]
     fn count_test(&mut self) {
-        if core::mem::take(&mut self.link.test2) {
+        if self.link.test2 {
+            self.link.test2 = false;
             self.link.quality.count(QualityEvent::Test2);
         }
     }
@@ -183,7 +184,7 @@ impl Master {
     /// After RX7: judges the safe channels and aligns the fast position.
     fn end_v_frame(&mut self) {
         let link = &mut self.link;
-        let VFrame { safe1, safe2 } = link.vframe;
+        let VFrame { safe1, safe2 } = &link.vframe;
         let position = safe1.vpos();
         let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
         let sound2 = safe2.is_sound();

@@ -135,12 +135,22 @@ impl Requester {
 
     /// Drops all messages without telling the encoder: the link is being started anew.
     pub fn drop_all(&mut self) -> Finished {
-        let finished = Finished {
-            short: (!self.short.is_free()).then_some(Err(Error::Dropped)),
-            long: (!self.long.is_free()).then_some(Err(Error::Dropped)),
-        };
-        *self = Self::new(self.limits);
+        let mut finished = Finished::default();
+        self.drop_into(&mut finished);
         finished
+    }
+
+    /// The same beside messages that have ended in this frame.
+    pub(crate) fn drop_into(&mut self, finished: &mut Finished) {
+        if !self.short.is_free() {
+            (self.short, finished.short) = (Slot::Free, Some(Err(Error::Dropped)));
+        }
+        if !self.long.is_free() {
+            (self.long, finished.long) = (Slot::Free, Some(Err(Error::Dropped)));
+        }
+        self.collector.idle();
+        self.sending = None;
+        self.reset = false;
     }
 
     /// The symbol for the next H-frame.

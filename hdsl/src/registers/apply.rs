@@ -211,6 +211,9 @@ impl Registers {
             if let Ok(answer) = result {
                 if let Some(data) = answer.data {
                     self.put(Register::SPcData, [data]);
+                    if self.dialect.registers == RegisterRule::Sick {
+                        self.put(Register::PcData, [data]);
+                    }
                 }
             }
             self.put(Register::SlaveRegCtrl, [0x3f]);

@@ -46,8 +46,19 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
 
 impl<E: core::error::Error> core::error::Error for BusError<E> {}
 
-/// A receiver that is reached over a [`RegisterBus`], for example the firmware of the Motor Control SDK or the SICK IP core in the map of
-/// the SDK.
+/// A receiver that is reached over a [`RegisterBus`]: the firmware of the Motor Control SDK, or the SICK IP core.
+///
+/// The two are different devices:
+///
+/// | | SDK, [`RegisterRule::Ti`] | IP core, [`RegisterRule::Sick`] |
+/// |---|---|---|
+/// | map | 56h bytes of memory | 40h registers; those of the encoder are at 40h..7Fh |
+/// | an event is cleared | by writing back the register without it; a 1 that is written is an event | by writing 0 to it; 1 changes nothing |
+/// | short message | SLAVE_REG_CTRL, S_PC_DATA | an access to the encoder's register; PC_DATA |
+/// | under way | FRES, FREL in the online status | what was started here |
+///
+/// The firmware of the SDK sets its events by reading and writing too. Where both meet an event can be lost or come twice: the
+/// online status is the truth.
 ///
 /// Messages are started with `start_...` and asked for with `poll_...` until they give something; their ends are known by
 /// the events FRES and FREL, which are taken then.
@@ -105,12 +116,14 @@ impl<E: core::error::Error> core::error::Error for BusError<E> {}
 pub struct RemoteReceiver<B> {
     bus: B,
     dialect: Dialect,
+    /// A short and a long message that were started here.
+    under_way: [bool; 2],
 }
 
 impl<B: RegisterBus> RemoteReceiver<B> {
     /// Over a bus; the dialect says in which order error codes stand.
     pub const fn new(dialect: Dialect, bus: B) -> Self {
-        Self { bus, dialect }
+        Self { bus, dialect, under_way: [false; 2] }
     }
 
     /// The bus.
@@ -128,14 +141,40 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         self.bus.write(register as u8, bytes).map_err(BusError::Bus)
     }
 
-    /// All registers. The bytes are not of one instant: for a position read only POS or VPOS.
+    const fn is_core(&self) -> bool {
+        matches!(self.dialect.registers, RegisterRule::Sick)
+    }
+
+    /// All registers; of the IP core those that are not in a bank of safe channel 2. The bytes are not of one instant: for a
+    /// position read only POS or VPOS.
     ///
     /// # Errors
     /// Those of the bus.
     pub fn registers(&mut self) -> Result<Registers, BusError<B::Error>> {
+        if self.is_core() {
+            let mut bytes = [0; Registers::CORE_LEN];
+            self.bus.read(0, &mut bytes).map_err(BusError::Bus)?;
+            return Ok(Registers::from_core(&bytes, None));
+        }
         let mut bytes = [0; Registers::LEN];
         self.bus.read(0, &mut bytes).map_err(BusError::Bus)?;
         Ok(Registers::from_bytes(&self.dialect, bytes))
+    }
+
+    /// Clears events of which `present` was read.
+    fn clear<const N: usize>(
+        &mut self,
+        register: Register,
+        present: [u8; N],
+        taken: [u8; N],
+    ) -> Result<(), BusError<B::Error>> {
+        let mut written = taken.map(|taken| !taken);
+        if !self.is_core() {
+            for (byte, present) in written.iter_mut().zip(present) {
+                *byte &= present;
+            }
+        }
+        self.put(register, &written)
     }
 
     /// Takes the events that happened: reads them, and clears those that were read.
@@ -145,8 +184,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
-        self.put(Register::EventH, &[!high, !low])?;
-        self.put(Register::EventS, &[!safe])?;
+        self.clear(Register::EventH, [high, low], [high, low])?;
+        self.clear(Register::EventS, [safe], [safe])?;
         let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
         Ok(Events { drive, safe: EventS::from_bits_retain(safe) })
     }
@@ -156,19 +195,29 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// # Errors
     /// [`Error::Busy`] while one is under way; those of the bus.
     pub fn start_short(&mut self, request: ShortRequest) -> Result<(), BusError<B::Error>> {
-        if self.get::<2>(Register::OnlineStatus1)?.last().is_none_or(|low| low & 1 == 0) {
+        let [short, _] = self.under_way;
+        if if self.is_core() { short } else { self.get::<2>(Register::OnlineStatus1)?[1] & 1 == 0 } {
             return Err(BusError::Link(Error::Busy));
         }
-        self.put(Register::EventS, &[!EventS::FRES.bits()])?;
-        let (read, register) = match request {
-            ShortRequest::Read(register) => (0x80, register),
-            ShortRequest::Write(register, value) => {
-                self.put(Register::SPcData, &[value])?;
-                (0, register)
+        let events = self.get(Register::EventS)?;
+        self.clear(Register::EventS, events, [EventS::FRES.bits()])?;
+        match (request, self.is_core()) {
+            // What this reading returns means nothing.
+            (ShortRequest::Read(register), true) => {
+                self.bus.read(register.address(), &mut [0]).map_err(BusError::Bus)?
             }
-        };
-        // With bit 6 set, which is not looked at: 3Fh is the idle mark and no write to 7Fh.
-        self.put(Register::SlaveRegCtrl, &[read | register.address()])
+            (ShortRequest::Write(register, value), true) => {
+                self.bus.write(register.address(), &[value]).map_err(BusError::Bus)?;
+            }
+            // With bit 6 set, which is not looked at: 3Fh is the idle mark and no write to 7Fh.
+            (ShortRequest::Read(register), false) => self.put(Register::SlaveRegCtrl, &[0x80 | register.address()])?,
+            (ShortRequest::Write(register, value), false) => {
+                self.put(Register::SPcData, &[value])?;
+                self.put(Register::SlaveRegCtrl, &[register.address()])?;
+            }
+        }
+        self.under_way[0] = true;
+        Ok(())
     }
 
     /// Whether the short message has ended, and the data that it brought if it was a reading.
@@ -180,8 +229,9 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         if events & EventS::FRES.bits() == 0 {
             return Ok(None);
         }
-        self.put(Register::EventS, &[!EventS::FRES.bits()])?;
-        let [data] = self.get(Register::SPcData)?;
+        self.clear(Register::EventS, [events], [EventS::FRES.bits()])?;
+        let [data] = self.get(if self.is_core() { Register::PcData } else { Register::SPcData })?;
+        self.under_way[0] = false;
         Ok(Some(data))
     }
 
@@ -190,10 +240,12 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// # Errors
     /// [`Error::Busy`] while one is under way; those of the bus.
     pub fn start_long(&mut self, request: &LongRequest) -> Result<(), BusError<B::Error>> {
-        if self.get::<2>(Register::OnlineStatusD)?.last().is_none_or(|low| low & 2 == 0) {
+        let [_, long] = self.under_way;
+        if if self.is_core() { long } else { self.get::<2>(Register::OnlineStatusD)?[1] & 2 == 0 } {
             return Err(BusError::Link(Error::Busy));
         }
-        self.put(Register::EventL, &[!(Event::FREL | Event::ANS).bits().to_le_bytes()[0]])?;
+        let events = self.get(Register::EventL)?;
+        self.clear(Register::EventL, events, [(Event::FREL | Event::ANS).bits().to_le_bytes()[0]])?;
         if let Access::Write(data) = &request.access {
             self.put(Register::PcBuffer, data.as_bytes())?;
         }
@@ -201,7 +253,9 @@ impl<B: RegisterBus> RemoteReceiver<B> {
             self.put(Register::PcOff, &(offset.get() | 0x8000).to_be_bytes())?;
         }
         self.put(Register::PcAdd, &request.header())?;
-        self.put(Register::PcCtrl, &[1])
+        self.put(Register::PcCtrl, &[1])?;
+        self.under_way[1] = true;
+        Ok(())
     }
 
     /// Whether the long message has ended, and what it brought: nothing after a write.
@@ -214,7 +268,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         if events & frel == 0 {
             return Ok(None);
         }
-        self.put(Register::EventL, &[!(frel | ans)])?;
+        self.clear(Register::EventL, [events], [frel | ans])?;
+        self.under_way[1] = false;
         if events & ans != 0 {
             return Err(BusError::Link(Error::NotAccepted { tries: 1 }));
         }

@@ -13,7 +13,7 @@ servowire_core::codes! {
         EventH = 0x04 => "EVENT_H",
         /// EVENT_L, see [`Event`](super::Event).
         EventL = 0x05 => "EVENT_L",
-        /// MASK_H: which events interrupt.
+        /// MASK_H: which events interrupt. By the manual bit 6 MSUM is that some bit of MASK_SUM is set.
         MaskH = 0x06 => "MASK_H",
         /// MASK_L.
         MaskL = 0x07 => "MASK_L",
@@ -50,6 +50,9 @@ servowire_core::codes! {
         PipeS = 0x2d => "PIPE_S",
         /// PIPE_D: the entry that was taken out; in the SDK the last byte of the pipe channel.
         PipeD = 0x2e => "PIPE_D",
+        /// PC_DATA: data of short messages at the drive's interface of the SICK core; S_PC_DATA is that of its safe one. Not in the
+        /// SDK.
+        PcData = 0x2f => "PC_DATA",
         /// SAFE_CTRL: like SYS_CTRL.
         SafeCtrl = 0x35 => "SAFE_CTRL",
         /// SAFE_SUM: SUMMARY of the last V-frame, of the last good one in the SICK core.
@@ -58,6 +61,10 @@ servowire_core::codes! {
         SPcData = 0x37 => "S_PC_DATA",
         /// ACC_ERR_CNT: acceleration words in a row that could not be used; stops at 31 in the SICK core.
         AccErrCnt = 0x38 => "ACC_ERR_CNT",
+        /// MAXACC: limit of the estimator's acceleration, FFh at first. Kept here, and not in the SDK.
+        MaxAcc = 0x39 => "MAXACC",
+        /// MAXDEV_H, MAXDEV_L: greatest deviation while estimating, FFFFh at first. Kept here, and not in the SDK.
+        MaxDev = 0x3a => "MAXDEV",
         /// EVENT_S, see [`EventS`](super::EventS).
         EventS = 0x3d => "EVENT_S",
         /// MASK_S: which safe events interrupt.

@@ -10,6 +10,10 @@ const SYS_CTRL: u8 = Register::SysCtrl as u8;
 const SYNC_CTRL: u8 = Register::SyncCtrl as u8;
 const EVENT_H: u8 = Register::EventH as u8;
 const EVENT_L: u8 = Register::EventL as u8;
+const MASK_H: u8 = Register::MaskH as u8;
+const MASK_SUM: u8 = Register::MaskSum as u8;
+/// Bit 6 of MASK_H: the OR of the bits of MASK_SUM (SICK manual, p. 41).
+const MSUM: u8 = 0x40;
 const PC_ADD: u8 = Register::PcAdd as u8;
 const PC_CTRL: u8 = Register::PcCtrl as u8;
 const PIPE_S: u8 = Register::PipeS as u8;
@@ -21,7 +25,7 @@ const ACC_ERR_CNT_THRESH: u8 = Register::AccErrCntThresh as u8;
 
 /// What only the receiver writes (SICK manual, p. 41-54); S_PC_DATA is written by the application before a short write.
 const fn is_read_only(address: u8) -> bool {
-    matches!(address, 0x03 | 0x09..=0x1f | 0x2d | 0x2e | 0x36 | 0x44..=0x55)
+    matches!(address, 0x03 | 0x09..=0x1f | 0x2d..=0x2f | 0x36 | 0x44..=0x55)
 }
 
 impl Registers {
@@ -84,6 +88,14 @@ impl Registers {
                 self.threshold(master, value.min(31));
             }
             ACC_ERR_CNT_THRESH => self.threshold(master, value),
+            MASK_SUM if self.dialect.registers == RegisterRule::Sick => {
+                self.set_byte(address, value);
+                let [mask, _] = self.get(Register::MaskH);
+                self.put(Register::MaskH, [if value == 0 { mask & !MSUM } else { mask | MSUM }]);
+            }
+            MASK_H if self.dialect.registers == RegisterRule::Sick => {
+                self.set_byte(address, value & !MSUM | present & MSUM);
+            }
             PC_ADD if self.dialect.registers == RegisterRule::Sick => self.set_byte(address, value | 0x80),
             _ => self.set_byte(address, value),
         }

@@ -1,4 +1,5 @@
-//! A hostile line: what is given as a position is the truth, or explained.
+//! A hostile line, for encoders of all widths and in both dialects: what is given as a position is the truth, or explained, and it
+//! comes back.
 //!
 //! `HOSTILE_EVENTS=100000000 cargo test --release -p hdsl --test all hostile:: -- --nocapture` runs as many H-frames and prints
 //! what happened in them; `HOSTILE_SEED` gives others.
@@ -9,16 +10,13 @@ use hdsl::device::Device;
 use hdsl::master::{Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::Registers;
-use hdsl::{Answer, Dialect, Doubt, EncoderId, Policy, Rule, Window};
+use hdsl::{Answer, Dialect, Doubt, EncoderId, Policy, Window};
 
 /// A free-running frame.
 const FRAME_NS: u64 = 11_520;
 const ANY_AGE: Policy = Policy::new(u64::MAX);
 
 const ANSWER: u64 = u64::MAX >> 3;
-/// 11 bits of acceleration, 24 of position.
-const ID: EncoderId = EncoderId::truncate(0x000d3);
-const BITS: u32 = 24;
 
 struct Noise(u64);
 
@@ -37,6 +35,8 @@ impl Noise {
 
 /// The motion, and what an encoder without errors would say about it.
 struct Motion {
+    /// Width of the encoder's position.
+    bits: u32,
     velocity: i64,
     /// Positions at the last sampling edges, the newest first.
     positions: [i64; 20],
@@ -44,8 +44,11 @@ struct Motion {
 
 impl Motion {
     fn step(&mut self, noise: &mut Noise) -> i64 {
-        let jerk = noise.below(81) as i64 - 40;
-        let wanted = if self.velocity.abs() > 30_000 { -jerk.abs() * self.velocity.signum() } else { jerk };
+        // Half of the speed that a V-frame can tell.
+        let fastest = (1_i64 << (self.bits - 5)).min(30_000);
+        let hardest = (fastest / 24).clamp(1, 40);
+        let jerk = noise.below(2 * hardest.unsigned_abs() + 1) as i64 - hardest;
+        let wanted = if self.velocity.abs() > fastest { -jerk.abs() * self.velocity.signum() } else { jerk };
         self.velocity += wanted;
         self.positions.rotate_right(1);
         self.positions[0] = self.positions[1] + self.velocity;
@@ -54,8 +57,13 @@ impl Motion {
 
     /// The position `age` frames ago, as an encoder of this width counts it.
     fn at(&self, age: u8) -> i64 {
-        self.positions[usize::from(age)].rem_euclid(1 << BITS)
+        self.positions[usize::from(age)].rem_euclid(1 << self.bits)
     }
+}
+
+/// 11 bits of acceleration, so many of position.
+fn id_of(bits: u32) -> EncoderId {
+    EncoderId::truncate(3 | (bits - 11) << 4)
 }
 
 /// What happens to an answer.
@@ -83,32 +91,33 @@ struct Tally {
     messages: u64,
     restarts: u64,
     identifiers: u64,
+    returned: u64,
 }
 
-fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
+fn run(dialect: Dialect, width: u32, seed: u64, frames: u64, tally: &mut Tally) {
     let mut noise = Noise(seed);
-    let mut tally = Tally::default();
-    // The range is passed every thousand frames or so.
-    let mut device = Device::new(ID);
+    let id = id_of(width);
+    let mut device = Device::new(id);
     device.resources_mut().set_register(RemoteRegister::PING, 0x5a);
     let mut master = Master::new(dialect);
     let mut map = Registers::new(&dialect);
-    let mut motion = Motion { velocity: 0, positions: [(1 << BITS) - 5; 20] };
+    let mut motion = Motion { bits: width, velocity: 0, positions: [(1 << width) - 5; 20] };
     // Frames since an acceleration word that was wrong and passed all checks.
-    let (mut since_poison, mut last, mut since_event) = (u32::MAX, 0, 0_u32);
+    let (mut since_poison, mut before_it, mut last, mut quiet) = (u32::MAX, u32::MAX, 0, 0_u32);
     for frame in 0..frames {
         let truth = motion.step(&mut noise);
         let mut head = master.transmission().head.bits();
-        if noise.below(2000) == 0 {
+        let mut damaged = noise.below(2000) == 0;
+        if damaged {
             head = Window::from_bits(head.bits() ^ 1 << noise.below(26), head.len()).unwrap();
             *tally.events.entry("head").or_default() += 1;
         }
         let answer = device.set_position(motion.at(0) as u64).hear(head);
         let (event, bits) = damage(&mut noise, answer.map_or(ANSWER, |answer| answer.bits), last);
         *tally.events.entry(event).or_default() += 1;
+        damaged |= event != "clean";
         last = answer.map_or(ANSWER, |answer| answer.bits);
-        let accepted = Answer::from_bits(Rule::Strict, bits).delta_delta();
-        since_event = if event == "clean" { since_event + 1 } else { 0 };
+        let accepted = Answer::from_bits(dialect.rule, bits).delta_delta();
         let running = master.state() == State::Running;
         let sampled_ns = (frame + 100) * FRAME_NS;
         // 91 bits from the edge to the end of the window.
@@ -124,28 +133,40 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
             assert_eq!(answer.result.unwrap().as_bytes(), b"RESOLUTN");
         }
         let poisoned = running && accepted.is_ok_and(|value| i64::from(value.get()) != truth);
-        since_poison = if poisoned { 0 } else { since_poison.saturating_add(1) };
+        if poisoned {
+            (before_it, since_poison) = (since_poison, 0);
+        } else {
+            since_poison = since_poison.saturating_add(1);
+        }
 
         // The identifier comes once and without check bits: an application knows which encoder it has and compares. (The line
         // inverted for that one frame gives another one.)
-        if master.encoder_id().is_some_and(|id| id != ID) {
+        if master.encoder_id().is_some_and(|known| known != id) {
             tally.identifiers += 1;
             master.request_restart();
             continue;
         }
-        // Law: the fast position is the truth; a wrong word that passed CRC-5 is found out at the end of the next V-frame.
-        if let Ok(fast) = master.fast().at(sampled_ns, Policy::new(0)) {
+        // Law: the fast position is the truth; a wrong word that passed CRC-5 is found out at the end of the next V-frame, and two
+        // that cancel in the position at the end of theirs by the one after that.
+        let fast = master.fast().at(sampled_ns, Policy::new(0));
+        let explained = since_poison < if before_it < 24 { 24 } else { 16 };
+        if let Ok(fast) = fast {
             tally.fast += 1;
             if (fast.position(), i64::from(fast.velocity())) != (motion.at(0), motion.velocity) {
                 assert!(
-                    since_poison < 16,
-                    "wrong fast position, {since_poison} frames after the last bad word: {fast:?}, truth {} {}, {tracker:?}",
+                    explained,
+                    "{width} bits: {fast:?}, truth {} {}, {since_poison} frames after the last bad word, {before_it} before it",
                     motion.at(0),
                     motion.velocity,
-                    tracker = (map.stage(), master.frame(), master.counters(), event, since_event),
                 );
                 tally.explained += 1;
             }
+        }
+        // Law: on a good line it comes back, 24 + 32 frames after the last damage at the latest.
+        quiet = if damaged || master.state() != State::Running { 0 } else { quiet + 1 };
+        if quiet > 56 {
+            tally.returned += u64::from(quiet == 57);
+            assert!(fast.is_ok(), "{width} bits: {fast:?} after {quiet} good frames, {:?}", master.counters());
         }
         // Law: the safe position is the true one of its time.
         if let Ok(safe) = master.safe().at(sampled_ns, Policy::new(15 * FRAME_NS)) {
@@ -166,20 +187,29 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
             let _ = master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
     }
-    tally
 }
 
 #[test]
 fn hostile_frames_give_the_truth_or_nothing() {
-    let frames = servowire_world::wanted_events(100_000);
+    let frames = servowire_world::wanted_events(200_000);
     let first = std::env::var("HOSTILE_SEED").map_or(1, |text| text.parse().unwrap());
-    for seed in [first, first + 1] {
-        let tally = run(Dialect::SICK, seed, frames / 2);
+    for dialect in [Dialect::SICK, Dialect::TI] {
+        let mut tally = Tally::default();
+        for bits in 11..=40 {
+            run(dialect, bits, first + u64::from(bits), frames / 60, &mut tally);
+        }
         println!(
-            "{} fast positions, {} of them wrong for up to 16 frames after a word that passed CRC-5; {} safe positions; \
+            "{} fast positions, {} of them wrong after words that passed CRC-5; it came back {} times; {} safe positions; \
              {} messages; {} restarts; {} wrong identifiers; {:?}",
-            tally.fast, tally.explained, tally.safe, tally.messages, tally.restarts, tally.identifiers, tally.events
+            tally.fast,
+            tally.explained,
+            tally.returned,
+            tally.safe,
+            tally.messages,
+            tally.restarts,
+            tally.identifiers,
+            tally.events
         );
-        assert!(tally.fast > frames / 20 && tally.safe > frames / 200 && tally.messages > 0);
+        assert!(tally.fast > frames / 20 && tally.safe > frames / 200 && tally.messages > 0 && tally.returned > 0);
     }
 }

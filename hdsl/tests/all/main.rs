@@ -10,6 +10,7 @@ mod cable;
 mod complaints;
 mod dialects;
 mod encoder;
+mod events;
 mod golden;
 mod hostile;
 mod instant;
@@ -18,6 +19,7 @@ mod message_rules;
 mod position_laws;
 mod receiver;
 mod register_map;
+mod remote;
 #[cfg(feature = "serde")]
 mod serde;
 mod small_print;

@@ -7,6 +7,7 @@ mod frame;
 mod message;
 mod position;
 mod registers;
+mod startup;
 mod sync;
 
 use crate::row::{Check, Fault};

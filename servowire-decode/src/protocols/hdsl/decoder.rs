@@ -13,7 +13,7 @@ use hdsl::inspect::{
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::Delay;
 use hdsl::{
-    Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, PositionBits, PositionTracker, QualityMonitor,
+    Answer, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, FastPosition, MasterSymbol, QualityMonitor,
     QualityRule, Rule, VFrame, Window,
 };
 
@@ -37,6 +37,8 @@ const GOOD: usize = 10;
 /// Answers from which the delay is learned, and bits in which they are.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
+/// Of an encoder whose identifier was not seen: 11 bits of acceleration, 40 of position.
+const WIDEST: EncoderId = EncoderId::truncate(0x001d3);
 const LONE: &str = "a lone nibble between two frames without one is no message: a bit was flipped";
 const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
 const PAUSED: &str = "the line rests here, though frames follow each other for ever";
@@ -61,7 +63,8 @@ pub(super) struct Decoder {
     delay: Option<u32>,
     /// Time from the end of a head to its answer, in picoseconds.
     lag: Option<i64>,
-    tracker: PositionTracker,
+    /// `None` only if there were encoders that it cannot follow.
+    fast: Option<FastPosition>,
     quality: QualityMonitor,
     frame: VFrame,
     /// Place in the V-frame, once VSYNC was seen.
@@ -92,7 +95,7 @@ impl Decoder {
             apart: None,
             delay: None,
             lag: None,
-            tracker: PositionTracker::new(PositionBits::MAX),
+            fast: FastPosition::new(WIDEST).ok(),
             quality: QualityMonitor::new(QualityRule::Sick),
             frame: VFrame::default(),
             at: None,
@@ -228,10 +231,16 @@ impl Decoder {
         }
     }
 
+    fn step(&mut self, value: Option<DeltaDelta>) {
+        if let Some(fast) = &mut self.fast {
+            fast.step(value);
+        }
+    }
+
     /// Frames that were not heard: the fast position and the V-frame go on without them.
     fn lose(&mut self, frames: u8) {
         for _ in 0..frames {
-            self.tracker.step(None);
+            self.step(None);
         }
         (self.lone, self.chain) = (None, None);
         self.lose_v_frame();
@@ -240,6 +249,9 @@ impl Decoder {
     /// Nobody knows where in a V-frame the next frame is.
     fn lose_v_frame(&mut self) {
         (self.at, self.failed, self.strays) = (None, None, 0);
+        if let Some(fast) = &mut self.fast {
+            fast.interrupt();
+        }
         self.settle(None);
     }
 
@@ -274,7 +286,7 @@ impl Decoder {
             let why = if silent { "no answer" } else { "hardly a word of the answer holds" };
             let class = if silent { NO_RESPONSE } else { "invalid_word" };
             let verdict = Err((class, why.to_owned()));
-            self.tracker.step(None);
+            self.step(None);
             self.chain = None;
             self.said.push(event(place, Direction::Answer, "answer", Vec::new(), verdict));
             if self.at == Some(7) {
@@ -306,7 +318,7 @@ impl Decoder {
         let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
         let fields = id.map_or_else(|_| Vec::new(), |id| vec![Field::hex("ENC_ID", id.get(), 5)]);
         self.said.push(event(place, Direction::Answer, "identifier", fields, id.map(|_| ()).map_err(refusal)));
-        if let Ok(bits) = id.and_then(EncoderId::check) {
+        if let Ok(fast) = id.and_then(FastPosition::new) {
             *self = Self {
                 said: std::mem::take(&mut self.said),
                 heads: self.heads,
@@ -315,7 +327,7 @@ impl Decoder {
                 next: self.next,
                 head: self.head,
                 apart: self.apart,
-                tracker: PositionTracker::new(bits),
+                fast: Some(fast),
                 ..Self::new()
             };
         }

@@ -7,7 +7,7 @@ use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceA
 use hdsl::registers::{Event, EventS, Events, Register, Registers};
 use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, SampledAnswer, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Reading, RunningDisparity, Word};
-use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
+use hdsl::sync::{Es, Next, Synchroniser};
 use hdsl::{
     Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity,
     MasterSymbol, ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor,
@@ -248,11 +248,6 @@ kernels! {
         Ok(sync.next(None))
     } over PERIODS;
 
-    /// The start-up arithmetic of sync mode.
-    fn hdsl_sync_startup((period, es): &(u32, u8)) -> Result<Startup, Error> {
-        Startup::new(*period * 4, CoreClock::Mhz300, es_of(*es)?)
-    } over PERIODS;
-
     /// The first frames of a link: master, registers, cable and encoder. (The timer cannot count the calls of a longer one.)
     fn hdsl_link(frames: &u32) -> Result<(Counters, u64), Error> {
         let mut master = Master::new(Dialect::SICK);
@@ -270,7 +265,7 @@ kernels! {
             }
             let _ = map.apply(master.hear(&samples, 11_520 * u64::from(frame))?);
         }
-        Ok((master.counters(), map.pos()))
+        Ok((master.counters(), map.vpos()))
     } over LINKS;
 
     /// What an application does with registers.

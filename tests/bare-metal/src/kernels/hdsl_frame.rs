@@ -1,5 +1,8 @@
 //! A whole H-frame of a running link, mean and worst of 4,000: what a processor has to do between an answer and the next
 //! head. A short and a long message are started every 100 frames, 1.2 ms.
+//!
+//! The mean is that of a line with jitter, the worst that of a damaged one: wrong bits, glitches in every bit, answers that are
+//! nothing but noise, silence, links that are lost and start anew.
 
 use core::hint::black_box;
 
@@ -24,6 +27,17 @@ struct Link {
     cable: Cable,
     position: u64,
     count: u32,
+    line: Line,
+    noise: u32,
+}
+
+/// What happens to answers.
+#[derive(Clone, Copy, PartialEq)]
+enum Line {
+    /// Jitter of a sample.
+    Polite,
+    /// In every third frame something worse.
+    Damaged,
 }
 
 /// An answer in all forms that a receiver takes.
@@ -39,7 +53,7 @@ type Step = fn(&mut Link, answer: &Received) -> Window;
 
 impl Link {
     /// Answers come `delay` eighths of a bit after the start of reception.
-    fn up(dialect: Dialect, delay: u32) -> Self {
+    fn up(dialect: Dialect, delay: u32, line: Line) -> Self {
         let mut link = Self {
             master: Master::new(dialect),
             map: Registers::new(&dialect),
@@ -47,11 +61,57 @@ impl Link {
             cable: Cable::new(Disturbance::default().with_jitter(1).with_delay(delay), 1),
             position: 0,
             count: 0,
+            line: Line::Polite,
+            noise: 1,
         };
         for _ in 0..200 {
             link.frame(hdsl_frame);
         }
+        link.line = line;
         link
+    }
+
+    fn draw(&mut self) -> u32 {
+        self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        self.noise >> 8
+    }
+
+    /// What is done to the samples of an answer, and to its bits.
+    fn damage(&mut self, samples: &mut [u8; WINDOW], bits: u64) -> u64 {
+        let place = self.draw() % 61;
+        match self.draw() % 240 {
+            // One wrong bit, and a glitch in it.
+            0..6 => {
+                samples[place as usize + 3] ^= 0xff;
+                bits ^ 1 << place
+            }
+            // A wrong bit in each word, and in each bit a glitch that leaves an RSSI of 4.
+            6..9 => {
+                samples.iter_mut().for_each(|byte| *byte ^= 0x10);
+                bits ^ 0x0402_0100_8040_2010
+            }
+            // Ten equal bits in each word.
+            9 => {
+                samples.fill(0);
+                0
+            }
+            // Silence.
+            10 => {
+                samples.fill(0xff);
+                u64::MAX >> 3
+            }
+            // Noise.
+            11..13 => {
+                samples.iter_mut().for_each(|byte| *byte = self.draw() as u8);
+                u64::from(self.draw()) << 37 | u64::from(self.draw()) << 20 | u64::from(self.draw())
+            }
+            // Glitches in the bits between the samples that are taken.
+            13..16 => {
+                samples.iter_mut().for_each(|byte| *byte ^= 0x10);
+                bits
+            }
+            _ => bits,
+        }
     }
 
     /// One H-frame, and the instructions of the receiver.
@@ -71,12 +131,16 @@ impl Link {
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
         let answer = self.encoder.set_position(self.position).hear(self.master.transmission().head.bits());
-        let bytes = self.cable.up(answer);
+        let mut bytes = self.cable.up(answer);
+        let mut bits = answer.map_or(u64::MAX >> 3, |answer| answer.bits);
+        if self.line == Line::Damaged {
+            bits = self.damage(&mut bytes, bits);
+        }
         let mut words = [0; WINDOW / 4];
         for (to, from) in words.iter_mut().zip(bytes.chunks_exact(4)) {
             *to = from.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
         }
-        Received { bytes, words, bits: answer.map_or(0, |answer| answer.bits), end_ns: 11_520 * u64::from(self.count) }
+        Received { bytes, words, bits, end_ns: 11_520 * u64::from(self.count) }
     }
 }
 
@@ -128,16 +192,11 @@ fn nothing(_: &mut Link, _: &Received) -> Window {
     Window::EMPTY
 }
 
-/// Mean, in tenths, and worst of all frames on 10 m of cable.
-fn measure(step: Step) -> (u32, u32) {
-    measure_at(14, step)
-}
-
-/// The same after a delay in eighths of a bit.
-fn measure_at(delay: u32, step: Step) -> (u32, u32) {
-    let mut link = Link::up(Dialect::SICK, delay);
+/// Mean, in tenths, and worst of all frames after a delay in eighths of a bit.
+fn measure(line: Line, delay: u32, step: Step) -> (u32, u32) {
+    let mut link = Link::up(Dialect::SICK, delay, line);
     // Without the receiver the link stands still; the answers are as long.
-    let mut idle = Link::up(Dialect::SICK, delay);
+    let mut idle = Link::up(Dialect::SICK, delay, Line::Polite);
     let empty = (0..FRAMES).fold(0, |sum: u32, _| sum + idle.frame(nothing)) / FRAMES;
     let (mut sum, mut worst) = (0, 0);
     for _ in 0..FRAMES {
@@ -148,28 +207,40 @@ fn measure_at(delay: u32, step: Step) -> (u32, u32) {
     ((sum / (FRAMES / 10)).saturating_sub(empty * 10), worst.saturating_sub(empty))
 }
 
-/// A frame with the register map beside it; the map alone is what is more.
-fn with_registers(link: &mut Link, answer: &Received) -> Window {
-    let _ = link.master.hear(&answer.bytes, answer.end_ns);
-    hdsl_frame_registers(&mut link.map, link.master.h_frame());
-    link.master.transmission().head.bits()
+/// On 10 m of cable.
+fn mean(step: Step) -> u32 {
+    measure(Line::Polite, 14, step).0
 }
 
-/// Mean and worst of the head that leaves early; the samples are taken in afterwards.
-fn measure_ahead(head: fn(&mut Link, &Received) -> Window) -> (u32, u32) {
-    let mut link = Link::up(Dialect::SICK, 14);
+fn worst(step: Step) -> u32 {
+    measure(Line::Damaged, 14, step).1 * 10
+}
+
+/// Mean and worst of a part of the work; the samples are taken in before or afterwards, and do not count.
+fn measure_part(line: Line, part: Step, ahead: bool) -> (u32, u32) {
+    let mut link = Link::up(Dialect::SICK, 14, line);
     let empty = link.frame(nothing);
     let (mut sum, mut worst) = (0, 0);
     for _ in 0..FRAMES {
         let received = link.received();
+        if !ahead {
+            hdsl_frame(&mut link, &received);
+        }
         let one = count::once(|| {
-            black_box(head(&mut link, black_box(&received)));
+            black_box(part(&mut link, black_box(&received)));
         });
-        hdsl_frame(&mut link, &received);
+        if ahead {
+            hdsl_frame(&mut link, &received);
+        }
         sum += one;
         worst = worst.max(one);
     }
     ((sum / (FRAMES / 10)).saturating_sub(empty * 10), worst.saturating_sub(empty))
+}
+
+fn registers(link: &mut Link, _: &Received) -> Window {
+    hdsl_frame_registers(&mut link.map, link.master.h_frame());
+    Window::EMPTY
 }
 
 /// A kernel under a name of its own that does what another one does.
@@ -191,21 +262,28 @@ macro_rules! named {
 named! {
     hdsl_frame_worst = hdsl_frame;
     hdsl_frame_words_worst = hdsl_frame_words;
+    hdsl_frame_damaged = hdsl_frame;
     hdsl_frame_border = hdsl_frame;
     hdsl_frame_bits_worst = hdsl_frame_bits;
+    hdsl_frame_bits_damaged = hdsl_frame_bits;
     hdsl_frame_ahead_worst = hdsl_frame_ahead;
 }
 
 pub(crate) const KERNELS: &[Kernel] = &[
-    Kernel { name: "hdsl_frame", tenths: || measure(hdsl_frame).0 },
-    Kernel { name: "hdsl_frame_worst", tenths: || measure(hdsl_frame_worst).1 * 10 },
+    Kernel { name: "hdsl_frame", tenths: || mean(hdsl_frame) },
+    Kernel { name: "hdsl_frame_damaged", tenths: || measure(Line::Damaged, 14, hdsl_frame_damaged).0 },
+    Kernel { name: "hdsl_frame_worst", tenths: || worst(hdsl_frame_worst) },
     // The edges are where bit times meet: with jitter two fall into one, and the RSSI has to be looked up.
-    Kernel { name: "hdsl_frame_border", tenths: || measure_at(16, hdsl_frame_border).0 },
-    Kernel { name: "hdsl_frame_words", tenths: || measure(hdsl_frame_words).0 },
-    Kernel { name: "hdsl_frame_words_worst", tenths: || measure(hdsl_frame_words_worst).1 * 10 },
-    Kernel { name: "hdsl_frame_bits", tenths: || measure(hdsl_frame_bits).0 },
-    Kernel { name: "hdsl_frame_bits_worst", tenths: || measure(hdsl_frame_bits_worst).1 * 10 },
-    Kernel { name: "hdsl_frame_ahead", tenths: || measure_ahead(hdsl_frame_ahead).0 },
-    Kernel { name: "hdsl_frame_ahead_worst", tenths: || measure_ahead(hdsl_frame_ahead_worst).1 * 10 },
-    Kernel { name: "hdsl_frame_registers", tenths: || measure(with_registers).0.saturating_sub(measure(hdsl_frame).0) },
+    Kernel { name: "hdsl_frame_border", tenths: || measure(Line::Polite, 16, hdsl_frame_border).0 },
+    Kernel { name: "hdsl_frame_words", tenths: || mean(hdsl_frame_words) },
+    Kernel { name: "hdsl_frame_words_worst", tenths: || worst(hdsl_frame_words_worst) },
+    Kernel { name: "hdsl_frame_bits", tenths: || mean(hdsl_frame_bits) },
+    Kernel { name: "hdsl_frame_bits_damaged", tenths: || measure(Line::Damaged, 14, hdsl_frame_bits_damaged).0 },
+    Kernel { name: "hdsl_frame_bits_worst", tenths: || worst(hdsl_frame_bits_worst) },
+    Kernel { name: "hdsl_frame_ahead", tenths: || measure_part(Line::Polite, hdsl_frame_ahead, true).0 },
+    Kernel {
+        name: "hdsl_frame_ahead_worst",
+        tenths: || measure_part(Line::Damaged, hdsl_frame_ahead_worst, true).1 * 10,
+    },
+    Kernel { name: "hdsl_frame_registers", tenths: || measure_part(Line::Polite, registers, false).0 },
 ];

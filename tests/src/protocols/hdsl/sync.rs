@@ -1,11 +1,12 @@
 //! External synchronisation.
 
 use hdsl::frame::{Extra, H_FRAME_BITS, Stuffing};
-use hdsl::sync::{CoreClock, Es, ExtraWindow, Startup};
+use hdsl::sync::Es;
 use hdsl::{Error, LineDisparity, MasterSymbol, ParameterByte};
 use serde::Deserialize;
 
 use super::Line;
+use super::startup::{CoreClock, Startup, of_registers};
 use crate::hex::Hex;
 use crate::row::{Fault, Row, Verdict, each, same};
 
@@ -36,18 +37,15 @@ pub(super) fn ext_sync_seed(rows: &[Row]) -> Vec<Verdict> {
         same("columns", &row.columns.iter().map(String::as_str).collect(), &columns.to_vec())?;
         let Start { extra_size, time_rest, num_stuffing, time_extra_window, extra_edge } = row.start;
         let blocks = Stuffing::new(num_stuffing).ok_or_else(|| Fault::Unreadable(format!("{num_stuffing} blocks")))?;
-        let state = ExtraWindow::from_registers(extra_size, time_rest, blocks, time_extra_window);
-        let mut state = state.map_err(|e| Fault::Unreadable(e.to_string()))?;
-        same("extra_edge", &extra_edge, &state.extra_edge())?;
+        let state = of_registers(extra_size, time_rest, blocks, time_extra_window);
+        let mut state = state.ok_or_else(|| Fault::Unreadable("a window out of its range".to_owned()))?;
+        same("extra_edge", &extra_edge, &state.extra().edge_register())?;
         same("steps", &row.adjust.len(), &row.steps.len())?;
         for (adjust, want) in row.adjust.iter().zip(row.steps) {
             same("step", &Ok(()), &state.step(*adjust))?;
-            let edge = state.extra_edge();
-            same(
-                "state",
-                &want,
-                &(state.extra_size(), state.time_rest(), state.stuffing().get(), state.window(), edge),
-            )?;
+            let edge = state.extra();
+            let (size, rest) = (edge.get() / 8, edge.get() % 8);
+            same("state", &want, &(size, rest, state.stuffing().get(), state.window(), edge.edge_register()))?;
         }
         Ok(())
     })

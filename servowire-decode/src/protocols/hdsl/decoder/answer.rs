@@ -2,7 +2,7 @@
 
 use hdsl::frame::ANSWER_BITS;
 use hdsl::inspect::{Chain, Expected, inspect};
-use hdsl::{AlignmentStage, Answer, EncoderByte, Error, Rule, VFrame, Window};
+use hdsl::{Answer, EncoderByte, Error, Policy, Rule, Sample, VFrame, Window};
 
 use super::super::refused::{Refused, event, position, refusal};
 use super::{Break, Decoder};
@@ -24,7 +24,7 @@ impl Decoder {
     pub(super) fn normal(&mut self, window: Window, place: Place) {
         let Ok(answer) = Answer::parse(Rule::Strict, window) else { return };
         let dd = answer.delta_delta();
-        self.tracker.step(dd.ok());
+        self.step(dd.ok());
         let parameter = answer.parameter();
         let report = inspect(Expected::Normal { at: self.at }, window);
         let chain = report.disparity();
@@ -48,10 +48,12 @@ impl Decoder {
             };
             Some(Span::even(place, ANSWER_BITS, first, last))
         });
-        let shown = self.tracker.registers();
-        if self.tracker.stage() == AlignmentStage::Check && !shown.pos_flag {
-            event.fields.push(Field::hex("POS", shown.pos, 10));
-            event.position = Some(position(shown.pos));
+        if let Some(sample) = self.sample() {
+            // 40 bits, as the register shows it.
+            let raw = u64::from_le_bytes(sample.position().to_le_bytes()) & 0xff_ffff_ffff;
+            event.fields.push(Field::hex("POS", raw, 10));
+            event.fields.push(Field::measured("VEL", sample.velocity(), "/frame"));
+            event.position = Some(position(raw));
         }
         if event.verdict.is_ok() && !answer.switch_ok() {
             event.fields.push(Field::text("note", SWITCH));
@@ -61,6 +63,11 @@ impl Decoder {
         self.join(sound.then_some((chain, number)));
         self.message_in(parameter.ok(), place);
         self.v_frame(answer, place);
+    }
+
+    /// The fast position, if a receiver may use it: the same verdict.
+    fn sample(&self) -> Option<Sample> {
+        self.fast?.evidence(0, 0).at(0, Policy::new(u64::MAX)).ok()
     }
 
     fn fields(&self, answer: Answer) -> Vec<Field> {
@@ -75,7 +82,6 @@ impl Decoder {
         fields.extend(byte("PIPE", answer.pipe()));
         fields.extend(answer.delta_delta().ok().map(|dd| Field::number("DD", dd.get())));
         fields.extend(byte("SEC", answer.secondary()));
-        fields.push(Field::measured("VEL", self.tracker.registers().vel, "/frame"));
         fields
     }
 
@@ -152,9 +158,8 @@ impl Decoder {
         let VFrame { safe1, safe2 } = self.frame;
         let safe = safe1.vpos();
         self.quality.count_v_frame(&self.frame);
-        match safe {
-            Ok(position) => self.tracker.align(position),
-            Err(_) => self.tracker.no_safe_position(),
+        if let Some(fast) = &mut self.fast {
+            fast.align(safe.ok());
         }
         let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
         fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));

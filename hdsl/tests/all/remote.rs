@@ -1,0 +1,207 @@
+//! `RemoteReceiver` on buses that behave like the two devices: the memory that the firmware of the Motor Control SDK shares, and
+//! the registers of the SICK IP core.
+
+use core::convert::Infallible;
+
+use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
+use hdsl::registers::{BusError, Event, EventS, Events, RegisterBus, Registers, RemoteReceiver};
+use hdsl::{Dialect, Error};
+
+/// Memory; the firmware reads and writes it too, a frame after the host.
+struct Firmware {
+    memory: [u8; 0x56],
+    /// Events that come between a reading and a writing of the host.
+    meanwhile: Option<(usize, u8)>,
+}
+
+impl Firmware {
+    fn new() -> Self {
+        let mut memory = [0; 0x56];
+        (memory[0x40], memory[0x51], memory[0x53]) = (0x3f, 0x02, 0x01);
+        Self { memory, meanwhile: None }
+    }
+
+    /// What the firmware does in its next frame.
+    fn frame(&mut self) {
+        if self.memory[0x40] != 0x3f {
+            if self.memory[0x40] & 0x80 != 0 {
+                self.memory[0x37] = 0x5a;
+            }
+            self.memory[0x40] = 0x3f;
+            self.memory[0x3d] |= 0x01;
+        }
+        if self.memory[0x2c] & 1 != 0 {
+            self.memory[0x2c] = 0;
+            self.memory[0x20..0x28].copy_from_slice(b"RESOLUTN");
+            self.memory[0x05] |= 0x02;
+        }
+    }
+}
+
+impl RegisterBus for Firmware {
+    type Error = Infallible;
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Infallible> {
+        let from = usize::from(address);
+        bytes.copy_from_slice(&self.memory[from..from + bytes.len()]);
+        if let Some((at, event)) = self.meanwhile.take_if(|(at, _)| (from..from + bytes.len()).contains(at)) {
+            self.memory[at] |= event;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Infallible> {
+        let from = usize::from(address);
+        self.memory[from..from + bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+/// The core: events are cleared by zeros and set by nothing that is written; what it shows cannot be written; the registers from
+/// 40h on are the encoder's.
+struct Core {
+    registers: [u8; 0x40],
+    encoder: [u8; 0x40],
+    reading: Option<u8>,
+    accesses: u32,
+}
+
+impl Core {
+    fn new() -> Self {
+        let mut registers = [0; 0x40];
+        (registers[0x39], registers[0x3a], registers[0x3b]) = (0xff, 0xff, 0xff);
+        Self { registers, encoder: core::array::from_fn(|at| at as u8), reading: None, accesses: 0 }
+    }
+
+    fn frame(&mut self) {
+        if let Some(register) = self.reading.take() {
+            self.registers[0x2f] = self.encoder[usize::from(register & 0x3f)];
+            self.registers[0x3d] |= 0x01;
+        }
+        if self.registers[0x2c] & 1 != 0 {
+            self.registers[0x2c] = 0;
+            self.registers[0x20..0x28].copy_from_slice(b"RESOLUTN");
+            self.registers[0x05] |= 0x02;
+        }
+    }
+}
+
+impl RegisterBus for Core {
+    type Error = Infallible;
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Infallible> {
+        for (address, byte) in (address..).zip(bytes) {
+            if address < 0x40 {
+                *byte = self.registers[usize::from(address)];
+            } else {
+                // A dummy; the answer comes later.
+                (*byte, self.reading, self.accesses) = (0xee, Some(address), self.accesses + 1);
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Infallible> {
+        for (address, byte) in (address..).zip(bytes) {
+            match address {
+                0x04 | 0x05 | 0x3d => self.registers[usize::from(address)] &= byte,
+                0x03 | 0x09..=0x1f | 0x2d..=0x2f | 0x36 => {}
+                0x00..=0x3f => self.registers[usize::from(address)] = *byte,
+                _ => {
+                    self.encoder[usize::from(address & 0x3f)] = *byte;
+                    self.registers[0x3d] |= 0x01;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+const NONE: Events = Events { drive: Event::empty(), safe: EventS::empty() };
+
+/// What was taken is gone, what nobody read stays, and nothing comes that never happened.
+#[test]
+fn events_are_taken_once() {
+    let mut remote = RemoteReceiver::new(Dialect::TI, Firmware::new());
+    (remote.bus().memory[0x04], remote.bus().memory[0x05], remote.bus().memory[0x3d]) = (0x08, 0x22, 0x41);
+    let events = Events { drive: Event::from_bits_retain(0x0822), safe: EventS::from_bits_retain(0x41) };
+    assert_eq!(remote.take_events(), Ok(events));
+    assert_eq!((remote.take_events(), remote.take_events()), (Ok(NONE), Ok(NONE)));
+    assert_eq!((remote.bus().memory[0x04], remote.bus().memory[0x05], remote.bus().memory[0x3d]), (0, 0, 0));
+
+    let mut remote = RemoteReceiver::new(Dialect::SICK, Core::new());
+    (remote.bus().registers[0x04], remote.bus().registers[0x05], remote.bus().registers[0x3d]) = (0x08, 0x22, 0x41);
+    assert_eq!(remote.take_events(), Ok(events));
+    assert_eq!((remote.take_events(), remote.take_events()), (Ok(NONE), Ok(NONE)));
+}
+
+/// Messages take the events that they wait for and leave the others alone, those that come at the same time too.
+#[test]
+fn messages_leave_other_events_alone() {
+    let mut remote = RemoteReceiver::new(Dialect::TI, Firmware::new());
+    (remote.bus().memory[0x05], remote.bus().memory[0x3d]) = (0x30, 0x41);
+    remote.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+    remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+    assert_eq!((remote.poll_short(), remote.poll_long()), (Ok(None), Ok(None)));
+    remote.bus().frame();
+    assert_eq!(remote.poll_short(), Ok(Some(0x5a)));
+    assert_eq!(remote.poll_long().unwrap().unwrap().as_bytes(), b"RESOLUTN");
+    assert_eq!((remote.poll_short(), remote.poll_long()), (Ok(None), Ok(None)));
+    // ANS was cleared with the request.
+    let left = Events { drive: Event::MIN, safe: EventS::SSUM };
+    assert_eq!(remote.take_events(), Ok(left));
+    // Set by the firmware between reading and writing: it is lost, and nothing else is made of it. The online status has it.
+    (remote.bus().memory[0x05], remote.bus().meanwhile) = (0x02, Some((0x05, 0x04)));
+    assert_eq!(remote.take_events().map(|events| events.drive), Ok(Event::FREL));
+    assert_eq!(remote.take_events(), Ok(NONE));
+}
+
+/// The registers of an encoder are reached directly in the core; PC_DATA has what comes back.
+#[test]
+fn messages_of_the_core() {
+    let mut remote = RemoteReceiver::new(Dialect::SICK, Core::new());
+    remote.start_short(ShortRequest::Read(RemoteRegister::SRSSI)).unwrap();
+    assert_eq!(remote.start_short(ShortRequest::Read(RemoteRegister::PING)), Err(BusError::Link(Error::Busy)));
+    assert_eq!(remote.poll_short(), Ok(None));
+    remote.bus().frame();
+    assert_eq!((remote.poll_short(), remote.bus().accesses), (Ok(Some(0x3c)), 1));
+    remote.start_short(ShortRequest::Write(RemoteRegister::PING, 0xa5)).unwrap();
+    assert_eq!(remote.bus().encoder[0x3f], 0xa5);
+    assert!(remote.poll_short().unwrap().is_some());
+    remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+    assert!(matches!(
+        remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)),
+        Err(BusError::Link(Error::Busy))
+    ));
+    assert_eq!(remote.poll_long(), Ok(None));
+    remote.bus().frame();
+    assert_eq!(remote.poll_long().unwrap().unwrap().as_bytes(), b"RESOLUTN");
+    assert_eq!(remote.poll_long(), Ok(None));
+}
+
+/// An image of each: nothing of the encoder's registers is taken for the receiver's.
+#[test]
+fn images() {
+    let mut remote = RemoteReceiver::new(Dialect::SICK, Core::new());
+    remote.bus().registers[0x19..0x1e].copy_from_slice(&[0, 0, 0, 0x12, 0x34]);
+    let map = remote.registers().unwrap();
+    assert_eq!((map.vpos(), map.byte(0x46), map.byte(0x39), remote.bus().accesses), (0x1234, Some(0), Some(0xff), 0));
+    let safe2 = core::array::from_fn(|at| at as u8);
+    let map = Registers::from_core(&[0; 0x40], Some(&safe2));
+    assert_eq!((map.byte(0x44), map.byte(0x46), map.vpos2()), (Some(0x0b), Some(0x18), 0x19_1a1b_1c1d));
+    assert_eq!((map.byte(0x45), map.byte(0x4c), map.byte(0x4d)), (Some(0x0f), Some(0x1e), Some(0x1f)));
+}
+
+/// Reset values, PC_DATA and MSUM of the map by the manual's rules, which the SDK does not have.
+#[test]
+fn what_only_the_manual_has() {
+    for (dialect, max, msum) in [(Dialect::SICK, [0xff; 3], 0x40), (Dialect::TI, [0; 3], 0x00)] {
+        let mut map = Registers::new(&dialect);
+        assert_eq!([0x39, 0x3a, 0x3b].map(|at| map.byte(at).unwrap()), max);
+        let mut master = hdsl::master::Master::new(dialect);
+        map.write(&mut master, 0x08, 0x10).unwrap();
+        assert_eq!(map.byte(0x06), Some(msum));
+        map.write(&mut master, 0x08, 0x00).unwrap();
+        assert_eq!(map.byte(0x06), Some(0));
+    }
+}
