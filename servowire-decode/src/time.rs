@@ -48,6 +48,7 @@ impl Time {
 impl Add<i64> for Time {
     type Output = Self;
 
+    #[inline]
     fn add(self, picoseconds: i64) -> Self {
         Self(self.0.saturating_add(picoseconds.into()))
     }
@@ -62,6 +63,7 @@ impl AddAssign<i64> for Time {
 impl Sub<i64> for Time {
     type Output = Self;
 
+    #[inline]
     fn sub(self, picoseconds: i64) -> Self {
         Self(self.0.saturating_sub(picoseconds.into()))
     }
@@ -73,8 +75,11 @@ impl Sub for Time {
 
     #[inline]
     fn sub(self, before: Self) -> i64 {
-        let way = self.0.saturating_sub(before.0);
-        i64::try_from(way).unwrap_or(if way < 0 { i64::MIN } else { i64::MAX })
+        match self.0.checked_sub(before.0).map(i64::try_from) {
+            Some(Ok(way)) => way,
+            _ if self < before => i64::MIN,
+            _ => i64::MAX,
+        }
     }
 }
 
