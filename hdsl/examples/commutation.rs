@@ -4,6 +4,8 @@
 //! H-frame after the other; the current control takes the electrical angle out of it, at instants of its own. At 3 ms a word of the
 //! acceleration channel is lost on the line: the angle goes on, with a bound that grows until a safe position has told.
 
+#![allow(clippy::arithmetic_side_effects)]
+
 use hdsl::device::Device;
 use hdsl::master::{Master, State};
 use hdsl::{Dialect, EncoderId, EvidenceShaftCell, Policy, Tolerated};

@@ -1,5 +1,7 @@
 //! The library as somebody else's program uses it.
 #![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
     clippy::expect_used,
     clippy::indexing_slicing,
     clippy::panic,

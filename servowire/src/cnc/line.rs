@@ -115,7 +115,7 @@ pub(super) struct Line {
     pub(super) first_cycle_ns: Option<u64>,
     /// Shortest gap between two device frames at the master, in ns; and where the last one ended.
     pub(super) gap_ns: f64,
-    line_free: f64,
+    free: f64,
     /// Why the master has started again last; which device has left the line because its measurement of it cannot be.
     pub(super) why: Option<String>,
     unmeasured: Option<String>,
@@ -153,7 +153,7 @@ impl Line {
             sent: [0; 4],
             first_cycle_ns: None,
             gap_ns: f64::INFINITY,
-            line_free: f64::NEG_INFINITY,
+            free: f64::NEG_INFINITY,
             why: None,
             unmeasured: None,
             events: Vec::new(),
@@ -248,7 +248,7 @@ impl Line {
                 self.why = Some(format!("{error}{why}"));
                 self.event(format!("cycle {cycles}: {error}{why}; the master starts again"));
                 host.restarted();
-                self.line_free = f64::NEG_INFINITY;
+                self.free = f64::NEG_INFINITY;
             }
             Action::Send { at_ns, frame } => {
                 self.start_up(frame, at_ns, record);
@@ -282,7 +282,6 @@ impl Line {
                     let (at, call) = (node.when(until_ns, now).max(now) + 0.01, node.call);
                     return self.push(at, Event::Device { k, call });
                 }
-                Wish::CycleStart { .. } => {}
                 Wish::Send { at_ns, .. } => {
                     let at = node.when(at_ns, now).max(now);
                     self.push(at, Event::Leaves { k });
@@ -297,8 +296,8 @@ impl Line {
                     let missed = node.device.counters().master;
                     self.event(format!("device {} starts again; master frames: {missed}", k + 1));
                 }
-                // It has waited in vain in the start-up, and the master says why.
-                Wish::Restart => {}
+                // A restart in the start-up: it has waited in vain, and the master says why.
+                Wish::CycleStart { .. } | Wish::Restart => {}
             }
         }
     }
@@ -347,7 +346,8 @@ impl Line {
         self.ask(k, Some(record));
         let length = (preamble + frame.len()) as f64 * BYTE_NS;
         let up = match (reaction.path, port) {
-            (Path::Absorb, _) => return,
+            // A frame that came from behind would be sent back to the end of the line, where nobody waits for it.
+            (Path::Absorb, _) | (Path::Reflect, PortId::B) => return,
             (Path::Forward, PortId::A) => {
                 if k + 1 < self.plugged {
                     let at = sof + self.wires.transit(k) + self.wires.out(k + 1);
@@ -357,8 +357,6 @@ impl Line {
             }
             (Path::Forward, PortId::B) => sof + self.wires.transit(k),
             (Path::Reflect, PortId::A) => sof + REFLECTION_NS,
-            // It would be sent back to the end of the line, where nobody waits for it.
-            (Path::Reflect, PortId::B) => return,
         };
         self.wires.occupy(k, up, up + length, &hit);
         let at = up + self.wires.back(k);
@@ -483,10 +481,10 @@ impl Line {
         if hit.get() {
             garble(&mut bytes);
         }
-        if self.line_free.is_finite() && !arrival.copy {
-            self.gap_ns = self.gap_ns.min(arrival.start - self.line_free);
+        if self.free.is_finite() && !arrival.copy {
+            self.gap_ns = self.gap_ns.min(arrival.start - self.free);
         }
-        self.line_free = self.now;
+        self.free = self.now;
         let captured = arrival.start + capture_ns(PREAMBLE) + self.wires.capture_jitter();
         // What the master refuses, it counts.
         let Ok(Heard::Device { frame, .. }) = self.master.hear(&bytes, captured.round() as u64) else { return };

@@ -177,7 +177,7 @@ impl Node {
         self.heard = true;
         // Which cycle is it, on the device's own clock?
         let own = ((self.clock.at(sent.begin) - zero) / self.cycle_ns as f64).round();
-        self.truth.stale += u64::from(arrival.copy || own != cycle as f64);
+        self.truth.stale += u64::from(arrival.copy || (own - cycle as f64).abs() > 0.5);
         let word = match slice {
             slice if self.positions => {
                 let word = self.follower.next(slice);
