@@ -3,7 +3,7 @@
 
 use nom::Parser;
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{Config, Device, FrameTimes, PortId, Reaction, State, Trigger};
+use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, Reaction, State, Trigger};
 use sorte_proto::iep::Channel;
 use sorte_proto::sync0::{CMP7_NS, MAX_LATENCY_NS, PULSE_NS, Variant};
 use sorte_proto::{
@@ -111,11 +111,11 @@ pub fn device(mut data: &[u8]) {
             3 => Sync::of_master(u32::from(*value) * 10_000, 76, place).emit().to_vec(),
             4 => {
                 now_ns += u64::from(*value) * 1_000_000;
-                device.poll(now_ns);
+                let _: Action = device.poll(now_ns as u32, now_ns);
                 continue;
             }
             5 => {
-                device.cycle_start();
+                let _: Action = device.poll(u32::from(*value) * 500, now_ns);
                 continue;
             }
             6 => {
@@ -125,7 +125,7 @@ pub fn device(mut data: &[u8]) {
                 continue;
             }
             _ => {
-                exchange(&mut device, *value);
+                exchange(&mut device, *value, now_ns);
                 continue;
             }
         };
@@ -159,16 +159,24 @@ fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, time
     assert!(known(&device) == before || device.state() == State::Idle);
 }
 
-fn exchange(device: &mut Device, value: u8) {
-    let frame = MasterFrame { status: Status::EXCHANGE, output: [value; 16], time_stamp: value.into() };
+/// A master frame, near its time or not: data only of the cycle that the device is in, and each once.
+fn exchange(device: &mut Device, value: u8, now_ns: u64) {
+    let Some(first) = device.first_cycle_ns() else { return };
+    let start = first.wrapping_add(u32::from(value & 15) * 4000);
+    let trigger = start.wrapping_add(500);
+    let frame = MasterFrame { status: Status::EXCHANGE, output: [value; 16], time_stamp: trigger as u16 };
     let mut bytes = [0; 21];
     assert_eq!(frame.emit_into(&mut bytes), Ok(21));
-    let good = device.hear_exchange(&bytes, 585, 585).map(|output| output.data.to_vec());
+    let sof_ns = trigger.wrapping_add(76 + 120 + u32::from(value >> 4) * 40);
+    let times = FrameTimes { sof_ns, counter_ns: sof_ns, now_ns };
+    let good = device.hear_exchange(&bytes, times).map(|output| output.data.to_vec());
     // A device at a far place owns none of the 16 bytes.
     assert!(good.is_err() || good == Ok(vec![value; 4]));
-    assert_eq!(good.is_ok(), device.answer([value; 3]).is_some() && device.assignment().is_some());
+    assert!(good.is_err() || value >> 4 <= 6, "{sof_ns} is not its time");
+    assert!(good.is_err() || device.answer([value; 3]).is_some());
+    assert!(device.hear_exchange(&bytes, times).is_err(), "each once");
     bytes[2] ^= 1;
-    assert!(device.hear_exchange(&bytes, 585, 585).is_err());
+    assert!(device.hear_exchange(&bytes, times).is_err());
 }
 
 /// Legal steps through the lossless generator: all of them, on time, at full width.

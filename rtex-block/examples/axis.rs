@@ -1,7 +1,12 @@
 //! What a machine does with one axis: text, parameters, position set, motion by the host and by the drive, latches, an alarm.
 //!
 //! `cargo run -p rtex-block --example axis`
-#![allow(clippy::std_instead_of_core, reason = "a program for a host")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::std_instead_of_core,
+    reason = "a program for a host"
+)]
 
 use core::convert::Infallible;
 use core::num::NonZeroU16;

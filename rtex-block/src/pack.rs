@@ -18,6 +18,7 @@
 /// The two sides do not have the same size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("{bytes} bytes do not fill {words} words exactly")]
 pub struct SizeMismatch {
     /// Bytes given.

@@ -3,6 +3,7 @@
 /// A pair of communication and update period with the drive parameters that choose it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Periods {
     /// Communication period: one exchange of frames, ns.
     pub com_ns: u32,
@@ -110,6 +111,7 @@ pub const A5NL: [(i32, i32, Periods); 4] = [
 /// Who gives the rhythm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TimerSystem {
     /// A timer of the host drives XTXTIM at the communication period and, divided, the NC interrupt at the update
     /// period. The receive interrupt (XINTRX) switches the memory bank and has priority **above** the NC interrupt.
@@ -154,6 +156,7 @@ pub fn timer_reload(timer_hz: u32, period_ns: u32) -> Option<u32> {
 /// times where there are any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameTime {
     /// With one axis, ns.
     pub one_ns: u32,

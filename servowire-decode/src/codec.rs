@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::ops::Deref;
 
 use crate::capture::hexlog::Burst;
 use crate::capture::pcapng::Packet;
@@ -11,65 +12,63 @@ use crate::line::lane::LineDecoder;
 use crate::settings::Settings;
 use crate::sink::Sink;
 
-/// What a protocol is called, and what is said of it.
+/// What is known of a protocol without decoding anything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Names {
-    /// On a command line.
+pub struct Facts {
+    /// Its name on a command line.
     pub name: &'static str,
-    /// As people write it.
+    /// Its name as people write it.
     pub title: &'static str,
     /// A line about it, for the help of a program.
     pub about: &'static str,
     /// What it is decoded from, for somebody who has something else.
     pub needs: &'static str,
+    /// The names of all fields that its events on a line or in packets may have.
+    pub fields: &'static [&'static str],
+    /// Its nominal bit rates on a recorded line; none where there is no such line.
+    pub rates: &'static [u32],
+    /// What its frames prove on a recorded line.
+    pub weights: Weights,
+    /// It has one rate, by the clock of its master: a recording may hold one sample a bit.
+    pub clocked: bool,
+    /// An answer says what it is without its request.
+    pub answers_alone: bool,
+    /// A frame in a log carries a check, so that it is not found where there is none.
+    pub checked: bool,
+    /// Published recordings: names and contents, each a VCD.
+    pub captures: &'static [(&'static str, &'static [u8])],
 }
 
-/// A protocol: its names, what it is decoded from, its decoders.
+impl Facts {
+    /// Of a protocol that has neither a line nor captures.
+    pub const NONE: Self = Self {
+        name: "",
+        title: "",
+        about: "",
+        needs: "",
+        fields: &[],
+        rates: &[],
+        weights: Weights { request: 0, answer: 0, alone: 0 },
+        clocked: false,
+        answers_alone: true,
+        checked: true,
+        captures: &[],
+    };
+}
+
+/// A protocol: what is known of it, and its decoders.
 pub trait Codec: Sync {
-    /// What it is called.
-    fn names(&self) -> &'static Names;
-
-    /// The names of all fields that its events on a line or in packets may have.
-    fn fields(&self) -> &'static [&'static str];
-
-    /// Published recordings: names and contents, each a VCD.
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &[]
-    }
-
-    /// Its nominal bit rates on a recorded line; none where there is no such line.
-    fn rates(&self) -> &'static [u32] {
-        &[]
-    }
-
-    /// What its frames prove on a recorded line.
-    fn weights(&self) -> Weights {
-        Weights::default()
-    }
+    /// What is known of it; the fields are those of the codec itself.
+    fn facts(&self) -> &'static Facts;
 
     /// A decoder for one idle-high line at `rate` bits a second.
     fn line(&self, _rate: u32, _settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         None
     }
 
-    /// Whether it has one rate, by the clock of its master: a recording may hold one sample a bit.
-    fn is_clocked(&self) -> bool {
-        false
-    }
-
-    /// Whether an answer says what it is without its request.
-    fn answers_alone(&self) -> bool {
-        true
-    }
-
     /// A decoder for a log of bytes that begins with `sample`.
     fn log(&self, _settings: &Settings, _sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
         None
-    }
-
-    /// Whether a frame in a log carries a check, so that it is not found where there is none.
-    fn is_checked(&self) -> bool {
-        true
     }
 
     /// A packet of a network as an event.
@@ -78,17 +77,18 @@ pub trait Codec: Sync {
     }
 }
 
-impl dyn Codec {
-    /// Its name as people write it.
-    pub fn title(&self) -> &'static str {
-        self.names().title
+impl Deref for dyn Codec + '_ {
+    type Target = Facts;
+
+    fn deref(&self) -> &Facts {
+        self.facts()
     }
 }
 
 /// Two are the same if their names are.
 impl PartialEq for dyn Codec {
     fn eq(&self, other: &Self) -> bool {
-        self.names() == other.names()
+        self.name == other.name
     }
 }
 
@@ -96,7 +96,7 @@ impl Eq for dyn Codec {}
 
 impl fmt::Debug for dyn Codec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.names().name)
+        f.write_str(self.name)
     }
 }
 

@@ -18,7 +18,7 @@ pub fn decode(
     settings: &Settings,
     out: &mut Output<'_>,
 ) -> Result<(), Stop> {
-    let of_lines = || meant(protocol).any(|codec| !codec.rates().is_empty());
+    let of_lines = || meant(protocol).any(|codec| !codec.rates.is_empty());
     match (capture, protocol) {
         // Whatever was asked for: what has packets.
         (Capture::Packets(mut packets), _) => {
@@ -34,7 +34,7 @@ pub fn decode(
             Ok(())
         }
         (Capture::Bytes(bytes), _) => log::decode(file, bytes, protocol, settings, out),
-        (_, Some(asked)) if !of_lines() => Err(Fault::new(file, At::File, asked.names().needs).into()),
+        (_, Some(asked)) if !of_lines() => Err(Fault::new(file, At::File, asked.needs).into()),
         (Capture::Edges(mut line), _) => line::decode(file, line.as_mut(), protocol, settings, out),
         (Capture::Samples(mut raw), _) => line::samples(file, &mut raw, protocol, settings, out),
     }

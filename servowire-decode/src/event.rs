@@ -61,29 +61,6 @@ impl Event {
     pub fn cut_off(place: Place) -> Self {
         Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
     }
-
-    /// No answer, called `what`, came to the request at `place` within `timeout`, in picoseconds, or until `now`, when
-    /// somebody `asked` again or the recording ended.
-    pub fn silence(
-        place: Place,
-        kind: &'static str,
-        what: &str,
-        timeout: i64,
-        (now, asked): (Time, bool),
-        cause: &str,
-    ) -> Self {
-        let (place, reason) = match place {
-            Place::Time { end: start, .. } => {
-                let end = (start + timeout).min(now);
-                let within = (end - start) as f64 / 1e6;
-                (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
-            }
-            Place::Line(_) if asked => (place, format!("no {what} before the next request")),
-            Place::Line(_) => (place, format!("no {what} before the log ends")),
-        };
-        let refusal = Refusal { cause: Some(cause.to_owned()), ..Refusal::new(NO_RESPONSE, reason) };
-        Self::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
-    }
 }
 
 /// Where in a capture.
@@ -98,6 +75,16 @@ pub enum Place {
     },
     /// A line of a log without times.
     Line(u64),
+}
+
+impl Place {
+    /// When it ends; none in a log without times.
+    pub fn end(self) -> Option<Time> {
+        match self {
+            Self::Time { end, .. } => Some(end),
+            Self::Line(_) => None,
+        }
+    }
 }
 
 /// Who spoke on a line with two ends.

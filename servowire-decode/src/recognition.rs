@@ -68,9 +68,9 @@ impl fmt::Display for Recognition {
             (None, None) => {}
         }
         let Tally { ok, refused, .. } = self.tally;
-        write!(f, ": {}, {ok} of {} frames hold", self.protocol.title(), ok + refused)?;
+        write!(f, ": {}, {ok} of {} frames hold", self.protocol.title, ok + refused)?;
         if let Some((protocol, rate)) = self.rival {
-            write!(f, "; next {} at {} Mbit/s", protocol.title(), mbit(f64::from(rate)))?;
+            write!(f, "; next {} at {} Mbit/s", protocol.title, mbit(f64::from(rate)))?;
         }
         if self.rates.spikes * SPIKY > self.rates.edges {
             write!(f, "; {} spikes beside {} edges: check termination", self.rates.spikes, self.rates.edges)?;
@@ -129,7 +129,7 @@ impl fmt::Display for Note {
         match self {
             Self::Line { file, line } => write!(f, "{file}: {line}"),
             Self::LineRather { file, line } => {
-                let (title, Tally { ok, refused, .. }) = (line.protocol.title(), line.tally);
+                let (title, Tally { ok, refused, .. }) = (line.protocol.title, line.tally);
                 let upside = if line.inverted { ", inverted" } else { "" };
                 let rate = mbit(f64::from(line.rate));
                 write!(f, "{file}: it looks like {title} at {rate} Mbit/s{upside}: {ok} of {} {so}", ok + refused)
@@ -138,11 +138,11 @@ impl fmt::Display for Note {
                 write!(f, "{file}: {moving} channels move, and the {tried} busiest were tried: name one by --channel")
             }
             Self::Log { protocol, share } => {
-                write!(f, "taken as {}, of which {share} % of the first frames hold", protocol.title())
+                write!(f, "taken as {}, of which {share} % of the first frames hold", protocol.title)
             }
             Self::LogRather { protocol, tally } => {
                 let (ok, all) = (tally.ok, tally.ok + tally.faults());
-                write!(f, "it looks like {}: {ok} of {all} {so}", protocol.title())
+                write!(f, "it looks like {}: {ok} of {all} {so}", protocol.title)
             }
             Self::Shape(text) => f.write_str(text),
         }

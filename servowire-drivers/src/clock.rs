@@ -3,8 +3,6 @@ pub(crate) mod embassy;
 #[cfg(feature = "fugit")]
 pub(crate) mod fugit;
 
-#[cfg(feature = "async")]
-use servowire_core::ClockCheck;
 use servowire_core::{ClockError, TickRate, TimeBase};
 
 /// Looks at a clock that stands: some 30 ms of a fast processor, 0.3 s of a slow one. In a tick of 1 us it makes a hundred, but the
@@ -79,16 +77,10 @@ impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
 #[cfg(feature = "async")]
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
-    /// Ends at `ns`, or at once if that is past.
-    ///
-    /// # Errors
-    /// Of a clock that would never come there.
-    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError>;
+    /// Ends after so many ns, better later than earlier. What it is then the driver asks the clock: a wait that ends too early is
+    /// followed by another, and a clock that does not go on ends the call.
+    async fn wait_ns(&mut self, ns: u64);
 }
-
-/// Delays that pass on a clock that stands.
-#[cfg(feature = "async")]
-const MAX_DELAYS: u32 = 1_000;
 
 /// A clock, and a delay to wait with.
 #[cfg(feature = "async")]
@@ -109,47 +101,7 @@ impl<C: Clock, D> Clock for WithDelay<C, D> {
 
 #[cfg(feature = "async")]
 impl<C: Clock, D: embedded_hal_async::delay::DelayNs> Timer for WithDelay<C, D> {
-    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
-        let mut check = ClockCheck::new(MAX_DELAYS);
-        loop {
-            let left_ns = ns.saturating_sub(check.check(self.clock.now_ns()?)?);
-            if left_ns == 0 {
-                return Ok(());
-            }
-            self.delay.delay_ns(u32::try_from(left_ns).unwrap_or(u32::MAX)).await;
-        }
-    }
-}
-
-#[cfg(all(test, feature = "async"))]
-mod tests {
-    use super::*;
-    use core::cell::Cell;
-    use core::future::Future;
-    use core::pin::pin;
-    use core::task::{Context, Poll, Waker};
-
-    /// Passes so much time for each ns.
-    struct Passes<'a>(&'a Cell<u64>, i64);
-
-    impl embedded_hal_async::delay::DelayNs for Passes<'_> {
-        async fn delay_ns(&mut self, ns: u32) {
-            self.0.set(self.0.get().saturating_add_signed(i64::from(ns) * self.1));
-        }
-    }
-
-    /// How a wait ends, and when.
-    fn wait(per_ns: i64) -> (Poll<Result<(), ClockError>>, u64) {
-        let now_ns = Cell::new(1_000_000);
-        let mut timer = WithDelay { clock: || now_ns.get(), delay: Passes(&now_ns, per_ns) };
-        let wait = pin!(timer.wait_until(20_000_000_000)).poll(&mut Context::from_waker(Waker::noop()));
-        (wait, now_ns.get())
-    }
-
-    #[test]
-    fn a_delay_is_waited_for_in_pieces_and_not_for_ever() {
-        assert_eq!(wait(1), (Poll::Ready(Ok(())), 20_000_000_000));
-        assert_eq!(wait(0), (Poll::Ready(Err(ClockError::Stopped)), 1_000_000));
-        assert_eq!(wait(-1), (Poll::Ready(Err(ClockError::Backwards { by_ns: 1_000_000 })), 0));
+    async fn wait_ns(&mut self, ns: u64) {
+        self.delay.delay_ns(u32::try_from(ns).unwrap_or(u32::MAX)).await;
     }
 }

@@ -1,10 +1,31 @@
-//! Two futures, of which the first is asked first.
+//! Waits of futures: for a time, and for the first of two, of which the first is asked first.
 
 use core::future::{Future, poll_fn};
 use core::pin::pin;
 use core::task::Poll;
 
-use servowire_core::ClockError;
+use servowire_core::{ClockCheck, ClockError};
+
+use crate::Timer;
+
+/// Delays that pass on a clock that stands.
+const MAX_DELAYS: u32 = 1_000;
+
+/// Waits until `until_ns` by the clock, which `look` checks.
+pub(crate) async fn sleep<T: Timer>(
+    timer: &mut T,
+    mut look: impl FnMut(&mut T) -> Result<u64, ClockError>,
+    until_ns: u64,
+) -> Result<(), ClockError> {
+    let mut check = ClockCheck::new(MAX_DELAYS);
+    loop {
+        let left_ns = until_ns.saturating_sub(check.check(look(timer)?)?);
+        if left_ns == 0 {
+            return Ok(());
+        }
+        timer.wait_ns(left_ns).await;
+    }
+}
 
 /// What `first` gives, or `None` if the wait of `second` ends before. What is there is taken before the clock is asked.
 pub(crate) async fn race<T>(
@@ -23,7 +44,9 @@ pub(crate) async fn race<T>(
 
 #[cfg(test)]
 mod tests {
-    use super::{ClockError, race};
+    use super::{ClockError, race, sleep};
+    use crate::{Clock, WithDelay};
+    use core::cell::Cell;
     use core::future::{pending, ready};
     use core::pin::pin;
     use core::task::{Context, Poll, Waker};
@@ -43,4 +66,29 @@ mod tests {
     }
 
     use core::future::Future;
+
+    /// Passes so much time for each ns.
+    struct Passes<'a>(&'a Cell<u64>, i64);
+
+    impl embedded_hal_async::delay::DelayNs for Passes<'_> {
+        async fn delay_ns(&mut self, ns: u32) {
+            self.0.set(self.0.get().saturating_add_signed(i64::from(ns) * self.1));
+        }
+    }
+
+    /// How a wait ends, and when.
+    fn wait(per_ns: i64) -> (Poll<Result<(), ClockError>>, u64) {
+        let now_ns = Cell::new(1_000_000);
+        let mut timer = WithDelay { clock: || now_ns.get(), delay: Passes(&now_ns, per_ns) };
+        let wait = pin!(sleep(&mut timer, Clock::now_ns, 20_000_000_000));
+        let ended = wait.poll(&mut Context::from_waker(Waker::noop()));
+        (ended, now_ns.get())
+    }
+
+    #[test]
+    fn a_delay_is_waited_for_in_pieces_and_not_for_ever() {
+        assert_eq!(wait(1), (Poll::Ready(Ok(())), 20_000_000_000));
+        assert_eq!(wait(0), (Poll::Ready(Err(ClockError::Stopped)), 1_000_000));
+        assert_eq!(wait(-1), (Poll::Ready(Err(ClockError::Backwards { by_ns: 1_000_000 })), 0));
+    }
 }

@@ -14,7 +14,7 @@
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. The counter
-//! echoes of one frame are equal, so the exchange compares those of what it has read, looks at [`FrameCount`] and at the clock before
+//! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at [`FrameCount`] before
 //! and after, and reads once more if it was not one frame. If it is not again, each axis takes its block only if that is on time
 //! ([`Arrival`](rtex_block::master::Arrival)); where two frames have the same counter (two communications in an update period) and the
 //! bank was switched between, none is taken. System Design Guide for Master, chapters 1 and 2.
@@ -31,7 +31,6 @@ mod port;
 use core::convert::Infallible;
 
 use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
-use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, pack};
 use servowire_core::{ClockCheck, ClockError};
 
@@ -195,7 +194,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         {
             self.began_ns = Some(began_ns);
         }
-        let Read { heard, torn, fault } = self.read(began_ns);
+        let Read { heard, torn, fault } = self.read();
         let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
@@ -219,10 +218,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// The blocks of one frame, if that can be had.
-    fn read(&mut self, began_ns: u64) -> Read<P, N> {
+    fn read(&mut self) -> Read<P, N> {
         let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None };
         for _ in 0..READS {
-            let before = self.bank(began_ns);
+            let frames = self.received.get();
             read.fault = None;
             for (place, heard) in read.heard.iter_mut().enumerate() {
                 *heard = self.block(place).unwrap_or_else(|fault| {
@@ -230,14 +229,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
                     Heard::Nothing
                 });
             }
-            let (mixed, switched) = (self.master.ring().is_torn(&read.heard), self.bank(began_ns) != before);
+            let mixed = self.master.ring().is_torn(&read.heard) || self.has_changed(&read.heard);
+            let switched = self.received.get() != frames;
             read.torn = mixed || switched;
-            if let Err(error) = before {
-                // Nothing says whether the bank was switched.
-                return Read { heard: [Heard::Nothing; N], torn: false, fault: Some(error.into()) };
-            }
             if !read.torn {
-                return read;
+                break;
             }
             if switched && !mixed {
                 // They look like one frame and are not.
@@ -245,14 +241,6 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             }
         }
         read
-    }
-
-    /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
-    fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
-        match self.master.config().timer {
-            TimerSystem::External => Ok(self.received.get()),
-            TimerSystem::Internal => self.frames_since(began_ns),
-        }
     }
 
     /// Frames that have begun since the one at `began_ns`.
@@ -264,6 +252,13 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// A look at the clock.
     fn now_ns(&mut self) -> Result<u64, ClockError> {
         self.check.check(self.clock.now_ns()?)
+    }
+
+    /// Whether a block that was read has another echo by now: the bank was switched in the middle of the last block.
+    fn has_changed(&mut self, heard: &[Heard; N]) -> bool {
+        let echo = |heard: &Heard| heard.response().map(|response| response.update_counter_echo);
+        let first = heard.iter().enumerate().find_map(|(place, heard)| Some((place, echo(heard)?)));
+        first.is_some_and(|(place, before)| self.block(place).is_ok_and(|now| echo(&now) != Some(before)))
     }
 
     fn block(&mut self, place: usize) -> Result<Heard, P::Error> {

@@ -31,10 +31,11 @@ const LOST: Error = Error::NoResponse { echo: false };
 /// Longest request and longest answer together.
 const MAX_BYTES: usize = 16;
 
-/// How long this request and the longest answer to it take.
+/// How long this request and the longest answer to it take, until that is handed over.
 fn longest_ns(line: &Line, request: &Frame) -> u64 {
     let fields = request.fields().saturating_add(12);
-    u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
+    let answered_ns = u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into());
+    answered_ns.saturating_add(line.hand_over_ns.into())
 }
 
 /// Why there was no answer: not for a reason of the encoder, if the line was still driven when it began to answer.

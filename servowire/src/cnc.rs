@@ -3,9 +3,10 @@
 mod axis;
 mod clock;
 mod driver;
-mod exchange;
 mod feed;
 mod host;
+#[cfg(test)]
+mod landing;
 mod line;
 mod node;
 mod noise;
@@ -16,6 +17,8 @@ mod program;
 mod record;
 mod report;
 mod scaling;
+mod setup;
+mod wires;
 
 use std::error::Error;
 use std::fmt;
@@ -35,11 +38,13 @@ use servowire_decode::time;
 use axis::Build;
 use driver::Fault;
 use host::Host;
-use line::{Line, Progress, Setup};
+use line::{Line, Progress};
 use plot::{Curves, Sound};
 use power::Power;
 use program::Program;
 use record::Recorder;
+use setup::Setup;
+use wires::{LONGEST_CABLE_NS, Physics};
 
 /// Runs of more cycles than this have a progress bar.
 const LONG: u64 = 2_000_000;
@@ -56,7 +61,7 @@ pub struct Arguments {
     /// Devices in the line, a motor each.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=254))]
     devices: u8,
-    /// Delay of the cables in ns, the one at the master first; the last stands for those after it.
+    /// Delay of the cables in ns, 500 at most (100 m), the one at the master first; the last stands for those after it.
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "85")]
     cables: Vec<u16>,
     /// Cycle of the IO exchange in ns, a multiple of 4000; without it the shortest that the line fits.
@@ -120,6 +125,10 @@ pub struct Arguments {
     /// Error of the capture of a frame's start, up to so many ns either way.
     #[arg(long, value_name = "NS", default_value_t = 5.0, value_parser = amount)]
     jitter: f64,
+    /// Rms of what each port adds to a frame that passes it, in ns. 1.443 is a port that samples at 200 MHz, 11.547 one that
+    /// re-times to 25 MHz; six sigma of all ports must fit into the gap between two device frames.
+    #[arg(long, value_name = "NS", default_value_t = 1.443, value_parser = amount)]
+    hop_jitter: f64,
     /// Ns by which the way back over each cable is longer than the way out: half of it is an error of the clocks.
     #[arg(long, value_name = "NS", default_value_t = 0.0, value_parser = amount)]
     asymmetry: f64,
@@ -129,6 +138,15 @@ pub struct Arguments {
     /// Probability that a bit flips on a cable.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     bit_error_rate: f64,
+    /// Probability that a frame of the exchange is lost on a cable.
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    loss: f64,
+    /// Probability that a frame of the exchange comes twice, the second time 6 us later.
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    duplicates: f64,
+    /// Send a damaged DISCOVERY again instead of starting again (an extension of this project).
+    #[arg(long)]
+    patient_discovery: bool,
     /// Pull the cable in front of a device in a cycle.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
     unplug: Option<(usize, u64)>,
@@ -242,6 +260,13 @@ impl Arguments {
                 return Err(format!("device {device} of {}", self.devices).into());
             }
         }
+        if let Some((k, ns)) = self.cables.iter().enumerate().find(|(_, ns)| **ns > LONGEST_CABLE_NS) {
+            return Err(format!(
+                "the cable in front of device {} delays by {ns} ns: 100BASE-TX ends at 100 m, which are {LONGEST_CABLE_NS} ns",
+                k + 1
+            )
+            .into());
+        }
         if let Some(path) = &self.part.gcode {
             if usize::from(self.devices) < AXES || self.dance || self.independent || self.cycles.is_some() {
                 return Err("--gcode moves X, Y and Z, and nothing else: it needs three devices, and no --dance, --independent or --cycles".into());
@@ -288,14 +313,20 @@ impl Arguments {
             cables_ns,
             cycle_ns: self.cycle_time,
             build,
+            physics: Physics {
+                asymmetry_ns: self.asymmetry,
+                hop_jitter_ns: self.hop_jitter,
+                capture_jitter_ns: self.jitter,
+                bit_error_rate: self.bit_error_rate,
+                loss: self.loss,
+                duplicates: self.duplicates,
+            },
             crystal_ppm: self.crystal,
             drift_ppm: self.drift,
-            jitter_ns: self.jitter,
-            asymmetry_ns: self.asymmetry,
-            bit_error_rate: self.bit_error_rate,
             unplug: self.unplug,
             driver_fault: self.driver_fault,
             positions: !(self.no_positions || self.published_sync0),
+            patient: self.patient_discovery,
             max_lag: self.max_lag,
             seed: self.seed,
         }
@@ -308,7 +339,8 @@ impl Arguments {
         let cycle_ns = line.setup.cycle_ns();
         let program = Power::new(program, axes, self.power_save, cycle_ns);
         let mut host = Host::new(program, axes, self.cycles, self.max_lag);
-        let mut record = Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles)?;
+        let mut record =
+            Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles, cycle_ns)?;
         let mut curves = self.svg.is_some().then(|| Curves::new(cycle_ns));
         let mut sound = self.wav.as_deref().map(|path| named(path, Sound::create(path, cycle_ns))).transpose()?;
         let bar = self.bar();

@@ -112,7 +112,7 @@ fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> i
 
 /// The captures that come with the program, of the protocol that is meant.
 fn bundled(arguments: &Decode) -> &'static [(&'static str, &'static [u8])] {
-    arguments.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures())
+    arguments.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures)
 }
 
 /// Decodes one file; whether it was good.

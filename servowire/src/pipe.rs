@@ -3,12 +3,18 @@
 use std::io::{self, Read};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+use servowire_decode::capture::Live;
 
 /// Bytes read at once.
 const CHUNK: usize = 1 << 16;
 /// Chunks that wait to be taken.
 const AHEAD: usize = 4;
+/// A source that gives nothing for so long has nothing for now.
+const PAUSE: Duration = Duration::from_millis(60);
+/// What comes is shown after this time at the latest, if it is complete.
+const SHOWN: Duration = Duration::from_millis(250);
 /// How often it is looked whether a file has grown.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -19,6 +25,8 @@ pub(crate) struct Pipe {
     taken: usize,
     fault: Option<io::Error>,
     ended: bool,
+    /// When it was last said that what came is to be shown.
+    shown: Instant,
 }
 
 impl Pipe {
@@ -47,7 +55,7 @@ impl Pipe {
                 }
             }
         });
-        Self { chunks, chunk: Vec::new(), taken: 0, fault: None, ended: false }
+        Self { chunks, chunk: Vec::new(), taken: 0, fault: None, ended: false, shown: Instant::now() }
     }
 
     fn is_empty(&self) -> bool {
@@ -63,7 +71,7 @@ impl Pipe {
     }
 
     /// Whether a read gives something, or the end, within `patience`.
-    pub(crate) fn is_ready(&mut self, patience: Duration) -> bool {
+    pub(crate) fn gives_within(&mut self, patience: Duration) -> bool {
         if self.is_empty() {
             match self.chunks.recv_timeout(patience) {
                 Ok(chunk) => self.take(chunk),
@@ -77,6 +85,20 @@ impl Pipe {
     /// Whether it has ended.
     pub(crate) fn is_over(&self) -> bool {
         self.ended && self.taken == self.chunk.len()
+    }
+}
+
+impl Live for Pipe {
+    fn is_ready(&mut self) -> bool {
+        self.gives_within(PAUSE)
+    }
+
+    fn is_overdue(&mut self) -> bool {
+        let overdue = self.shown.elapsed() > SHOWN;
+        if overdue {
+            self.shown = Instant::now();
+        }
+        overdue
     }
 }
 

@@ -11,12 +11,8 @@ fn main() {
     println!("line delay {line_delay} ns between any two; 4 output bytes and 3 payload bytes a device\n");
     println!("devices  master frame at the last  last frame at the master  shortest cycle  limited by");
     for devices in (1..=12).chain([32, 100, 254]) {
-        let output_len = u16::from(devices) * 4;
-        let budget = Timing { line_delays_ns: &[line_delay], devices, output_len, payload_len: 3 }.budget();
-        let limit = match budget.limit() {
-            Limit::MasterFrame => "the way out",
-            Limit::DeviceFrames => "the way back",
-        };
+        let budget = Timing::new(&[line_delay], devices).budget();
+        let limit = if budget.limit() == Limit::MasterFrame { "the way out" } else { "the way back" };
         println!(
             "{devices:7}  {:21} ns  {:21} ns  {:11} ns  {limit}{}",
             budget.master_frame_at_last_ns,
@@ -31,12 +27,7 @@ fn main() {
     }
     println!("\ncycle times that the vendor names, and the devices that they have room for");
     for cycle_ns in Parameters::CYCLE_TIMES_NS.into_iter().rev() {
-        let fits = |devices: &u8| {
-            let output_len = u16::from(*devices) * 4;
-            Timing { line_delays_ns: &[line_delay], devices: *devices, output_len, payload_len: 3 }
-                .misfit(cycle_ns)
-                .is_none()
-        };
+        let fits = |devices: &u8| Timing::new(&[line_delay], *devices).misfit(cycle_ns).is_none();
         println!("{:9} us  {:3}", f64::from(cycle_ns) / 1e3, (1..=254).take_while(fits).last().unwrap_or(0));
     }
     let named = Parameters::GAPS_NS;

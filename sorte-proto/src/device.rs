@@ -1,20 +1,24 @@
 //! The device's side: two ports, and what a device learns from the frames that pass.
 //!
-//! Sans-IO. The caller moves bytes between the ports as [`Reaction::path`] says, sends the delay requests and device
-//! frames that are asked for, and writes the corrections into its counter. A frame in a buffer goes through
-//! [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`].
+//! Sans-IO: frames and the time go in, and what to do comes out. The caller moves bytes between the ports as [`Reaction::path`]
+//! says, sends the delay requests that are asked for, and writes the corrections into its counter. A frame in a buffer goes
+//! through [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`]. In the IO exchange [`Device::poll`] says when a
+//! cycle begins, when the own frame leaves and which cycle has brought nothing, and [`Device::hear_exchange`] gives the data of
+//! a frame that is of the present cycle. The device is silent until the first master frame of the exchange.
 //!
 //! Data are used only after their checksum was found right. (The published device uses them in any case.)
 
 mod config;
+mod exchange;
 mod heard;
 mod machine;
 mod mode;
 mod passage;
 mod port;
+mod raster;
 
 pub use config::{Config, Counters, PortCounters};
-pub use heard::{FrameTimes, HeardSync, Output, Path, PortId, Reaction};
+pub use heard::{Action, FrameTimes, HeardSync, Output, Path, PortId, Reaction};
 pub use machine::Device;
 pub use mode::Forwarding;
 pub use passage::Passage;

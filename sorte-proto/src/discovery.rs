@@ -97,7 +97,7 @@ impl<'a> DiscoveryView<'a> {
     }
 
     /// The entries of the devices counted, in the order of their addresses.
-    pub fn entries(self) -> impl Iterator<Item = Entry> + 'a {
+    pub fn entries(self) -> impl Iterator<Item = Entry> + Clone + 'a {
         self.table().take(usize::from(self.count()))
     }
 
@@ -106,7 +106,7 @@ impl<'a> DiscoveryView<'a> {
         self.entries().nth(usize::from(address.hops_before()))
     }
 
-    fn table(self) -> impl Iterator<Item = Entry> + 'a {
+    fn table(self) -> impl Iterator<Item = Entry> + Clone + 'a {
         let (_, table) = self.fields.split_at(6);
         table.chunks_exact(4).map(|e| e.first_chunk().map_or(Entry::default(), |e| Entry::parse(*e)))
     }
@@ -156,6 +156,7 @@ impl serde::Serialize for DiscoveryView<'_> {
 
 /// The values of a discovery frame, all 254 entries with what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Discovery {
     /// SA, 0 in everything the published firmware sends.
@@ -169,6 +170,7 @@ pub struct Discovery {
     /// Output bytes of these devices.
     pub output_total: u16,
     /// Entries of the devices 1 to 254.
+    #[cfg_attr(feature = "serde", serde(with = "crate::table"))]
     pub entries: [Entry; MAX_DEVICES],
 }
 
@@ -297,11 +299,37 @@ pub(crate) fn next_address(devices_before: u16) -> Option<DeviceAddress> {
 
 /// The line as the master knows it from the last discovery answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 pub struct Network {
     devices: u8,
     input_total: u16,
     output_total: u16,
+    #[cfg_attr(feature = "serde", serde(with = "crate::table"))]
     entries: [Entry; MAX_DEVICES],
+}
+
+/// A network as a file has it.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    devices: u16,
+    input_total: u16,
+    output_total: u16,
+    #[serde(with = "crate::table")]
+    entries: [Entry; MAX_DEVICES],
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Network {
+    type Error = Error;
+
+    fn try_from(told: Unchecked) -> Result<Self, Error> {
+        let mut network = Self::EMPTY;
+        let entries = told.entries.iter().copied();
+        network.set(told.devices, (told.input_total, told.output_total), entries)?;
+        Ok(network)
+    }
 }
 
 impl Network {
@@ -324,24 +352,38 @@ impl Network {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn take(&mut self, answer: DiscoveryView<'_>) -> Result<(), Error> {
-        let count = answer.count();
+        self.set(answer.count(), (answer.input_total(), answer.output_total()), answer.entries())
+    }
+
+    fn set(
+        &mut self,
+        count: u16,
+        (input_total, output_total): (u16, u16),
+        entries: impl Iterator<Item = Entry> + Clone,
+    ) -> Result<(), Error> {
         let devices = match u8::try_from(count) {
             Ok(n) if usize::from(n) <= MAX_DEVICES => n,
             _ => return Err(Error::TooManyDevices { count }),
         };
+        let entries = entries.take(devices.into());
         let (mut input, mut output) = (0u16, 0u16);
-        for entry in answer.entries() {
+        for entry in entries.clone() {
             (input, output) = (input.saturating_add(entry.input), output.saturating_add(entry.output));
         }
-        for (got, want) in [(answer.input_total(), input), (answer.output_total(), output)] {
+        for (got, want) in [(input_total, input), (output_total, output)] {
             // A sum that reached the end of u16 is not a sum any more.
             if got != want || want == u16::MAX {
                 return Err(Error::TableMismatch { got, want });
             }
         }
-        self.entries.iter_mut().zip(answer.entries()).for_each(|(to, entry)| *to = entry);
+        self.entries.iter_mut().zip(entries).for_each(|(to, entry)| *to = entry);
         (self.devices, self.input_total, self.output_total) = (devices, input, output);
         Ok(())
+    }
+
+    /// Whether an answer tells this line.
+    pub(crate) fn is_told_by(&self, answer: DiscoveryView<'_>) -> bool {
+        answer.count() == u16::from(self.devices) && self.entries().iter().copied().eq(answer.entries())
     }
 
     /// Devices in the line, 0..=254.

@@ -195,6 +195,39 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 30,
+        /// The frame of a device comes too close to the one before it, for the jitter of the ports that both pass.
+        #[error("the frame of device {device} comes {gap_ns} ns after the one before it, {needs_ns} ns are needed")]
+        GapTooShort = 31 {
+            /// Whose frame.
+            device: u8,
+            /// From the end of the one before, at the master; negative: they overlap.
+            gap_ns: i32,
+            /// What six sigma of jitter need.
+            needs_ns: u32,
+        },
+        /// A device would have to send before its cycle begins: its cable is longer than a slot.
+        #[error("device {device} would have to send {early_ns} ns before the cycle")]
+        SendBeforeCycle = 32 {
+            /// Which.
+            device: u8,
+            /// So much before.
+            early_ns: u32,
+        },
+        /// A frame of the IO exchange began at a time that is none of its sender's.
+        #[error("the frame began {off_ns} ns away from its time")]
+        OutsideWindow = 33 {
+            /// From the nearest time at which it was expected.
+            off_ns: i32,
+        },
+        /// A frame of this sender has come in this cycle already.
+        #[error("a second frame of {address} in one cycle")]
+        Doubled = 34 {
+            /// Who sent it; 0: the master.
+            address: u8,
+        },
+        /// A frame of the IO exchange belongs to a cycle that is over.
+        #[error("the frame belongs to a cycle that is over")]
+        CycleOver = 35,
     }
 }
 

@@ -109,7 +109,7 @@ pub fn emit_master_frame_into(output: &[u8], time_stamp: u16, into: &mut [u8]) -
 }
 
 #[inline]
-fn write(status: Status, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+pub(crate) fn write(status: Status, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
     let want = output.len().saturating_add(MasterFrameView::OVERHEAD);
     if let Some((body, stamp)) = room(into, want)?.split_last_chunk_mut() {
         seal(body, 0, status, output);

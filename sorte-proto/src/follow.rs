@@ -220,6 +220,34 @@ mod tests {
         assert_eq!((device.ordered(), device.lag(), device.is_stopped()), (Some(7), 0, false));
     }
 
+    /// A stop of the steps is no reason to keep the current on.
+    #[test]
+    fn a_stopped_axis_lets_its_driver_be_switched_off() {
+        let (mut asked, mut device) = (Asked::new(), Follower::new(2));
+        device.next(Some(asked.slice(word(3))));
+        for _ in 0..4 {
+            asked.slice(word(0));
+        }
+        assert_eq!(device.next(Some(asked.slice(word(0)))), word(3));
+        assert!(device.is_stopped());
+        assert_eq!(device.next(Some(asked.slice(Pto::DriverOff))), Pto::DriverOff);
+        assert!(device.is_stopped());
+    }
+
+    /// A step forward was lost, and the next one is back: neither is made, and the axis is where it was asked to.
+    #[test]
+    fn a_step_against_the_lag_is_left_out() {
+        let (mut asked, mut device) = (Asked::new(), Follower::new(9));
+        device.next(Some(asked.slice(word(3))));
+        asked.slice(word(0));
+        let back = device.next(Some(asked.slice(word(1))));
+        assert_eq!((back, device.lag(), asked.asked()), (word(2), 0, 0));
+        // Two forward are missing: the step back makes it one.
+        asked.slice(word(0));
+        asked.slice(word(0));
+        assert_eq!((device.next(Some(asked.slice(word(1)))).start(), device.lag()), (None, 1));
+    }
+
     proptest! {
         /// Whatever is lost: nothing is made twice, steps stay 4 us apart, and after some rest all are made.
         #[test]

@@ -34,6 +34,7 @@ const NEVER: u64 = u64::MAX;
 
 /// A change of the SYNC0 output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Edge {
     /// When, in ns since the start.
     pub ns: u64,
@@ -49,6 +50,7 @@ servowire_core::one_line!(Edge {
 /// Events that wait for the handler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Events {
     /// The pulse is over.
     pub cmp6: bool,

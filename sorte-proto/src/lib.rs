@@ -43,6 +43,9 @@ mod status;
 pub mod stream;
 mod sync;
 pub mod sync0;
+#[cfg(feature = "serde")]
+mod table;
+mod tally;
 pub mod timing;
 
 pub use servowire_core::OutOfRange;
@@ -69,3 +72,4 @@ pub use preamble::{Preamble, strip_preamble};
 pub use pto::{Direction, Pto, Reserved, StartTime};
 pub use status::Status;
 pub use sync::{Sync, SyncView, TRANSIT_NS, TRIGGER_TO_CAPTURE_NS};
+pub use tally::Tally;

@@ -40,6 +40,7 @@ pub struct RoundTrips {
 /// Line delay from round trips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LineDelay {
     model: DelayModel,
     count: u8,
@@ -56,15 +57,21 @@ impl LineDelay {
 
     /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips
     /// beyond the sixteenth are left out.
-    pub fn add(&mut self, rtt_ns: u32) {
+    #[inline]
+    pub const fn add(&mut self, rtt_ns: u32) {
         if self.is_complete() {
             return;
         }
         let term = if self.model.shift_samples { rtt_ns >> 4 } else { rtt_ns };
         self.sum = self.sum.saturating_add(term);
         self.count = self.count.saturating_add(1);
-        self.min = self.min.min(rtt_ns);
-        self.max = self.max.max(rtt_ns);
+        // Compared here: at opt-level s `min` and `max` are calls or not, as it pleases the compiler.
+        if rtt_ns < self.min {
+            self.min = rtt_ns;
+        }
+        if rtt_ns > self.max {
+            self.max = rtt_ns;
+        }
     }
 
     /// Round trips taken.
@@ -139,6 +146,17 @@ mod tests {
         assert_eq!(device.checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 352 }));
         assert_eq!(device.published(), 65532);
         assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
+    }
+
+    /// Sixteen round trips of 4096 ns do not fit the published 16 bits, sixteen of 4095 do.
+    #[test]
+    fn the_longest_round_trip_is_4095_ns() {
+        for model in [DelayModel::MASTER, DelayModel::DEVICE] {
+            assert!(of(model, [4095; 16]).checked().is_ok());
+            let mut one = [500; 16];
+            one[7] = 4096;
+            assert_eq!(of(model, one).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 4096 }));
+        }
     }
 
     #[test]

@@ -235,6 +235,18 @@ impl<'a> ParamView<'a> {
     }
 }
 
+/// As the values.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for ParamView<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serde::Serialize::serialize(
+            &Param { source: self.source(), status: self.status(), parameters: self.parameters() },
+            serializer,
+        )
+    }
+}
+
 /// The values of a PARAM frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

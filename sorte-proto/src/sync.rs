@@ -68,6 +68,23 @@ impl<'a> SyncView<'a> {
     }
 }
 
+/// As the values.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for SyncView<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serde::Serialize::serialize(
+            &Sync {
+                source: self.source(),
+                status: self.status(),
+                time_stamp_ns: self.time_stamp_ns(),
+                delay_ns: self.delay_ns(),
+            },
+            serializer,
+        )
+    }
+}
+
 /// The values of a SYNC frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -123,6 +140,11 @@ impl Sync {
     pub fn emit(&self) -> [u8; Self::LEN] {
         let ([t0, t1, t2, t3], [d0, d1]) = (self.time_stamp_ns.to_le_bytes(), self.delay_ns.to_le_bytes());
         emit(self.source, FrameType::Sync, self.status, &[t0, t1, t2, t3, d0, d1])
+    }
+
+    /// When the master triggered the frame, in its time, as a device sees it that is `delay_ns` away.
+    pub(crate) const fn trigger_ns(self, delay_ns: u32) -> u32 {
+        self.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns)
     }
 
     /// The delay from the master in all its bits, for lines longer than 65,535 ns. **An extension of this crate, not TI's.**

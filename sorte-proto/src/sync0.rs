@@ -109,6 +109,7 @@ impl Flags {
 
 /// A register of the IEP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Register {
     /// CMP_CFG: which compare events are enabled.
     CmpCfg,
@@ -124,6 +125,7 @@ pub enum Register {
 
 /// A value for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Write {
     /// Where.
     pub register: Register,

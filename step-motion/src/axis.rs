@@ -34,8 +34,8 @@ pub enum Work {
 /// request acts where the segments that are out end: after twice the [reach](Self::with_reach) at the latest, but for
 /// [`halt`](Self::halt), after which there is no step. Each step is made within 3/4 of a tick, or 25 ns where that is more, of its exact
 /// time. Behind all that is out lies a stop: if [`poll`](Self::poll) is not called
-/// in time the axis comes to rest, and goes on from there when it is. That stop is as exact as there are slots for it: 129 hold
-/// ramps of a thousand steps to the nanosecond.
+/// in time the axis comes to rest, and goes on from there when it is. Its intervals are exact
+/// to a hundredth.
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -111,6 +111,9 @@ struct Tail {
 
 /// A tick in times.
 const TICK: i128 = 1 << 32;
+/// How exact a stop is that is to be run only if the background starves: its intervals by parts of 128, or of 8 where slots are few.
+const COARSE: i32 = -7;
+const COARSEST: i32 = -3;
 /// The longest wait in an event, in ticks.
 const LONGEST: u32 = 1 << 30;
 
@@ -120,13 +123,13 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock.
     pub fn new(queue: &'q Queue<N>, clock: Clock, limits: Limits) -> Result<(Self, StepTimer<'q, N>), Error> {
-        let mover = Mover::new(clock, limits)?;
+        let mover = Mover::new(clock, limits)?.cutting();
         let timer = StepTimer::new(queue).ok_or(Error::QueueFull)?;
         // Half a tick is what rounding to ticks takes of 3/4, or of 25 ns where that is more.
         let tick = Real::new(clock.moment(1));
         let ns = |n: u64| Real::new(clock.moments().into()) * Real::new(n) / Real::new(1_000_000_000);
         let off = (tick / Real::new(5)).max(ns(23) - tick.half());
-        let reach = (clock.hz() / 200).max(4);
+        let reach = (clock.hz() / 100).max(4);
         let axis = Self {
             queue,
             mover,
@@ -150,7 +153,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok((axis, timer))
     }
 
-    /// With so many ticks of motion in each half of the queue, at least 4; 5 ms if nothing is said.
+    /// With so many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
@@ -264,7 +267,8 @@ impl<'q, const N: usize> Axis<'q, N> {
     }
 
     /// A slice of the background's work: a segment, a stop that is planned, or a look at the interrupt. Call it until it says
-    /// other than [`Work::More`], again after each request, and every half [reach](Self::with_reach).
+    /// other than [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often where the slots of
+    /// a block hold less than that.
     pub fn poll(&mut self) -> Work {
         if let Some(ticket) = self.halt {
             return self.confirm(ticket);
@@ -370,12 +374,12 @@ impl<'q, const N: usize> Axis<'q, N> {
             self.until = self.end.saturating_add(i128::from(self.reach) << 32);
         }
         let (until, now) = (tick(self.until), self.now());
-        let full = self.len.saturating_add(4) > Queue::<N>::BLOCK / 2;
+        let full = self.len.saturating_add(4) > Queue::<N>::BLOCK / 3;
         if full || self.len > 0 && now >= until {
             return self.close();
         }
         let time = Real::new(self.clock.moment(until.saturating_sub(now)));
-        match self.mover.cut(&Demand { off: self.off, time }, until) {
+        match self.mover.cut(&Demand { off: self.off, coarse: None, time }, until) {
             Cut::Steps(stretch, direction) => {
                 let steps = u32::from(stretch.count);
                 self.made = self.made.wrapping_add(if direction.dir() { steps.wrapping_neg() } else { steps });
@@ -398,12 +402,16 @@ impl<'q, const N: usize> Axis<'q, N> {
 
     /// The block is as long as it is to be: what comes behind it.
     fn close(&mut self) -> Work {
+        self.close_with(COARSE)
+    }
+
+    fn close_with(&mut self, coarse: i32) -> Work {
         if let Some(out) = self.out.get_mut(self.block) {
             out.len = self.len;
         }
         let mut mover = self.mover.clone();
         mover.stop(self.now());
-        let demand = Demand { off: self.off, time: Real::HUGE };
+        let demand = Demand { off: self.off, coarse: Some(coarse), time: Real::HUGE };
         self.stop = Some(Tail { mover, demand, end: self.end, dir: self.dir, len: self.len });
         Work::More
     }
@@ -427,14 +435,10 @@ impl<'q, const N: usize> Axis<'q, N> {
         (tail.end, tail.dir, tail.len) = (self.end, self.dir, self.len);
         (self.end, self.dir, self.len) = (end, dir, len);
         if tail.len > Queue::<N>::BLOCK {
-            // Once more with fewer segments: a stop that nobody asked for need not be as exact.
-            let off = tail.demand.off.scaled(4);
-            if off > Real::new(self.clock.moment(1 << 20)) {
-                return self.give_up();
-            }
-            self.close();
-            if let Some(tail) = &mut self.stop {
-                tail.demand.off = off;
+            // Once more with fewer segments.
+            match tail.demand.coarse {
+                Some(coarse) if coarse < COARSEST => return self.close_with(coarse.saturating_add(2)),
+                _ => return self.give_up(),
             }
         } else if more {
             self.stop = Some(tail);
@@ -489,7 +493,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             let count = u16::try_from(times).unwrap_or(u16::MAX);
             let end = self.end.saturating_add(longest);
             self.put(count, kind, end, [i64::from(LONGEST) << 32, 0, 0]);
-            self.end = self.end.saturating_add(longest.saturating_mul(times));
+            self.end = self.end.saturating_add(longest.wrapping_mul(times));
             left = until.saturating_sub(self.end);
         }
         if left >= TICK {

@@ -33,6 +33,8 @@ pub(crate) struct Cutter {
 pub(crate) struct Demand {
     /// How far off a step may be, in moments.
     pub(crate) off: Real,
+    /// For a stop that nobody is to need: it may be off by an interval times 2 to this, too.
+    pub(crate) coarse: Option<i32>,
     /// Time that its steps may take, in moments; one step may take longer.
     pub(crate) time: Real,
 }
@@ -58,12 +60,14 @@ impl Stretch {
     /// When its last step is made, each interval added as the interrupt does.
     pub(crate) fn last(&self) -> i128 {
         let [interval, add, bend] = self.differences.map(i128::from);
-        let n = i128::from(self.count.saturating_sub(1));
-        // n, n (n - 1) / 2, n (n - 1) (n - 2) / 6 times.
-        let pairs = n.saturating_mul(n.saturating_sub(1)) >> 1;
-        let triples = pairs.saturating_mul(n.saturating_sub(2)).checked_div(3).unwrap_or(0);
-        let more = interval.saturating_mul(n).saturating_add(add.saturating_mul(pairs));
-        self.first.saturating_add(more).saturating_add(bend.saturating_mul(triples))
+        let n = u64::from(self.count).saturating_sub(1);
+        // n, n (n - 1) / 2, n (n - 1) (n - 2) / 6 times: 2^48 at most.
+        let pairs = n.wrapping_mul(n.saturating_sub(1)) >> 1;
+        let triples = pairs.wrapping_mul(n.saturating_sub(2)).checked_div(3).unwrap_or(0);
+        let [n, pairs, triples] = [n, pairs, triples].map(i128::from);
+        let more =
+            interval.wrapping_mul(n).wrapping_add(add.wrapping_mul(pairs)).wrapping_add(bend.wrapping_mul(triples));
+        self.first.saturating_add(more)
     }
 }
 
@@ -89,7 +93,8 @@ impl Cutter {
         let from = self.time.max(piece.time).max(curve.skipped.0);
         let on = On { piece, frame, curve, end };
         let left = until.saturating_sub(self.count);
-        let (count, stretch, last) = self.many(&on, from, left, demand).unwrap_or_else(|| on.single(self.count, from));
+        let (count, stretch, last) =
+            self.many(&on, from, left, demand).unwrap_or_else(|| on.single(self.count, from, demand));
         (self.count, self.time) = (self.count.saturating_add(count.into()), last);
         Some(stretch)
     }
@@ -100,17 +105,22 @@ impl Cutter {
         let even = here.a.is_zero() && here.j.is_zero();
         let mut count = if even { left } else { left.min(self.hint) };
         let pace = Real::ONE / here.v;
-        let most = (demand.time / pace).to_fixed(0).min(if even { 0xffff } else { 1024 });
-        count = count.min(u32::try_from(most).unwrap_or(u32::MAX));
+        let room = (demand.time / pace).to_fixed(0).min(match demand.coarse {
+            _ if even => 0xffff,
+            None => 1024,
+            Some(_) => 2048,
+        });
+        count = count.min(u32::try_from(room).unwrap_or(u32::MAX));
         while count >= 2 {
             let middle = (from + pace * Real::fixed(count.into(), 1)).min(on.end).max(from);
             let state = on.state(middle);
             let series = Series::new(&state, on.behind(self.count, &state));
+            let most = demand.coarse.map_or(demand.off, |by| demand.off.max(series.r.scaled(by)));
             match series.off(count) {
-                Ok(off) if off <= demand.off => {
+                Ok(off) if off <= most => {
                     if !even {
                         // Twice as many steps are 16 times as far off.
-                        let room = demand.off.exponent().saturating_sub(off.exponent()).clamp(0, 16);
+                        let room = most.exponent().saturating_sub(off.exponent()).clamp(0, 16);
                         let quarter = if room > 1 { count >> 2 } else { 0 };
                         self.hint = (count << (room >> 2)).saturating_add(quarter);
                     }
@@ -119,7 +129,7 @@ impl Cutter {
                     return Some((count, stretch, last));
                 }
                 Ok(off) => {
-                    let much = off.exponent().saturating_sub(demand.off.exponent()).clamp(4, 64);
+                    let much = off.exponent().saturating_sub(most.exponent()).clamp(4, 64);
                     count = count.checked_shr(much.unsigned_abs() >> 2).unwrap_or(0);
                 }
                 Err(doublings) => count = count.checked_shr(doublings).unwrap_or(0),
@@ -169,18 +179,19 @@ impl On<'_> {
     }
 
     /// The next step alone, from a time that is not after it.
-    fn single(&self, count: u32, from: Real) -> (u16, Stretch, Real) {
-        let time = self.search(count, from);
+    fn single(&self, count: u32, from: Real, demand: &Demand) -> (u16, Stretch, Real) {
+        let time = self.search(count, from, demand);
         (1, Stretch { count: 1, first: self.tick(time), differences: [0; 3] }, time)
     }
 
     /// The time of a step: Newton's method between the times that are known to be too early and late enough; if it takes long,
     /// halving.
-    fn search(&self, count: u32, from: Real) -> Real {
+    fn search(&self, count: u32, from: Real, demand: &Demand) -> Real {
         let here = self.state(from);
         let (way, _) = self.behind(count, &here);
         let (mut low, mut high) = (from, self.end.max(from));
         let mut time = (from + guess(way, &here)).min(high);
+        let enough = demand.off.scaled(-4);
         for round in 0..48_u8 {
             let state = self.state(time);
             let (ahead, past) = self.behind(count, &state);
@@ -190,8 +201,8 @@ impl On<'_> {
                 low = time;
             }
             let by = ahead.max(past) / state.v;
-            // A sixteenth of a moment is near enough.
-            if by < Real::fixed(1, 4) || (high - low) < Real::fixed(1, 4) {
+            let near = demand.coarse.map_or(enough, |by| enough.max((time - from).scaled(by)));
+            if by < near || (high - low) < near {
                 break;
             }
             let next = time.along(by, past.is_zero());
@@ -265,7 +276,7 @@ impl Series {
         let Self { r, w, y, up, faster, first: (ahead, behind) } = *self;
         let bits = TICK.saturating_sub(i32::try_from(on.frame.shift).unwrap_or(0));
         let signed = |x: Real, plus: bool, bits: i32| {
-            let size = x.to_wide(bits);
+            let size = x.to_wide(bits.saturating_add(1)).saturating_add(1) >> 1;
             if plus { size } else { size.saturating_neg() }
         };
         let (square, third) = ((w.squared() * Real::new(3)), y);
@@ -280,29 +291,28 @@ impl Series {
         let c3 = signed(r * c3 * THIRD.half(), plus, bits.saturating_add(24));
         let place = |x: Real, plus| signed(x, plus, STEP_BITS);
         let u = if ahead.is_zero() { place(behind, false) } else { place(ahead, true) };
+        // No sum or product comes near 2^127, as the third term is less than the second, and that less than the first.
         let down = |x: i128, by: u32| x >> by;
         // c1 u + c2 u² + c3 u³
         let at = |u: i128| {
-            let inner = c2.saturating_add(down(c3.saturating_mul(u), STEP));
-            let inner = c1.saturating_add(down(down(inner, 12).saturating_mul(u), STEP.saturating_add(12)));
-            down(inner.saturating_mul(u), STEP)
+            let inner = c2.wrapping_add(down(c3.wrapping_mul(u), STEP));
+            let inner = c1.wrapping_add(down(down(inner, 12).wrapping_mul(u), STEP.wrapping_add(12)));
+            down(inner.wrapping_mul(u), STEP)
         };
         let one = 1_i128 << STEP;
-        let double = u.saturating_mul(2).saturating_add(one);
-        let cubic = u.saturating_mul(u.saturating_add(one)).saturating_mul(3);
-        let cubic = down(cubic, STEP).saturating_add(one);
+        let double = u.wrapping_mul(2).wrapping_add(one);
+        let cubic = u.wrapping_mul(u.wrapping_add(one)).wrapping_mul(3);
+        let cubic = down(cubic, STEP).wrapping_add(one);
         let narrow = |x: i128| i64::try_from(x).ok();
-        let interval = c1.saturating_add(down(
-            down(c2, 12).saturating_mul(double).saturating_add(down(c3, 12).saturating_mul(cubic)),
-            STEP.saturating_add(12),
+        let interval = c1.wrapping_add(down(
+            down(c2, 12).wrapping_mul(double).wrapping_add(down(c3, 12).wrapping_mul(cubic)),
+            STEP.wrapping_add(12),
         ));
-        let add = down(c2, 23).saturating_add(down(
-            down(c3, 8).saturating_mul(u.saturating_add(one)).saturating_mul(6),
-            STEP.saturating_add(16),
-        ));
-        let bend = down(c3.saturating_mul(6), 24);
+        let add = down(c2, 23)
+            .wrapping_add(down(down(c3, 8).wrapping_mul(u.wrapping_add(one)).wrapping_mul(6), STEP.wrapping_add(16)));
+        let bend = down(c3.wrapping_mul(6), 24);
         let differences = [narrow(interval)?, narrow(add)?, narrow(bend)?];
-        let last = u.saturating_add(i128::from(count.saturating_sub(1)) << STEP);
+        let last = u.wrapping_add(i128::from(count.saturating_sub(1)) << STEP);
         // Where the segment ends, for the next one to look from: the fraction of a tick does not matter.
         let size = u64::try_from(at(last).unsigned_abs()).ok()?;
         let time = middle.along(Real::fixed(size, bits), last >= 0).max(on.piece.time);

@@ -63,6 +63,8 @@ pub struct Mover {
     phases: Phases,
     stepper: Stepper,
     cutter: Cutter,
+    /// Its steps are cut into stretches, not taken one by one.
+    cuts: bool,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
@@ -102,6 +104,7 @@ impl Mover {
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
             cutter: Cutter::new(),
+            cuts: false,
             direction: Direction::Forward,
             origin: 0,
             commanded: 0,
@@ -297,6 +300,11 @@ impl Mover {
         self.limits
     }
 
+    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
+    pub(super) const fn cutting(self) -> Self {
+        Self { cuts: true, ..self }
+    }
+
     /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
     pub(super) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
         if self.due.is_none() {
@@ -434,7 +442,14 @@ impl Mover {
             self.origin = self.commanded;
             (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
             let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
-            self.due = self.stepper.next(&phases.curve, &phases.frame).map(|due| due.max(self.free).max(begin));
+            let Phases { curve, frame } = &phases;
+            let due = if self.cuts {
+                // Not after the next step is enough.
+                (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
+            } else {
+                self.stepper.next(curve, frame)
+            };
+            self.due = due.map(|due| due.max(self.free).max(begin));
             if self.dir != Some(self.direction) {
                 self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
                 self.dir = None;

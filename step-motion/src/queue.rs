@@ -120,7 +120,7 @@ impl Slot {
 }
 
 /// Segments between an [`Axis`](crate::Axis) in the background and a [`StepTimer`](crate::StepTimer) in an interrupt: `N` slots
-/// of 40 bytes, 9 at least. Half of them are a block, half of a block is for the stop behind it.
+/// of 40 bytes, 9 at least. Half of them are a block; two thirds of a block are for the stop behind it.
 ///
 /// It lies in a `static`; [`Axis::new`](crate::Axis::new) gives both ends.
 #[derive(Debug)]

@@ -1,10 +1,10 @@
 //! The interrupt's half of a motion: it only adds.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{Ordering, fence};
 
 use servowire_core::Direction;
 
-use crate::queue::{COUNT, DELTA, DIR, IDLE, Queue, Slot, TICKET};
+use crate::queue::{COUNT, DELTA, DIR, IDLE, Kind, Queue, Segment, Slot, TICKET};
 
 /// What a call of [`StepTimer::fire`] asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,12 +62,8 @@ pub struct StepTimer<'q, const N: usize> {
     queue: &'q Queue<N>,
     /// The segment under way, or the one that it stands behind.
     slot: &'q Slot,
-    /// Which one that is.
-    at: u32,
+    /// What this event is, and how many are left in the segment, this one included.
     head: u32,
-    /// Events left in it, this one included.
-    left: u32,
-    made: u32,
     /// Part of a tick that the next event is later than its tick, in 2^-32.
     fraction: u32,
     interval: u64,
@@ -77,34 +73,47 @@ pub struct StepTimer<'q, const N: usize> {
 impl<'q, const N: usize> StepTimer<'q, N> {
     pub(crate) fn new(queue: &'q Queue<N>) -> Option<Self> {
         let slot = queue.slots.first()?;
-        Some(Self { queue, slot, at: 0, head: 1, left: 1, made: 0, fraction: 0, interval: 0, add: 0 })
+        Some(Self { queue, slot, head: 1, fraction: 0, interval: 0, add: 0 })
+    }
+
+    /// For measurements: segments of so many steps that follow each other for ever, in a queue that nobody else uses.
+    #[doc(hidden)]
+    pub fn endless(queue: &'q Queue<N>, count: u16) -> Option<Self> {
+        let kind = Kind { step: true, reverse: false };
+        let segment = Segment { count, kind, first: 5 << 32, interval: 5 << 32, add: 1, bend: 1 };
+        for (slot, after) in [(1, 0), (2, 1)] {
+            queue.put(slot, &segment, Some(after));
+        }
+        queue.link(2, 1);
+        Self::new(queue)
     }
 
     /// The event that is due now, and the ticks until the next one. While it stands, a call begins with what has been planned.
     #[inline]
     pub fn fire(&mut self) -> Fired {
         let queue = self.queue;
-        let head = self.head;
         let halt = queue.halt.load(Ordering::Relaxed);
         if halt != 0 {
             return self.halted(halt);
         }
+        let head = self.head;
+        // Nobody else writes there.
         #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "-1, 0 or 1 in the top bits")]
-        let step = (head as i32 >> DELTA) as u32;
-        self.made = self.made.wrapping_add(step);
-        queue.made.store(self.made, Ordering::Relaxed);
-        let left = self.left.wrapping_sub(1);
-        let interval = if left == 0 {
-            let next = self.slot.next.load(Ordering::Acquire);
-            let Some(slot) = queue.slots.get(next as usize) else { return self.idle() };
-            (self.slot, self.at) = (slot, next);
-            queue.current.store(next, Ordering::Release);
+        let made = queue.made.load(Ordering::Relaxed).wrapping_add((head as i32 >> DELTA) as u32);
+        queue.made.store(made, Ordering::Relaxed);
+        let left = head.wrapping_sub(1);
+        let interval = if left & COUNT == 0 {
+            let next = self.slot.next.load(Ordering::Relaxed);
+            // The slot has been written before it was linked, and the one before it is read before its block is free.
+            fence(Ordering::AcqRel);
+            let Some(slot) = queue.slots.get(next as usize) else { return self.idle(head) };
+            queue.current.store(next, Ordering::Relaxed);
+            self.slot = slot;
             self.head = slot.head.load(Ordering::Relaxed);
-            self.left = self.head & COUNT;
             (self.interval, self.add) = (slot.interval(), slot.add());
             slot.first()
         } else {
-            self.left = left;
+            self.head = left;
             self.interval = self.interval.wrapping_add(self.add);
             self.add = self.add.wrapping_add(self.slot.bend());
             self.interval
@@ -119,10 +128,10 @@ impl<'q, const N: usize> StepTimer<'q, N> {
     /// The last event has been; nothing follows.
     #[cold]
     #[inline(never)]
-    fn idle(&mut self) -> Fired {
-        let head = self.head;
-        (self.head, self.left) = (head & DIR | 1, 1);
-        self.queue.current.store(self.at | IDLE, Ordering::Release);
+    fn idle(&mut self, head: u32) -> Fired {
+        self.head = head & DIR | 1;
+        let current = &self.queue.current;
+        current.store(current.load(Ordering::Relaxed) | IDLE, Ordering::Release);
         Fired { head, wait: 0 }
     }
 
@@ -131,9 +140,9 @@ impl<'q, const N: usize> StepTimer<'q, N> {
     #[inline(never)]
     fn halted(&mut self, ticket: u32) -> Fired {
         if let Some(slot) = self.queue.slots.first() {
-            (self.slot, self.at) = (slot, 0);
+            self.slot = slot;
         }
-        (self.head, self.left, self.fraction) = (self.head & DIR | 1, 1, 0);
+        (self.head, self.fraction) = (self.head & DIR | 1, 0);
         self.queue.current.store(IDLE | ticket << TICKET, Ordering::Release);
         Fired { head: self.head, wait: 0 }
     }

@@ -212,7 +212,7 @@ const fn six_fields(cf: u8, sf: StatusField, [d0, d1, d2]: [u8; 3]) -> [u8; 6] {
 
 /// How many fields the response to a request for `id` has when it begins with `cf`: an ID 3 frame that was not
 /// asked for is the encoder's refusal.
-pub(crate) const fn expected_fields(id: DataId, cf: u8) -> u8 {
+const fn expected_fields(id: DataId, cf: u8) -> u8 {
     if cf == CF3 { DataId::ReadAll.response_fields() } else { id.response_fields() }
 }
 

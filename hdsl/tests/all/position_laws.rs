@@ -1,6 +1,7 @@
 //! Laws of the fast position at all widths and in both dialects: it is the truth or none, and it comes back.
 
 use hdsl::device::{Device, Fault};
+use hdsl::frame::Stuffing;
 use hdsl::master::{Master, State};
 use hdsl::{Dialect, Doubt, EncoderId, Policy, Sample, Tolerated};
 
@@ -275,6 +276,25 @@ fn a_late_end_is_no_lost_frame() {
     assert!(link.frame(3, 0).is_ok());
     link.sampled_ns += 5_800;
     assert!(link.frame(3, 0).is_err());
+}
+
+/// Frames with 12 blocks of stuffing last 180 bits, 19.2 us: none is taken for lost, and one that is lost is known.
+#[test]
+fn frames_with_stuffing() {
+    let mut link = Link::new(Dialect::SICK, 32);
+    link.master.set_stuffing(Stuffing::new(12).unwrap());
+    let stuffed = |link: &mut Link, more_ns: u64| {
+        link.sampled_ns += 19_200 - FRAME_NS + more_ns;
+        link.frame(3, 0)
+    };
+    let first = (0..200).find(|_| stuffed(&mut link, 0).is_ok());
+    assert!(first.is_some_and(|frame| frame < 120), "{first:?}");
+    for _ in 0..20 {
+        assert!(stuffed(&mut link, 0).is_ok());
+        assert_eq!(link.master.h_frame().tail.stuffing.get(), 12);
+    }
+    assert!(stuffed(&mut link, 5_700).is_ok());
+    assert!(stuffed(&mut link, 19_200).is_err());
 }
 
 /// Nobody feeds the receiver any more: its last evidence grows old.

@@ -5,7 +5,11 @@
 use crate::common::exchanges::{Setup, Shown, bus, single};
 use crate::common::line::{USUAL_EVENTS, events, first_seed, rates};
 use crate::common::switches::{Switches, assert_all_drawn};
-use nikon_aformat::BitRate;
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::master::{BusTransaction, Line, Progress};
+use nikon_aformat::{
+    BitRate, Command, Data, EncoderAddress, EncoderStatus, Operation, Request, Resolution, Response, U40,
+};
 use servowire_world::{Kind, Scenario};
 
 /// Runs seeds until enough has happened.
@@ -38,4 +42,44 @@ fn hostile_transactions() {
 fn hostile_buses() {
     let shown = seeds(|setup, shown| bus(setup, 30, shown));
     assert!(events() < USUAL_EVENTS || shown.tally.of(Kind::Flip) > 0);
+}
+
+/// A line on which nothing happens: eight encoders with any positions and status, and with shafts at rest of which one looks
+/// like the begin of a response, frame by frame and all in one block. `HOSTILE_EVENTS=100000000` runs as many cycles.
+#[test]
+fn a_perfect_line_loses_nothing() {
+    let line = Line::new(BitRate::Mbit16);
+    let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
+    let mut draw = 0x9e37_79b9_7f4a_7c15_u64;
+    let cycles = events() / 10;
+    for cycle in 0..cycles {
+        let mut bus = BusTransaction::start(request, Resolution::default(), Addresses::ALL, line, 0);
+        let (mut block, mut want, mut at_ns) = (Vec::with_capacity(32), [0; 8], 4_125);
+        for (ea, abs) in EncoderAddress::ALL.into_iter().zip(&mut want) {
+            draw = draw.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            *abs = match cycle % 4 {
+                // Bits 0..=15 and 16..=31 stand where a response to command 4 begins.
+                0 => draw >> 44 << 12 & 0xff_f000 | 0x104,
+                1 => draw >> 28 & 0xff_0000_ffff | 0x0104 << 16,
+                _ => draw >> 24,
+            } & 0xf_ffff_ffff;
+            let es = EncoderStatus::from_bits_truncate((draw >> 20) as u8);
+            let sent = Response::new(ea, Command::Abs40Mt, es, Data::Abs40 { abs: U40::truncate(*abs) }).emit();
+            for content in sent.contents() {
+                at_ns += 1_125;
+                if cycle % 2 == 0 {
+                    let _ = bus.hear(&[Some(*content)], at_ns);
+                }
+                block.push(Some(*content));
+            }
+            at_ns += 1_500;
+        }
+        if cycle % 2 == 1 {
+            let _ = bus.hear_since(&block, 4_125, at_ns - 1_500);
+        }
+        assert!(matches!(bus.progress(), Progress::Done { .. }), "cycle {cycle}: {} missing", bus.bus().missing());
+        let got = EncoderAddress::ALL.map(|ea| bus.bus().response(ea).and_then(Response::abs));
+        assert_eq!(got, want.map(Some), "cycle {cycle}");
+    }
+    println!("{cycles} cycles of eight encoders");
 }

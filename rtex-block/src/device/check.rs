@@ -10,6 +10,7 @@ use crate::header::MacId;
 /// Type code, index, data and the pairing of the codes come later, when the command is executed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Verdict {
     /// Error_Code of the main block.
     pub error: Option<ErrorCode>,

@@ -11,10 +11,12 @@ use crate::header::{MacId, UpdateCounter};
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{Gear, max_step, step};
 use crate::response::ResponseBlock;
+use crate::status::StatusFlags;
 
 /// Something that a log shows between its blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum LogFinding {
     /// The echo of the counter stands still for more than the two communications that an update period can have.
@@ -90,9 +92,20 @@ pub enum LogFinding {
     AtEnd(MacId, Unfinished),
 }
 
+servowire_core::codes! {
+    /// What somebody has to look after.
+    pub enum Trouble: u8 {
+        /// A drive reports an alarm.
+        Alarm = 1 => "a drive reports an alarm",
+        /// The counter echo of a drive stood still: the communication, or the drive, did.
+        EchoStood = 2 => "the counter echo of a drive stood still",
+    }
+}
+
 /// What goes on at the end of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Unfinished {
     /// The echo of the counter stands still.
@@ -196,6 +209,9 @@ struct Track {
     /// The request that is out, and, until it is answered, the responses and the busy ones of them.
     request: Option<Request>,
     open: Option<(u32, u32)>,
+    /// Alarm was 1, and the echo stood still, at any time.
+    alarmed: bool,
+    stood: bool,
 }
 
 impl Track {
@@ -213,6 +229,8 @@ impl Track {
         awaited: None,
         request: None,
         open: None,
+        alarmed: false,
+        stood: false,
     };
 
     /// The counter of a command.
@@ -257,6 +275,7 @@ impl Track {
             let started = self.code.is_none_or(|code| code != Code::NOP);
             let says = self.same == NORMAL && started;
             self.stands |= says;
+            self.stood |= says;
             return says.then_some(LogFinding::EchoStands { responses: NORMAL });
         }
         let responses = core::mem::replace(&mut self.same, 1);
@@ -346,6 +365,18 @@ impl LogAnalysis {
         found.into_iter().flatten()
     }
 
+    /// The gravest of what the log holds, if there is anything that somebody has to look after.
+    pub fn trouble(&self) -> Option<Trouble> {
+        let any = |what: fn(&Track) -> bool| self.tracks.iter().any(what);
+        if any(|track| track.alarmed) {
+            Some(Trouble::Alarm)
+        } else if any(|track| track.stood) {
+            Some(Trouble::EchoStood)
+        } else {
+            None
+        }
+    }
+
     /// At the end of the log: drives that were only on one side of it, and what goes on.
     pub fn end(&self) -> impl Iterator<Item = LogFinding> {
         let both = self.tracks.iter().any(|t| t.commands > 0) && self.tracks.iter().any(|t| t.responses > 0);
@@ -382,6 +413,7 @@ impl LogAnalysis {
         let commands = core::mem::replace(&mut track.unanswered, 0);
         let again = track.responses > 0 && commands > NORMAL;
         track.responses = track.responses.saturating_add(1);
+        track.alarmed |= block.status().contains(StatusFlags::ALARM);
         let stands = track.echo(block.update_counter_echo());
         let late = track.come_back(block.code());
         let answered = track.answer(block);
@@ -393,49 +425,77 @@ impl LogAnalysis {
 /// What the whole of a log looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LogShape {
     /// The size of the blocks.
     pub size: BlockSize,
     /// How many bytes of each word are turned round: 1 none, 2 or 4.
     pub word: usize,
+    /// Bytes before the first whole block: not 0 where the log begins in the middle of one.
+    pub skip: usize,
 }
 
 impl LogShape {
-    /// The size and byte order with which most of the blocks at the beginning make sense; `None` for less than four blocks, or
-    /// where nothing does.
+    /// The size, byte order and beginning with which most of the blocks make sense. `None` where nothing does, or where there are less
+    /// than four blocks after the NOPs from before the start: they look alike in every shape, so give more of the log then.
     ///
     /// In a log of 32-byte blocks every second piece of 16 bytes is a sub block: a command's begins with 80h, 82h or 8Ah, which
     /// read as a main block would be a response of drive 0, 2 or 10.
     pub fn guess(bytes: &[u8]) -> Option<Self> {
-        let shapes = [1, 2, 4]
-            .into_iter()
-            .flat_map(|word| [BlockSize::Bytes16, BlockSize::Bytes32].map(|size| Self { size, word }));
+        let shapes = || {
+            let sizes = [BlockSize::Bytes16, BlockSize::Bytes32];
+            [1, 2, 4].into_iter().flat_map(move |word| sizes.map(|size| Self { size, word, skip: 0 }))
+        };
+        // More than half.
+        let aligned = Self::best(shapes(), bytes, 501);
+        if aligned.is_some() {
+            return aligned;
+        }
+        let shifted = shapes().flat_map(|shape| (1..shape.size.bytes()).map(move |skip| Self { skip, ..shape }));
+        Self::best(shifted, bytes, 900)
+    }
+
+    /// The first of those that score best, and `least` at the least; a larger size only where it explains more.
+    fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
         let mut best: Option<(Self, usize)> = None;
         for shape in shapes {
-            let (mut good, mut all) = (0_usize, 0_usize);
-            for block in bytes.chunks_exact(shape.size.bytes()).take(64) {
-                all = all.saturating_add(1);
-                good = good.saturating_add(usize::from(shape.is_sound(block)));
-            }
-            let score = good.saturating_mul(1_000).checked_div(all).unwrap_or(0);
-            // More than half; a larger size only where it explains more.
-            if all >= 4 && score > 500 && best.is_none_or(|(_, other)| score > other) {
+            let score = shape.score(bytes).filter(|score| *score >= least);
+            if let Some(score) = score.filter(|score| best.is_none_or(|(_, other)| *score > other)) {
                 best = Some((shape, score));
             }
         }
         best.map(|(shape, _)| shape)
     }
 
-    /// Whether a block of this shape is what an encoder writes, and no NOP: too little to go by.
-    fn is_sound(self, block: &[u8]) -> bool {
+    /// Sound blocks after the first ones that are NOPs, in thousandths.
+    fn score(self, bytes: &[u8]) -> Option<usize> {
+        let (mut good, mut all) = (0_usize, 0_usize);
+        let blocks = bytes.get(self.skip..)?.chunks_exact(self.size.bytes());
+        for block in blocks.skip_while(|block| self.is_nop(block)).take(256) {
+            all = all.saturating_add(1);
+            good = good.saturating_add(usize::from(self.is_sound(block) && !self.is_nop(block)));
+        }
+        good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
+    }
+
+    /// A block with its bytes in order.
+    fn turned(self, block: &[u8]) -> [u8; 32] {
         let mut turned = [0; 32];
-        let Some(turned) = turned.get_mut(..self.size.bytes()) else { return false };
         for (to, from) in turned.chunks_exact_mut(self.word).zip(block.chunks_exact(self.word)) {
             for (to, from) in to.iter_mut().zip(from.iter().rev()) {
                 *to = *from;
             }
         }
-        let nop = turned.get(1).is_some_and(|byte1| byte1 & 0x7f == 0);
-        super::strict(turned).is_ok() && !nop
+        turned
+    }
+
+    /// Code 00h: nothing else in the block is sure to tell anything.
+    fn is_nop(self, block: &[u8]) -> bool {
+        self.turned(block).get(1).is_some_and(|byte1| byte1 & 0x7f == 0)
+    }
+
+    /// Whether a block of this shape is what an encoder writes.
+    fn is_sound(self, block: &[u8]) -> bool {
+        self.turned(block).get(..self.size.bytes()).is_some_and(|turned| super::strict(turned).is_ok())
     }
 }

@@ -55,12 +55,10 @@ pub struct Axis {
     /// What the last block said.
     wire: Wire,
     evidence: Evidence,
-    /// From the position before to that of the evidence.
-    travel: i32,
     watch: EchoWatch,
     arrival: Arrival,
-    /// The end of the last update period, ns.
-    heard_ns: u64,
+    /// The low half of the end of the last update period, ns.
+    heard_ns: u32,
     control: ControlBits,
     /// Command_Data3, Sub_Command_Data2 and 3.
     feed_forward: [i32; 3],
@@ -84,7 +82,7 @@ struct Wire {
     mode: ActiveCode,
     /// Command_Data1.
     value: i32,
-    /// In CP with the servo on, from the value before to this one.
+    /// In CP with the servo on, from the value before to this one; in another mode what the motor has moved since the last block.
     step: i32,
 }
 
@@ -112,7 +110,6 @@ impl Axis {
             setpoint: 0,
             wire: Wire { mode: config.mode, value: 0, step: 0 },
             evidence: Evidence::NEVER,
-            travel: 0,
             watch: EchoWatch::new(config.limits.echo),
             arrival: Arrival::Missing,
             heard_ns: 0,
@@ -185,7 +182,7 @@ impl Axis {
             Err(SwitchOnError::Alarm)
         } else if !status.contains(StatusFlags::SERVO_READY) {
             Err(SwitchOnError::NotReady)
-        } else if self.main.asking.is_some() && self.main.needs_servo_off {
+        } else if self.main.slot.asking().is_some() && self.main.needs_servo_off {
             Err(SwitchOnError::Busy)
         } else {
             Ok(())
@@ -209,6 +206,7 @@ impl Axis {
         let Turn::Valid(sent) = sent else {
             if let Some(response) = response {
                 // The counter stands still in invalid data, so nothing says when this is from.
+                self.watch.note(response.update_counter_echo);
                 self.evidence = Evidence::of(response, 0);
             }
             return self.rest();
@@ -221,7 +219,9 @@ impl Axis {
         self.serve(on_time);
         self.serve_sub(on_time.and(heard.sub()));
         if let Some(response) = on_time {
-            self.travel = step(self.evidence.last().position(), response.response_data1);
+            if self.wire.mode != ActiveCode::CyclicPosition {
+                self.wire.step = step(self.evidence.last().position(), response.response_data1);
+            }
             self.evidence = Evidence::of(response, end_ns);
         } else if let Some(response) = response {
             self.evidence = self.evidence.alarmed(response.status);
@@ -244,8 +244,12 @@ impl Axis {
             Some(profile) if profile.progress().is_pending() => profile.target_position(),
             _ => self.setpoint,
         };
-        let follows = self.wire.mode == ActiveCode::CyclicPosition && self.is_energised();
-        let step = if follows { step(self.wire.value, value) } else { 0 };
+        let step = match self.wire.mode {
+            ActiveCode::CyclicPosition if self.is_energised() => step(self.wire.value, value),
+            ActiveCode::CyclicPosition => 0,
+            _ if self.mode == ActiveCode::CyclicPosition => 0,
+            _ => self.wire.step,
+        };
         self.wire = Wire { mode: self.mode, value, step };
         let off = *ServoOff::new(mac_id, counter, self.mode).command();
         let [data3, sub2, sub3] = self.feed_forward;
@@ -254,12 +258,14 @@ impl Axis {
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
     }
 
-    /// Update periods since the last one in which nothing was exchanged, by the clock; more than a counter has values do not matter.
+    /// Update periods since the last one in which nothing was exchanged, by the clock; three at the most, for the counter has no more.
+    /// Whether it was more than four seconds does not matter: no block is on time then, or it has been for long.
+    #[expect(clippy::cast_possible_truncation, reason = "the difference counts")]
     fn missed(&mut self, end_ns: u64) -> u8 {
-        let (gap_ns, update_ns) = (end_ns.saturating_sub(self.heard_ns), u64::from(self.config.update_ns));
-        self.heard_ns = end_ns;
-        let over = |periods: u64| gap_ns > update_ns.saturating_mul(periods).saturating_add(update_ns / 2);
-        if over(1) { 1_u8.saturating_add(over(2).into()).saturating_add(over(3).into()) } else { 0 }
+        let gap_ns = (end_ns as u32).wrapping_sub(self.heard_ns);
+        self.heard_ns = end_ns as u32;
+        let most_ns = self.config.update_ns.saturating_add(self.config.update_ns >> 1);
+        if gap_ns <= most_ns { 0 } else { periods(gap_ns.wrapping_sub(most_ns), self.config.update_ns) }
     }
 
     /// The response, if it is sound and the drive's own; every block is counted.
@@ -274,4 +280,11 @@ impl Axis {
         self.last_refusal = outcome.err();
         outcome.ok()
     }
+}
+
+/// Whole and begun update periods in this time, three at the most.
+#[cold]
+fn periods(over_ns: u32, update_ns: u32) -> u8 {
+    let more = over_ns.saturating_sub(1).checked_div(update_ns).unwrap_or(2).min(2);
+    u8::try_from(more).unwrap_or(2).saturating_add(1)
 }

@@ -10,6 +10,7 @@ use crate::sub::split32;
 /// What the response to a command should say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Expected {
     /// 16- or 32-byte blocks.
     pub size: BlockSize,

@@ -3,6 +3,7 @@ use crate::header::UpdateCounter;
 /// What goes out in one update period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Turn {
     /// Invalid data: 00h with counter 0, to every drive.
     Invalid,

@@ -118,9 +118,14 @@ impl EchoWatch {
         self.updates >= self.limit.get()
     }
 
-    /// Forgets everything: the link was set up anew.
+    /// An echo while invalid data go out: the one after it has to be another.
+    pub(super) const fn note(&mut self, echo: UpdateCounter) {
+        self.last = Some(echo);
+    }
+
+    /// The link was set up anew. What lies in the memory from before is not new for that.
     pub const fn reset(&mut self) {
-        *self = Self::new(self.limit);
+        *self = Self { last: self.last, ..Self::new(self.limit) };
     }
 }
 
@@ -156,7 +161,7 @@ impl ReceiveWatchdog {
     }
 
     /// Whether the limit was reached.
-    pub(super) const fn is_tripped(&self) -> bool {
+    pub(super) const fn is_tripped(self) -> bool {
         self.ticks >= self.limit.get()
     }
 }

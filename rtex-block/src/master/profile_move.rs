@@ -1,4 +1,5 @@
 use super::progress::{Failure, Progress};
+use super::state::StopReason;
 use crate::code::Code;
 use crate::execution::{Execution, ProfileFlags};
 use crate::header::MacId;
@@ -51,7 +52,7 @@ pub struct ProfileMove {
     stage: MoveStage,
     progress: Progress<CommandEnded>,
     /// Why it is being broken off.
-    broken: Option<Failure>,
+    broken: Option<StopReason>,
     latch_sel1: Nibble,
     monitor_sel: u8,
     flags: ProfileFlags,
@@ -135,13 +136,13 @@ impl ProfileMove {
         self.monitor_data
     }
 
-    /// It ends for this reason and no other: at once, or, where the drive `slows` down, with In_Progress. An end that is not
+    /// It ends for this reason, or because the servo is off, and for no other: at once, or, where the drive `slows` down, with In_Progress. An end that is not
     /// `confirmed` was one of this kind.
-    pub(super) fn break_off(&mut self, error: Failure, confirmed: bool, slows: bool) {
+    pub(super) fn break_off(&mut self, reason: Option<StopReason>, confirmed: bool, slows: bool) {
         match self.progress {
-            Progress::Pending { .. } if slows => _ = self.broken.get_or_insert(error),
-            Progress::Pending { .. } => self.fail(self.broken.unwrap_or(error)),
-            Progress::Done { .. } if !confirmed => self.fail(error),
+            Progress::Pending { .. } if slows => self.broken = self.broken.or(reason),
+            Progress::Pending { .. } => self.fail(broken(self.broken.or(reason))),
+            Progress::Done { .. } if !confirmed => self.fail(broken(reason)),
             Progress::Done { .. } | Progress::Failed { .. } => {}
         }
     }
@@ -176,8 +177,8 @@ impl ProfileMove {
             self.fail(Failure::Execution);
         } else if moves {
             self.stage = MoveStage::Moving;
-        } else if let (MoveStage::Moving, Some(error)) = (self.stage, self.broken) {
-            self.fail(error);
+        } else if let (MoveStage::Moving, Some(reason)) = (self.stage, self.broken) {
+            self.fail(Failure::Stopped(reason));
         } else if self.stage == MoveStage::Moving {
             let in_position = response.status.contains(StatusFlags::IN_POSITION);
             let warning = execution.contains(Execution::WNG);
@@ -210,4 +211,9 @@ impl ProfileMove {
         self.progress = Progress::Failed { error };
         self.stage = MoveStage::Ended;
     }
+}
+
+/// Why a motion is broken off.
+fn broken(reason: Option<StopReason>) -> Failure {
+    reason.map_or(Failure::ServoOff, Failure::Stopped)
 }

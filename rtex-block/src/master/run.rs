@@ -12,6 +12,7 @@ use crate::status::StatusFlags;
 
 /// Why a job of a [runner](Run) ended before it was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Ended<E> {

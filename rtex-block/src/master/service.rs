@@ -19,6 +19,7 @@ use crate::timing::{Periods, TimerSystem};
 /// What a master is set up with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MasterConfig {
     /// Size of the blocks; all drives of a ring have the same here.
@@ -224,6 +225,6 @@ impl<const N: usize> Master<N> {
     }
 
     fn is_timed_out(&self) -> bool {
-        self.ring.is_timed_out() || self.watchdog.is_some_and(|watchdog| watchdog.is_tripped())
+        self.ring.is_timed_out() || self.watchdog.is_some_and(ReceiveWatchdog::is_tripped)
     }
 }

@@ -8,7 +8,9 @@ use crate::sub::{SubCode, SubCommand, SubResponse};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SubHandshake {
-    command: SubCommand,
+    code: SubCode,
+    type_code: u8,
+    index: u16,
     left: u32,
 }
 
@@ -18,18 +20,18 @@ impl SubHandshake {
     pub const fn new(code: SubCode, type_code: u8, index: u16, limit: u32) -> Option<Self> {
         match code {
             SubCode::Normal => None,
-            _ => Some(Self { command: SubCommand { code, type_code, index, ..SubCommand::IDLE }, left: limit }),
+            _ => Some(Self { code, type_code, index, left: limit }),
         }
     }
 
     /// What to send while the handshake is pending.
     pub const fn command(&self) -> SubCommand {
-        self.command
+        SubCommand { code: self.code, type_code: self.type_code, index: self.index, ..SubCommand::IDLE }
     }
 
     /// Takes what one update period brought: the sub block of the drive's response, `None` if there was none.
     pub fn receive(&mut self, response: Option<&SubResponse>) -> Progress<SubResponse> {
-        let progress = response.filter(|r| r.code.get() == self.command.code.code()).and_then(|r| self.read(r));
+        let progress = response.filter(|r| r.code.get() == self.code.code()).and_then(|r| self.read(r));
         progress.unwrap_or_else(|| match self.left.checked_sub(1) {
             Some(left) => {
                 self.left = left;
@@ -40,11 +42,11 @@ impl SubHandshake {
     }
 
     /// `None` while the answer is due.
-    fn read(&self, response: &SubResponse) -> Option<Progress<SubResponse>> {
+    fn read(self, response: &SubResponse) -> Option<Progress<SubResponse>> {
         if let Some(code) = response.error_code() {
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }
-        if response.type_code != self.command.type_code || response.index != self.command.index {
+        if response.type_code != self.type_code || response.index != self.index {
             return None;
         }
         if response.execution.contains(Execution::ERR) {

@@ -1,6 +1,6 @@
 //! What a log shows between its blocks, by hand-written bytes.
 
-use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape, Unfinished};
+use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
 use rtex_block::position::Gear;
 use rtex_block::{BlockSize, Code, MacId, UpdateCounter};
 
@@ -307,13 +307,13 @@ fn size_and_byte_order_of_a_log() {
     };
     for word in [1, 2, 4] {
         let guess = LogShape::guess(&swapped(&short, word));
-        assert_eq!(guess, Some(LogShape { size: BlockSize::Bytes16, word }));
+        assert_eq!(guess, Some(LogShape { size: BlockSize::Bytes16, word, skip: 0 }));
         let guess = LogShape::guess(&swapped(&long, word));
-        assert_eq!(guess, Some(LogShape { size: BlockSize::Bytes32, word }));
+        assert_eq!(guess, Some(LogShape { size: BlockSize::Bytes32, word, skip: 0 }));
     }
     assert_eq!(LogShape::guess(&[0; 256]), None);
     // Four blocks are enough, of which more than half make sense.
-    let shape = Some(LogShape { size: BlockSize::Bytes16, word: 1 });
+    let shape = Some(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 });
     assert_eq!(LogShape::guess(&short[..64]), shape);
     let spoilt = |blocks: usize| {
         let mut bytes = short.clone();
@@ -330,4 +330,59 @@ fn size_and_byte_order_of_a_log() {
     assert_eq!(like_main(10), Some(BlockSize::Bytes32));
     assert_eq!(like_main(16), Some(BlockSize::Bytes16));
     assert_eq!(LogShape::guess(&short[..48]), None);
+}
+
+/// Seconds of NOPs from before the start say nothing of the shape, and nothing against the one that comes after them: in every size,
+/// byte order, and from any byte on.
+#[test]
+fn a_log_from_power_up() {
+    for wide in [false, true] {
+        for word in [1, 2, 4] {
+            let mut bytes = Vec::new();
+            for k in 0..400_u16 {
+                let started = k >= 380;
+                let mut block =
+                    command(if started { k as u8 & 3 } else { 0 }, if started { 0x20 } else { 0 }, 0).to_vec();
+                if !started {
+                    block[2] = 0;
+                }
+                if wide {
+                    block.extend([0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+                }
+                bytes.extend(block.chunks(word).flat_map(|word| word.iter().rev().copied().collect::<Vec<_>>()));
+            }
+            let size = if wide { BlockSize::Bytes32 } else { BlockSize::Bytes16 };
+            assert_eq!(LogShape::guess(&bytes), Some(LogShape { size, word, skip: 0 }), "{wide} {word}");
+            let begins = bytes.len() - 20 * size.bytes();
+            assert_eq!(LogShape::guess(&bytes[..begins]), None, "{wide} {word}: NOPs alone");
+            // It begins five bytes before a block.
+            let cut = LogShape::guess(&bytes[begins - 5..]).unwrap();
+            assert!(cut.skip > 0 && (word > 1 || (cut.size, cut.skip) == (size, 5)), "{wide} {word}: {cut:?}");
+        }
+    }
+}
+
+/// An alarm at any time, or an echo that stood still, is not over with the next block.
+#[test]
+fn what_somebody_has_to_look_after() {
+    let response = |echo: u8, status: u8| {
+        let mut block = [0; 16];
+        block[..3].copy_from_slice(&[0x85 | echo << 5, 0x20, status]);
+        block
+    };
+    let mut log = LogAnalysis::new(None, Gear::UNITY);
+    for k in 0..4 {
+        log.block(&command(k, 0x20, 0)).count();
+        log.block(&response(k, 0x40)).count();
+    }
+    assert_eq!(log.trouble(), None);
+    for k in 4..8 {
+        log.block(&command(k & 3, 0x20, 0)).count();
+        log.block(&response(0, 0x40)).count();
+    }
+    log.block(&response(1, 0x40)).count();
+    assert_eq!(log.trouble().map(Trouble::name), Some("the counter echo of a drive stood still"));
+    log.block(&response(2, 0x60)).count();
+    log.block(&response(3, 0x40)).count();
+    assert_eq!(log.trouble(), Some(Trouble::Alarm));
 }

@@ -24,6 +24,7 @@ mod log;
 mod master;
 mod places_in_time;
 mod procedures;
+mod refusals;
 mod ring;
 mod runner;
 #[cfg(feature = "serde")]

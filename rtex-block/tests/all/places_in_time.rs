@@ -226,3 +226,32 @@ fn a_procedure_starts_when_it_is_told_to() {
         }
     }
 }
+
+/// What lies in the memory from before is no new block, neither after a stop that was cleared nor after a start with invalid data.
+#[test]
+fn what_lay_in_the_memory_is_not_new() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+    let old = pair.received;
+    let freeze = |pair: &mut Pair, periods: u32| {
+        for _ in 0..periods {
+            pair.received = old;
+            pair.update();
+        }
+    };
+    freeze(&mut pair, 20);
+    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::EchoTimeout));
+    pair.axis.clear();
+    for _ in 0..5 {
+        freeze(&mut pair, 1);
+        assert_eq!(pair.axis.arrival(), Arrival::Repeated);
+        assert!(pair.axis.switch_on().is_err());
+    }
+    // A controller that has started anew, and a memory that holds what its predecessor has read.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+    for _ in 0..8 {
+        freeze(&mut pair, 1);
+        assert_ne!(pair.axis.arrival(), Arrival::OnTime);
+        assert!(pair.axis.evidence().at(pair.now_ns(), Policy::new(0)).is_err());
+        assert!(pair.axis.switch_on().is_err());
+    }
+}

@@ -29,8 +29,8 @@ impl Run<2> for Bench {
         self.lasts = self.lasts.checked_sub(1).ok_or("cut")?;
         self.now_ns += 500_000;
         let commands = self.ring.update(&self.heard, self.now_ns);
-        for place in 0..2 {
-            let block = self.drives[place].hear(&commands[place].main.emit());
+        for (place, command) in commands.iter().enumerate() {
+            let block = self.drives[place].hear(&command.main.emit());
             self.heard[place] = block.map_or(Heard::Nothing, |block| Response::parse(&block).into());
         }
         Ok(self.now_ns)

@@ -51,8 +51,8 @@ impl Bench {
     fn update(&mut self) {
         self.now_ns += 500_000;
         let commands = self.ring.update(&self.heard, self.now_ns);
-        for place in 0..2 {
-            let block = commands[place].main.emit();
+        for (place, command) in commands.iter().enumerate() {
+            let block = command.main.emit();
             if place == 1 {
                 let data = i32::from_le_bytes(block[4..8].try_into().unwrap());
                 self.sent.push((block[2] & 0x80 != 0, block[1] >> 4, block[3], data));

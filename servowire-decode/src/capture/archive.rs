@@ -5,7 +5,7 @@
 
 use std::io::{self, Read, SeekFrom, Take};
 
-use flate2::CrcReader;
+use flate2::Crc;
 use flate2::bufread::DeflateDecoder;
 use zip::{CompressionMethod, ZipArchive};
 
@@ -128,8 +128,8 @@ struct Chunk {
 
 /// A chunk that is being unpacked.
 enum Open {
-    Stored(CrcReader<Take<Box<dyn SeekRead>>>),
-    Deflated(Box<CrcReader<DeflateDecoder<Take<Box<dyn SeekRead>>>>>),
+    Stored(Take<Box<dyn SeekRead>>),
+    Deflated(Box<DeflateDecoder<Take<Box<dyn SeekRead>>>>),
 }
 
 impl Open {
@@ -140,17 +140,10 @@ impl Open {
         }
     }
 
-    /// The file, and the check sum of what was read.
-    fn close(self) -> (Box<dyn SeekRead>, u32) {
+    fn close(self) -> Box<dyn SeekRead> {
         match self {
-            Self::Stored(reader) => {
-                let sum = reader.crc().sum();
-                (reader.into_inner().into_inner(), sum)
-            }
-            Self::Deflated(reader) => {
-                let sum = reader.crc().sum();
-                (reader.into_inner().into_inner().into_inner(), sum)
-            }
+            Self::Stored(reader) => reader.into_inner(),
+            Self::Deflated(reader) => reader.into_inner().into_inner(),
         }
     }
 }
@@ -161,8 +154,8 @@ struct Chunks {
     left: std::vec::IntoIter<io::Result<Chunk>>,
     /// Between two chunks.
     file: Option<Box<dyn SeekRead>>,
-    /// With its check sum.
-    open: Option<(Open, u32)>,
+    /// With its check sum, and that of what was read of it.
+    open: Option<(Open, u32, Crc)>,
 }
 
 impl Chunks {
@@ -192,39 +185,35 @@ impl Chunks {
     }
 
     /// The next chunk; none after the last.
-    fn next(&mut self) -> io::Result<Option<(Open, u32)>> {
+    fn next(&mut self) -> io::Result<Option<(Open, u32, Crc)>> {
         let (Some(chunk), Some(mut file)) = (self.left.next().transpose()?, self.file.take()) else { return Ok(None) };
         file.seek(SeekFrom::Start(chunk.start))?;
         let packed = file.take(chunk.packed);
         let open = match chunk.method {
-            CompressionMethod::Stored => Open::Stored(CrcReader::new(packed)),
-            _ => Open::Deflated(Box::new(CrcReader::new(DeflateDecoder::new(packed)))),
+            CompressionMethod::Stored => Open::Stored(packed),
+            _ => Open::Deflated(Box::new(DeflateDecoder::new(packed))),
         };
-        Ok(Some((open, chunk.crc)))
+        Ok(Some((open, chunk.crc, Crc::new())))
     }
 }
 
 impl Read for Chunks {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        loop {
-            let (mut open, crc) = match self.open.take() {
-                Some(open) => open,
-                None => match self.next()? {
-                    Some(open) => open,
-                    None => return Ok(0),
-                },
-            };
+        while let Some((mut open, due, mut crc)) =
+            self.open.take().map_or_else(|| self.next(), |open| Ok(Some(open)))?
+        {
             let count = open.read(buffer)?;
             if count > 0 || buffer.is_empty() {
-                self.open = Some((open, crc));
+                crc.update(buffer.get(..count).unwrap_or_default());
+                self.open = Some((open, due, crc));
                 return Ok(count);
             }
-            let (file, sum) = open.close();
-            if sum != crc {
+            if crc.sum() != due {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, "Invalid checksum"));
             }
-            self.file = Some(file);
+            self.file = Some(open.close());
         }
+        Ok(0)
     }
 }
 

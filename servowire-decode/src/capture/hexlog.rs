@@ -7,7 +7,6 @@ mod dump;
 mod words;
 
 use std::collections::VecDeque;
-use std::io::{BufRead, Read};
 
 use super::input::{HEAD, Input};
 use crate::event::Direction;
@@ -176,12 +175,8 @@ impl HexLog {
         self.text.clear();
         self.line += 1;
         let at = At::Line(self.line);
-        let mut limited = self.input.by_ref().take(LONGEST as u64);
-        let got = limited.read_until(b'\n', &mut self.text).map_err(|e| self.input.io_fault(at, &e))?;
-        if got == LONGEST {
-            let what = format!("a line of more than {LONGEST} characters: not a log of hex bytes");
-            return Err(self.input.fault(at, what));
-        }
+        let what = || format!("a line of more than {LONGEST} characters: not a log of hex bytes");
+        let got = self.input.line(&mut self.text, at, LONGEST, what)?;
         self.over = got == 0;
         let text = String::from_utf8_lossy(&self.text).into_owned();
         let (number, ready) = (self.line, &mut self.ready);

@@ -210,6 +210,18 @@ impl Input {
         }
     }
 
+    /// Appends the next line, with its end, to `text`; how many bytes it has. One of `most` is none: `what` says so.
+    pub(super) fn line(
+        &mut self,
+        text: &mut Vec<u8>,
+        at: At,
+        most: usize,
+        what: impl FnOnce() -> String,
+    ) -> Result<usize, Fault> {
+        let got = self.by_ref().take(most as u64).read_until(b'\n', text).map_err(|e| self.io_fault(at, &e))?;
+        if got == most { Err(self.fault(at, what())) } else { Ok(got) }
+    }
+
     /// Fills `buffer` as far as the file goes; of one that pauses, with the whole units of `unit` bytes that are there.
     pub fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
         let mut filled = 0;

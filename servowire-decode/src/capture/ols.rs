@@ -1,7 +1,5 @@
 //! Files of the OLS client and of `sigrok-cli -O ols`: a word at a sample number, where the level changes or at all.
 
-use std::io::{BufRead, Read};
-
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
@@ -10,7 +8,7 @@ use crate::time::{self, Clock, Time};
 /// Changes given at once.
 const BLOCK: usize = 4096;
 /// Longer lines are none of this format.
-const LONGEST: u64 = 1 << 12;
+const LONGEST: usize = 1 << 12;
 /// The most channels.
 const CHANNELS: u32 = 64;
 
@@ -56,10 +54,7 @@ impl Ols {
     fn next_line(&mut self) -> Result<Option<String>, Fault> {
         let mut text = Vec::new();
         let at = At::Line(self.line + 1);
-        let got = self.input.by_ref().take(LONGEST).read_until(b'\n', &mut text);
-        if got.map_err(|e| self.input.io_fault(at, &e))? as u64 == LONGEST {
-            return Err(self.input.fault(at, format!("a line of {LONGEST} characters")));
-        }
+        self.input.line(&mut text, at, LONGEST, || format!("a line of {LONGEST} characters"))?;
         self.line += 1;
         Ok((!text.is_empty()).then(|| String::from_utf8_lossy(&text).trim().to_owned()))
     }

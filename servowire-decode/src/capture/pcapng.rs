@@ -45,6 +45,9 @@ pub struct Packet {
     pub link: DataLink,
     /// To the capturing side (`Some(true)`) or from it, where the file says so.
     pub inbound: Option<bool>,
+    /// Whether the file says that its bytes end with their frame check sequence. Most network cards take it off, and most files
+    /// say nothing.
+    pub has_fcs: bool,
     /// Its bytes.
     pub bytes: Vec<u8>,
 }
@@ -92,12 +95,14 @@ impl Pcapng {
             // The reader gives the file's units of time as if they were nanoseconds.
             let units = packet.timestamp.as_nanos();
             let (time, link) = (picoseconds(units, interface), interface.linktype);
+            let has_fcs = |option: &_| matches!(option, InterfaceDescriptionOption::IfFcsLen(length) if *length > 0);
+            let has_fcs = interface.options.iter().any(has_fcs);
             let time = time.ok_or_else(|| self.fault("its time cannot be"))?;
             let bytes = match packet.data {
                 Cow::Owned(bytes) => bytes,
                 Cow::Borrowed(bytes) => bytes.to_vec(),
             };
-            return Ok(Some(Packet { time, link, inbound, bytes }));
+            return Ok(Some(Packet { time, link, inbound, has_fcs, bytes }));
         }
     }
 
@@ -114,7 +119,7 @@ impl Pcapng {
         let time =
             packet.timestamp.as_nanos().checked_mul(1000).and_then(|time| i128::try_from(time).ok().map(Time::from_ps));
         let time = time.ok_or_else(|| self.fault("its time cannot be"))?;
-        Ok(Some(Packet { time, link, inbound: None, bytes: packet.data.into_owned() }))
+        Ok(Some(Packet { time, link, inbound: None, has_fcs: false, bytes: packet.data.into_owned() }))
     }
 
     fn fault(&self, what: &str) -> Fault {

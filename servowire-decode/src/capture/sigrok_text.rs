@@ -1,7 +1,5 @@
 //! `sigrok-cli -O bits`, `-O hex` and `-O ascii`: a line of samples for each channel, round after round.
 
-use std::io::{BufRead, Read};
-
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
@@ -71,11 +69,7 @@ impl SigrokText {
     fn next_line(&mut self) -> Result<Option<String>, Fault> {
         let mut text = Vec::new();
         let at = At::Line(self.line + 1);
-        let got = self.input.by_ref().take(LONGEST as u64).read_until(b'\n', &mut text);
-        let got = got.map_err(|e| self.input.io_fault(at, &e))?;
-        if got == LONGEST {
-            return Err(self.input.fault(at, format!("a line of more than {LONGEST} characters")));
-        }
+        let got = self.input.line(&mut text, at, LONGEST, || format!("a line of more than {LONGEST} characters"))?;
         self.line += 1;
         Ok((got > 0).then(|| String::from_utf8_lossy(&text).trim_end_matches(['\n', '\r']).to_owned()))
     }

@@ -9,7 +9,6 @@ pub(super) mod cell;
 mod heading;
 
 use std::collections::VecDeque;
-use std::io::{BufRead, Read};
 
 use super::hints::Hints;
 use super::input::Input;
@@ -82,15 +81,11 @@ impl Lines {
     pub(super) fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
         text.clear();
         let at = At::Line(self.line + 1);
-        let mut limited = self.input.by_ref().take(LONGEST as u64);
-        let got = limited.read_until(b'\n', text).map_err(|e| self.input.io_fault(at, &e))?;
-        if got == 0 {
+        let what = || format!("a line of more than {LONGEST} characters: not a table");
+        if self.input.line(text, at, LONGEST, what)? == 0 {
             return Ok(false);
         }
         self.line += 1;
-        if got == LONGEST {
-            return Err(self.input.fault(at, format!("a line of more than {LONGEST} characters: not a table")));
-        }
         while text.last().is_some_and(|last| matches!(last, b'\n' | b'\r')) {
             text.pop();
         }

@@ -36,11 +36,10 @@ pub(super) struct Evidence {
     weights: Weights,
     /// The sum, in bits.
     pub(super) score: i64,
-    /// Sound requests, sound answers to them, sound answers alone, answers missing.
+    /// Sound requests, sound answers to them, sound answers alone.
     pub(super) requests: u32,
     pub(super) answers: u32,
     pub(super) alone: u32,
-    pub(super) silences: u32,
     /// All frames by their verdict.
     pub(super) tally: Tally,
     /// Where sound frames begin, in picoseconds, and what they hold.
@@ -57,7 +56,6 @@ impl Evidence {
             requests: 0,
             answers: 0,
             alone: 0,
-            silences: 0,
             tally: Tally::default(),
             starts: Vec::new(),
             until: Time::MAX,
@@ -102,10 +100,7 @@ impl Sink for Evidence {
                 self.weights.alone
             }
             (Verdict::Ok, None, _) => 0,
-            (Verdict::Refused(_), _, _) if event.verdict.is_silence() => {
-                self.silences += 1;
-                0
-            }
+            (Verdict::Refused(_), _, _) if event.verdict.is_silence() => 0,
             (Verdict::Refused(refusal), _, delay) => match (refusal.class, delay) {
                 ("rejected", _) => REJECTED,
                 ("crc", Some(_)) => ONLY_THE_CHECK,

@@ -7,17 +7,17 @@ use super::receive::{EdgeReceiver, Rates};
 use super::start_stop::StartStop;
 use crate::capture::Hole;
 use crate::capture::samples::Samples;
-use crate::event::{Event, Place, Verdict};
+use crate::event::{Event, Verdict};
 use crate::sink::Sink;
 use crate::time::Time;
 
 /// A channel and which way up it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Tap {
+pub(crate) struct Tap {
     /// Index of the channel.
-    pub channel: u16,
+    pub(crate) channel: u16,
     /// Whether it idles low.
-    pub inverted: bool,
+    pub(crate) inverted: bool,
 }
 
 /// Turns the levels of one idle-high line into events.
@@ -47,7 +47,7 @@ pub trait LineDecoder {
 }
 
 /// Decodes a start-stop protocol.
-pub struct StartStopLine<P> {
+pub(crate) struct StartStopLine<P> {
     receiver: EdgeReceiver,
     protocol: P,
     weights: Weights,
@@ -75,7 +75,7 @@ struct Held<'a> {
 
 impl Sink for Held<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        let lasts = matches!(event.place, Place::Time { end, .. } if end > self.end);
+        let lasts = event.place.end().is_some_and(|end| end > self.end);
         let refused = !event.verdict.is_ok() && !event.verdict.is_silence();
         if event.verdict == Verdict::cut_off() || lasts && refused {
             return self.out.event(&Event { fields: Vec::new(), verdict: self.cut.clone(), ..event.clone() });
@@ -207,7 +207,7 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
 /// The wires of a lane as one idle-high line: a wire that is at work is low, so that both together are a half-duplex
 /// line.
 #[derive(Debug, Clone)]
-pub struct Wires {
+pub(crate) struct Wires {
     taps: Vec<Tap>,
     levels: Vec<Option<bool>>,
     level: Option<bool>,
@@ -215,18 +215,18 @@ pub struct Wires {
 
 impl Wires {
     /// One tap, or that of the requests and that of the answers.
-    pub fn new(taps: &[Tap]) -> Self {
+    pub(crate) fn new(taps: &[Tap]) -> Self {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
 
     /// Nothing is known of the levels any more.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.levels.fill(None);
         self.level = None;
     }
 
     /// The level of the line after a change of a channel, where it changes.
-    pub fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
+    pub(crate) fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
         for (tap, own) in self.taps.iter().zip(&mut self.levels) {
             if tap.channel == channel {
                 *own = Some(level != tap.inverted);

@@ -5,19 +5,14 @@ use crate::codec::Codec;
 use crate::protocols::meant;
 use crate::recognition::mbit;
 
-/// What a capture shows where no line was found in it.
-pub(super) struct Seen<'a> {
-    /// The busiest channel's first edges.
-    pub(super) busiest: Option<(u16, &'a Edges)>,
-    /// Edges by channel.
-    pub(super) moves: &'a [u64],
-    /// Names of the channels.
-    pub(super) names: &'a [String],
-}
-
-/// Why no channel can be decoded.
-pub(super) fn nothing(seen: &Seen<'_>, protocol: Option<&'static dyn Codec>, only: Option<&[u16]>) -> String {
-    let Seen { busiest, moves, names } = *seen;
+/// Why no channel can be decoded: `busiest`: the one with most edges, and the first of them; `moves`: edges by channel.
+pub(super) fn nothing(
+    busiest: Option<(u16, &Edges)>,
+    moves: &[u64],
+    names: &[String],
+    protocol: Option<&'static dyn Codec>,
+    only: Option<&[u16]>,
+) -> String {
     let name = |channel: u16| names.get(usize::from(channel)).map_or("", String::as_str);
     let Some((channel, edges)) = busiest else {
         let moved = |channel: u16| moves.get(usize::from(channel)).copied().unwrap_or(0).saturating_sub(1);
@@ -32,12 +27,12 @@ pub(super) fn nothing(seen: &Seen<'_>, protocol: Option<&'static dyn Codec>, onl
 
 /// A channel that moves and holds nothing.
 fn strange(name: &str, edges: &Edges, protocol: Option<&'static dyn Codec>) -> String {
-    let of_lines = || meant(protocol).filter(|protocol| !protocol.rates().is_empty());
+    let of_lines = || meant(protocol).filter(|protocol| !protocol.rates.is_empty());
     let rates = |protocol: &'static dyn Codec| {
-        let rates = protocol.rates().iter().map(|rate| mbit(f64::from(*rate)).to_string()).collect::<Vec<_>>();
+        let rates = protocol.rates.iter().map(|rate| mbit(f64::from(*rate)).to_string()).collect::<Vec<_>>();
         let (last, first) = rates.split_last().map_or(("", &[][..]), |(last, first)| (last.as_str(), first));
         let list = if first.is_empty() { last.to_owned() } else { format!("{} and {last}", first.join(", ")) };
-        format!("{} has {list} Mbit/s", protocol.title())
+        format!("{} has {list} Mbit/s", protocol.title)
     };
     let known = of_lines().map(rates).collect::<Vec<_>>().join(", ");
     let Some(seen) = seen_rate(edges) else {
@@ -45,7 +40,7 @@ fn strange(name: &str, edges: &Edges, protocol: Option<&'static dyn Codec>) -> S
     };
     let digits = (2.0 - mbit(seen).log10().floor()).clamp(0.0, 6.0) as usize;
     let near = |rate: &u32| (seen / f64::from(*rate) - 1.0).abs() < 0.05;
-    if of_lines().any(|protocol| protocol.rates().iter().any(near)) {
+    if of_lines().any(|protocol| protocol.rates.iter().any(near)) {
         return format!(
             "channel \"{name}\" runs at about {:.digits$} Mbit/s, but hardly a frame on it holds: {known}; \
              say what it is with --protocol",

@@ -27,7 +27,7 @@ const MOST_EDGES: usize = 512;
 
 /// Receives fields of one line. Levels are given as on an idle-high line.
 #[derive(Debug, Clone)]
-pub struct EdgeReceiver {
+pub(crate) struct EdgeReceiver {
     bit: f64,
     content_bits: u32,
     spikes: Spikes,
@@ -101,7 +101,7 @@ impl Rates {
 
 impl EdgeReceiver {
     /// For fields of `content_bits`, 8 or 16, of bits of `bit` picoseconds.
-    pub fn new(bit: f64, content_bits: u32) -> Self {
+    pub(crate) fn new(bit: f64, content_bits: u32) -> Self {
         Self {
             bit,
             content_bits,
@@ -119,17 +119,17 @@ impl EdgeReceiver {
 
     /// The capture begins inside a field: so many falling edges are passed over before the first start bit.
     #[must_use]
-    pub fn beginning_at(self, skipped: u32) -> Self {
+    pub(crate) fn beginning_at(self, skipped: u32) -> Self {
         Self { skipped, ..self }
     }
 
     /// What was measured so far.
-    pub fn rates(&self) -> Rates {
+    pub(crate) fn rates(&self) -> Rates {
         self.rates
     }
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
-    pub fn change(&mut self, time: Time, level: bool) -> bool {
+    pub(crate) fn change(&mut self, time: Time, level: bool) -> bool {
         if let Some(edge) = self.spikes.plain_change(time, level) {
             self.edge(edge);
         } else {
@@ -141,7 +141,7 @@ impl EdgeReceiver {
     }
 
     /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
-    pub fn reach(&mut self, time: Time) -> bool {
+    pub(crate) fn reach(&mut self, time: Time) -> bool {
         for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge);
         }
@@ -154,7 +154,7 @@ impl EdgeReceiver {
     }
 
     /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
-    pub fn finish(&mut self, time: Time) -> bool {
+    pub(crate) fn finish(&mut self, time: Time) -> bool {
         for edge in self.spikes.reach(time + (self.bit * 2.0) as i64).into_iter().flatten() {
             self.edge(edge);
         }
@@ -167,7 +167,7 @@ impl EdgeReceiver {
     }
 
     /// The fields that are complete.
-    pub fn take(&mut self) -> std::vec::Drain<'_, LineField> {
+    pub(crate) fn take(&mut self) -> std::vec::Drain<'_, LineField> {
         self.fields.drain(..)
     }
 

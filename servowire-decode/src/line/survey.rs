@@ -94,8 +94,8 @@ impl Candidates {
     pub(super) fn new(protocol: Option<&'static dyn Codec>, settings: Settings, pair: Option<[u16; 2]>) -> Self {
         let rated = |protocol: &'static dyn Codec| {
             let rates: Vec<u32> = match settings.line.bit_rate {
-                Some(rate) if !protocol.rates().is_empty() && !protocol.is_clocked() => vec![rate],
-                _ => protocol.rates().to_vec(),
+                Some(rate) if !protocol.rates.is_empty() && !protocol.clocked => vec![rate],
+                _ => protocol.rates.to_vec(),
             };
             rates.into_iter().map(move |rate| Speech { protocol, rate })
         };
@@ -172,7 +172,7 @@ impl Candidates {
 
     /// What a protocol makes of one channel, or of two as one line.
     pub(super) fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges]) -> (Evidence, Rates) {
-        let mut evidence = Evidence::new(speech.protocol.weights());
+        let mut evidence = Evidence::new(speech.protocol.weights);
         let Some(mut decoder) = speech.protocol.line(speech.rate, &self.settings) else {
             return (evidence, Rates::default());
         };
@@ -235,7 +235,7 @@ impl Candidates {
     fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| {
             let evidence = &found.evidence;
-            !found.speech.protocol.answers_alone() && evidence.requests > 8 && evidence.alone * 4 < evidence.requests
+            !found.speech.protocol.answers_alone && evidence.requests > 8 && evidence.alone * 4 < evidence.requests
         };
         for asking in readings.clone().into_iter().filter(asks) {
             let own = asking.taps.clone();

@@ -27,7 +27,7 @@ pub(super) struct Reading {
 /// is; what leaves fewest refused wins.
 fn readings() -> impl Iterator<Item = Reading> {
     let of = |checked: bool, wrapped: bool| {
-        let codecs = CODECS.iter().filter(move |codec| codec.is_checked() == checked);
+        let codecs = CODECS.iter().filter(move |codec| codec.checked == checked);
         codecs.map(move |protocol| Reading { protocol: *protocol, wrapped })
     };
     of(true, false).chain(of(true, true)).chain(of(false, false))
@@ -55,10 +55,10 @@ pub(super) fn recognise(
             if let Some((tally, protocol)) = sample.rather(asked, best.map_or(0, |(tally, _)| share(tally))) {
                 out.note(&Note::LogRather { protocol, tally });
             }
-            best.ok_or(asked.names().needs)?.1
+            best.ok_or(asked.needs)?.1
         }
     };
-    let reader = reading.protocol.log(settings, bursts).ok_or(reading.protocol.names().needs)?;
+    let reader = reading.protocol.log(settings, bursts).ok_or(reading.protocol.needs)?;
     Ok((reading, reader))
 }
 
@@ -106,7 +106,7 @@ impl<'a> Sample<'a> {
     fn rather(&self, asked: &'static dyn Codec, held: u64) -> Option<(Tally, &'static dyn Codec)> {
         let (other, reading) = self.best(|known| known != asked)?;
         // Of what has no check not one may be refused, and hardly anything hold as it was meant.
-        let sure = if reading.protocol.is_checked() {
+        let sure = if reading.protocol.checked {
             share(other) >= SURE && 2 * held <= share(other)
         } else {
             share(other) == 100 && 10 * held <= 100

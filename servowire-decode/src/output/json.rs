@@ -47,7 +47,7 @@ impl Serialize for Object<'_> {
         map.serialize_entry("file", &self.origin.file)?;
         if let Some(lane) = self.origin.lane() {
             map.serialize_entry("channel", &lane.channel)?;
-            map.serialize_entry("protocol", lane.protocol.title())?;
+            map.serialize_entry("protocol", lane.protocol.title)?;
             map.serialize_entry("bit_rate", &lane.rate)?;
         }
         match event.place {

@@ -50,7 +50,7 @@ impl<W: Write> Csv<W> {
     fn heading(&mut self, origin: &Origin) -> io::Result<()> {
         if self.names.is_none() {
             let mut names: Vec<&'static str> = Vec::new();
-            let of_lanes = origin.lanes.iter().flat_map(|lane| lane.protocol.fields().iter().copied());
+            let of_lanes = origin.lanes.iter().flat_map(|lane| lane.protocol.fields.iter().copied());
             let of_events = self.held.iter().flat_map(|event| event.fields.iter().map(|field| field.name));
             for name in of_lanes.chain(of_events) {
                 if !names.contains(&name) {
@@ -72,7 +72,7 @@ impl<W: Write> Csv<W> {
         let out = &mut self.out;
         out.write_field(&origin.file)?;
         out.write_field(lane.map_or("", |lane| &lane.channel))?;
-        out.write_field(lane.map_or("", |lane| lane.protocol.title()))?;
+        out.write_field(lane.map_or("", |lane| lane.protocol.title))?;
         match event.place {
             Place::Line(line) => [line.to_string(), String::new(), String::new()],
             Place::Time { start, end } => [String::new(), microseconds(start.ps()), microseconds(end.ps())],

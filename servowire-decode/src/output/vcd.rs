@@ -71,7 +71,7 @@ impl VcdOut {
             writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
             let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
             let (frame, verdict) = (string("frame")?, string("verdict")?);
-            let names = lane.protocol.fields();
+            let names = lane.protocol.fields;
             let fields = names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
             writer.upscope()?;
             self.strings.push(Strings { frame, verdict, names, fields });

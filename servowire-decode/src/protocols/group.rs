@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use crate::event::{Event, Field, Place, Refusal, Span};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Refusal, Span};
 use crate::line::start_stop::LineField;
 use crate::time::Time;
 
@@ -150,5 +150,15 @@ pub(super) fn silence(
     } else {
         format!("only the request is on the line: {nobody}, A and B exchanged, or not its bit rate")
     };
-    Event::silence(place, kind, what, timeout, (now, asked), &cause)
+    let (place, reason) = match place {
+        Place::Time { end: start, .. } => {
+            let end = (start + timeout).min(now);
+            let within = (end - start) as f64 / 1e6;
+            (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
+        }
+        Place::Line(_) if asked => (place, format!("no {what} before the next request")),
+        Place::Line(_) => (place, format!("no {what} before the log ends")),
+    };
+    let refusal = Refusal { cause: Some(cause), ..Refusal::new(NO_RESPONSE, reason) };
+    Event::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
 }

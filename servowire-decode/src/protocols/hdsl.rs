@@ -17,7 +17,7 @@ use hdsl::frame::BIT_RATE;
 use crate::bundled;
 use crate::capture::Hole;
 use crate::capture::samples::Samples;
-use crate::codec::{Codec, Names};
+use crate::codec::{Codec, Facts};
 use crate::line::evidence::Weights;
 use crate::line::lane::LineDecoder;
 use crate::line::receive::Rates;
@@ -35,42 +35,27 @@ const FIELDS: &[&str] = &[
 pub(super) struct Hdsl;
 
 impl Codec for Hdsl {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "hdsl",
-            title: "HIPERFACE DSL",
-            about: "HIPERFACE DSL, from edges or samples of the pair",
-            needs: "HIPERFACE DSL is decoded from edges or samples of the line",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "hdsl",
+                title: "HIPERFACE DSL",
+                about: "HIPERFACE DSL, from edges or samples of the pair",
+                needs: "HIPERFACE DSL is decoded from edges or samples of the line",
+                fields: FIELDS,
+                rates: &[BIT_RATE],
+                // Twelve fixed bits and a word of the code; six words and two checks.
+                weights: Weights { request: 8, answer: 16, alone: 16 },
+                clocked: true,
+                answers_alone: false,
+                captures: &bundled::HDSL,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        FIELDS
-    }
-
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &bundled::HDSL
-    }
-
-    fn rates(&self) -> &'static [u32] {
-        &[BIT_RATE]
-    }
-
-    /// Twelve fixed bits and a word of the code; six words and two checks.
-    fn weights(&self) -> Weights {
-        Weights { request: 8, answer: 16, alone: 16 }
     }
 
     fn line(&self, rate: u32, _: &Settings) -> Option<Box<dyn LineDecoder>> {
         Some(Box::new(DslLine::new(1e12 / f64::from(rate.max(1)))))
-    }
-
-    fn is_clocked(&self) -> bool {
-        true
-    }
-
-    fn answers_alone(&self) -> bool {
-        false
     }
 }
 

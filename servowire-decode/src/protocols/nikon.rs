@@ -17,7 +17,7 @@ use nikon_aformat::{
 
 use crate::bundled;
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Event, Place, Verdict};
 use crate::line::evidence::Weights;
 use crate::line::lane::{LineDecoder, StartStopLine};
@@ -33,43 +33,32 @@ use frames::Frames;
 pub(super) struct Nikon;
 
 impl Codec for Nikon {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "nikon",
-            title: "A-format",
-            about: "Nikon A-format",
-            needs: "A-format is decoded from edges or samples of the line, or from a log of words",
-        }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        describe::FIELDS
-    }
-
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &bundled::NIKON
-    }
-
-    fn rates(&self) -> &'static [u32] {
+    fn facts(&self) -> &'static Facts {
         const {
-            &[
-                BitRate::Mbit2_5.bits_per_second(),
-                BitRate::Mbit4.bits_per_second(),
-                BitRate::Mbit6_67.bits_per_second(),
-                BitRate::Mbit8.bits_per_second(),
-                BitRate::Mbit16.bits_per_second(),
-            ]
+            &Facts {
+                name: "nikon",
+                title: "A-format",
+                about: "Nikon A-format",
+                needs: "A-format is decoded from edges or samples of the line, or from a log of words",
+                fields: describe::FIELDS,
+                rates: &[
+                    BitRate::Mbit2_5.bits_per_second(),
+                    BitRate::Mbit4.bits_per_second(),
+                    BitRate::Mbit6_67.bits_per_second(),
+                    BitRate::Mbit8.bits_per_second(),
+                    BitRate::Mbit16.bits_per_second(),
+                ],
+                // Sync and frame code, CRC-3; sync code, fixed bit, echo and CRC-8.
+                weights: Weights { request: 6, answer: 22, alone: 14 },
+                captures: &bundled::NIKON,
+                ..Facts::NONE
+            }
         }
-    }
-
-    /// Sync and frame code, CRC-3; sync code, fixed bit, echo and CRC-8.
-    fn weights(&self) -> Weights {
-        Weights { request: 6, answer: 22, alone: 14 }
     }
 
     fn line(&self, rate: u32, settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         let bit = 1e12 / f64::from(rate.max(1));
-        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.weights())))
+        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.facts().weights)))
     }
 
     fn log(&self, settings: &Settings, _: &[Burst]) -> Option<Box<dyn LogDecoder>> {
@@ -98,15 +87,7 @@ struct Pending {
     replies: u32,
 }
 
-impl Pending {
-    /// When it ended; none in a log without times.
-    fn end(&self) -> Option<Time> {
-        match self.place {
-            Place::Time { end, .. } => Some(end),
-            Place::Line(_) => None,
-        }
-    }
-}
+impl Pending {}
 
 /// Finds requests and replies among the frames of a line.
 #[derive(Debug, Clone)]
@@ -193,10 +174,10 @@ impl Decoder {
         let asked = pending.map(|pending| pending.request);
         if let Some(pending) = pending.filter(|pending| !pending.request.command().is_multi_response()) {
             self.pending = None;
-            return self.answer(group, asked, pending.end());
+            return self.answer(group, asked, pending.place.end());
         }
         let first = pending.filter(|pending| pending.replies == 1);
-        self.answer(group, asked, first.and_then(|pending| pending.end()))
+        self.answer(group, asked, first.and_then(|pending| pending.place.end()))
     }
 
     fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<Time>) -> Event {
@@ -326,7 +307,7 @@ impl StartStop for Decoder {
             }
             self.close(out)?;
         }
-        match self.pending.and_then(|pending| pending.end()) {
+        match self.pending.and_then(|pending| pending.place.end()) {
             // Its reply may have come later.
             Some(asked) if end - asked < REPLY_TIMEOUT_BITS * self.bit => self.pending = None,
             _ => self.give_up(end, false, out)?,

@@ -7,11 +7,11 @@
 use std::collections::HashMap;
 use std::io;
 
-use rtex_block::inspect::{self, Cause, LogAnalysis, LogShape, Report, inspect};
+use rtex_block::inspect::{self, Cause, LogAnalysis, LogShape, Report, Trouble, inspect};
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Span, Value, Verdict};
 use crate::settings::{self, Settings};
 use crate::sink::Sink;
@@ -21,38 +21,42 @@ use crate::time::Time;
 pub(super) struct Rtex;
 
 impl Codec for Rtex {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "rtex",
-            title: "RTEX",
-            about: "Panasonic RTEX data blocks, from logs of bytes",
-            needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "rtex",
+                title: "RTEX",
+                about: "Panasonic RTEX data blocks, from logs of bytes",
+                needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+                // A block has no check sum, and a log no levels for a VCD of fields.
+                checked: false,
+                ..Facts::NONE
+            }
         }
-    }
-
-    /// A log of blocks has no levels, so there is no VCD to hold its fields.
-    fn fields(&self) -> &'static [&'static str] {
-        &[]
     }
 
     fn log(&self, settings: &Settings, sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
         Some(Box::new(Decoder::new(settings.rtex, sample)))
     }
-
-    /// A block has no check sum.
-    fn is_checked(&self) -> bool {
-        false
-    }
 }
 
 /// Bytes by which size and byte order are recognised.
-const SAMPLE: usize = 4096;
+const SAMPLE: usize = 1 << 14;
+/// Lines or records that are held back where the beginning says nothing of the shape: seconds of NOPs after power-up.
+const MOST_HELD: usize = 1 << 16;
+
+/// Lines or records behind the NOPs that are enough to tell the shape.
+const TELLING: usize = 16;
 
 /// Follows the blocks of a log.
 struct Decoder {
     settings: settings::Rtex,
     block_size: usize,
     shape: Option<LogShape>,
+    /// What was read before the shape was known.
+    held: Vec<Burst>,
+    /// Blocks are decoded, in whichever shape.
+    began: bool,
     /// Each line holds half a block of 32 bytes; the main half, while the other is still to come.
     halves: bool,
     half: Option<Vec<u8>>,
@@ -68,29 +72,64 @@ struct Decoder {
 impl Decoder {
     /// `sample`: the beginning of the log.
     fn new(settings: settings::Rtex, sample: &[Burst]) -> Self {
-        let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
-        // What a line has held that is spoilt, or too short or long, does not matter, but its place does.
-        let line = vec![0; most_common(read().map(Vec::len))];
-        let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
-        let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
-        let bytes: Vec<u8> = lines.flatten().copied().take(SAMPLE).collect();
-        let shape = LogShape::guess(&bytes);
-        // Lines or records of one block are what they are; a size is guessed where the lines allow both.
-        let guessed = shape.map_or(rtex_block::LEN, |shape| shape.size.bytes());
-        let block_size = settings.block_size.unwrap_or(guessed);
-        let halves =
-            block_size == rtex_block::LEN32 && !line.is_empty() && read().all(|it| it.len() == rtex_block::LEN);
-        Self {
+        let mut decoder = Self {
             settings,
-            block_size,
-            shape,
-            halves,
+            block_size: 0,
+            shape: None,
+            held: Vec::new(),
+            began: false,
+            halves: false,
             half: None,
             analysis: LogAnalysis::new(settings.period_ns, settings.gear),
             last: HashMap::new(),
             updates: HashMap::new(),
             place: Place::Line(0),
+        };
+        decoder.look_at(sample);
+        decoder
+    }
+
+    /// Finds the shape in this piece of the log.
+    fn look_at(&mut self, sample: &[Burst]) {
+        let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
+        // What a line has held that is spoilt, or too short or long, does not matter, but its place does.
+        let line = vec![0; most_common(read().map(Vec::len))];
+        let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
+        let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
+        let bytes: Vec<u8> = lines.flatten().copied().collect();
+        // NOPs from before the start tell nothing: so the end of what is there, which has more than them.
+        let known = bytes.chunks(SAMPLE).find_map(LogShape::guess);
+        let from_last = bytes.len().saturating_sub(SAMPLE) / 32 * 32;
+        self.shape = known.or_else(|| LogShape::guess(bytes.get(from_last..).unwrap_or_default()));
+        // Lines or records of one block are what they are; a size is guessed where the lines allow both.
+        let guessed = self.shape.map_or(rtex_block::LEN, |shape| shape.size.bytes());
+        self.block_size = self.settings.block_size.unwrap_or(guessed);
+        self.halves =
+            self.block_size == rtex_block::LEN32 && !line.is_empty() && read().all(|it| it.len() == rtex_block::LEN);
+    }
+
+    /// Decodes what was held back.
+    fn let_go(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        let held = std::mem::take(&mut self.held);
+        self.began = true;
+        self.look_at(&held);
+        if let Some(note) = self.note() {
+            out.event(&Event::remark(Place::Line(1), "log", note))?;
         }
+        held.iter().try_for_each(|burst| self.decode(burst, out))
+    }
+
+    /// A line or record, now that the shape is known as well as it can be.
+    fn decode(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        if self.halves {
+            return self.half(burst, out);
+        }
+        for block in burst.bytes.chunks(self.block_size.max(1)) {
+            if let Some(event) = self.block(burst, block) {
+                out.event(&event)?;
+            }
+        }
+        Ok(())
     }
 
     /// Half of a block.
@@ -170,13 +209,18 @@ impl Decoder {
 impl LogDecoder for Decoder {
     /// What there is to say about the log as a whole, before its blocks.
     fn note(&self) -> Option<String> {
-        let LogShape { size, word } = self.shape?;
+        let LogShape { size, word, skip } = self.shape?;
         let size = size.bytes();
         let order = match word {
             1 => "",
             2 => ", with the bytes of each 16-bit word exchanged",
             _ => ", with the bytes of each 32-bit word in the other order",
         };
+        if skip > 0 {
+            return Some(format!(
+                "the log looks like blocks of {size} bytes{order}, the first of which begins at byte {skip}"
+            ));
+        }
         if word == 1 && size == self.block_size && (size == rtex_block::LEN || self.settings.block_size.is_some()) {
             return None;
         }
@@ -184,30 +228,40 @@ impl LogDecoder for Decoder {
         Some(format!("the log looks like blocks of {size} bytes{order}{taken}"))
     }
 
-    /// Why the log as a whole was not read as it was written.
+    /// Why the log as a whole was not read as it was written, or what somebody has to look after.
     fn fault(&self) -> Option<&'static str> {
-        match self.shape?.word {
-            1 => None,
-            2 => Some("the bytes of each 16-bit word are exchanged in most of its blocks: pack with shifts"),
-            _ => Some("the bytes of each 32-bit word are in the other order in most of its blocks: pack with shifts"),
+        match self.shape {
+            Some(LogShape { skip: 1.., .. }) => {
+                Some("the log begins in the middle of a block: no block is read as it was written")
+            }
+            Some(LogShape { word: 2, .. }) => {
+                Some("the bytes of each 16-bit word are exchanged in most of its blocks: pack with shifts")
+            }
+            Some(LogShape { word: 4, .. }) => {
+                Some("the bytes of each 32-bit word are in the other order in most of its blocks: pack with shifts")
+            }
+            _ => self.analysis.trouble().map(Trouble::name),
         }
     }
 
-    /// A line or record of the log.
+    /// A line or record of the log. NOPs from before the start are held back until something tells the shape.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
-        if self.halves {
-            return self.half(burst, out);
+        if self.shape.is_some() || self.settings.block_size.is_some() || self.began {
+            return self.decode(burst, out);
         }
-        for block in burst.bytes.chunks(self.block_size.max(1)) {
-            if let Some(event) = self.block(burst, block) {
-                out.event(&event)?;
-            }
-        }
-        Ok(())
+        self.held.push(burst.clone());
+        let nops = |burst: &Burst| burst.bytes.chunks(rtex_block::LEN).all(is_empty);
+        let told = self.held.iter().rev().take_while(|burst| !nops(burst)).count();
+        // Nothing but NOPs, or too few blocks behind them to tell by.
+        let waits = self.held.len() > told && told < TELLING && self.held.len() < MOST_HELD;
+        if waits { Ok(()) } else { self.let_go(out) }
     }
 
     /// A line that is not bytes: of a block in two lines the other half is lost with it.
-    fn spoilt(&mut self, _: &mut dyn Sink) -> io::Result<()> {
+    fn spoilt(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.held.is_empty() {
+            self.let_go(out)?;
+        }
         self.half = match self.half.take() {
             Some(_) => None,
             None => self.halves.then(Vec::new),
@@ -217,6 +271,9 @@ impl LogDecoder for Decoder {
 
     /// The end of the log: drives that were on one side of it only, and what goes on there.
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.held.is_empty() {
+            self.let_go(out)?;
+        }
         let mut notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
         if self.half.as_ref().is_some_and(|half| !half.is_empty()) {
             notes.push("the log ends in the middle of a block".to_owned());
@@ -226,6 +283,11 @@ impl LogDecoder for Decoder {
         }
         out.event(&Event::remark(self.place, "log", notes.join("; ")))
     }
+}
+
+/// A NOP from before the start, in any order of its bytes: there is nothing but an address, or Sub_Chk.
+fn is_empty(block: &[u8]) -> bool {
+    matches!(block, [_, code, control, ..] if code & 0x7f == 0 && *control == 0)
 }
 
 /// The length that most lines have; of several the longest.

@@ -1,16 +1,18 @@
 //! TI SORTE: the frames of a network capture, an event a packet.
 //!
-//! Packets of an Ethernet interface are start-up frames with their FCS; packets of another interface are frames of the
-//! IO exchange, which have neither type nor addresses: the one with SA 0 is the master's.
+//! Packets of an Ethernet interface are start-up frames, with their FCS if the file says so; if it does not, frames without one,
+//! padded or not, are taken as a network card gives them, and say so. Packets of another interface are frames of the IO exchange,
+//! which have neither type nor addresses: the one with SA 0 is the master's.
 
 use std::fmt::Write as _;
 
 use pcap_file::DataLink;
-use sorte_proto::inspect::{During, Frame, inspect};
-use sorte_proto::{FrameType, Param, Status};
+use sorte_proto::follow::InputSlice;
+use sorte_proto::inspect::{Cause, During, Frame, inspect};
+use sorte_proto::{FrameType, Network, Param, Status};
 
 use crate::capture::pcapng::Packet;
-use crate::codec::{Codec, Names};
+use crate::codec::{Codec, Facts};
 use crate::event::{Direction, Event, Field, Place, Refusal, Span, Verdict};
 
 /// The names of all fields.
@@ -31,6 +33,9 @@ const FIELDS: &[&str] = &[
     "PTO 2",
     "PTO 3",
     "PTO 4",
+    "FCS",
+    "DRV8711",
+    "reserved or steps ordered",
 ];
 const PTO: [&str; 4] = ["PTO 1", "PTO 2", "PTO 3", "PTO 4"];
 
@@ -41,17 +46,17 @@ const BYTE: i64 = 80_000;
 pub(super) struct Sorte;
 
 impl Codec for Sorte {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "sorte",
-            title: "SORTE",
-            about: "TI SORTE, from a network capture",
-            needs: "SORTE is decoded from a pcapng file",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "sorte",
+                title: "SORTE",
+                about: "TI SORTE, from a network capture",
+                needs: "SORTE is decoded from a pcapng file",
+                fields: FIELDS,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        FIELDS
     }
 
     fn packet(&self, packet: &Packet) -> Option<Event> {
@@ -63,8 +68,14 @@ fn event(packet: &Packet) -> Event {
     let during = if packet.link == DataLink::ETHERNET { During::StartUp } else { During::Exchange };
     let report = inspect(during, &packet.bytes);
     let kind = report.kind().name();
-    let (fields, verdict) = match (report.error(), report.frame()) {
-        (None, Some(frame)) => (fields(&frame), Verdict::Ok),
+    let unchecked = matches!(report.cause(), Some(Cause::FcsMissing | Cause::FcsMissingAndPadded));
+    let error = report.error().filter(|_| packet.has_fcs || !unchecked);
+    let (fields, verdict) = match (error, report.frame()) {
+        (None, Some(frame)) => {
+            let mut fields = fields(&frame);
+            fields.extend(report.error().map(|_| Field::text("FCS", "not captured")));
+            (fields, contents(&frame))
+        }
         (None, None) => (Vec::new(), Verdict::Ok),
         (Some(error), _) => (Vec::new(), Refusal::new(error.class().name(), error).into()),
     };
@@ -89,12 +100,11 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
         (_, "STATUS") => (3, 3),
         (Frame::Discovery(_), "devices") => (4, 5),
         (Frame::Discovery(_), "in") => (6, 7),
-        (Frame::Discovery(_), "out") => (8, 9),
+        (Frame::Discovery(_), "out") | (Frame::Sync(_), "delay") => (8, 9),
         (Frame::Param(_), "cycle_time") | (Frame::Sync(_), "time stamp") => (4, 7),
         (Frame::Param(_), "delay_burst") => (14, 14),
         (Frame::Param(_), "ipg") => (20, 23),
         (Frame::Param(_), "crc_mode") => (35, 35),
-        (Frame::Sync(_), "delay") => (8, 9),
         // Behind the output data come CRC and time stamp, behind a payload its check.
         (Frame::Master(_), "time stamp") => (len.checked_sub(2)?, len - 1),
         (Frame::Master(_), "data") => (2, len.checked_sub(4)?),
@@ -106,6 +116,17 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
             (at, at + 1)
         }
     })
+}
+
+/// A table that cannot be is no answer, whatever its check says.
+fn contents(frame: &Frame<'_>) -> Verdict {
+    match frame {
+        Frame::Discovery(view) => match Network::new(*view) {
+            Ok(_) => Verdict::Ok,
+            Err(error) => Refusal::new(error.class().name(), error).into(),
+        },
+        _ => Verdict::Ok,
+    }
 }
 
 fn fields(frame: &Frame<'_>) -> Vec<Field> {
@@ -144,7 +165,16 @@ fn fields(frame: &Frame<'_>) -> Vec<Field> {
             fields
         }
         Frame::Device(view) => {
-            vec![Field::number("SA", view.address().get()), status(view.status()), data(view.payload())]
+            let mut fields = vec![Field::number("SA", view.address().get()), status(view.status())];
+            match view.payload().first_chunk().filter(|_| view.payload().len() == InputSlice::LEN) {
+                Some(bytes) => {
+                    let slice = InputSlice::parse(*bytes);
+                    fields.push(Field::flags("DRV8711", &slice.driver, 2));
+                    fields.push(Field::number("reserved or steps ordered", slice.ordered));
+                }
+                None => fields.push(data(view.payload())),
+            }
+            fields
         }
     }
 }
@@ -161,4 +191,62 @@ fn data(bytes: &[u8]) -> Field {
 
 fn status(status: Status) -> Field {
     Field::flags("STATUS", &status, 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use sorte_proto::{Discovery, Entry, Place, Sync};
+
+    use super::*;
+    use crate::time::Time;
+
+    fn of(link: DataLink, has_fcs: bool, bytes: &[u8]) -> Event {
+        event(&Packet { time: Time::from_ps(0), link, inbound: None, has_fcs, bytes: bytes.to_vec() })
+    }
+
+    fn class(event: &Event) -> Option<&'static str> {
+        match &event.verdict {
+            Verdict::Ok => None,
+            Verdict::Refused(refusal) => Some(refusal.class),
+        }
+    }
+
+    /// 300 devices, and totals that are not the sums of the entries.
+    #[test]
+    fn a_table_that_cannot_be_is_refused() {
+        let mut frame = Discovery::request(Place::Inner);
+        frame.entries[0] = Entry::STOCK;
+        (frame.count, frame.input_total, frame.output_total) = (1, 4, 4);
+        assert_eq!(class(&of(DataLink::ETHERNET, true, &frame.emit())), None);
+        frame.output_total = 5;
+        assert_eq!(class(&of(DataLink::ETHERNET, true, &frame.emit())), Some("table_mismatch"));
+        frame.count = 300;
+        assert_eq!(class(&of(DataLink::ETHERNET, true, &frame.emit())), Some("too_many_devices"));
+    }
+
+    /// As a network card gives it, 10 bytes and padded to 60; but not where the file says that the FCS is there.
+    #[test]
+    fn frames_without_their_fcs_are_taken_where_the_file_does_not_promise_it() {
+        let sync = Sync::of_master(500, 76, Place::Inner).emit();
+        let mut padded = sync[..10].to_vec();
+        padded.resize(60, 0);
+        for bytes in [&sync[..10], &padded] {
+            let event = of(DataLink::ETHERNET, false, bytes);
+            assert_eq!(class(&event), None);
+            assert!(event.fields.iter().any(|field| field.name == "FCS"), "{event:?}");
+            assert!(class(&of(DataLink::ETHERNET, true, bytes)).is_some());
+        }
+        assert!(class(&of(DataLink::ETHERNET, false, &sync[..9])).is_some());
+        let mut damaged = sync;
+        damaged[5] ^= 1;
+        assert_eq!(class(&of(DataLink::ETHERNET, false, &damaged)), Some("bad_fcs"));
+    }
+
+    /// Device 1: its driver stalled, 4711 steps.
+    #[test]
+    fn the_payload_of_a_device_is_named() {
+        let event = of(DataLink::USER0, false, &[0x01, 0x00, 0x40, 0x67, 0x12, 0x04]);
+        let names: Vec<_> = event.fields.iter().map(|field| field.name).collect();
+        assert_eq!((class(&event), names), (None, vec!["SA", "STATUS", "DRV8711", "reserved or steps ordered"]));
+    }
 }

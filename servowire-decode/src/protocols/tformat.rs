@@ -14,7 +14,7 @@ use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::bundled;
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Direction, Event, Verdict};
 use crate::line::evidence::Weights;
 use crate::line::lane::{LineDecoder, StartStopLine};
@@ -30,35 +30,26 @@ use frame::{ANSWER_TIMEOUT, Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 pub(super) struct Tformat;
 
 impl Codec for Tformat {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "tformat",
-            title: "T-Format",
-            about: "Tamagawa T-Format",
-            needs: "T-Format is decoded from edges or samples of the line, or from a log of bytes",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "tformat",
+                title: "T-Format",
+                about: "Tamagawa T-Format",
+                needs: "T-Format is decoded from edges or samples of the line, or from a log of bytes",
+                fields: describe::FIELDS,
+                rates: &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()],
+                // 9 of 256 control fields; with the echo and the check field of the answer.
+                weights: Weights { request: 4, answer: 24, alone: 16 },
+                captures: &bundled::TFORMAT,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        describe::FIELDS
-    }
-
-    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
-        &bundled::TFORMAT
-    }
-
-    fn rates(&self) -> &'static [u32] {
-        const { &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()] }
-    }
-
-    /// 9 of 256 control fields; with the echo and the check field of the answer.
-    fn weights(&self) -> Weights {
-        Weights { request: 4, answer: 24, alone: 16 }
     }
 
     fn line(&self, rate: u32, settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         let bit = 1e12 / f64::from(rate.max(1));
-        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.weights())))
+        Some(Box::new(StartStopLine::new(bit, Decoder::new(bit as i64, settings.widths), self.facts().weights)))
     }
 
     fn log(&self, settings: &Settings, _: &[Burst]) -> Option<Box<dyn LogDecoder>> {
@@ -184,7 +175,7 @@ impl Decoder {
             // The encoder refuses a damaged request with an ID 3 frame.
             (None, None) => AllData::parse(frame.contents()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
         };
-        let delay = pending.end().map(|end| frame.start() - end);
+        let delay = pending.place.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);
         let mut event = self.encoder.answer(frame, asked, result, delay);
         if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, pending.request) {
@@ -308,7 +299,7 @@ impl StartStop for Decoder {
             self.skip = None;
         }
         if self.open.is_empty() {
-            let due = self.pending.and_then(|pending| pending.end()).map(|end| end + ANSWER_TIMEOUT);
+            let due = self.pending.and_then(|pending| pending.place.end()).map(|end| end + ANSWER_TIMEOUT);
             if due.is_some_and(|due| field.start > due) {
                 self.give_up(field.start, true, out)?;
             }
@@ -333,7 +324,7 @@ impl StartStop for Decoder {
             }
             self.close(out)?;
         }
-        match self.pending.and_then(|pending| pending.end()) {
+        match self.pending.and_then(|pending| pending.place.end()) {
             Some(asked) if end > asked + ANSWER_TIMEOUT => self.give_up(end, false, out),
             // Its answer may have come later.
             _ => {

@@ -27,7 +27,7 @@ fn place(event: &Event, name: &str) -> (u32, u32, i64, i64) {
 }
 
 fn of_capture(codec: usize, capture: usize) -> Vec<Event> {
-    let (name, bytes) = CODECS[codec].captures()[capture];
+    let (name, bytes) = CODECS[codec].captures[capture];
     events(name, Capture::Edges(line(name, bytes)), Some(CODECS[codec]))
 }
 
@@ -75,7 +75,7 @@ fn fields_of_rtex_blocks_have_bytes_and_a_line() {
     let log = "05 20 00 00 46 00 00 00 00 00 00 00 00 00 00 00\n".repeat(2);
     let input = Input::over("log", Cursor::new(log));
     let capture = capture::open(input, Hints { format: Some(Format::Hex), ..Hints::default() }).unwrap();
-    let rtex = CODECS.iter().copied().find(|codec| codec.names().name == "rtex");
+    let rtex = CODECS.iter().copied().find(|codec| codec.name == "rtex");
     let all = events("log", capture, rtex);
     let data = all[0]
         .fields
@@ -116,7 +116,7 @@ fn crc8(bytes: &[u8]) -> u8 {
 #[test]
 fn every_field_has_its_place() {
     for codec in CODECS {
-        for (name, bytes) in codec.captures() {
+        for (name, bytes) in codec.captures {
             for event in events(name, Capture::Edges(line(name, bytes)), Some(*codec)) {
                 let Place::Time { start, end } = event.place else { panic!("{event:?}") };
                 for field in &event.fields {

@@ -20,7 +20,7 @@ fn changes(name: &str, bytes: &'static [u8]) -> (Vec<String>, Vec<Change>, Time)
 #[test]
 fn edges_pushed_in_pieces_say_what_the_file_says() {
     for codec in CODECS {
-        for (name, bytes) in codec.captures() {
+        for (name, bytes) in codec.captures {
             let due = events(name, Capture::Edges(line(name, bytes)), Some(*codec));
             assert!(due.iter().filter(|event| event.verdict.is_ok()).count() > 1, "{name}: {due:?}");
             let (channels, changes, end) = changes(name, bytes);
@@ -41,7 +41,7 @@ fn edges_pushed_in_pieces_say_what_the_file_says() {
 
 #[test]
 fn a_pause_shows_what_is_certain_before_the_end() {
-    let (name, bytes) = CODECS[0].captures()[0];
+    let (name, bytes) = CODECS[0].captures[0];
     let (channels, changes, end) = changes(name, bytes);
     let mut keep = Keep::default();
     let mut out = Output::new(name, &mut keep);
@@ -60,7 +60,7 @@ fn a_pause_shows_what_is_certain_before_the_end() {
 
 #[test]
 fn columns_are_the_changes() {
-    for (name, bytes) in CODECS.iter().flat_map(|codec| codec.captures()) {
+    for (name, bytes) in CODECS.iter().flat_map(|codec| codec.captures) {
         let (channels, changes, _) = changes(name, bytes);
         let columns = columns(line(name, bytes).as_mut()).unwrap();
         assert_eq!(columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>(), channels);

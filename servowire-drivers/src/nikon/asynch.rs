@@ -6,7 +6,7 @@ use servowire_core::run_async as run;
 
 use super::Frame;
 use crate::Timer;
-use crate::race::race;
+use crate::race::{self, race};
 
 /// What sends and receives frames.
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
@@ -37,10 +37,10 @@ async fn take<F: FramePort>(
     timer: &mut impl Timer,
     until_ns: u64,
 ) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
-    let what = race(port.take(), timer.wait_until(until_ns)).await?;
+    let what = race(port.take(), sleep(line, timer, until_ns)).await?;
     Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
-async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    timer.wait_until(until_ns).await
+async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
 }

@@ -4,7 +4,7 @@ use embedded_hal_async::digital::Wait;
 
 use super::{Driver, Exchanged, Failure, Port};
 use crate::Timer;
-use crate::race::race;
+use crate::race::{race, sleep};
 
 /// How the period of an exchange began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,11 +38,12 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     pub async fn next(&mut self, sync: &mut impl Wait) -> Result<Period, Failure<P>> {
         let update_ns = u64::from(self.master().config().periods.update_ns);
         let until_ns = self.now_ns()?.saturating_add(update_ns.saturating_mul(3) >> 1);
-        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await?;
+        let look = |clock: &mut T| self.check.check(clock.now_ns()?);
+        let edge = race(sync.wait_for_falling_edge(), sleep(&mut self.clock, look, until_ns)).await?;
         let began = match edge {
             Some(Ok(())) => Began::Edge,
             Some(Err(_)) => {
-                self.clock.wait_until(until_ns).await?;
+                sleep(&mut self.clock, |clock| self.check.check(clock.now_ns()?), until_ns).await?;
                 Began::Clock
             }
             None => Began::Clock,

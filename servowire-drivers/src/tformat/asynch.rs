@@ -9,7 +9,7 @@ use embedded_io_async::{ErrorType, Read, Write};
 use servowire_core::run_async as run;
 
 use crate::Timer;
-use crate::race::race;
+use crate::race::{self, race};
 
 driver!(awaited, [Read, Write], Timer, async);
 
@@ -21,10 +21,10 @@ async fn read<U: Read>(
     timer: &mut impl Timer,
     until_ns: u64,
 ) -> Result<Heard<Result<usize, U::Error>>, ClockError> {
-    let what = race(uart.read(bytes), timer.wait_until(until_ns)).await?;
+    let what = race(uart.read(bytes), sleep(line, timer, until_ns)).await?;
     Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
-async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    timer.wait_until(until_ns).await
+async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
 }

@@ -189,6 +189,8 @@ macro_rules! driver {
                         }
                         Progress::Failed { error, ready_ns } => {
                             let now_ns = self.state.now_ns(&mut self.clock)?;
+                            // What was on the line until then may be handed over as late as that.
+                            let ready_ns = ready_ns.saturating_add(self.line.hand_over_ns.into());
                             self.state.failed(ready_ns, now_ns);
                             return Err(refused(error, self.late_ns));
                         }

@@ -55,6 +55,9 @@ pub struct Ring {
     pub read_of: Vec<u32>,
     /// Faults: calls of the port until one fails, frames that are lost, a stall at an access.
     pub fail_in: Option<u32>,
+    /// Places that cannot be written, or read, at all.
+    pub dead: Option<usize>,
+    pub deaf: Option<usize>,
     pub lose_frames: u32,
     pub stall_in: Option<(u32, u64)>,
     pub found: [Slave; AXES],
@@ -90,6 +93,8 @@ impl Ring {
             interrupt_waits: false,
             read_of: Vec::new(),
             fail_in: None,
+            dead: None,
+            deaf: None,
             lose_frames: 0,
             stall_in: None,
             found: SWITCHES.map(|switches| Slave { mac_id: MacId::new(switches).unwrap(), kind: 1 }),
@@ -246,6 +251,9 @@ impl<W: Drawn> Port for Bus<W> {
 
     fn read(&mut self, place: usize, words: &mut [W]) -> Result<(), ()> {
         let mut ring = self.0.borrow_mut();
+        if ring.deaf == Some(place) {
+            return Err(());
+        }
         let width = size_of::<W>();
         for (k, word) in words.iter_mut().enumerate() {
             ring.access(1)?;
@@ -258,7 +266,10 @@ impl<W: Drawn> Port for Bus<W> {
 
     fn write(&mut self, place: usize, words: &[W]) -> Result<(), ()> {
         let mut ring = self.0.borrow_mut();
-        ring.writing = true;
+        ring.writing = ring.dead != Some(place);
+        if !ring.writing {
+            return Err(());
+        }
         let width = size_of::<W>();
         for (k, word) in words.iter().enumerate() {
             ring.access(1).inspect_err(|()| ring.writing = false)?;

@@ -10,13 +10,14 @@ use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use servowire_drivers::{Clock, ClockError, Worst};
 use servowire_world::{
-    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Wire, World,
+    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Unit, Verdict, Wire, World,
 };
 use tformat::device::Device;
 use tformat::master::Line;
 use tformat::{Abm, Abs, BitRate};
 
 use crate::hostile::{Calls, rates};
+use crate::second::tformat::Encoder;
 
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
 /// A look at the clock.
@@ -38,9 +39,14 @@ pub enum Misframed {
 pub struct Bench {
     world: World,
     encoder: Device<6>,
+    /// Encoders of the tests' own, in its place.
+    pub seconds: Vec<Encoder>,
     misframed: Misframed,
     fifo: VecDeque<Option<u8>>,
     sent_until_ns: u64,
+    /// The last request, and what of it the first encoder has heard.
+    asked: Vec<(u64, bool)>,
+    heard: Vec<(u64, bool)>,
     /// Bytes that the encoder has heard; the shaft moves with each.
     turns: u32,
     pub request: Option<Id>,
@@ -49,6 +55,8 @@ pub struct Bench {
     pub off_at_ns: u64,
     /// How often the host had been preempted when the last call was judged.
     preempts: u64,
+    /// Bytes that the UART had lost then.
+    overruns: u64,
     /// The port is an SPI, which sends and samples by one clock. The line may delay its request all the same; nothing is asked of
     /// such a call.
     pub sampled: bool,
@@ -56,20 +64,38 @@ pub struct Bench {
 
 pub type Shared = Rc<RefCell<Bench>>;
 
+/// What the truth says of a call.
+pub struct Heard {
+    /// Of its position, if it gave one.
+    pub verdict: Option<Verdict>,
+    /// Whether request and answer came through unhurt.
+    pub whole: bool,
+    pub preempted: bool,
+}
+
 impl Bench {
     pub fn new(scenario: Scenario, misframed: Misframed) -> Shared {
+        Self::with(scenario, misframed, 1)
+    }
+
+    /// So many encoders with one address.
+    pub fn with(scenario: Scenario, misframed: Misframed, devices: u8) -> Shared {
         Rc::new(RefCell::new(Self {
-            world: World::new(WIRE, scenario),
+            world: World::new(Wire { devices, ..WIRE }, scenario),
             encoder: Device::new(0x17, BitRate::Mbit2_5),
+            seconds: Vec::new(),
             misframed,
             fifo: VecDeque::new(),
             sent_until_ns: 0,
+            asked: Vec::new(),
+            heard: Vec::new(),
             turns: 0,
             request: None,
             driver_on: false,
             on_at_ns: 0,
             off_at_ns: 0,
             preempts: 0,
+            overruns: 0,
             sampled: false,
         }))
     }
@@ -134,24 +160,65 @@ impl Bench {
             match self.world.next(until_ns) {
                 Event::Time { .. } => return,
                 Event::Delivered(block) => self.take(&block.bytes().collect::<Vec<_>>()),
-                Event::Heard { unit, .. } => {
-                    let (byte, framed) = unit.bits.content();
+                Event::Heard { device, unit } => {
                     self.turns += 1;
+                    if device == 0 && Some(unit.origin.transmission) == self.request {
+                        self.heard.push(unit.bits.content());
+                    }
                     let shaft = place(self.turns);
-                    self.encoder.set_position(Abs::truncate(shaft), Abm::truncate(3));
-                    let now_ns = self.world.now_ns();
-                    let answer = if framed {
-                        self.encoder.hear(&[byte as u8], now_ns)
-                    } else {
-                        self.encoder.framing_error(now_ns)
-                    };
-                    if let Some(answer) = answer {
-                        let message = Message::bytes(answer.frame.as_bytes()).tagged(shaft.into());
-                        self.world.answer(0, unit.origin.transmission, &message, answer.start_ns);
+                    if let Some((bytes, start_ns)) = self.answer(device, &unit, shaft) {
+                        let message = Message::bytes(&bytes).tagged(shaft.into());
+                        self.world.answer(device, unit.origin.transmission, &message, start_ns);
                     }
                 }
             }
         }
+    }
+
+    /// What an encoder answers to a byte with its shaft there, and when.
+    fn answer(&mut self, device: u8, unit: &Unit, shaft: u32) -> Option<(Vec<u8>, u64)> {
+        let (byte, framed) = unit.bits.content();
+        let now_ns = self.world.now_ns();
+        if let Some(second) = self.seconds.get_mut(usize::from(device)) {
+            second.abs = shaft;
+            return second.hear(byte as u8, framed, now_ns).map(|answer| (answer.bytes, answer.start_ns));
+        }
+        self.encoder.set_position(Abs::truncate(shaft), Abm::truncate(3));
+        let answer = if framed { self.encoder.hear(&[byte as u8], now_ns) } else { self.encoder.framing_error(now_ns) };
+        answer.map(|answer| (answer.frame.as_bytes().to_vec(), answer.start_ns))
+    }
+
+    /// The encoders lose their supply for a moment.
+    pub fn restart(&mut self) {
+        let now_ns = self.now_ns();
+        self.seconds.iter_mut().for_each(|encoder| encoder.restart(now_ns));
+    }
+
+    /// Another master asks.
+    pub fn intrude(&mut self, bytes: &[u8], at_ns: u64) {
+        self.world.intrude(&Message::bytes(bytes), at_ns);
+    }
+
+    /// The truth of the last call, which gave this position if any.
+    pub fn verdict(&mut self, shaft: Option<u32>) -> Heard {
+        // Bytes that a UART loses without a word are not counted back over in a block.
+        let preempted = self.was_preempted() || self.tally().overrun > self.overruns;
+        (self.preempts, self.overruns) = (self.tally().of(Kind::Preempt), self.tally().overrun);
+        let truth = self.world.truth();
+        let request = self.request.and_then(|id| truth.transmission(id));
+        let verdict = shaft.zip(request).map(|(shaft, request)| truth.verdict(request.id, shaft.into()));
+        let whole = request.is_some_and(|sent| {
+            let gapless = |t: &Transmission| t.end_ns - t.start_ns == 4_000 * t.units as u64;
+            let in_time = |answer: &Transmission| {
+                let own = answer.start_ns == answer.asked_ns && answer.delivered_ns <= answer.end_ns + HAND_OVER_NS;
+                own && gapless(answer) && answer.start_ns <= sent.sent_ns + 10_000
+            };
+            let left = sent.start_ns == sent.asked_ns && sent.end_ns == sent.sent_ns && gapless(sent);
+            left && self.heard == self.asked && truth.undisturbed(sent.id) && truth.intact_answers(sent.id).any(in_time)
+        });
+        let past_ns = self.now_ns().saturating_sub(1_000_000);
+        self.world.truth_mut().forget_before(past_ns);
+        Heard { verdict, whole, preempted }
     }
 
     fn take(&mut self, bytes: &[(u8, bool)]) {
@@ -194,6 +261,8 @@ impl Write for Uart {
         let begin_ns = bench.sent_until_ns.max(bench.now_ns());
         let id = bench.world.send(&Message::bytes(bytes), begin_ns);
         bench.request = Some(id);
+        bench.asked = bytes.iter().map(|byte| (u64::from(*byte), true)).collect();
+        bench.heard.clear();
         bench.sent_until_ns = begin_ns + 4_000 * bytes.len() as u64;
         Ok(bytes.len())
     }

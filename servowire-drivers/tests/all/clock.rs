@@ -182,6 +182,94 @@ fn nikon() {
     });
 }
 
+/// Futures wait with a delay that passes on another clock, or not at all: each wait ends, and the error names the clock.
+#[cfg(feature = "async")]
+mod asynch {
+    use std::future::pending;
+
+    use servowire_drivers::WithDelay;
+    use servowire_drivers::nikon::asynch as nikon_asynch;
+    use servowire_drivers::tformat::asynch as tformat_asynch;
+
+    use super::*;
+    use crate::polls::{pause, run};
+
+    type Encoder<C> = tformat_asynch::Driver<Silence, Automatic, C>;
+    type Master<C> = nikon_asynch::Driver<Silence, C>;
+
+    struct Delay;
+
+    impl embedded_hal_async::delay::DelayNs for Delay {
+        async fn delay_ns(&mut self, _: u32) {
+            pause().await;
+        }
+    }
+
+    impl embedded_io_async::Write for Silence {
+        async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+            Ok(bytes.len())
+        }
+
+        async fn flush(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    impl embedded_io_async::Read for Silence {
+        async fn read(&mut self, _: &mut [u8]) -> Result<usize, Infallible> {
+            pending().await
+        }
+    }
+
+    impl nikon_asynch::FramePort for Silence {
+        type Error = Infallible;
+
+        async fn send(&mut self, _: &[RequestFrame], _: u32) -> Result<(), Infallible> {
+            Ok(())
+        }
+
+        async fn take(&mut self) -> Result<Frame, Infallible> {
+            pending().await
+        }
+    }
+
+    #[test]
+    fn tformat() {
+        let line = ::tformat::master::Line::new(::tformat::BitRate::Mbit2_5);
+        let address = ::tformat::Address::truncate(5);
+        macro_rules! holds {
+            ($name:literal, $call:expr) => {
+                holds($name, |clock| {
+                    let timer = WithDelay { clock: || clock.look(), delay: Delay };
+                    let mut encoder = tformat_asynch::Driver::new(Silence, Automatic, timer, line).unwrap();
+                    std::array::from_fn(|_| run($call(&mut encoder), usize::MAX).unwrap().err())
+                });
+            };
+        }
+        holds!("read_data", async |e: &mut Encoder<_>| e.read_data().await);
+        holds!("clear_errors", async |e: &mut Encoder<_>| e.clear_errors().await);
+        holds!("read_eeprom", async |e: &mut Encoder<_>| e.read_eeprom(::tformat::Page::truncate(1), address).await);
+    }
+
+    #[test]
+    fn nikon() {
+        let line = nikon_aformat::master::Line::new(nikon_aformat::BitRate::Mbit2_5);
+        let (resolution, ea) = (nikon_aformat::Resolution::default(), EncoderAddress::ZERO);
+        macro_rules! holds {
+            ($name:literal, $call:expr) => {
+                holds($name, |clock| {
+                    let timer = WithDelay { clock: || clock.look(), delay: Delay };
+                    let mut master = nikon_asynch::Driver::new(Silence, timer, resolution, line);
+                    std::array::from_fn(|_| run($call(&mut master), usize::MAX).unwrap().err())
+                });
+            };
+        }
+        holds!("read_abs40", async |m: &mut Master<_>| m.read_abs40(ea).await);
+        holds!("read_bus", async |m: &mut Master<_>| m.read_bus(Operation::Abs40Mt, Addresses::first(8)).await);
+        holds!("clear_status", async |m: &mut Master<_>| m.clear_status(ea).await);
+    }
+}
+
 /// An ASIC that never gets ready, and the blocks that were written to it.
 struct Stuck<'a>(&'a Cell<u32>);
 

@@ -22,6 +22,8 @@ use servowire_world::{
 };
 
 use crate::hostile::{Calls, rates};
+#[cfg(feature = "async")]
+use crate::polls::pause;
 
 /// 2.5 Mbit/s: a frame is 7.2 us.
 pub const RATE: BitRate = BitRate::Mbit2_5;
@@ -213,14 +215,9 @@ impl Clock for Port {
 }
 
 #[cfg(feature = "async")]
-#[cfg(feature = "async")]
 impl Timer for Port {
-    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
-        poll_fn(|_| match self.now_ns() {
-            Ok(now_ns) if now_ns < ns => Poll::Pending,
-            end => Poll::Ready(end.map(drop)),
-        })
-        .await
+    async fn wait_ns(&mut self, _: u64) {
+        pause().await;
     }
 }
 

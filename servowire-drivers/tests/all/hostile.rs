@@ -70,10 +70,9 @@ impl Calls {
         }
     }
 
-    /// Whether there has to be more: 100,000 faults always, and as many events (faults, transmissions and units) as the environment
-    /// wants.
+    /// Whether there has to be more: 100,000 faults always, and as many as the environment wants.
     fn go_on(&self) -> bool {
-        self.tally.all_faults() < FAULTS || self.tally.events() < wanted_events(0)
+        self.tally.all_faults() < wanted_events(0).max(FAULTS)
     }
 
     /// Says what there was, and that it was enough of everything.

@@ -35,6 +35,8 @@ mod clock;
 mod contract;
 #[cfg(feature = "tformat")]
 mod direction;
+#[cfg(feature = "tformat")]
+mod hard;
 #[cfg(all(feature = "nikon", feature = "async"))]
 mod nikon_asynch;
 #[cfg(feature = "nikon")]

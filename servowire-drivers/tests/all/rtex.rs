@@ -6,8 +6,8 @@ use std::num::NonZeroU16;
 use crate::asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
 use rtex_block::device::{Drive, Fault};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig, RingFailure,
-    Slave, StopReason,
+    ActiveCode, Arrival, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig,
+    RingFailure, Slave, StopCategory, StopReason,
 };
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{Alarm, BlockSize, Doubt, MacId, Policy};
@@ -158,7 +158,8 @@ fn a_switch_of_the_bank_never_tears_an_exchange() {
     for external in [true, false] {
         let ring = Ring::new(external, false);
         let mut driver = on::<u16>(&ring);
-        let words = AXES * 8;
+        // A block is read again at the end.
+        let words = (AXES + 1) * 8;
         let mut twice = 0;
         for at in 0..words {
             // The exchange begins with a frame, which is back 29.6 us later; the next one begins after 500 us.
@@ -166,11 +167,11 @@ fn a_switch_of_the_bank_never_tears_an_exchange() {
             let exchanged = update(&ring, &mut driver).unwrap();
             ring.borrow_mut().stall_in = None;
             let read = std::mem::take(&mut ring.borrow_mut().read_of);
-            let taken = &read[read.len() - words..];
+            let taken = &read[read.len() - words..][..AXES * 8];
             assert!(taken.iter().all(|frame| *frame == taken[0]), "{external} {at}: {read:?}");
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);
-            twice += usize::from(read.len() == 2 * words);
+            twice += usize::from(read.len() > words);
             for _ in 0..2 {
                 update(&ring, &mut driver).unwrap();
             }
@@ -207,6 +208,85 @@ fn a_fault_of_the_port_is_over_with_the_next_exchange() {
             assert_eq!(driver.master().ring().failure(), None, "{at}");
         }
     }
+}
+
+/// A place that cannot be written: every other drive is written all the same, so a stop reaches it in the period after, and so does
+/// the servo-off after the communication has failed. A place that cannot be read is one axis without a block, and no other.
+#[test]
+fn a_dead_place_is_one_place() {
+    for external in [false, true] {
+        for dead in 0..AXES {
+            let ring = Ring::new(external, false);
+            let mut driver = on::<u16>(&ring);
+            ring.borrow_mut().dead = Some(dead);
+            driver.ring_mut().stop(StopCategory::Zero);
+            for _ in 0..3 {
+                assert_eq!(update(&ring, &mut driver), Err(Error::Io(())));
+            }
+            for place in 0..AXES {
+                assert_eq!(ring.borrow().drives[place].is_active(), place == dead, "{external} {dead} {place}");
+            }
+
+            let ring = Ring::new(external, true);
+            let mut driver = on::<u32>(&ring);
+            ring.borrow_mut().deaf = Some(dead);
+            for _ in 0..2 {
+                assert_eq!(update(&ring, &mut driver), Err(Error::Io(())));
+                assert!((0..AXES).all(|place| place == dead || position(&ring, &driver, place).is_some()));
+            }
+            (0..LIMIT).for_each(|_| _ = update(&ring, &mut driver));
+            let failure = Some(RingFailure { place: dead as u8, reason: StopReason::EchoTimeout });
+            assert_eq!(driver.master().ring().failure(), failure);
+            (0..3).for_each(|_| _ = update(&ring, &mut driver));
+            assert!(!ring.borrow().drives.iter().any(Drive::is_active));
+        }
+    }
+}
+
+/// The interrupt is noticed 60 us late and the exchange goes over the next edge, so the clock sees nothing: what an axis takes is of
+/// the frame that is due, whichever access the bank was switched at.
+#[test]
+fn a_late_interrupt_mixes_no_frames() {
+    let ring = Ring::new(false, false);
+    let mut driver = on::<u16>(&ring);
+    // A block is read again at the end: the bank may have been switched in the middle of the last one.
+    let words = (AXES + 1) * 8;
+    let mut mixed = 0;
+    for at in 0..200 {
+        let began_ns = {
+            let mut ring = ring.borrow_mut();
+            let begins_ns = ring.next_frame_ns();
+            ring.pass(begins_ns + 60_000);
+            ring.in_exchange = true;
+            ring.read_of.clear();
+            ring.stall_in = Some((at % words as u32, 441_000));
+            ring.now_ns
+        };
+        let exchanged = driver.exchange(began_ns).unwrap();
+        let read = {
+            let mut ring = ring.borrow_mut();
+            ring.in_exchange = false;
+            ring.stall_in = None;
+            ring.let_in();
+            std::mem::take(&mut ring.read_of)
+        };
+        // The frame that was there when the interrupt came.
+        let due = read[0];
+        let taken = &read[read.len() - words..][..AXES * 8];
+        mixed += usize::from(read.iter().any(|frame| *frame != due));
+        for (place, axis) in driver.master().ring().axes().iter().enumerate() {
+            let own = &taken[8 * place..8 * place + 8];
+            if axis.arrival() == Arrival::OnTime {
+                assert!(own.iter().all(|frame| *frame == due), "{at}: place {place} of {read:?}");
+            }
+        }
+        assert_eq!((exchanged.torn, driver.master().ring().failure()), (false, None), "{at}");
+        for _ in 0..6 {
+            update(&ring, &mut driver).unwrap();
+        }
+        assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
+    }
+    assert!(mixed > 150, "{mixed}");
 }
 
 /// What `Evidence::at` refuses, of a place, of a time and of a drive, is refused of the driver's evidence.
@@ -409,7 +489,7 @@ mod asynch {
             let mut driver = waiting::<u16, _>(&ring, Looks);
             let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
             run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
-            let words = AXES * 8;
+            let words = (AXES + 1) * 8;
             for at in 0..words {
                 // Half a period later the clock takes the place of a lost edge.
                 let late_ns = if lost { 250_000 } else { 19_000 };
@@ -419,9 +499,9 @@ mod asynch {
                 let Period { exchanged, .. } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
                 ring.borrow_mut().stall_in = None;
                 let read = std::mem::take(&mut ring.borrow_mut().read_of);
-                let taken = &read[read.len() - words..];
+                let taken = &read[read.len() - words..][..AXES * 8];
                 assert!(taken.iter().all(|frame| *frame == taken[0]), "{lost} {at}: {read:?}");
-                assert_eq!((exchanged.frames_late, exchanged.torn), (1, false), "{lost} {at}");
+                assert!(exchanged.frames_late <= 1 && !exchanged.torn, "{lost} {at}: {read:?}");
                 (pin.lost, pin.late_ns) = (false, 0);
                 for _ in 0..3 {
                     run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
@@ -460,14 +540,15 @@ mod asynch {
     }
 
     impl Timer for Steps {
-        async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
+        async fn wait_ns(&mut self, ns: u64) {
+            let ns = self.0.0.borrow().now_ns + ns;
             poll_fn(|_| {
                 let mut ring = self.0.0.borrow_mut();
                 let until_ns = ns.min(ring.now_ns + 20_000);
                 ring.pass(until_ns);
-                if ring.now_ns >= ns { Poll::Ready(Ok(())) } else { Poll::Pending }
+                if ring.now_ns >= ns { Poll::Ready(()) } else { Poll::Pending }
             })
-            .await
+            .await;
         }
     }
 

@@ -25,6 +25,8 @@ pub(super) struct Tally {
     pub(super) on_time: u64,
     /// Pulses at another time.
     pub(super) late: u64,
+    /// Pulses without a step: the published device makes its last step again when a frame is lost.
+    pub(super) extra: u64,
     /// Steps without a pulse.
     pub(super) lost: u64,
     /// Steps that the motor made: pulses with the driver on.
@@ -182,16 +184,20 @@ impl Axis {
         self.tally.step_faults += u64::from(at - self.fall < f64::from(STEP_NS));
         self.tally.wake_faults += u64::from(!self.enabled || at - self.woken < f64::from(WAKE_NS));
         self.rise = at;
+        // What is long over will not come.
+        while self.expected.front().is_some_and(|want| at - want > PERIOD as f64) {
+            self.expected.pop_front();
+            self.tally.lost += 1;
+        }
         // The nearest is meant: steps are 4 us apart.
         let near = |want: &f64| (at - want).abs() < PERIOD as f64 / 2.0;
-        if let Some(place) = self.expected.iter().position(near) {
-            self.tally.lost += place as u64;
-            if place > 0 {
-                self.expected.drain(..place);
-            }
-        }
-        // If none is near: a step of a cycle before, or one that nobody asked for.
-        let error = self.expected.pop_front().map_or(f64::INFINITY, |want| (at - want).abs());
+        let Some(place) = self.expected.iter().position(near) else {
+            // Nobody asked for it: a step made twice.
+            self.tally.extra += 1;
+            return;
+        };
+        self.tally.lost += place as u64;
+        let error = self.expected.drain(..=place).next_back().map_or(0.0, |want| (at - want).abs());
         self.tally.worst_ns = self.tally.worst_ns.max(error);
         if error <= self.build.tolerance_ns {
             self.tally.on_time += 1;

@@ -1,102 +1,98 @@
-//! Master, cables and devices: the start-up, frame by frame.
+//! Master, cables and devices: one queue of events, in which the start-up and the exchange share the wires.
 
-use std::collections::VecDeque;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::rc::Rc;
 
-use sorte_proto::Link;
-use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Reaction, State, Trigger};
-use sorte_proto::master::{Action, Config, Master, Outgoing};
-use sorte_proto::timing::{BYTE_NS, CNC_CYCLE_NS, Timing};
-use sorte_proto::{DelayModel, Discovery, Parameters, TRANSIT_NS};
+use sorte_proto::device::{Action as Wish, Device, Path, PortId, Trigger};
+use sorte_proto::follow::InputSlice;
+use sorte_proto::master::{Action, Heard, Master, Outgoing};
+use sorte_proto::{DeviceFrame, Discovery, Link, MasterFrameView, Preamble};
 
-use super::axis::Build;
 use super::clock::Clock;
 use super::driver::Fault;
 use super::host::Host;
-use super::node::Node;
-use super::noise::{Noise, SplitMix64};
+use super::node::{Node, Sent};
+use super::noise::SplitMix64;
 use super::periods::Periods;
 use super::record::Recorder;
+use super::setup::Setup;
+use super::wires::{Arrival, BYTE_NS, Hit, NEIGHBOUR_NS, REFLECTION_NS, Wires, capture_ns};
 
-/// From the end of the request to its reflection as the master and as a device see it.
-const MASTER_REFLECTION_NS: f64 = 320.0;
-const DEVICE_REFLECTION_NS: f64 = 360.0;
-/// From the trigger of a SYNC frame to the capture of its start.
-const CAPTURE_NS: f64 = 280.0;
-/// From the capture to the correction of the counter.
-const HANDLER_NS: f64 = 700.0;
-/// Devices that a cycle of 4 us has room for: the published send times are theirs.
-const PUBLISHED: usize = 4;
+/// Trigger of the master frame in its cycle.
+const TRIGGER_NS: u64 = 500;
+/// Preamble of the frames of the exchange.
+const PREAMBLE: usize = 2;
+/// From the end of the master frame until the device has checked it and taken its slice: 119 instructions of the
+/// published receive path, and the table of its CRC.
+const RECEIVE_NS: f64 = 800.0;
+const DEVICE_FRAME: usize = DeviceFrame::<{ InputSlice::LEN }>::LEN;
 /// Lines for the user that are kept; the rest is counted.
 const EVENTS: usize = 50;
 
-/// What the machine is built of.
-#[derive(Debug, Clone)]
-pub(super) struct Setup {
-    pub(super) cables_ns: Vec<u16>,
-    /// Cycle of the IO exchange; `None`: the shortest that the line fits.
-    pub(super) cycle_ns: Option<u32>,
-    pub(super) build: Build,
-    /// Crystals are up to so wrong, and gain up to so much in a second.
-    pub(super) crystal_ppm: f64,
-    pub(super) drift_ppm: f64,
-    /// Captures of a frame's start are up to so wrong, in ns.
-    pub(super) jitter_ns: f64,
-    /// The way back over a cable takes so much longer than the way out, in ns.
-    pub(super) asymmetry_ns: f64,
-    pub(super) bit_error_rate: f64,
-    /// The cable in front of this device (from 1) is pulled in this cycle.
-    pub(super) unplug: Option<(usize, u64)>,
-    /// This happens to the driver of this device (from 1) in this cycle.
-    pub(super) driver_fault: Option<(usize, u64, Fault)>,
-    /// Positions travel in the command words.
-    pub(super) positions: bool,
-    pub(super) max_lag: u16,
-    pub(super) seed: u64,
+/// Something that happens.
+enum Event {
+    /// The master wants to be asked.
+    Master,
+    /// A device wants to be asked, if it has not been since.
+    Device {
+        k: usize,
+        call: u64,
+    },
+    /// A start-up frame begins at a device's port, or has ended at the master.
+    StartUp {
+        at: Place,
+        port: PortId,
+        frame: Vec<u8>,
+        preamble: usize,
+        hit: Hit,
+    },
+    /// A device has dealt with a master frame of the exchange.
+    Dealt {
+        k: usize,
+        arrival: Arrival,
+        sent: Rc<Sent>,
+    },
+    /// A device's frame leaves; one has ended at the master.
+    Leaves {
+        k: usize,
+    },
+    Answer {
+        k: usize,
+        arrival: Arrival,
+        hit: Hit,
+    },
 }
 
-impl Setup {
-    /// The line as the time plan sees it.
-    pub(super) fn timing(&self) -> Timing<'_> {
-        let devices = self.cables_ns.len();
-        let output_len = (devices * 4).max(16) as u16;
-        Timing { line_delays_ns: &self.cables_ns, devices: devices as u8, output_len, payload_len: 3 }
-    }
+#[derive(Clone, Copy)]
+enum Place {
+    Device(usize),
+    Master { sof: f64 },
+}
 
-    /// Cycle of the IO exchange: whole periods of the generator, with room for clocks that are 2 ns a device off.
-    pub(super) fn cycle_ns(&self) -> u32 {
-        let needs = self.timing().budget().min_cycle_ns() + 2 * self.cables_ns.len() as u32;
-        self.cycle_ns.unwrap_or(needs.div_ceil(CNC_CYCLE_NS) * CNC_CYCLE_NS)
-    }
+struct Due {
+    at: f64,
+    order: u64,
+    event: Event,
+}
 
-    /// Whether the delay field of SYNC is too short, so that this project's extension is needed.
-    pub(super) fn is_long(&self) -> bool {
-        let way: u64 = self.cables_ns.iter().map(|ns| u64::from(*ns) + u64::from(TRANSIT_NS)).sum();
-        way > u64::from(u16::MAX)
+impl PartialEq for Due {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
     }
+}
 
-    fn master(&self) -> Config {
-        let cycle_time_ns = self.cycle_ns();
-        Config::new()
-            .with_cycle_ns(cycle_time_ns)
-            .with_parameters(Parameters { cycle_time_ns, ..Parameters::CNC })
-            .with_long_line(self.is_long())
-            .with_stop_cycles(25_000)
-            .with_max_failures(20)
+impl Eq for Due {}
+
+impl PartialOrd for Due {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
+}
 
-    fn device(&self) -> device::Config {
-        let timing = self.timing();
-        let config = device::Config::new().with_output_len(Some(timing.output_len));
-        if self.cables_ns.len() <= PUBLISHED && self.cycle_ns() == 4000 {
-            return config;
-        }
-        // In a long line what the published measurement loses in each hop would add up to microseconds, and in a long cycle
-        // sixteen frames are far apart.
-        let frames = (64_000 / self.cycle_ns()).clamp(1, 16) as u8;
-        config
-            .with_clock_average(frames)
-            .with_slot_ns(Some(timing.slot_ns()))
-            .with_delay_model(DelayModel { shift_samples: false, ..DelayModel::DEVICE })
+impl Ord for Due {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.at.total_cmp(&other.at).then(self.order.cmp(&other.order))
     }
 }
 
@@ -104,29 +100,29 @@ pub(super) struct Line {
     pub(super) setup: Setup,
     pub(super) master: Master,
     pub(super) nodes: Vec<Node>,
-    pub(super) periods: Periods,
-    pub(super) noise: Noise,
-    pub(super) random: SplitMix64,
+    periods: Periods,
+    pub(super) wires: Wires,
+    queue: BinaryHeap<Reverse<Due>>,
+    order: u64,
+    now: f64,
+    /// When the master wants to be asked.
+    asked: f64,
     /// Devices that a cable leads to.
-    pub(super) plugged: usize,
-    pub(super) now_ns: u64,
+    plugged: usize,
     /// Start-up frames sent, by kind: DISCOVERY, PARAM, DELAY_REQ, SYNC.
     pub(super) sent: [u64; 4],
     /// When the first cycle began.
     pub(super) first_cycle_ns: Option<u64>,
-    /// Device frames that ran into the one before, and those that came after the end of their cycle.
-    pub(super) collisions: u64,
-    pub(super) overruns: u64,
-    /// Shortest gap between two device frames at the master, in ns.
+    /// Shortest gap between two device frames at the master, in ns; and where the last one ended.
     pub(super) gap_ns: f64,
+    line_free: f64,
+    /// Why the master has started again last; which device has left the line because its measurement of it cannot be.
+    pub(super) why: Option<String>,
+    unmeasured: Option<String>,
     /// Lines for the user: what went wrong, and when; and how many there were.
     pub(super) events: Vec<String>,
     pub(super) event_count: u64,
-    /// Start-up frames on their way back: when they begin and end at the master.
-    returning: VecDeque<(f64, f64, Vec<u8>)>,
-    /// A master frame as it is sent and as it travels.
-    pub(super) buffers: [Vec<u8>; 2],
-    pub(super) output: Vec<u8>,
+    output: Vec<u8>,
 }
 
 /// What a call of [`Line::step`] has done.
@@ -139,28 +135,29 @@ impl Line {
     pub(super) fn new(setup: Setup) -> Self {
         let mut random = SplitMix64(setup.seed);
         let config = setup.device();
-        let mut either = |most: f64| (random.unit() - 0.5) * 2.0 * most;
         let mut nodes = Vec::new();
         for _ in &setup.cables_ns {
-            let clock = Clock::new(2e9 + either(2e9), either(setup.crystal_ppm), either(setup.drift_ppm));
-            nodes.push(Node::new(config, setup.build, clock, setup.max_lag));
+            let value = 2e9 + random.either(2e9);
+            let clock = Clock::new(value, random.either(setup.crystal_ppm), random.either(setup.drift_ppm));
+            nodes.push(Node::new(config, setup.build, clock, setup.positions, setup.max_lag));
         }
         let mut line = Self {
             master: Master::new(setup.master()),
             periods: Periods::new(),
-            noise: Noise::new(setup.bit_error_rate, setup.seed ^ 0x5eed),
-            random,
+            wires: Wires::new(&setup.cables_ns, setup.physics, setup.seed),
+            queue: BinaryHeap::new(),
+            order: 0,
+            now: 0.0,
+            asked: 0.0,
             plugged: 0,
-            now_ns: 0,
             sent: [0; 4],
             first_cycle_ns: None,
-            collisions: 0,
-            overruns: 0,
             gap_ns: f64::INFINITY,
+            line_free: f64::NEG_INFINITY,
+            why: None,
+            unmeasured: None,
             events: Vec::new(),
             event_count: 0,
-            returning: VecDeque::new(),
-            buffers: [Vec::new(), Vec::new()],
             output: Vec::new(),
             nodes,
             setup,
@@ -176,10 +173,11 @@ impl Line {
             node.set_up = node.axis.driver.set_up();
         }
         line.plug(line.nodes.len());
+        line.push(0.0, Event::Master);
         line
     }
 
-    pub(super) fn plug(&mut self, devices: usize) {
+    fn plug(&mut self, devices: usize) {
         self.plugged = devices;
         for (k, node) in self.nodes.iter_mut().enumerate() {
             let link = |there| if there { Link::Up } else { Link::Down };
@@ -188,90 +186,124 @@ impl Line {
         if devices == 0 {
             self.master.set_link(Link::Down);
         }
+        for k in 0..self.nodes.len() {
+            self.ask(k, None);
+        }
     }
 
-    pub(super) fn event(&mut self, text: String) {
+    fn event(&mut self, text: String) {
         self.event_count += 1;
         if self.events.len() < EVENTS {
             self.events.push(text);
         }
     }
 
-    pub(super) fn cable(&self, k: usize) -> f64 {
-        self.setup.cables_ns.get(k).copied().unwrap_or_default().into()
+    fn push(&mut self, at: f64, event: Event) {
+        self.order += 1;
+        self.queue.push(Reverse(Due { at, order: self.order, event }));
     }
 
-    /// The same cable on the way to the master.
-    pub(super) fn cable_back(&self, k: usize) -> f64 {
-        self.cable(k) + self.setup.asymmetry_ns
-    }
-
-    /// Error of a capture.
-    pub(super) fn jitter(&mut self) -> f64 {
-        if self.setup.jitter_ns == 0.0 { 0.0 } else { (self.random.unit() - 0.5) * 2.0 * self.setup.jitter_ns }
-    }
-
-    /// Goes on until something has been sent; `None`: the master waits for ever.
+    /// Goes on until the master has sent something; `None`: it waits for ever.
     pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
-        loop {
-            match self.master.poll(self.now_ns) {
-                Action::Wait { until_ns } if self.hear(until_ns) => {}
-                Action::Wait { until_ns: u64::MAX } => return None,
-                Action::Wait { until_ns } => self.wait(until_ns),
-                Action::Send { at_ns, frame } => {
-                    self.start_up(frame, at_ns, record);
-                    return Some(Progress::StartUp);
-                }
-                Action::Exchange { at_ns, time_stamp, cycle, stop } => {
-                    self.first_cycle_ns.get_or_insert(at_ns);
-                    host.plan(stop, &self.nodes);
-                    self.cycle(at_ns, time_stamp, cycle, host.words(), record);
-                    if stop && host.is_still() {
-                        self.master.halted();
+        while let Some(Reverse(Due { at, event, .. })) = self.queue.pop() {
+            self.now = at;
+            match event {
+                Event::Master if at < self.asked => {}
+                Event::Master => match self.ask_master(host, record) {
+                    Ok(Some(progress)) => return Some(progress),
+                    Ok(None) => {}
+                    Err(Stopped) => return None,
+                },
+                Event::Device { k, call } => {
+                    if self.nodes.get(k).is_some_and(|node| node.call == call) {
+                        self.ask(k, Some(record));
                     }
-                    return Some(Progress::Cycle);
                 }
-                Action::Restart { error } => {
-                    let cycles = self.master.counters().cycles;
-                    self.event(format!("cycle {cycles}: {error}; the master starts again"));
-                    host.restarted();
+                Event::StartUp { at: Place::Master { sof }, frame, preamble, hit, .. } => {
+                    self.returned(frame, sof, preamble, &hit, record);
                 }
+                Event::StartUp { at: Place::Device(k), port, frame, preamble, hit } => {
+                    self.passes(k, port, frame, preamble, hit, record);
+                }
+                Event::Dealt { k, arrival, sent } => self.dealt(k, &arrival, &sent, record),
+                Event::Leaves { k } => self.leaves(k, record),
+                Event::Answer { k, arrival, hit } => self.answer(k, &arrival, &hit),
+            }
+        }
+        None
+    }
+
+    fn ask_master(&mut self, host: &mut Host, record: &mut Recorder) -> Result<Option<Progress>, Stopped> {
+        let now_ns = self.now as u64;
+        match self.master.poll(now_ns) {
+            Action::Wait { until_ns: u64::MAX } => return Err(Stopped),
+            Action::Wait { until_ns } => {
+                self.asked = until_ns as f64;
+                self.push(self.asked, Event::Master);
+                return Ok(None);
+            }
+            Action::Restart { error } => {
+                let cycles = self.master.counters().cycles;
+                let why = self.unmeasured.take().map_or(String::new(), |why| format!(" ({why})"));
+                self.why = Some(format!("{error}{why}"));
+                self.event(format!("cycle {cycles}: {error}{why}; the master starts again"));
+                host.restarted();
+                self.line_free = f64::NEG_INFINITY;
+            }
+            Action::Send { at_ns, frame } => {
+                self.start_up(frame, at_ns, record);
+                self.push(self.now, Event::Master);
+                return Ok(Some(Progress::StartUp));
+            }
+            Action::Exchange { at_ns, time_stamp, cycle, stop } => {
+                self.first_cycle_ns.get_or_insert(at_ns);
+                host.plan(stop, &self.nodes);
+                self.cycle(at_ns, time_stamp, cycle, host, record);
+                if stop && host.is_still() {
+                    self.master.halted();
+                }
+                self.push(self.now, Event::Master);
+                return Ok(Some(Progress::Cycle));
+            }
+        }
+        self.push(self.now, Event::Master);
+        Ok(None)
+    }
+
+    /// Does what a device wants now, and plans when to ask it again.
+    fn ask(&mut self, k: usize, mut record: Option<&mut Recorder>) {
+        let now = self.now;
+        loop {
+            let Some(node) = self.nodes.get_mut(k) else { return };
+            node.leave(&mut self.periods);
+            match node.poll(now) {
+                Wish::Wait { until_ns } => {
+                    node.call += 1;
+                    let (at, call) = (node.when(until_ns, now).max(now) + 0.01, node.call);
+                    return self.push(at, Event::Device { k, call });
+                }
+                Wish::CycleStart { .. } => {}
+                Wish::Send { at_ns, .. } => {
+                    let at = node.when(at_ns, now).max(now);
+                    self.push(at, Event::Leaves { k });
+                }
+                Wish::Lost { cycle } => {
+                    let axle = node.lost(cycle);
+                    if let Some(record) = record.as_deref_mut() {
+                        node.run(&axle, k, &mut self.periods, record);
+                    }
+                }
+                Wish::Restart if node.is_running() => {
+                    let missed = node.device.counters().master;
+                    self.event(format!("device {} starts again; master frames: {missed}", k + 1));
+                }
+                // It has waited in vain in the start-up, and the master says why.
+                Wish::Restart => {}
             }
         }
     }
 
-    /// Time passes; devices that wait for a frame in vain give up.
-    fn wait(&mut self, until_ns: u64) {
-        let cycle_ns = u64::from(self.setup.cycle_ns());
-        // The first of them begins when its frame is sent, or not at all.
-        let cycles = (until_ns.saturating_sub(self.now_ns) / cycle_ns).saturating_sub(1);
-        self.now_ns = until_ns;
-        for node in &mut self.nodes {
-            if node.device.state() != State::Exchange {
-                node.device.poll(until_ns);
-            }
-            for _ in 0..cycles.min(8) {
-                if node.device.state() == State::Exchange {
-                    node.device.cycle_start();
-                }
-            }
-            node.leave(cycle_ns, &mut self.periods);
-        }
-    }
-
-    /// The next start-up frame that has come back by `until_ns`, if there is one.
-    fn hear(&mut self, until_ns: u64) -> bool {
-        let due = self.returning.front().is_some_and(|(_, end, _)| *end <= until_ns as f64);
-        if !due {
-            return false;
-        }
-        let Some((sof, end, answer)) = self.returning.pop_front() else { return false };
-        self.now_ns = self.now_ns.max(end as u64);
-        // What the master refuses, it counts.
-        let _: Result<_, _> = self.master.hear(&answer, sof as u64);
-        true
-    }
-
+    /// The master sends a start-up frame.
     fn start_up(&mut self, frame: Outgoing, at_ns: u64, record: &mut Recorder) {
         let kind = match frame {
             Outgoing::Discovery { .. } => 0,
@@ -284,137 +316,222 @@ impl Line {
         }
         let mut buffer = [0; Discovery::LEN];
         let len = frame.emit_into(&mut buffer).unwrap_or_default();
-        let bytes = buffer.get(..len).unwrap_or_default();
-        record.start_up(at_ns, frame.preamble(), bytes, false);
-        if let Some((answer, sof)) = self.carry(bytes, at_ns as f64) {
-            let sof_ns = sof as u64;
-            record.start_up(sof_ns, frame.preamble(), &answer, true);
-            let captured = (sof + self.jitter()).max(at_ns as f64);
-            let end = sof + answer.len() as f64 * f64::from(BYTE_NS);
-            self.returning.push_back((captured, end, answer));
+        let bytes = buffer.get(..len).unwrap_or_default().to_vec();
+        record.start_up(at_ns, frame.preamble(), &bytes, false);
+        if self.plugged > 0 {
+            let preamble = frame.preamble().bytes().len();
+            let event =
+                Event::StartUp { at: Place::Device(0), port: PortId::A, frame: bytes, preamble, hit: Hit::default() };
+            self.push(at_ns as f64 + self.wires.out(0), event);
         }
     }
 
-    /// A start-up frame goes to the end of the line and comes back.
-    fn carry(&mut self, frame: &[u8], at_ns: f64) -> Option<(Vec<u8>, f64)> {
-        let mut frame = frame.to_vec();
-        let mut sof_ns = at_ns;
-        for k in 0..self.plugged {
-            sof_ns += self.cable(k);
-            self.noise.pass(&mut frame);
-            let reaction = self.pass(k, PortId::A, &mut frame, sof_ns)?;
-            self.measure(k, reaction.trigger, sof_ns);
-            match reaction.path {
-                Path::Forward => sof_ns += f64::from(TRANSIT_NS),
-                Path::Absorb => return None,
-                Path::Reflect => {
-                    sof_ns += MASTER_REFLECTION_NS;
-                    return self.carry_back(k, frame, sof_ns);
+    /// A start-up frame passes a device.
+    fn passes(&mut self, k: usize, port: PortId, mut frame: Vec<u8>, preamble: usize, hit: Hit, record: &mut Recorder) {
+        let sof = self.now;
+        if k >= self.plugged {
+            return;
+        }
+        self.wires.noise.pass(&mut frame);
+        if hit.get() {
+            garble(&mut frame);
+        }
+        let jitter = self.wires.capture_jitter();
+        let Some(node) = self.nodes.get_mut(k) else { return };
+        let reaction = node.start_up(port, &mut frame, sof + capture_ns(preamble), jitter);
+        let unmeasured = matches!(reaction.result, Err(sorte_proto::Error::ImplausibleRoundTrip { .. }));
+        if let (true, Err(error)) = (unmeasured, reaction.result) {
+            self.unmeasured = Some(format!("device {}: {error}", k + 1));
+        }
+        self.measure(k, reaction.trigger, sof);
+        self.ask(k, Some(record));
+        let length = (preamble + frame.len()) as f64 * BYTE_NS;
+        let up = match (reaction.path, port) {
+            (Path::Absorb, _) => return,
+            (Path::Forward, PortId::A) => {
+                if k + 1 < self.plugged {
+                    let at = sof + self.wires.transit(k) + self.wires.out(k + 1);
+                    self.push(at, Event::StartUp { at: Place::Device(k + 1), port, frame, preamble, hit });
                 }
+                return;
             }
-        }
-        None
-    }
-
-    fn carry_back(&mut self, from: usize, mut frame: Vec<u8>, mut sof_ns: f64) -> Option<(Vec<u8>, f64)> {
-        for k in (0..from).rev() {
-            sof_ns += self.cable_back(k + 1);
-            self.noise.pass(&mut frame);
-            if self.pass(k, PortId::B, &mut frame, sof_ns)?.path != Path::Forward {
-                return None;
-            }
-            sof_ns += f64::from(TRANSIT_NS);
-        }
-        self.noise.pass(&mut frame);
-        Some((frame, sof_ns + self.cable_back(0)))
-    }
-
-    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: f64) -> Option<Reaction> {
-        let jitter = self.jitter();
-        let node = self.nodes.get_mut(k)?;
-        let captured = sof_ns + CAPTURE_NS;
-        let times = FrameTimes {
-            sof_ns: node.clock.read(captured + jitter),
-            counter_ns: node.clock.read(captured + HANDLER_NS),
-            now_ns: sof_ns as u64,
+            (Path::Forward, PortId::B) => sof + self.wires.transit(k),
+            (Path::Reflect, PortId::A) => sof + REFLECTION_NS,
+            // It would be sent back to the end of the line, where nobody waits for it.
+            (Path::Reflect, PortId::B) => return,
         };
-        let reaction = node.device.hear(port, frame, times);
-        node.clock.correct(reaction.correction, captured + HANDLER_NS);
-        Some(reaction)
+        self.wires.occupy(k, up, up + length, &hit);
+        let at = up + self.wires.back(k);
+        let (at, place) = match k.checked_sub(1) {
+            Some(before) => (at, Place::Device(before)),
+            None => (at + length, Place::Master { sof: at }),
+        };
+        self.push(at, Event::StartUp { at: place, port: PortId::B, frame, preamble, hit });
     }
 
-    /// Device k measures the line to the next one, which then does the same.
+    /// A start-up frame is back at the master.
+    fn returned(&mut self, mut frame: Vec<u8>, sof: f64, preamble: usize, hit: &Hit, record: &mut Recorder) {
+        self.wires.noise.pass(&mut frame);
+        if hit.get() {
+            garble(&mut frame);
+        }
+        let form = [Preamble::Long, Preamble::Middle].into_iter().find(|form| form.bytes().len() == preamble);
+        record.start_up(sof as u64, form.unwrap_or(Preamble::Short), &frame, true);
+        let captured = sof + capture_ns(preamble) + self.wires.capture_jitter();
+        // What the master refuses, it counts.
+        let _: Result<_, _> = self.master.hear(&frame, captured.max(0.0).round() as u64);
+        self.asked = self.now;
+        self.push(self.now, Event::Master);
+    }
+
+    /// Device k measures the line to the next one, which then does the same. Nothing else is on that wire.
     fn measure(&mut self, k: usize, trigger: Trigger, at_ns: f64) {
         let (Some(request), true) = (Device::delay_request(trigger), k + 1 < self.plugged) else { return };
         let mut frame = request.emit();
-        let (out, back) = (self.cable(k + 1), self.cable_back(k + 1));
-        self.noise.pass(&mut frame);
-        let Some(reaction) = self.pass(k + 1, PortId::A, &mut frame, at_ns + out) else { return };
+        let (out, back) = (self.wires.out(k + 1), self.wires.back(k + 1));
+        self.wires.noise.pass(&mut frame);
+        let jitter = self.wires.capture_jitter();
+        let Some(next) = self.nodes.get_mut(k + 1) else { return };
+        let reaction = next.start_up(PortId::A, &mut frame, at_ns + out, jitter);
         self.measure(k + 1, reaction.trigger, at_ns);
         if reaction.path != Path::Reflect {
             return;
         }
-        self.noise.pass(&mut frame);
-        let jitter = self.jitter();
+        self.wires.noise.pass(&mut frame);
+        let jitter = self.wires.capture_jitter();
         if let Some(node) = self.nodes.get_mut(k) {
             // Both captures are on the 5 ns grid, so the measured time varies by a tick.
             let sent = node.clock.read(at_ns);
-            let rtt = node.clock.read(at_ns + out + back + DEVICE_REFLECTION_NS + jitter).wrapping_sub(sent);
+            let rtt = node.clock.read(at_ns + out + back + NEIGHBOUR_NS + jitter).wrapping_sub(sent);
+            // A damaged one is counted and not used.
             let _: Result<_, _> = node.device.hear_reflection(trigger, &frame, rtt);
+        }
+    }
+
+    /// A cycle begins: the master sends its frame to all devices.
+    fn cycle(&mut self, at_ns: u64, time_stamp: u16, cycle: u64, host: &Host, record: &mut Recorder) {
+        self.incidents(cycle);
+        let mut output = core::mem::take(&mut self.output);
+        output.clear();
+        for (node, word) in self.nodes.iter_mut().zip(host.words()) {
+            output.extend(node.ask(*word).emit());
+        }
+        output.resize(self.master.output_len().into(), 0);
+        let mut bytes = vec![0; output.len() + MasterFrameView::OVERHEAD];
+        // The length is the line's.
+        let _: Result<_, _> = self.master.emit_into(&output, time_stamp, &mut bytes);
+        self.output = output;
+        record.exchange(at_ns, &bytes, false);
+        let wire_ns = (PREAMBLE + bytes.len()) as f64 * BYTE_NS;
+        let sent = Rc::new(Sent { bytes: bytes.clone(), begin: (at_ns - TRIGGER_NS) as f64 });
+        let arrivals = self.wires.down(self.plugged, at_ns as f64, bytes);
+        let reached = arrivals.last().map_or(0, |(k, _)| k + 1);
+        // Before its first frame a device does not wait for one.
+        for node in self.nodes.iter_mut().skip(reached).filter(|node| node.is_heard()) {
+            node.truth.lost_out += 1;
+        }
+        for (k, arrival) in arrivals {
+            if let (true, Some(node)) = (arrival.copy, self.nodes.get_mut(k)) {
+                node.truth.again_out += 1;
+            }
+            let at = arrival.start + wire_ns + RECEIVE_NS;
+            self.push(at, Event::Dealt { k, arrival, sent: Rc::clone(&sent) });
+        }
+    }
+
+    fn dealt(&mut self, k: usize, arrival: &Arrival, sent: &Sent, record: &mut Recorder) {
+        let (now, jitter) = (self.now, self.wires.capture_jitter());
+        let Some(node) = self.nodes.get_mut(k) else { return };
+        // What is due before is done before: the frame may belong to a cycle whose start was not yet asked for.
+        if let Some(axle) = node.hear(arrival, sent, arrival.start + capture_ns(PREAMBLE), jitter, now) {
+            node.look_at_clock(now, now - self.master.epoch_ns() as f64);
+            node.run(&axle, k, &mut self.periods, record);
+        }
+        node.leave(&mut self.periods);
+        self.ask(k, Some(record));
+    }
+
+    /// A device's frame leaves, and goes through all devices before it.
+    fn leaves(&mut self, k: usize, record: &mut Recorder) {
+        let now = self.now;
+        if k >= self.plugged {
+            return;
+        }
+        let Some(node) = self.nodes.get_mut(k) else { return };
+        let input = node.input(now);
+        let Some(answer) = node.device.answer(input.emit()) else { return };
+        let mut bytes = vec![0; DEVICE_FRAME];
+        if answer.emit_into(&mut bytes).is_err() {
+            return;
+        }
+        let length = (PREAMBLE + bytes.len()) as f64 * BYTE_NS;
+        let (arrivals, hit) = self.wires.up(k, now, PREAMBLE, bytes);
+        let [lost, again] = [arrivals.is_empty(), arrivals.len() > 1].map(u32::from);
+        if let Some(node) = self.nodes.get_mut(k) {
+            node.truth.lost_back += lost;
+            node.truth.again_back += again;
+        }
+        for arrival in arrivals {
+            record.exchange(arrival.start as u64, &arrival.bytes, true);
+            let at = arrival.start + length;
+            self.push(at, Event::Answer { k, arrival, hit: Rc::clone(&hit) });
+        }
+    }
+
+    fn answer(&mut self, k: usize, arrival: &Arrival, hit: &Hit) {
+        let mut bytes = Rc::as_ref(&arrival.bytes).clone();
+        if hit.get() {
+            garble(&mut bytes);
+        }
+        if self.line_free.is_finite() && !arrival.copy {
+            self.gap_ns = self.gap_ns.min(arrival.start - self.line_free);
+        }
+        self.line_free = self.now;
+        let captured = arrival.start + capture_ns(PREAMBLE) + self.wires.capture_jitter();
+        // What the master refuses, it counts.
+        let Ok(Heard::Device { frame, .. }) = self.master.hear(&bytes, captured.round() as u64) else { return };
+        let Some(node) = self.nodes.get_mut(k) else { return };
+        node.truth.stale += u64::from(arrival.copy);
+        if let Some(payload) = frame.payload().first_chunk() {
+            node.reported(InputSlice::parse(*payload));
+        }
+    }
+
+    /// What was to happen in a cycle that never came.
+    pub(super) fn still_to_come(&self) -> Option<String> {
+        let cycles = self.master.counters().cycles;
+        let unplug = self.setup.unplug.filter(|(_, when)| *when >= cycles);
+        let fault = self.setup.driver_fault.filter(|(_, when, _)| *when >= cycles);
+        unplug
+            .map(|(device, when)| {
+                format!("cycle {when}, in which the cable in front of device {device} was to be pulled")
+            })
+            .or(fault
+                .map(|(device, when, _)| format!("cycle {when}, in which the driver of device {device} was to fail")))
+    }
+
+    /// What was to happen in this cycle.
+    fn incidents(&mut self, cycle: u64) {
+        if let Some((device, _)) = self.setup.unplug.filter(|(_, when)| *when == cycle) {
+            self.event(format!("cycle {cycle}: the cable in front of device {device} is pulled"));
+            self.plug(device - 1);
+        }
+        let fault: Option<(usize, u64, Fault)> = self.setup.driver_fault.filter(|(_, when, _)| *when == cycle);
+        if let Some((device, _, fault)) = fault {
+            self.event(format!("cycle {cycle}: the driver of device {device} {fault}"));
+            if let Some(node) = self.nodes.get_mut(device - 1) {
+                node.axis.driver.hit(fault);
+            }
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use sorte_proto::sync0::Variant;
-    use step_profile::{Motors, Parameters as Ramp, Profile, Speed};
+/// The master waits for ever.
+struct Stopped;
 
-    use super::super::power::Power;
-    use super::super::program::Program;
-    use super::*;
-
-    /// A cycle without a frame counts once; the device gives up with the sixth.
-    #[test]
-    fn a_device_waits_for_five_missing_frames() {
-        for (cycles, missed, state) in [(1, 0, State::Exchange), (2, 1, State::Exchange), (6, 5, State::Exchange)] {
-            let mut line = running();
-            line.wait(line.now_ns + cycles * 4000);
-            let device = &line.nodes[1].device;
-            assert_eq!((device.missed_frames(), device.state()), (missed, state), "{cycles} cycles");
-        }
-        let mut line = running();
-        line.wait(line.now_ns + 7 * 4000);
-        assert_ne!(line.nodes[1].device.state(), State::Exchange);
-    }
-
-    /// Two devices that have had a hundred frames.
-    fn running() -> Line {
-        let build = Build { variant: Variant::Lossless, latency_ns: 300, write_ns: 20, tolerance_ns: 100.0 };
-        let mut line = Line::new(Setup {
-            cables_ns: vec![85; 2],
-            cycle_ns: None,
-            build,
-            crystal_ppm: 50.0,
-            drift_ppm: 0.0,
-            jitter_ns: 0.0,
-            asymmetry_ns: 0.0,
-            bit_error_rate: 0.0,
-            unplug: None,
-            driver_fault: None,
-            positions: true,
-            max_lag: 128,
-            seed: 1,
-        });
-        let ramp = Profile::new(Ramp::at(Speed::KHZ_100)).unwrap();
-        let program = Program::turns(Motors::new(3).unwrap(), vec![ramp], 50_000, 1);
-        let mut host = Host::new(Power::new(program, 2, None, 4000), 2, None, 128);
-        let mut record = Recorder::new(2, None, None, 0).unwrap();
-        let mut cycles = 0;
-        while cycles < 100 {
-            cycles += u64::from(matches!(line.step(&mut host, &mut record).unwrap(), Progress::Cycle));
-            assert_eq!(line.nodes[1].device.missed_frames(), 0);
-        }
-        line
+/// What comes out of two frames on one wire is neither.
+fn garble(frame: &mut [u8]) {
+    for byte in frame {
+        *byte ^= 0x55;
     }
 }

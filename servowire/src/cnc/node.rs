@@ -1,13 +1,22 @@
 //! A device with its clock, its axis and what the master knows of it.
 
-use sorte_proto::device::{Config, Device, State};
+use std::rc::Rc;
+
+use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, Reaction, State};
 use sorte_proto::drv8711;
 use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::{Pto, Slice};
 
-use super::axis::{Axis, Build, Incoming, Seen};
+use super::axis::{Axis, Build, Incoming};
 use super::clock::Clock;
 use super::periods::{Generator, PERIOD, Periods};
+use super::record::Recorder;
+use super::wires::Arrival;
+
+/// From the capture of a frame's start to the correction of the counter.
+const HANDLER_NS: f64 = 700.0;
+/// 2^32.
+const WRAP: f64 = 4_294_967_296.0;
 
 pub(super) struct Node {
     pub(super) device: Device,
@@ -25,37 +34,46 @@ pub(super) struct Node {
     pub(super) status: drv8711::Status,
     /// Whether the driver took its registers.
     pub(super) set_up: Result<(), servowire_drivers::drv8711::Error>,
-    incoming: Option<Incoming>,
-    /// Own counter and master's time at the start of the first cycle; `None` outside the IO exchange.
-    zero: Option<(f64, f64)>,
-    /// Start of the own frame in its cycle, in ns.
-    slot: f64,
-    cycle: u64,
+    /// Positions are in the command words; else the published device, which uses the last word again.
+    positions: bool,
+    cycle_ns: u64,
+    /// Own counter at the start of cycle 0; `None` outside the IO exchange.
+    zero: Option<f64>,
+    pub(super) truth: Truth,
+    heard: bool,
     /// Largest clock error in the IO exchange, in ns.
     pub(super) clock_error_ns: f64,
     /// Frames that were accepted although a bit of what the CRC-8 covers was wrong.
     pub(super) undetected: u64,
     /// Frames accepted with a wrong time stamp, which nothing covers.
     pub(super) bad_stamps: u64,
+    /// Calls that were planned before this one are of no interest.
+    pub(super) call: u64,
 }
 
-/// A master frame at a device.
-pub(super) struct Received<'a> {
-    pub(super) frame: &'a [u8],
+/// What has really happened to the frames of the exchange between the master and a device.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Truth {
+    /// Master frames that never reached the device, and those that came again.
+    pub(super) lost_out: u32,
+    pub(super) again_out: u32,
+    /// The same of the device's frames.
+    pub(super) lost_back: u32,
+    pub(super) again_back: u32,
+    /// Frames taken, at either end, although they came again or are not of the cycle that they were booked in.
+    pub(super) stale: u64,
+}
+
+/// A master frame of the exchange.
+pub(super) struct Sent {
     /// As the master sent it.
-    pub(super) sent: &'a [u8],
-    /// Start of the frame here, as it is captured, and when the device has dealt with it.
-    pub(super) sof: f64,
-    pub(super) done: f64,
-    /// The master's time at the start of the cycle after next in which the step is made.
-    pub(super) acts: f64,
-    pub(super) cycle_ns: u64,
-    /// Positions are in the command words; else the published device, which uses the last word again.
-    pub(super) positions: bool,
+    pub(super) bytes: Vec<u8>,
+    /// The master's time at the start of its cycle.
+    pub(super) begin: f64,
 }
 
 impl Node {
-    pub(super) fn new(config: Config, build: Build, clock: Clock, max_lag: u16) -> Self {
+    pub(super) fn new(config: Config, build: Build, clock: Clock, positions: bool, max_lag: u16) -> Self {
         Self {
             device: Device::new(config),
             build,
@@ -68,128 +86,180 @@ impl Node {
             lag: 0,
             status: drv8711::Status::empty(),
             set_up: Ok(()),
-            incoming: None,
+            positions,
+            cycle_ns: PERIOD,
             zero: None,
-            slot: 0.0,
-            cycle: 0,
+            truth: Truth::default(),
+            heard: false,
             clock_error_ns: 0.0,
             undetected: 0,
             bad_stamps: 0,
+            call: 0,
         }
     }
 
     /// What the master sends this device for `word`.
-    pub(super) fn ask(&mut self, word: Pto, positions: bool) -> Slice {
+    pub(super) fn ask(&mut self, word: Pto) -> Slice {
         self.before = self.asked;
         self.axis.tally.asked += u64::from(word.start().is_some());
         let slice = self.asked.slice(word);
-        if positions { slice } else { Slice::from(word) }
+        if self.positions { slice } else { Slice::from(word) }
     }
 
-    /// A cycle begins at `begin` of the master's time.
-    pub(super) fn enter(&mut self, begin: f64, cycle_ns: u64) {
-        if self.zero.is_some() || self.device.state() != State::Exchange {
-            return;
+    /// The counter as the device uses it.
+    fn counter(&self, now: f64) -> u32 {
+        self.clock.at(now).rem_euclid(WRAP) as u32
+    }
+
+    /// When the counter shows a value that is near.
+    pub(super) fn when(&self, counter_ns: u32, now: f64) -> f64 {
+        self.clock.when(self.unwrapped(counter_ns, now))
+    }
+
+    fn unwrapped(&self, counter_ns: u32, now: f64) -> f64 {
+        let value = self.clock.at(now).floor();
+        value + f64::from(counter_ns.wrapping_sub(value.rem_euclid(WRAP) as u32) as i32)
+    }
+
+    /// What the device wants at this time.
+    pub(super) fn poll(&mut self, now: f64) -> Action {
+        let action = self.device.poll(self.counter(now), now as u64);
+        if let (Action::CycleStart { cycle, start_ns }, None) = (action, self.zero) {
+            let parameters = self.device.parameters();
+            self.cycle_ns = parameters.map_or(PERIOD, |parameters| parameters.cycle_time_ns.into());
+            self.zero = Some(self.unwrapped(start_ns, now) - (cycle * self.cycle_ns) as f64);
+            self.axis.start();
+            self.generator = self.build.generator();
         }
-        let (Some(first), Some(slot)) = (self.device.first_cycle_ns(), self.device.send_time_ns()) else { return };
-        // The counter has 32 bits; the time meant is the one nearby.
-        let now = self.clock.at(begin);
-        let ahead = first.wrapping_sub(now as i64 as u32) as i32;
-        let first = now.floor() + f64::from(ahead);
-        // On a long line the master waits for the answer to the last SYNC, and the device's first cycles pass without a frame.
-        let passed = ((now - first) / cycle_ns as f64).round().max(0.0);
-        let zero = first + passed * cycle_ns as f64;
-        (self.zero, self.slot) = (Some((zero, begin)), slot.into());
-        (self.cycle, self.incoming) = (0, None);
-        self.axis.start();
-        self.generator = self.build.generator();
+        action
+    }
+
+    /// A start-up frame at a port, whose start is captured at `captured`, `jitter` off.
+    pub(super) fn start_up(&mut self, port: PortId, frame: &mut [u8], captured: f64, jitter: f64) -> Reaction {
+        let times = FrameTimes {
+            sof_ns: self.clock.read(captured + jitter),
+            counter_ns: self.clock.read(captured + HANDLER_NS),
+            now_ns: captured as u64,
+        };
+        let reaction = self.device.hear(port, frame, times);
+        self.clock.correct(reaction.correction, captured + HANDLER_NS);
+        reaction
     }
 
     pub(super) fn is_running(&self) -> bool {
         self.zero.is_some()
     }
 
-    /// The axis runs through this cycle of the device.
-    pub(super) fn run(&mut self, cycle_ns: u64, periods: &mut Periods, mut seen: Option<&mut Vec<(u64, Seen)>>) {
-        let start = self.cycle * cycle_ns;
-        // The word is held back until its cycle begins, so that it does not matter when in the cycle before it came.
-        let word = self.incoming.take().map(|word| Incoming { at: word.at.max(start), ..word });
-        let taken = word.map_or(0, |word| word.at).max(start + PERIOD);
-        self.go(taken, word, periods, seen.as_deref_mut());
-        if cycle_ns > PERIOD {
-            self.generator.rest();
-            self.go(start + cycle_ns, None, periods, seen);
-        }
-        self.cycle += 1;
+    /// Whether a master frame of this exchange has come.
+    pub(super) fn is_heard(&self) -> bool {
+        self.heard
     }
 
-    /// Goes on until the own counter is `until` ns after the start of the generator. `word` gets into the device's buffer on
-    /// the way.
-    fn go(
+    /// A master frame of the exchange was captured at `captured`, `jitter` off, and is looked at now.
+    pub(super) fn hear(
         &mut self,
-        until: u64,
-        word: Option<Incoming>,
-        periods: &mut Periods,
-        mut seen: Option<&mut Vec<(u64, Seen)>>,
-    ) {
-        let Self { generator, axis, clock, zero: Some((zero, _)), .. } = self else { return };
-        generator.run(until, word.map(|word| (word.at, word.word)), periods, |ns, change| {
-            axis.take(change, || clock.when(*zero + ns as f64), word, seen.as_deref_mut());
-        });
-    }
-
-    /// When the own frame of this cycle leaves, and the frame's payload.
-    pub(super) fn answer(&mut self, cycle_ns: u64, positions: bool) -> Option<(f64, InputSlice)> {
-        let (zero, _) = self.zero?;
-        let ordered = if positions { self.follower.ordered().unwrap_or_default() } else { 0 };
-        let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + self.slot);
-        let driver = self.axis.driver.status(self.cycle * cycle_ns);
-        Some((at, InputSlice { driver, ordered }))
-    }
-
-    /// The master has got the device's frame.
-    pub(super) fn reported(&mut self, input: InputSlice, positions: bool) {
-        self.lag = if positions { self.before.lag(input.ordered) } else { 0 };
-        self.status = input.driver;
-    }
-
-    /// The master frame of the cycle that [`run`](Self::run) has just gone through.
-    pub(super) fn receive(&mut self, received: &Received<'_>) {
-        let Some((zero, begin)) = self.zero else { return };
-        let own = (zero as i64 as u32).wrapping_add(((self.cycle - 1) * received.cycle_ns) as u32);
-        let in_cycle = |ns: f64| self.clock.read(ns).wrapping_sub(own);
-        let (sof_ns, now_ns) = (in_cycle(received.sof), in_cycle(received.done));
-        let output = self.device.hear_exchange(received.frame, sof_ns, now_ns);
-        let slice = output.ok().and_then(|output| output.data.first_chunk()).map(|bytes| Slice::parse(*bytes));
-        if let Ok(output) = output {
-            self.clock.correct(output.correction, received.done);
-            self.judge(received);
-            let error = (self.clock.at(received.done) - zero) - (received.done - begin);
-            self.clock_error_ns = self.clock_error_ns.max(error.abs());
-        }
+        arrival: &Arrival,
+        sent: &Sent,
+        captured: f64,
+        jitter: f64,
+        now: f64,
+    ) -> Option<Axle> {
+        let zero = self.zero?;
+        let times = FrameTimes {
+            sof_ns: self.clock.read(captured + jitter),
+            counter_ns: self.clock.read(now),
+            now_ns: now as u64,
+        };
+        let output = self.device.hear_exchange(&arrival.bytes, times).ok()?;
+        let (cycle, slice) = (output.cycle, output.data.first_chunk().map(|bytes| Slice::parse(*bytes)));
+        self.clock.correct(output.correction, now);
+        self.judge(arrival, sent);
+        self.heard = true;
+        // Which cycle is it, on the device's own clock?
+        let own = ((self.clock.at(sent.begin) - zero) / self.cycle_ns as f64).round();
+        self.truth.stale += u64::from(arrival.copy || own != cycle as f64);
         let word = match slice {
-            slice if received.positions => {
+            slice if self.positions => {
                 let word = self.follower.next(slice);
                 let own = slice.is_some_and(|slice| slice.pto.start().is_some());
                 self.axis.tally.caught_up += u64::from(word.start().is_some() && !own);
-                word
+                Some(word)
             }
-            Some(slice) => slice.pto,
-            // The published device keeps the word and makes its step once more.
-            None => return,
+            slice => slice.map(|slice| slice.pto),
         };
-        let expected = received.acts + word.start().map_or(0.0, |start| f64::from(start.ns()));
-        let at = (self.clock.at(received.done) - zero).max(0.0) as u64;
-        self.incoming = Some(Incoming { at, word, expected });
+        let acts = sent.begin + (self.cycle_ns + PERIOD) as f64;
+        let at = (self.clock.at(now) - zero).max(0.0) as u64;
+        let incoming = word.map(|word| Incoming {
+            at,
+            word,
+            expected: acts + word.start().map_or(0.0, |start| f64::from(start.ns())),
+        });
+        Some(Axle { cycle, incoming })
+    }
+
+    /// No frame of this cycle has come: the follower knows, and the published device makes its last word again.
+    pub(super) fn lost(&mut self, cycle: u64) -> Axle {
+        if self.positions {
+            let _rest = self.follower.next(None);
+        }
+        let word = Pto::default();
+        // Later than the cycle before it, earlier than the data of the next one.
+        let incoming = self.positions.then(|| Incoming { at: (cycle + 1) * self.cycle_ns, word, expected: 0.0 });
+        Axle { cycle, incoming }
+    }
+
+    /// The axis runs through the cycle after the one that has brought a word, or nothing.
+    pub(super) fn run(&mut self, axle: &Axle, k: usize, periods: &mut Periods, record: &mut Recorder) {
+        let Some(zero) = self.zero else { return };
+        let (axis, clock, generator) = (&mut self.axis, &self.clock, &mut self.generator);
+        let start = (axle.cycle + 1) * self.cycle_ns;
+        let end = start + self.cycle_ns;
+        // The word is held back until its cycle begins, so that it does not matter when in the cycle before it came.
+        let word = axle.incoming.map(|word| Incoming { at: word.at.max(start), ..word });
+        let taken = word.map_or(0, |word| word.at).max(start + PERIOD);
+        record.axis(k, |mut seen| {
+            let mut go = |until, word: Option<Incoming>, generator: &mut Generator| {
+                generator.run(until, word.map(|word| (word.at, word.word)), periods, |ns, change| {
+                    axis.take(change, || clock.when(zero + ns as f64), word, seen.as_deref_mut());
+                });
+            };
+            go(taken, word, generator);
+            if end > start + PERIOD {
+                generator.rest();
+                go(end, None, generator);
+            }
+        });
+    }
+
+    /// The payload of the device's frame.
+    pub(super) fn input(&mut self, now: f64) -> InputSlice {
+        let told = self.follower.ordered().filter(|_| self.positions);
+        if self.positions && told.is_none() {
+            // A position that it does not know must not look like one.
+            self.device.flag_error();
+        }
+        InputSlice { driver: self.axis.driver.status(now as u64), ordered: told.unwrap_or_default() }
+    }
+
+    /// The master has got the device's frame.
+    pub(super) fn reported(&mut self, input: InputSlice) {
+        self.lag = if self.positions { self.before.lag(input.ordered) } else { 0 };
+        self.status = input.driver;
+    }
+
+    /// What the counter is off from the master's time.
+    pub(super) fn look_at_clock(&mut self, now: f64, master_ns: f64) {
+        let off = (self.clock.at(now) - master_ns + WRAP / 2.0).rem_euclid(WRAP) - WRAP / 2.0;
+        self.clock_error_ns = self.clock_error_ns.max(off.abs());
     }
 
     /// What was wrong with a frame that the device has accepted.
-    fn judge(&mut self, received: &Received<'_>) {
-        let (frame, sent) = (received.frame, received.sent);
+    fn judge(&mut self, arrival: &Arrival, sent: &Sent) {
+        let (frame, sent) = (Rc::as_ref(&arrival.bytes), &sent.bytes);
+        let stamp = frame.len().saturating_sub(2);
         if frame == sent {
             return;
         }
-        let stamp = frame.len().saturating_sub(2);
         if frame.get(..stamp) == sent.get(..stamp) {
             self.bad_stamps += 1;
         } else {
@@ -198,13 +268,23 @@ impl Node {
     }
 
     /// The device has left the IO exchange: pulses that are programmed still come.
-    pub(super) fn leave(&mut self, cycle_ns: u64, periods: &mut Periods) {
-        if self.device.state() == State::Exchange || self.zero.is_none() {
+    pub(super) fn leave(&mut self, periods: &mut Periods) {
+        if self.device.state() == State::Exchange {
             return;
         }
-        self.incoming = None;
+        let Some(zero) = self.zero.take() else { return };
+        self.heard = false;
         self.generator.rest();
-        self.go(self.cycle * cycle_ns + 3 * PERIOD, None, periods, None);
-        self.zero = None;
+        let (axis, clock) = (&mut self.axis, &self.clock);
+        let until = self.generator.now() + 3 * PERIOD;
+        self.generator.run(until, None, periods, |ns, change| {
+            axis.take(change, || clock.when(zero + ns as f64), None, None);
+        });
     }
+}
+
+/// What a cycle has brought for the axis.
+pub(super) struct Axle {
+    cycle: u64,
+    incoming: Option<Incoming>,
 }

@@ -1,5 +1,7 @@
 //! Bit errors on the cables, seeded.
 
+use std::rc::Rc;
+
 /// A stream of bits of which each is wrong with the same probability.
 ///
 /// Only the distances between errors are drawn, so a clean frame costs a subtraction.
@@ -59,6 +61,19 @@ impl Noise {
     }
 }
 
+impl Noise {
+    /// The same for a frame that others have too.
+    pub(super) fn pass_shared(&mut self, frame: &mut Rc<Vec<u8>>) {
+        let bits = frame.len() as u64 * 8;
+        if self.good >= bits {
+            self.good -= bits;
+        } else {
+            let frame: &mut Vec<u8> = Rc::make_mut(frame);
+            self.pass(frame);
+        }
+    }
+}
+
 /// A small generator of random numbers (Steele, Lea and Flood, 2014), so that a seed gives the same run for ever.
 #[derive(Debug, Clone)]
 pub(super) struct SplitMix64(pub(super) u64);
@@ -69,6 +84,11 @@ impl SplitMix64 {
         let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         mixed ^ mixed >> 31
+    }
+
+    /// From -`most` to `most`.
+    pub(super) fn either(&mut self, most: f64) -> f64 {
+        (self.unit() - 0.5) * 2.0 * most
     }
 
     /// Above 0, at most 1.

@@ -167,6 +167,11 @@ impl Generator {
         Self { channel, now: 0, last: None }
     }
 
+    /// How far it has run, in ns since the start.
+    pub(super) fn now(&self) -> u64 {
+        self.now
+    }
+
     /// The word in the buffer has been taken.
     pub(super) fn rest(&mut self) {
         self.channel.set_start(None);

@@ -20,7 +20,7 @@ const BYTE_NS: u64 = 80;
 /// Preamble of the frames of the IO exchange.
 const SHORT: usize = Preamble::Short.bytes().len();
 
-/// Nothing is seen later than so long after it happened: the clocks of the devices differ.
+/// The clocks of the devices differ, by this at most; and an axis runs through a cycle at once.
 const SETTLED_NS: u64 = 20_000;
 
 /// Interface of the start-up frames, which are Ethernet frames; and of the others.
@@ -36,16 +36,25 @@ pub(super) struct Recorder {
     cycles: u64,
     /// A cycle has begun.
     running: bool,
+    /// Nothing is seen later than so long after it happened.
+    settled_ns: u64,
     /// The first thing that could not be written.
     failure: Option<io::Error>,
 }
 
 impl Recorder {
-    /// `cycles`: how many of the IO exchange are recorded.
-    pub(super) fn new(devices: usize, vcd: Option<&Path>, pcapng: Option<&Path>, cycles: u64) -> io::Result<Self> {
+    /// `cycles`: how many of the IO exchange are recorded, of `cycle_ns` each.
+    pub(super) fn new(
+        devices: usize,
+        vcd: Option<&Path>,
+        pcapng: Option<&Path>,
+        cycles: u64,
+        cycle_ns: u32,
+    ) -> io::Result<Self> {
         let vcd = vcd.map(|path| Trace::create(path, devices)).transpose()?;
         let packets = pcapng.map(open).transpose()?;
-        Ok(Self { vcd, packets, cycles, running: false, failure: None })
+        let settled_ns = SETTLED_NS + 2 * u64::from(cycle_ns);
+        Ok(Self { vcd, packets, cycles, running: false, settled_ns, failure: None })
     }
 
     fn wants(&self) -> bool {
@@ -82,7 +91,7 @@ impl Recorder {
     fn frame(&mut self, at_ns: u64, preamble: usize, frame: &[u8], answer: bool, name: &'static str, interface: u32) {
         let wire_ns = (preamble + frame.len()) as u64 * BYTE_NS;
         if let Some(trace) = &mut self.vcd {
-            let result = if answer { Ok(()) } else { trace.flush(at_ns.saturating_sub(SETTLED_NS)) };
+            let result = if answer { Ok(()) } else { trace.flush(at_ns.saturating_sub(self.settled_ns)) };
             trace.frame(at_ns, wire_ns, answer, name);
             self.keep(result);
         }

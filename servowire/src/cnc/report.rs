@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use sorte_proto::Tally;
 use sorte_proto::master::State;
 use sorte_proto::timing::Limit;
 
@@ -49,7 +50,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let budget = line.setup.timing().budget();
     let limit = match budget.limit() {
         Limit::MasterFrame => "the master frame's way out",
-        Limit::DeviceFrames => "the device frames' way back",
+        _ => "the device frames' way back",
     };
     writeln!(
         out,
@@ -57,7 +58,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
         budget.master_frame_bytes, budget.master_frame_at_last_ns, budget.device_frames_at_master_ns
     )?;
     let cycle_ns = line.setup.cycle_ns();
-    let fits = if budget.fits(cycle_ns) { "fits" } else { "does not fit" };
+    let fits = line.setup.timing().misfit(cycle_ns).map_or("fits", |_| "does not fit");
     writeln!(out, "            shortest cycle {} ns, limited by {limit}: {fits} {cycle_ns} ns", budget.min_cycle_ns())?;
     if line.setup.is_long() {
         writeln!(out, "            the line is longer than the delay field of SYNC: with this project's extension")?;
@@ -102,7 +103,7 @@ fn axes(out: &mut dyn Write, line: &Line) -> io::Result<()> {
             "  {:4}  {:10}  {:10}  {:10}  {:8}  {:8}  {:9}  {:10}  {:8.0} ns  {:8.0} ns",
             k + 1,
             t.asked,
-            t.on_time + t.late,
+            t.on_time + t.late + t.extra,
             t.on_time,
             t.late,
             t.lost,
@@ -130,16 +131,22 @@ fn errors(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     writeln!(
         out,
         "errors      {} bits flipped; devices refused {} frames, the master {}; {} cycles with a frame missing",
-        line.noise.flips,
+        line.wires.noise.flips,
         sum(line, |n| n.device.counters().crc_errors),
         counters.crc_errors,
         counters.timing_errors
     )?;
+    let at_devices = tally(line.nodes.iter().map(|node| node.device.counters().master));
+    writeln!(
+        out,
+        "            master frames at the devices: {at_devices}; device frames at the master: {}",
+        counters.frames
+    )?;
     if line.gap_ns.is_finite() {
         writeln!(
             out,
-            "            device frames at the master: {} collisions, {} after their cycle, smallest gap {:.0} ns",
-            line.collisions, line.overruns, line.gap_ns
+            "            {} frames met another one; smallest gap between two device frames {:.0} ns",
+            line.wires.collisions, line.gap_ns
         )?;
     }
     let (stamps, undetected) = (sum(line, |n| n.bad_stamps), sum(line, |n| n.undetected));
@@ -158,6 +165,17 @@ fn errors(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     Ok(())
 }
 
+/// The tallies of all devices together.
+fn tally(of: impl Iterator<Item = Tally>) -> Tally {
+    of.fold(Tally::default(), |mut all, one| {
+        all.missed += one.missed;
+        all.doubled += one.doubled;
+        all.late += one.late;
+        all.stale += one.stale;
+        all
+    })
+}
+
 fn sum(line: &Line, of: fn(&Node) -> u64) -> u64 {
     line.nodes.iter().map(of).sum()
 }
@@ -165,14 +183,14 @@ fn sum(line: &Line, of: fn(&Node) -> u64) -> u64 {
 /// What was not as it should be, the gravest first; `None` if every step was made at its time.
 pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
     if line.master.state() == State::Error || line.first_cycle_ns.is_none() {
-        let last = line.events.last().map_or("no device answers", String::as_str);
+        let last = line.why.as_deref().unwrap_or("no device answers");
         return Some(format!("the machine did not run: {last}"));
     }
     if let Some(why) = &host.ended {
         return Some(format!("the motion was stopped: {why}"));
     }
     if !host.is_done() {
-        let last = line.events.last().map_or("the master waits for ever", String::as_str);
+        let last = line.why.as_deref().unwrap_or("the master waits for ever");
         return Some(format!("the motion was not finished: {last}"));
     }
     if let Some(what) = line.still_to_come() {
@@ -193,10 +211,10 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
         if node.axis.position != asked {
             return Some(format!("axis {axis} was asked to {asked} and is at {}", node.axis.position));
         }
-        if t.late + t.lost > 0 {
+        if t.late + t.lost + t.extra > 0 {
             return Some(format!(
-                "axis {axis}: {} steps late, {} lost, {:.0} ns off at worst",
-                t.late, t.lost, t.worst_ns
+                "axis {axis}: {} steps late, {} lost, {} made twice, {:.0} ns off at worst",
+                t.late, t.lost, t.extra, t.worst_ns
             ));
         }
         if t.dir_faults > 0 {
@@ -212,9 +230,9 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
             return Some(format!("axis {axis}: {} steps are still to come", node.axis.under_way()));
         }
     }
-    if line.collisions + line.overruns > 0 {
-        let (collisions, overruns) = (line.collisions, line.overruns);
-        return Some(format!("{collisions} device frames collided, {overruns} came after their cycle"));
+    let (collisions, frames) = (line.wires.collisions, line.master.counters().frames);
+    if collisions > 0 || frames.late + frames.stale > 0 && line.setup.physics.duplicates == 0.0 {
+        return Some(format!("{collisions} frames met another one; device frames at the master: {frames}"));
     }
     None
 }

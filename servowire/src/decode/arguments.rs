@@ -28,8 +28,7 @@ impl ValueEnum for Meant {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, about) =
-            self.0.map_or(("auto", "Whatever the capture holds"), |codec| (codec.names().name, codec.names().about));
+        let (name, about) = self.0.map_or(("auto", "Whatever the capture holds"), |codec| (codec.name, codec.about));
         Some(PossibleValue::new(name).help(about))
     }
 }
@@ -40,16 +39,9 @@ pub(crate) struct Named(Format);
 
 impl ValueEnum for Named {
     fn value_variants<'a>() -> &'a [Self] {
-        static ALL: [Named; Format::ALL.len()] = {
-            let mut all = [Named(Format::Vcd); Format::ALL.len()];
-            let mut at = 0;
-            while at < all.len() {
-                all[at] = Named(Format::ALL[at].0);
-                at += 1;
-            }
-            all
-        };
-        &ALL
+        static ALL: LazyLock<[Named; Format::ALL.len()]> =
+            LazyLock::new(|| Format::ALL.map(|(format, ..)| Named(format)));
+        ALL.as_slice()
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {

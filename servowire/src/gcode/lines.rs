@@ -195,14 +195,29 @@ impl State<'_> {
         let chords: Vec<_> = arc
             .map_err(|e| format!("{e}, in 0.1 um: begin and end are not on one circle around I and J, or it is none"))?
             .collect();
-        let count = chords.len() as f64;
-        for (k, [x, y]) in chords.iter().enumerate() {
-            let part = (k + 1) as f64 / count;
+        // Z rises with the angle, for chords differ in that.
+        let mut before = [from[0], from[1]];
+        let angles = chords.iter().map(|chord| {
+            let here = chord.map(|part| f64::from(part) / 1e4);
+            angle(std::mem::replace(&mut before, here), here, center)
+        });
+        let angles: Vec<f64> = angles.collect();
+        let whole: f64 = angles.iter().sum();
+        let mut swept = 0.0;
+        for (k, ([x, y], angle)) in chords.iter().zip(&angles).enumerate() {
+            swept += angle;
+            let part = swept / whole;
             let point = [f64::from(*x) / 1e4, f64::from(*y) / 1e4, from[2] + (to[2] - from[2]) * part];
             self.lines.push(Line { to: if k + 1 == chords.len() { to } else { point }, feed });
         }
         Ok(())
     }
+}
+
+/// The angle between two places, seen from a center.
+fn angle(from: [f64; 2], to: [f64; 2], center: [f64; 2]) -> f64 {
+    let [[x0, y0], [x1, y1]] = [from, to].map(|[x, y]| [x - center[0], y - center[1]]);
+    (x0 * y1 - y0 * x1).atan2(x0 * x1 + y0 * y1).abs()
 }
 
 #[cfg(test)]
@@ -237,6 +252,21 @@ mod tests {
         let turn = ends("G0 X10\nG2 I-10 Z-2 F600");
         let low = turn.iter().map(|p| p[1]).fold(0.0, f64::min);
         assert!((low + 10.0).abs() < 1e-3 && turn.last() == Some(&[10.0, 0.0, -2.0]));
+    }
+
+    /// However the arc is cut into chords, Z is where its angle has it.
+    #[test]
+    fn a_helix_rises_with_the_angle() {
+        for (text, whole) in [
+            ("G0 X10\nG3 X-9.396926 Y-3.420201 Z-10 I-10 J0 F600", 200.0_f64),
+            ("G0 X10\nG3 X9.998477 Y-0.174524 Z-10 I-10 J0 F600", 359.0),
+            ("G0 X10\nG3 X9.238795 Y3.826834 Z-10 I-10 J0 F600", 22.5),
+        ] {
+            for [x, y, z] in &ends(text)[1..] {
+                let angle = y.atan2(*x).to_degrees().rem_euclid(360.0);
+                assert!((z + 10.0 * angle / whole).abs() < 2e-3, "{z} at {angle} of {whole}");
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The steps of a part program: as a table, a line a step, a drawing, and wires.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -18,6 +20,9 @@ const NAMES: [&str; AXES] = ["X", "Y", "Z"];
 
 /// Length of a STEP pulse in a VCD, in ns.
 const PULSE_NS: u64 = 1000;
+
+/// From DIR to STEP, in ns, unless the axis turns faster than that.
+const LEAD_NS: u64 = 1000;
 
 /// What an axis has done.
 #[derive(Debug, Clone, Copy, Default)]
@@ -102,15 +107,25 @@ fn rows(json: bool, steps: Steps, out: &mut dyn Write) -> io::Result<()> {
 struct Wire {
     step: IdCode,
     dir: IdCode,
-    direction: Option<Direction>,
-    /// When the last pulse is over.
+    direction: Direction,
+    /// When the last pulse began, and when the one that is high is over.
+    last: u64,
     falls: Option<u64>,
+}
+
+/// What happens to a wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Change {
+    Dir(bool),
+    Step,
 }
 
 /// STEP and DIR of each axis.
 struct Wires {
     to: Writer<BufWriter<File>>,
     axes: Vec<Wire>,
+    /// Not written yet: when, what, and on which axis.
+    changes: BinaryHeap<Reverse<(u64, Change, usize)>>,
 }
 
 impl Wires {
@@ -122,7 +137,7 @@ impl Wires {
         let mut axes = Vec::new();
         for name in NAMES {
             let (step, dir) = (to.add_wire(1, &format!("{name}_step"))?, to.add_wire(1, &format!("{name}_dir"))?);
-            axes.push(Wire { step, dir, direction: None, falls: None });
+            axes.push(Wire { step, dir, direction: Direction::Forward, last: 0, falls: None });
         }
         to.upscope()?;
         to.enddefinitions()?;
@@ -131,7 +146,7 @@ impl Wires {
             to.change_scalar(wire.step, Value::V0)?;
             to.change_scalar(wire.dir, Value::V0)?;
         }
-        Ok(Self { to, axes })
+        Ok(Self { to, axes, changes: BinaryHeap::new() })
     }
 
     /// Lets pulses end that are over before a time.
@@ -145,20 +160,42 @@ impl Wires {
         Ok(())
     }
 
+    /// Nothing that comes later is before this pulse by more than the lead of DIR.
     fn add(&mut self, pulse: &AxisPulse) -> io::Result<()> {
-        self.until(pulse.tick)?;
-        let Some(wire) = self.axes.get_mut(usize::from(pulse.axis)) else { return Ok(()) };
-        self.to.timestamp(pulse.tick)?;
-        if wire.direction != Some(pulse.direction) {
-            wire.direction = Some(pulse.direction);
-            self.to.change_scalar(wire.dir, Value::from(pulse.direction.dir()))?;
+        let (at, time) = (usize::from(pulse.axis), pulse.tick);
+        let begun = time.saturating_sub(LEAD_NS);
+        let Some(wire) = self.axes.get_mut(at) else { return Ok(()) };
+        if wire.direction != pulse.direction {
+            wire.direction = pulse.direction;
+            // In the middle of the rest where that is shorter than twice the lead.
+            let turn = begun.max(wire.last.midpoint(time));
+            self.changes.push(Reverse((turn, Change::Dir(pulse.direction.dir()), at)));
         }
-        self.to.change_scalar(wire.step, Value::V1)?;
-        wire.falls = Some(pulse.tick + PULSE_NS);
+        wire.last = time;
+        self.changes.push(Reverse((time, Change::Step, at)));
+        self.write(begun)
+    }
+
+    /// Writes what comes before a time.
+    fn write(&mut self, before: u64) -> io::Result<()> {
+        while self.changes.peek().is_some_and(|Reverse((time, ..))| *time < before) {
+            let Some(Reverse((time, change, at))) = self.changes.pop() else { break };
+            self.until(time)?;
+            let Some(wire) = self.axes.get_mut(at) else { continue };
+            self.to.timestamp(time)?;
+            match change {
+                Change::Dir(high) => self.to.change_scalar(wire.dir, Value::from(high))?,
+                Change::Step => {
+                    self.to.change_scalar(wire.step, Value::V1)?;
+                    wire.falls = Some(time + PULSE_NS);
+                }
+            }
+        }
         Ok(())
     }
 
     fn finish(mut self) -> io::Result<()> {
+        self.write(u64::MAX)?;
         self.until(u64::MAX)?;
         self.to.flush()
     }
@@ -217,6 +254,29 @@ fn draw(places: &[Place]) -> Result<String, Box<dyn Error>> {
 mod tests {
     use super::*;
     use crate::profile::stroke::geometry::nothing_is_covered;
+
+    /// DIR leads STEP by a microsecond, or by half of the time since the pulse before; each axis by itself.
+    #[test]
+    fn dir_changes_between_pulses() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps.vcd");
+        let mut wires = Wires::new(&path).unwrap();
+        let pulse = |axis, tick, direction| AxisPulse { axis, tick, direction };
+        for (axis, tick, direction) in [
+            (0, 5000, Direction::Reverse),
+            (1, 5500, Direction::Forward),
+            (0, 9000, Direction::Reverse),
+            (0, 10_400, Direction::Forward),
+            (1, 10_500, Direction::Reverse),
+        ] {
+            wires.add(&pulse(axis, tick, direction)).unwrap();
+        }
+        wires.finish().unwrap();
+        let text = fs::read_to_string(path).unwrap();
+        let times: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
+        let want = [0, 4000, 5000, 5500, 6000, 6500, 9000, 9500, 9700, 10_000, 10_400, 10_500, 11_400, 11_500];
+        assert_eq!(times, want.map(|time: u64| format!("#{time}")));
+    }
 
     #[test]
     fn labels_leave_the_curves_free() {

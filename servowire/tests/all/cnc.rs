@@ -143,7 +143,8 @@ fn a_cable_that_is_pulled_stops_all_axes_in_order() {
     let rows = axes(&report);
     // The ramp of 20 ms is half of what full speed would have made of it: 2500 steps.
     let [a, b, c, d] = [0, 1, 2, 3].map(|k| rows[k][6]);
-    assert!(a == b && c == d && (2400..2600).contains(&(a - c)), "{rows:?}");
+    // The last frame may be on its way through the fourth device when its link goes.
+    assert!(a == b && (0..=1).contains(&(c - d)) && (2400..2600).contains(&(a - c)), "{rows:?}");
     let first = servowire(&["cnc", "--unplug", "1@1000"]);
     assert!(failure(&first).contains("the link is down"));
 }
@@ -338,7 +339,9 @@ fn what_is_recorded_is_read_back() {
     // Answers share the line of their request.
     let count = |kind: &str| lines.lines().filter(|line| line.contains(kind)).count();
     assert_eq!((count("DISCOVERY"), count("PARAM"), count("DELAY_REQ"), count("SYNC")), (10, 10, 16, 1024));
-    assert_eq!((count("master"), count("device")), (1000, 4000 + 10), "devices counts in DISCOVERY too");
+    // Devices counts in DISCOVERY too. In the first cycle all four are silent; the frame of the first one leaves with the master's
+    // next one.
+    assert_eq!((count("master"), count("device")), (1000, 4000 - 4 + 1 + 10));
 
     let trace = fs::read_to_string(&vcd).unwrap();
     assert!(trace.contains("$var wire 1") && trace.contains("sDISCOVERY"));

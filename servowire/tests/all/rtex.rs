@@ -181,7 +181,6 @@ fn findings_between_blocks() {
     let notes = |lines: &[String]| {
         let run = bench.decode("log.txt", lines.join("\n"), &["--protocol", "rtex", "--bytes", "--json"]);
         let noted: Vec<_> = run
-            .is_good()
             .json()
             .iter()
             .enumerate()
@@ -193,6 +192,16 @@ fn findings_between_blocks() {
     // The echo of the counter stands still beyond the two communications of an update.
     let still = [1, 2, 2, 2, 3].map(|counter| response(counter, 0x20, 0));
     assert_eq!(notes(&still), [note(3, "the counter echo stands still for 3 responses")]);
+    // Somebody has to look after that, and after an alarm: so says the exit code.
+    let trouble = |lines: &[String]| {
+        let run = bench.decode("log.txt", lines.join("\n"), &["--protocol", "rtex", "--bytes"]);
+        (run.code, run.err.lines().last().unwrap_or_default().to_owned())
+    };
+    let (code, said) = trouble(&still);
+    assert!(code == 1 && said.ends_with("the counter echo of a drive stood still"), "{said}");
+    let alarm = [1, 2, 3].map(|counter| response(counter, 0x20, 0).replacen("20c1", "20e1", 1));
+    let (code, said) = trouble(&alarm);
+    assert!(code == 1 && said.ends_with("a drive reports an alarm"), "{said}");
     // The code comes back later than one command after the other.
     let late: Vec<_> =
         (1..=4).flat_map(|k| [command(k & 3, 0x20), response(k & 3, if k == 4 { 0x20 } else { 0x10 }, 0)]).collect();
@@ -399,4 +408,38 @@ fn a_remark_on_the_log_is_counted_nowhere() {
     // Its line has no verdict, as it is no frame.
     let shown = bench.decode("log.txt", &text, &options).out;
     assert!(!shown.trim_end().ends_with("ok"), "{shown}");
+}
+
+/// A log from power-up: seconds of NOPs, and then blocks with the bytes of each word in the other order, or of 32 bytes.
+#[test]
+fn a_log_from_power_up() {
+    let bench = Bench::new();
+    for (wide, turned) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut text = String::new();
+        let mut put = |block: &[u8], sub: u8| {
+            let mut bytes = block.to_vec();
+            if wide {
+                bytes.push(sub);
+                bytes.extend([0; 15]);
+            }
+            let width = if turned { 4 } else { 1 };
+            for byte in bytes.chunks(width).flat_map(|word| word.iter().rev()) {
+                write!(text, "{byte:02x}").unwrap();
+            }
+            text.push('\n');
+        };
+        for _ in 0..2_000 {
+            put(&[5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], 0x80);
+        }
+        for (command, response) in exchanges() {
+            put(&command, 0x80);
+            put(&response, 0);
+        }
+        let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--json"]);
+        let said = format!("{wide} {turned}: {}", run.err);
+        assert_eq!(run.code, i32::from(turned), "{said}");
+        assert!(!turned || run.err.contains("pack with shifts"), "{said}");
+        let drives = run.json().iter().filter(|event| event["kind"].as_str().unwrap().ends_with('5')).count();
+        assert!(turned || drives == 2_012, "{said}: {drives}");
+    }
 }

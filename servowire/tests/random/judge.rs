@@ -1,6 +1,7 @@
 //! Decodes a random capture without options and holds what comes out against what is due.
 
 use std::cell::RefCell;
+use std::fmt::Write as _;
 use std::io;
 
 use servowire_decode::capture::{Capture as Opened, Change, Line};
@@ -91,7 +92,9 @@ pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let memory = Memory { names, changes, at: 0, end: Time::from_ps(capture.end.into()) };
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
-    let notes = |note: &Note| said.borrow_mut().push_str(&format!("{note}\n"));
+    let notes = |note: &Note| {
+        let _ = writeln!(said.borrow_mut(), "{note}");
+    };
     let mut out = Output::new("x", &mut keep).with_notes(&notes);
     let opened = Opened::Edges(Box::new(memory));
     if let Err(stop) = servowire_decode::decode("x", opened, None, &Settings::default(), &mut out) {
@@ -118,7 +121,7 @@ pub fn judge(capture: &Capture, inside: bool) -> Outcome {
     for due in &capture.due {
         let name = due.channels.join(" + ");
         let Some((_, events)) =
-            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title() == due.kind.name())
+            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title == due.kind.name())
         else {
             blame(format!("{name} is not found as {}", due.kind.name()), &mut outcome);
             continue;

@@ -5,6 +5,8 @@ use crate::clock::AVERAGE;
 use crate::discovery::Entry;
 use crate::error::Error;
 use crate::line_delay::DelayModel;
+use crate::tally::Tally;
+use crate::timing::Slots;
 
 /// What a device is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -16,12 +18,20 @@ pub struct Config {
     pub lengths: Entry,
     /// Output bytes of the master frame; `None`: as many as DISCOVERY counted.
     pub output_len: Option<u16>,
-    /// Start of its own frame in ns of the common time; `None`: as published, by its address.
-    pub send_time_ns: Option<u32>,
-    /// Spacing of the device frames at the master in ns: the own frame starts 500 ns and so many slots into the cycle, less
-    /// the way to the master. `None`: as published, or as [`send_time_ns`](Self::send_time_ns) says. 880 fits 3 payload bytes
-    /// and cables of up to 525 ns.
-    pub slot_ns: Option<u32>,
+    /// Cycle of the IO exchange in ns; `None`: what PARAM says. The published device runs at 4000 whatever PARAM says, and its
+    /// master says 10,000.
+    pub cycle_ns: Option<u32>,
+    /// When it sends its own frame: the same as the master's, and every device's.
+    pub slots: Slots,
+    /// How long before its time [`Action::Send`](super::Action::Send) is given out, in ns: what the port needs to take the frame.
+    pub lead_ns: u32,
+    /// From the end of a frame of the exchange until it is handed over, at most, in ns. After that it is lost.
+    pub hand_over_ns: u32,
+    /// How far from its time a master frame of the exchange may begin, and how far its time stamp may be off, in ns.
+    pub window_ns: u16,
+    /// DISCOVERY frames are taken until the first PARAM: for a master that repeats the last one, see
+    /// [`master::Config::patient_discovery`](crate::master::Config::patient_discovery). An extension of this crate.
+    pub patient_discovery: bool,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
     /// Frames that a correction of the clock is made from, see [`Clock::averaging`](crate::Clock::averaging).
@@ -33,13 +43,17 @@ pub struct Config {
 }
 
 impl Config {
-    /// The reference design's; the start-up time-out is this crate's, the published device has none.
+    /// The reference design's. Time-outs, windows and `lead_ns` are this crate's; the published device has none.
     pub const fn new() -> Self {
         Self {
             lengths: Entry::STOCK,
             output_len: Some(16),
-            send_time_ns: None,
-            slot_ns: None,
+            cycle_ns: None,
+            slots: Slots::Published,
+            lead_ns: 400,
+            hand_over_ns: 1000,
+            window_ns: 250,
+            patient_discovery: false,
             delay_model: DelayModel::DEVICE,
             clock_average: AVERAGE,
             missed_frames: 5,
@@ -49,8 +63,12 @@ impl Config {
     servowire_core::builder! {
         with_lengths: lengths, Entry;
         with_output_len: output_len, Option<u16>;
-        with_send_time_ns: send_time_ns, Option<u32>;
-        with_slot_ns: slot_ns, Option<u32>;
+        with_cycle_ns: cycle_ns, Option<u32>;
+        with_slots: slots, Slots;
+        with_lead_ns: lead_ns, u32;
+        with_hand_over_ns: hand_over_ns, u32;
+        with_window_ns: window_ns, u16;
+        with_patient_discovery: patient_discovery, bool;
         with_delay_model: delay_model, DelayModel;
         with_clock_average: clock_average, u8;
         with_missed_frames: missed_frames, u8;
@@ -77,6 +95,8 @@ pub struct Counters {
     pub format_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
+    /// Master frames of the exchange that were not there, not once, or not at their time.
+    pub master: Tally,
     /// Of these, at [`PortId::A`].
     pub a: PortCounters,
     /// Of these, at [`PortId::B`].
@@ -84,8 +104,9 @@ pub struct Counters {
 }
 
 servowire_core::one_line!(Counters {
-    Self { good_frames, crc_errors, format_errors, retrains, .. } =>
-        "{} good frames, {} bad checksums, {} other refusals, {} restarts", good_frames, crc_errors, format_errors, retrains;
+    Self { good_frames, crc_errors, format_errors, retrains, master, .. } =>
+        "{} good frames, {} bad checksums, {} other refusals, {} restarts; master frames: {}",
+        good_frames, crc_errors, format_errors, retrains, master;
 });
 
 /// What a device counts at one of its ports. A port that forwards by hardware sees no frames.
@@ -105,7 +126,7 @@ pub struct PortCounters {
 impl Counters {
     pub(super) const ZERO: Self = {
         const PORT: PortCounters = PortCounters { good_frames: 0, crc_errors: 0, format_errors: 0 };
-        Self { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0, a: PORT, b: PORT }
+        Self { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0, master: Tally::ZERO, a: PORT, b: PORT }
     };
 
     /// A frame at `port` was good, or refused for a reason.

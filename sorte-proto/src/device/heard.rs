@@ -43,7 +43,8 @@ pub enum Path {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameTimes {
-    /// The device's counter at the start of the frame, in ns.
+    /// The device's counter at the capture of the frame's start, in ns: see
+    /// [`Preamble::capture_ns`](crate::Preamble::capture_ns).
     pub sof_ns: u32,
     /// The device's counter now, in ns.
     pub counter_ns: u32,
@@ -66,16 +67,60 @@ pub struct Reaction {
     pub correction: Correction,
 }
 
-/// What the IO exchange gave a device.
+/// What the IO exchange gave a device: of this cycle, or it would not be here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Output<'a> {
     /// Its output bytes.
     pub data: &'a [u8],
-    /// The master's time at the start of the frame, seen here, in ns.
+    /// The cycle that they belong to, from 0 with the first of the exchange.
+    pub cycle: u64,
+    /// The common time at which the master began to send them, in ns modulo 2^32.
+    pub trigger_ns: u32,
+    /// The frame's time stamp and the delay from the master, as the published device adds them up, in ns.
     pub reference_ns: u32,
     /// What to do to the counter.
     pub correction: Correction,
+}
+
+impl Output<'_> {
+    /// How old the data are when the device's counter shows `counter_ns`, in ns.
+    pub const fn age_ns(&self, counter_ns: u32) -> u32 {
+        counter_ns.wrapping_sub(self.trigger_ns)
+    }
+}
+
+/// What a device has to do now. Times are those of its counter, modulo 2^32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[must_use]
+pub enum Action {
+    /// Nothing before `until_ns`, unless a frame comes.
+    Wait {
+        /// When to ask again.
+        until_ns: u32,
+    },
+    /// A cycle of the exchange begins.
+    CycleStart {
+        /// Its number, from 0.
+        cycle: u64,
+        /// When; it has passed by less than a cycle.
+        start_ns: u32,
+    },
+    /// The own frame leaves, see [`Device::answer`](super::Device::answer).
+    Send {
+        /// In this cycle.
+        cycle: u64,
+        /// At this time, which has not passed.
+        at_ns: u32,
+    },
+    /// No good master frame has come in this cycle, and none will.
+    Lost {
+        /// Which.
+        cycle: u64,
+    },
+    /// The device has waited too long and is in IDLE again: address, clock and line delay are forgotten.
+    Restart,
 }
 
 /// A SYNC frame, and when it was heard.
@@ -102,6 +147,14 @@ servowire_core::one_line!(Reaction {
     Self { path, result: Err(error), .. } => "{}, not used: {}", path, error;
 });
 servowire_core::one_line!(Output<'_> {
-    Self { data, reference_ns, correction } => "{} at {} ns, {}", Hex(data), reference_ns, correction;
+    Self { data, cycle, reference_ns, correction, .. } =>
+        "{} of cycle {} at {} ns, {}", Hex(data), cycle, reference_ns, correction;
+});
+servowire_core::one_line!(Action {
+    Self::Wait { until_ns } => "wait until {} ns", until_ns;
+    Self::CycleStart { cycle, start_ns } => "cycle {} begins at {} ns", cycle, start_ns;
+    Self::Send { cycle, at_ns } => "send in cycle {} at {} ns", cycle, at_ns;
+    Self::Lost { cycle } => "cycle {} has brought nothing", cycle;
+    Self::Restart => "restart";
 });
 servowire_core::one_line!(HeardSync { Self { sync, sof_ns } => "{}, heard at {} ns", sync, sof_ns; });

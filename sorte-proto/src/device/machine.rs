@@ -1,15 +1,15 @@
 //! The machine: what a device learns from the frames that pass.
 
 use super::config::{Config, Counters};
-use super::heard::{FrameTimes, HeardSync, Output, Path, PortId, Reaction};
+use super::heard::{FrameTimes, HeardSync, Path, PortId, Reaction};
 use super::passage::{Kind, Learnt, Passage, Plain};
 use super::port::{Port, PortFlags, State, Trigger};
+use super::raster::Raster;
 use crate::clock::{Clock, Correction};
 use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
 use crate::delay_req::DelayReq;
 use crate::discovery::Assignment;
 use crate::error::Error;
-use crate::exchange::{DeviceFrame, MasterFrameView};
 use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::line_delay::LineDelay;
@@ -17,31 +17,30 @@ use crate::link::Link;
 use crate::param::Parameters;
 use crate::place::Place;
 use crate::status::Status;
-use crate::sync::TRIGGER_TO_CAPTURE_NS;
-use crate::timing::{TRIGGER_NS, published_send_time_ns};
 
 /// A device with two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Device {
-    config: Config,
+    pub(super) config: Config,
     pub(super) a: Port,
     pub(super) b: Port,
-    counters: Counters,
+    pub(super) counters: Counters,
     /// Goes into the next STATUS byte the device writes.
-    error: bool,
-    assignment: Option<Assignment>,
-    output_total: Option<u16>,
+    pub(super) error: bool,
+    pub(super) assignment: Option<Assignment>,
+    pub(super) output_total: Option<u16>,
     parameters: Option<[u8; Parameters::LEN]>,
     line: LineDelay,
-    clock: Clock,
-    last_sync: Option<HeardSync>,
+    pub(super) clock: Clock,
+    pub(super) last_sync: Option<HeardSync>,
     /// Delay from the master in ns.
-    way_ns: Option<u32>,
-    received: bool,
-    missed: u8,
+    pub(super) way_ns: Option<u32>,
+    /// The cycles of the IO exchange, while it is in there.
+    pub(super) raster: Option<Raster>,
+    pub(super) missed: u8,
     /// When a frame of the present state came last.
-    alive_ns: u64,
+    pub(super) alive_ns: u64,
 }
 
 impl Device {
@@ -61,7 +60,7 @@ impl Device {
             clock: Clock::averaging(config.clock_average),
             last_sync: None,
             way_ns: None,
-            received: false,
+            raster: None,
             missed: 0,
             alive_ns: 0,
         }
@@ -99,7 +98,7 @@ impl Device {
     }
 
     /// The port that does not face the master; B while none is known to.
-    fn reverse_port(&self) -> PortId {
+    pub(super) fn reverse_port(&self) -> PortId {
         self.master_port().map_or(PortId::B, PortId::other)
     }
 
@@ -148,24 +147,6 @@ impl Device {
     /// last SYNC frame.
     pub fn cycle_zero_ns(&self) -> Option<u32> {
         self.last_sync.map(|last| last.sof_ns.wrapping_add(10_000))
-    }
-
-    /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master triggers its first
-    /// frame one SYNC period of 10 us after the last SYNC frame, and a cycle begins 500 ns before its trigger.
-    pub fn first_cycle_ns(&self) -> Option<u32> {
-        let (HeardSync { sync, .. }, delay_ns) = (self.last_sync?, self.way_ns?);
-        let sent_ns = sync.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns);
-        Some(sent_ns.wrapping_add(10_000).wrapping_sub(TRIGGER_NS))
-    }
-
-    /// When to send the own frame, in ns of the common time.
-    pub fn send_time_ns(&self) -> Option<u32> {
-        let address = self.assignment?.address;
-        let slot = self.config.slot_ns.map(|slot| {
-            let slots = slot.saturating_mul(address.hops_before().into());
-            TRIGGER_NS.saturating_add(slots).saturating_sub(self.delay_ns().unwrap_or_default())
-        });
-        self.config.send_time_ns.or(slot).or_else(|| Some(published_send_time_ns(address)))
     }
 
     /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
@@ -218,41 +199,15 @@ impl Device {
         (self.a.flags, self.b.flags) = (a, b);
     }
 
-    /// Looks at the time: a start-up state that has waited too long for its frame gives up. Returns whether it has.
-    pub fn poll(&mut self, now_ns: u64) -> bool {
-        let waits = !matches!(self.state(), State::Idle | State::Exchange | State::Diag | State::Error);
-        let late = waits && now_ns.saturating_sub(self.alive_ns) > self.config.start_up_timeout_ns;
-        if late {
-            self.restart();
-        }
-        late
-    }
-
-    /// A cycle of the IO exchange begins. The sixth without a frame since the one before makes the device start again;
-    /// returns whether it has.
-    pub fn cycle_start(&mut self) -> bool {
-        self.missed = if self.received { 0 } else { self.missed.saturating_add(1) };
-        self.received = false;
-        let lost = self.missed > self.config.missed_frames && !self.is_out();
-        if lost {
-            self.restart();
-        }
-        lost
-    }
-
-    /// Cycle starts without a frame since the last frame.
-    pub const fn missed_frames(&self) -> u8 {
-        self.missed
-    }
-
     /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`hear_passed`](Self::hear_passed).
     pub fn passage(&self, port: PortId) -> Passage {
         let handler = self.port(port);
         let master = handler.flags.contains(PortFlags::MASTER_PORT);
         let idle_last = handler.state == State::Idle && handler.flags.contains(PortFlags::LAST_DEVICE);
         let kind = match (handler.state, self.line_delay_next_ns()) {
-            _ if idle_last => self.discovery(),
-            (State::Discovery, _) if master => self.discovery(),
+            _ if idle_last => Kind::Discovery(self.discovery()),
+            (State::Discovery, _) if master => Kind::Discovery(self.discovery()),
+            (State::Param, _) if master && self.is_patient() => Kind::Either(self.discovery(), Plain::NEW),
             (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.adds())),
             _ => Kind::Plain(Plain::NEW),
         };
@@ -264,8 +219,13 @@ impl Device {
         Status::of_device(self.is_last(), self.error)
     }
 
-    const fn discovery(&self) -> Kind {
-        Kind::Discovery(DiscoveryRewriter::new(self.config.lengths, self.adds()))
+    /// DISCOVERY may still be repeated, see [`Config::patient_discovery`](super::Config::patient_discovery).
+    const fn is_patient(&self) -> bool {
+        self.config.patient_discovery && self.parameters.is_none()
+    }
+
+    const fn discovery(&self) -> DiscoveryRewriter {
+        DiscoveryRewriter::new(self.config.lengths, self.adds())
     }
 
     /// A start-up frame whose bytes went through a [`passage`](Self::passage) has ended at `port`.
@@ -294,7 +254,8 @@ impl Device {
             self.port_mut(port).flags.remove(PortFlags::MASTER_PORT);
         }
         let master = self.port(port).flags.contains(PortFlags::MASTER_PORT);
-        if master && state.waits_for(head) {
+        let repeated = self.is_patient() && state == State::Param && State::Discovery.waits_for(head);
+        if master && (state.waits_for(head) || repeated) {
             self.alive_ns = times.now_ns;
         }
         match learnt {
@@ -314,6 +275,9 @@ impl Device {
             self.output_total = passage.output_total().or(self.output_total);
         }
         self.port_mut(port).end_of_frame();
+        if master && state == State::Sync && self.port(port).state == State::Exchange {
+            self.enter_exchange();
+        }
         // A device that cannot rewrite SYNC must not take part: its line delay was never measured.
         let unmeasured = master && state == State::Sync && passage.transit().is_for_all(FrameType::Sync);
         if let (true, Err(error)) = (unmeasured, self.line_delay_next_ns()) {
@@ -332,7 +296,7 @@ impl Device {
         self.hear_passed(port, passage, times)
     }
 
-    fn count(&mut self, port: PortId, result: Result<(), Error>) {
+    pub(super) fn count(&mut self, port: PortId, result: Result<(), Error>) {
         self.counters.count(port, result);
         self.error |= matches!(result, Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }));
     }
@@ -379,40 +343,5 @@ impl Device {
             self.port_mut(port).end_of_frame();
         }
         Ok(())
-    }
-
-    /// A master frame of the IO exchange at the port that faces the master. `sof_ns`, `counter_ns`: the counter within
-    /// the cycle at the start of the frame and now. Frames of the other port just pass.
-    ///
-    /// # Errors
-    /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
-    /// IO exchange. The frame counts as received even so.
-    pub fn hear_exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
-        let (State::Exchange, Some(place), Some(delay_ns)) = (self.state(), self.assignment, self.way_ns) else {
-            return Err(Error::WrongState);
-        };
-        self.received = true;
-        let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
-        let taken = MasterFrameView::parse(output_len.into(), frame).and_then(|view| {
-            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
-        });
-        self.count(self.reverse_port().other(), taken.map(|_| ()));
-        let (data, reference_ns) = taken?;
-        // Start 500 ns into the cycle, and the way here.
-        let expected = delay_ns.saturating_add(TRIGGER_NS);
-        Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
-    }
-
-    /// The next STATUS byte that the device writes carries ERROR, as after a wrong checksum: for firmware that does not know where
-    /// its axis is, see [`follow`](crate::follow).
-    pub const fn flag_error(&mut self) {
-        self.error = true;
-    }
-
-    /// The own frame of the IO exchange; reports an error once.
-    pub fn answer<const P: usize>(&mut self, payload: [u8; P]) -> Option<DeviceFrame<P>> {
-        let (State::Exchange, Some(place)) = (self.state(), self.assignment) else { return None };
-        let status = Status::of_device(self.is_last(), core::mem::take(&mut self.error));
-        Some(DeviceFrame { address: place.address, status, payload })
     }
 }

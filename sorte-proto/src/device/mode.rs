@@ -73,8 +73,9 @@ servowire_core::one_line!(Forwarding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{Config, FrameTimes, Path};
+    use crate::device::{Action, Config, FrameTimes, Path};
     use crate::discovery::Discovery;
+    use crate::error::Error;
     use crate::link::Link;
     use crate::place::Place;
 
@@ -131,9 +132,8 @@ mod tests {
             let handled = device.hear(PortId::A, &mut frame, arrival);
             assert_eq!(handled.path, if last { Path::Reflect } else { Path::Forward });
             assert_eq!((frame, device.state()), (Discovery::request(Place::Last).emit(), State::Error));
-            assert!(!device.poll(u64::MAX) && device.answer([0; 3]).is_none());
-            assert!((0..20).all(|_| !device.cycle_start()));
-            assert!(device.hear_exchange(&[0; 21], 0, 0).is_err());
+            assert!(matches!(device.poll(0, u64::MAX), Action::Wait { .. }) && device.answer([0; 3]).is_none());
+            assert_eq!(device.hear_exchange(&[0; 21], arrival).map(|_| ()), Err(Error::WrongState));
             // A link that comes and goes does not end it.
             device.set_links(Link::Down, Link::Up);
             device.set_links(Link::Up, if last { Link::Down } else { Link::Up });

@@ -27,6 +27,8 @@ pub(super) enum Kind {
     Plain(Plain),
     Discovery(DiscoveryRewriter),
     Sync(SyncRewriter),
+    /// A DISCOVERY that is sent again, or PARAM.
+    Either(DiscoveryRewriter, Plain),
 }
 
 /// A frame that passes unchanged.
@@ -81,9 +83,22 @@ impl Passage {
     /// The byte to send for the byte received.
     #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
+        // The longest of all frames.
+        match &mut self.kind {
+            Kind::Discovery(rewriter) => rewriter.byte(byte),
+            _ => self.short(byte),
+        }
+    }
+
+    #[inline(never)]
+    fn short(&mut self, byte: u8) -> u8 {
         match &mut self.kind {
             Kind::Discovery(rewriter) => rewriter.byte(byte),
             Kind::Sync(rewriter) => rewriter.byte(byte),
+            Kind::Either(rewriter, plain) => {
+                plain.take(byte);
+                rewriter.byte(byte)
+            }
             Kind::Plain(plain) => {
                 plain.take(byte);
                 byte
@@ -108,7 +123,7 @@ impl Passage {
     pub(super) const fn transit(&self) -> &Transit {
         match &self.kind {
             Kind::Plain(plain) => &plain.transit,
-            Kind::Discovery(rewriter) => rewriter.transit(),
+            Kind::Discovery(rewriter) | Kind::Either(rewriter, _) => rewriter.transit(),
             Kind::Sync(rewriter) => rewriter.transit(),
         }
     }
@@ -117,7 +132,7 @@ impl Passage {
     pub(super) const fn has_written_status(&self) -> bool {
         let frame_type = match self.kind {
             Kind::Plain(_) => return false,
-            Kind::Discovery(_) => FrameType::Discovery,
+            Kind::Discovery(_) | Kind::Either(..) => FrameType::Discovery,
             Kind::Sync(_) => FrameType::Sync,
         };
         self.transit().len() > 3 && self.transit().is_for_all(frame_type)
@@ -127,6 +142,9 @@ impl Passage {
     pub(super) fn output_total(&self) -> Option<u16> {
         match &self.kind {
             Kind::Discovery(rewriter) => Some(rewriter.output_total()),
+            Kind::Either(rewriter, _) if rewriter.transit().is_for_all(FrameType::Discovery) => {
+                Some(rewriter.output_total())
+            }
             Kind::Plain(Plain { transit, stored }) if transit.is_for_all(FrameType::Discovery) => {
                 let [_, _, _, _, low, high, ..] = *stored;
                 Some(u16::from_le_bytes([low, high]))
@@ -138,13 +156,20 @@ impl Passage {
     /// The checks of [`LongFrame::parse`](crate::LongFrame::parse), then what the frame says. A good frame of another type
     /// than the one that is rewritten says nothing.
     pub(super) fn learnt(&self) -> Result<Learnt, Error> {
+        let plain = |plain: &Plain| {
+            plain.transit.check().map(|frame_type| match frame_type {
+                FrameType::Param => Learnt::Parameters(plain.stored),
+                _ => Learnt::Nothing,
+            })
+        };
         let learnt = match &self.kind {
             Kind::Discovery(rewriter) => rewriter.finish().map(|passed| Learnt::Place(passed.assignment)),
             Kind::Sync(rewriter) => rewriter.finish().map(Learnt::Sync),
-            Kind::Plain(plain) => plain.transit.check().map(|frame_type| match frame_type {
-                FrameType::Param => Learnt::Parameters(plain.stored),
-                _ => Learnt::Nothing,
-            }),
+            Kind::Either(rewriter, other) => match rewriter.finish() {
+                Err(Error::UnexpectedType { .. }) => plain(other),
+                passed => passed.map(|passed| Learnt::Place(passed.assignment)),
+            },
+            Kind::Plain(other) => plain(other),
         };
         match learnt {
             Err(Error::UnexpectedType { .. }) => Ok(Learnt::Nothing),

@@ -1,8 +1,10 @@
 //! What comes back in the start-up, and what counts as an answer.
 
 use super::config::State;
+use super::cycle::{Cycle, Cycles, nearest};
 use super::heard::Heard;
-use super::machine::Master;
+use super::machine::{AGREED, Master};
+use crate::address::DeviceAddress;
 use crate::delay_req::DelayReq;
 use crate::discovery::DiscoveryView;
 use crate::error::Error;
@@ -10,22 +12,34 @@ use crate::exchange::DeviceFrameView;
 use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::param::ParamView;
+use crate::preamble::Preamble;
 use crate::status::Status;
 use crate::sync::{Sync, TRANSIT_NS};
-use crate::timing::Timing;
+use crate::tally::Fault;
+use crate::timing::{Limit, Misfit, TRIGGER_NS, Timing};
+
+/// From the first bit of a device frame to the capture of its start.
+const CAPTURE_NS: u32 = Preamble::Short.capture_ns();
+/// What the published measurement of a line delay loses, in a hop and back, in ns at most.
+const LOST_NS: u64 = 16;
 
 impl Master {
-    /// A frame was heard that began at `sof_ns`: a start-up frame that has come back, or a device's frame of the IO exchange. Its
-    /// payload may be used only if this accepts it.
+    /// A frame was heard whose start was captured at `sof_ns`, see [`Preamble::capture_ns`]: a start-up frame that has come back, or a
+    /// device's frame of the IO exchange. Its payload may be used only if this accepts it: if its checks are right, if it began at
+    /// the time of its device in a cycle that is open, and if it is the first in that cycle.
     ///
     /// # Errors
     /// What the frame is refused for: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
-    /// began before the frame that it would answer; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer and
+    /// began before the frame that it would answer; [`Error::OutsideWindow`], [`Error::CycleOver`] and [`Error::Doubled`], which
+    /// [`tally`](Master::tally) counts for each device; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer and
     /// [`Error::TopologyChanged`] take the master back to IDLE, everything else just does not count.
     pub fn hear<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<Heard<'a>, Error> {
         let result = match self.state {
             State::Idle | State::Error => return Err(Error::WrongState),
-            State::Exchange => return self.device_frame(frame).map(|frame| Heard::Device { frame, sof_ns }),
+            State::Exchange => {
+                let (frame, cycle) = self.device_frame(frame, sof_ns)?;
+                return Ok(Heard::Device { frame, cycle, sof_ns });
+            }
             State::Discovery => self.discovery_answer(frame, sof_ns),
             State::Param => self.param_answer(frame, sof_ns),
             State::LineDelay => self.delay_answer(frame, sof_ns),
@@ -34,20 +48,20 @@ impl Master {
         if let Err(error) = result {
             self.count(error);
             let stale = matches!(error, Error::BeforeRequest { .. });
-            if self.state == State::Discovery && !stale
-                || matches!(error, Error::LineTooLong { .. } | Error::CycleTooShort { .. })
-            {
+            if self.state == State::Discovery && !stale && !self.config.patient_discovery || is_misfit(error) {
                 self.fail(error);
             }
         }
         result.map(|()| Heard::StartUp)
     }
 
-    fn device_frame<'a>(&mut self, frame: &'a [u8]) -> Result<DeviceFrameView<'a>, Error> {
+    fn device_frame<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<(DeviceFrameView<'a>, Option<u64>), Error> {
         let view = match DeviceFrameView::parse(self.config.payload_len.into(), frame) {
             Ok(view) => view,
             Err(error) => {
-                self.cycle.damaged = true;
+                if let Some(present) = &mut self.cycles.present {
+                    present.damaged = true;
+                }
                 self.count(error);
                 return Err(error);
             }
@@ -58,11 +72,50 @@ impl Master {
             self.give_up(error);
             return Err(error);
         }
-        self.cycle.mark(address);
+        let cycle = self.cycle_of(view.address(), sof_ns)?;
         if view.status().contains(Status::ERROR) {
             self.counters.device_errors = self.counters.device_errors.saturating_add(1);
         }
-        Ok(view)
+        Ok((view, cycle))
+    }
+
+    /// The cycle that a frame belongs to by its time, whichever is open now; `None` for one that the host has left out. Each cycle has
+    /// one frame of each device.
+    fn cycle_of(&mut self, address: DeviceAddress, sof_ns: u64) -> Result<Option<u64>, Error> {
+        let Cycles { present, before, hop_ns, .. } = &mut self.cycles;
+        let Some(present) = present else { return Err(Error::WrongState) };
+        let (hops, first) = (u32::from(address.hops_before()), u32::from(self.line.checked().unwrap_or_default()));
+        let way = hop_ns.saturating_mul(hops).saturating_add(first);
+        let arrives = self.config.slots.send_ns(address, way).saturating_add(way.into());
+        let arrives = arrives.saturating_add(CAPTURE_NS.into()).saturating_sub(TRIGGER_NS.into());
+        let cycle_ns = self.config.cycle_ns;
+        let from = |cycle: &Cycle| nearest(sof_ns, cycle.trigger_ns.saturating_add_signed(arrives), cycle_ns);
+        let window = u64::from(self.config.window_ns).saturating_add(u64::from(hops).saturating_mul(LOST_NS));
+        let (ahead, off_ns) = from(present);
+        let open = match ahead {
+            0 => Some(&mut *present),
+            1.. => None,
+            _ => before.as_mut().filter(|before| from(before).0 == 0),
+        };
+        let (fault, error) = match open {
+            _ if off_ns.unsigned_abs() > window => {
+                (Fault::Late, Error::OutsideWindow { off_ns: i32::try_from(off_ns).unwrap_or(i32::MAX) })
+            }
+            _ if ahead > 0 => return Ok(None),
+            None => (Fault::Stale, Error::CycleOver),
+            Some(cycle) => {
+                if cycle.mark(address.get()) {
+                    return Ok(Some(cycle.number));
+                }
+                (Fault::Doubled, Error::Doubled { address: address.get() })
+            }
+        };
+        present.disorderly = true;
+        self.counters.frames.add(fault);
+        if let Some(own) = self.tallies.get_mut(usize::from(address.hops_before())) {
+            own.add(fault);
+        }
+        Err(error)
     }
 
     /// What began before the request is not its answer.
@@ -76,9 +129,20 @@ impl Master {
     fn discovery_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let answer = DiscoveryView::parse(frame)?;
         self.is_fresh(sof_ns)?;
-        if answer.status().contains(Status::LAST) {
-            self.network.take(answer)?;
+        if !answer.status().contains(Status::LAST) {
+            return Ok(());
+        }
+        let same = self.network.is_told_by(answer);
+        self.network.take(answer)?;
+        if !self.config.patient_discovery {
             self.answered = true;
+            return Ok(());
+        }
+        if self.agreed >= AGREED {
+            // Whoever was counted before must be in the answer to the last one too.
+            self.answered = answer.status().contains(Status::STATE_CHANGE) && same;
+        } else {
+            self.agreed = if same { self.agreed.saturating_add(1) } else { 1 };
         }
         Ok(())
     }
@@ -127,11 +191,17 @@ impl Master {
         let devices = self.network.devices();
         let hop = hops.checked_div(u32::from(devices).saturating_sub(1)).unwrap_or_default();
         let cable = u16::try_from(hop.saturating_sub(TRANSIT_NS.into())).unwrap_or(u16::MAX);
-        let (line_delays_ns, payload_len) = ([first, cable], self.config.payload_len.into());
-        let line = Timing { line_delays_ns: &line_delays_ns, devices, output_len: self.output_len(), payload_len };
+        let line_delays_ns = [first, cable];
+        let line = Timing::new(&line_delays_ns, devices)
+            .with_output_len(self.output_len())
+            .with_payload_len(self.config.payload_len.into())
+            .with_slots(Some(self.config.slots))
+            .with_jitter_ps(self.config.jitter_ps);
         if let Some(misfit) = line.misfit(self.config.cycle_ns) {
-            return Err(Error::CycleTooShort { device: misfit.device, needs_ns: misfit.needs_ns });
+            return Err(refusal(misfit));
         }
+        self.cycles.end_ns = line.budget().device_frames_at_master_ns.saturating_sub(TRIGGER_NS);
+        self.cycles.hop_ns = u32::from(cable).saturating_add(TRANSIT_NS.into());
         self.answered = true;
         Ok(())
     }
@@ -143,4 +213,23 @@ impl Master {
         };
         *counter = counter.saturating_add(1);
     }
+}
+
+/// Why a line is not started.
+const fn refusal(Misfit { device, limit, needs_ns, has_ns }: Misfit) -> Error {
+    match limit {
+        Limit::MasterFrame | Limit::DeviceFrames => Error::CycleTooShort { device, needs_ns },
+        Limit::Gap => Error::GapTooShort { device, gap_ns: has_ns, needs_ns },
+        Limit::SendTime => Error::SendBeforeCycle { device, early_ns: needs_ns },
+    }
+}
+
+const fn is_misfit(error: Error) -> bool {
+    matches!(
+        error,
+        Error::LineTooLong { .. }
+            | Error::CycleTooShort { .. }
+            | Error::GapTooShort { .. }
+            | Error::SendBeforeCycle { .. }
+    )
 }

@@ -2,6 +2,8 @@
 
 use crate::line_delay::DelayModel;
 use crate::param::Parameters;
+use crate::tally::Tally;
+use crate::timing::{JITTER_PS, Slots};
 
 servowire_core::codes! {
     /// State of the master, by the codes that the published one shows to its host: the low three bits of its status register,
@@ -35,6 +37,13 @@ servowire_core::codes! {
 pub struct Config {
     /// DISCOVERY frames, 2 at least: devices take part from the second on.
     pub discovery_frames: u16,
+    /// A damaged answer to DISCOVERY does not end the phase: frames are sent until two answers in a row tell the same line, then
+    /// the last one until it comes back whole. The devices need
+    /// [`device::Config::patient_discovery`](crate::device::Config::patient_discovery) too: a published one that has had the last
+    /// frame lets its repetitions pass without being counted. An extension of this crate; the published master starts again.
+    pub patient_discovery: bool,
+    /// DISCOVERY frames at most, if it is patient.
+    pub discovery_tries: u16,
     /// PARAM frames that must be answered.
     pub param_frames: u16,
     /// SYNC frames.
@@ -60,8 +69,15 @@ pub struct Config {
     pub min_output_len: u16,
     /// Payload bytes of a device frame.
     pub payload_len: u8,
-    /// What the devices are told.
+    /// What the devices are told. The published master says 10 us and exchanges every 4 us; here both are the cycle.
     pub parameters: Parameters,
+    /// When the devices send: the same as theirs.
+    pub slots: Slots,
+    /// Rms jitter of each port of the line, in ps.
+    pub jitter_ps: u32,
+    /// How far from its time a device frame may begin, in ns; 16 ns more for each device that it passes, which the published
+    /// measurement of the line loses. The published send times depend on the cables, and the master knows their mean only.
+    pub window_ns: u16,
     /// How the line to the first device is measured.
     pub delay_model: DelayModel,
     /// Cycles in a row with a damaged device frame that make the master start again; 0: never.
@@ -84,6 +100,8 @@ impl Config {
     pub const fn new() -> Self {
         Self {
             discovery_frames: 10,
+            patient_discovery: false,
+            discovery_tries: 1000,
             param_frames: 10,
             sync_frames: 1024,
             frame_period_ns: 1_000_000,
@@ -96,7 +114,10 @@ impl Config {
             min_devices: 1,
             min_output_len: 16,
             payload_len: 3,
-            parameters: Parameters::STOCK,
+            parameters: Parameters::CNC,
+            slots: Slots::Published,
+            jitter_ps: JITTER_PS,
+            window_ns: 500,
             delay_model: DelayModel::MASTER,
             retrain_crc_errors: 3,
             retrain_timing_errors: 3,
@@ -106,13 +127,20 @@ impl Config {
         }
     }
 
+    /// The same with this period of the IO exchange in ns, which the devices are told too.
+    #[must_use]
+    pub const fn with_cycle_ns(self, cycle_ns: u32) -> Self {
+        Self { cycle_ns, parameters: Parameters { cycle_time_ns: cycle_ns, ..self.parameters }, ..self }
+    }
+
     servowire_core::builder! {
         with_discovery_frames: discovery_frames, u16;
+        with_patient_discovery: patient_discovery, bool;
+        with_discovery_tries: discovery_tries, u16;
         with_param_frames: param_frames, u16;
         with_sync_frames: sync_frames, u16;
         with_frame_period_ns: frame_period_ns, u64;
         with_sync_period_ns: sync_period_ns, u32;
-        with_cycle_ns: cycle_ns, u32;
         with_answer_timeout_ns: answer_timeout_ns, u64;
         with_param_tries: param_tries, u16;
         with_restart_pause_ns: restart_pause_ns, u64;
@@ -121,6 +149,9 @@ impl Config {
         with_min_output_len: min_output_len, u16;
         with_payload_len: payload_len, u8;
         with_parameters: parameters, Parameters;
+        with_slots: slots, Slots;
+        with_jitter_ps: jitter_ps, u32;
+        with_window_ns: window_ns, u16;
         with_delay_model: delay_model, DelayModel;
         with_retrain_crc_errors: retrain_crc_errors, u8;
         with_retrain_timing_errors: retrain_timing_errors, u8;
@@ -156,15 +187,21 @@ pub struct Counters {
     pub retrains: u64,
     /// Cycles of the IO exchange that were left out because [`Master::poll`](super::Master::poll) was called after their time.
     pub skipped_cycles: u64,
+    /// Device frames that were not there, not once, or not at their time; of each device in [`Master::tally`](super::Master::tally).
+    pub frames: Tally,
 }
 
 impl core::fmt::Display for Counters {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { cycles, crc_errors, timing_errors, format_errors, device_errors, retrains, skipped_cycles } = self;
+        let Self { cycles, crc_errors, timing_errors, format_errors, device_errors, retrains, skipped_cycles, frames } =
+            self;
         write!(
             f,
             "{cycles} cycles, {skipped_cycles} left out, {timing_errors} with a frame missing; {crc_errors} bad checksums, "
         )?;
-        write!(f, "{format_errors} other refusals, {device_errors} device errors, {retrains} restarts")
+        write!(
+            f,
+            "{format_errors} other refusals, {device_errors} device errors, {retrains} restarts; device frames: {frames}"
+        )
     }
 }

@@ -13,14 +13,16 @@ pub enum Heard<'a> {
     Device {
         /// The frame.
         frame: DeviceFrameView<'a>,
-        /// Its start, in ns.
+        /// The cycle that it belongs to by its time; `None`: one that the host has left out.
+        cycle: Option<u64>,
+        /// Capture of its start, in ns.
         sof_ns: u64,
     },
 }
 
 servowire_core::one_line!(Heard<'_> {
     Self::StartUp => "start-up frame";
-    Self::Device { frame, sof_ns } => "{} at {} ns", frame, sof_ns;
+    Self::Device { frame, sof_ns, .. } => "{} at {} ns", frame, sof_ns;
 });
 
 impl<'a> Heard<'a> {
@@ -37,7 +39,7 @@ impl<'a> Heard<'a> {
     pub fn evidence(self, positions: Positions) -> Evidence {
         match self {
             Self::StartUp => Evidence::NEVER,
-            Self::Device { frame, sof_ns } => Evidence::of(frame, positions, sof_ns),
+            Self::Device { frame, sof_ns, .. } => Evidence::of(frame, positions, sof_ns),
         }
     }
 }

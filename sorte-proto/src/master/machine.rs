@@ -2,21 +2,26 @@
 
 use super::action::{Action, Outgoing};
 use super::config::{Config, Counters, State};
-use super::cycle::Cycle;
+use super::cycle::{Cycle, Cycles, Tallies};
 use crate::delay_req::DelayReq;
-use crate::discovery::Network;
+use crate::discovery::{MAX_DEVICES, Network};
 use crate::error::Error;
-use crate::exchange::emit_master_frame_into;
+use crate::exchange::write;
 use crate::frame_type::FrameType;
 use crate::line_delay::{LineDelay, SAMPLES};
 use crate::link::Link;
 use crate::param::{Param, Parameters};
 use crate::place::Place;
+use crate::preamble::Preamble;
+use crate::status::Status;
 use crate::sync::Sync;
+use crate::tally::{Fault, Tally};
 use crate::timing::TRIGGER_NS;
 
-/// From the last SYNC frame to the first of the exchange: the devices' first cycle.
-const SYNC_TO_EXCHANGE_NS: u64 = 10_000;
+/// From the last SYNC frame to the first of the exchange, as the published master has it: 10 us to its cycle zero, and 500 ns.
+const SYNC_TO_EXCHANGE_NS: u64 = 10_500;
+/// Answers to DISCOVERY that must tell the same line before the last one is sent: devices take part from the second on.
+pub(super) const AGREED: u8 = 2;
 /// When the answer to the last SYNC frame is looked at first.
 const LOOK_NS: u64 = 5000;
 
@@ -37,12 +42,14 @@ pub struct Master {
     /// PARAM: answers still needed, frames without one.
     pub(super) remaining: u16,
     pub(super) unanswered: u16,
-    /// Start of the start-up frame sent last.
+    /// Capture of the start of the start-up frame sent last.
     pub(super) sent_ns: u64,
     /// PARAM, LINE_DELAY: its answer is still to come.
     pub(super) asking: bool,
     /// DISCOVERY, SYNC: the answer that is needed has come.
     pub(super) answered: bool,
+    /// Patient DISCOVERY: answers in a row that told the same line.
+    pub(super) agreed: u8,
     /// SYNC: time stamp of the frame sent last.
     pub(super) sync_stamp_ns: u32,
     /// Where the master's time is 0.
@@ -52,7 +59,8 @@ pub struct Master {
     pub(super) stopping: Option<(Error, u32)>,
     pub(super) failures: u16,
     pub(super) good_cycles: u16,
-    pub(super) cycle: Cycle,
+    pub(super) cycles: Cycles,
+    pub(super) tallies: Tallies,
 }
 
 impl Master {
@@ -71,6 +79,7 @@ impl Master {
                 device_errors: 0,
                 retrains: 0,
                 skipped_cycles: 0,
+                frames: Tally::ZERO,
             },
             network: Network::EMPTY,
             line: LineDelay::new(config.delay_model),
@@ -81,13 +90,15 @@ impl Master {
             sent_ns: 0,
             asking: false,
             answered: false,
+            agreed: 0,
             sync_stamp_ns: 0,
             epoch_ns: 0,
             pending: None,
             stopping: None,
             failures: 0,
             good_cycles: 0,
-            cycle: Cycle::NEW,
+            cycles: Cycles::NEW,
+            tallies: [Tally::ZERO; MAX_DEVICES],
         }
     }
 
@@ -114,6 +125,11 @@ impl Master {
     /// Where the master's time, which SYNC gives to the devices, is 0.
     pub const fn epoch_ns(&self) -> u64 {
         self.epoch_ns
+    }
+
+    /// What became of the frames of the device `address` since the master was made; `None` for 0 and 255.
+    pub fn tally(&self, address: u8) -> Option<Tally> {
+        self.tallies.get(usize::from(address).checked_sub(1)?).copied()
     }
 
     /// Output bytes of the master frame.
@@ -210,7 +226,7 @@ impl Master {
     }
 
     /// The request handed out last has begun at `sof_ns`, as the port has captured it. Round trips count from there; where
-    /// a port does not tell, they count from the time at which the request was to be triggered.
+    /// a port does not tell, they count from where the capture of a request triggered at its time would be.
     pub const fn sent(&mut self, sof_ns: u64) {
         if matches!(self.state, State::LineDelay) && self.asking {
             self.sent_ns = sof_ns;
@@ -223,14 +239,18 @@ impl Master {
         self.next_ns = now_ns;
         self.answered = false;
         match state {
-            State::Discovery => self.network = Network::EMPTY,
+            State::Discovery => (self.network, self.agreed) = (Network::EMPTY, 0),
             State::Param => (self.remaining, self.unanswered) = (self.config.param_frames, 0),
             State::LineDelay => (self.line, self.asking) = (LineDelay::new(self.config.delay_model), false),
             State::Sync => {
                 self.epoch_ns = now_ns;
                 self.next_ns = now_ns.saturating_add(TRIGGER_NS.into());
             }
-            State::Exchange => self.cycle = Cycle::NEW,
+            // What SYNC has measured stays.
+            State::Exchange => {
+                let Cycles { end_ns, hop_ns, .. } = self.cycles;
+                self.cycles = Cycles { end_ns, hop_ns, ..Cycles::NEW };
+            }
             State::Idle | State::Error => {}
         }
     }
@@ -239,7 +259,8 @@ impl Master {
     fn send(&mut self, now_ns: u64, frame: Outgoing, period_ns: u64) -> Action {
         let at_ns = self.next_ns.max(now_ns);
         self.frame = self.frame.saturating_add(1);
-        (self.sent_ns, self.asking) = (at_ns, true);
+        self.sent_ns = at_ns.saturating_add(frame.preamble().capture_ns().into());
+        self.asking = true;
         self.next_ns = at_ns.saturating_add(period_ns);
         Action::Send { at_ns, frame }
     }
@@ -249,9 +270,16 @@ impl Master {
     }
 
     fn discovery(&mut self, now_ns: u64) -> Action {
-        let frames = self.config.discovery_frames;
-        if self.frame < frames {
-            let place = self.place(frames);
+        let (patient, frames) = (self.config.patient_discovery, self.config.discovery_frames);
+        // The patient one: until the last has come back whole, and not for ever.
+        let more =
+            if patient { !self.answered && self.frame < self.config.discovery_tries } else { self.frame < frames };
+        if more {
+            let place = match patient {
+                true if self.agreed >= AGREED => Place::Last,
+                true => Place::Inner,
+                false => self.place(frames),
+            };
             return self.send(now_ns, Outgoing::Discovery { place }, self.config.frame_period_ns);
         }
         let (got, want) = (self.network.devices(), self.config.min_devices.max(1));
@@ -329,7 +357,8 @@ impl Master {
             // A long line takes longer.
             return self.await_answer(now_ns, FrameType::Sync);
         }
-        self.enter(State::Exchange, self.sent_ns.saturating_add(SYNC_TO_EXCHANGE_NS));
+        let capture_ns = u64::from(Preamble::Middle.capture_ns());
+        self.enter(State::Exchange, self.sent_ns.saturating_sub(capture_ns).saturating_add(SYNC_TO_EXCHANGE_NS));
         self.catch_up(now_ns, self.config.cycle_ns);
         self.plan(now_ns)
     }
@@ -341,7 +370,7 @@ impl Master {
     }
 
     fn exchange(&mut self, now_ns: u64) -> Action {
-        if let Err(error) = self.close_cycle() {
+        if let Err(error) = self.close_cycles(now_ns) {
             self.give_up(error);
         }
         match &mut self.stopping {
@@ -360,43 +389,68 @@ impl Master {
         let (at_ns, cycle) = (self.next_ns, self.counters.cycles);
         self.counters.cycles = cycle.saturating_add(1);
         self.next_ns = at_ns.saturating_add(self.config.cycle_ns.into());
+        self.cycles.first.get_or_insert(cycle);
+        self.cycles.present = Some(Cycle::new(cycle, at_ns));
         let [low, high, ..] = self.time_ns(at_ns).to_le_bytes();
         Action::Exchange { at_ns, time_stamp: u16::from_le_bytes([low, high]), cycle, stop: self.stopping.is_some() }
     }
 
+    /// The next cycle is about to begin: the frames of the one before it are all there, or on their way if the host asks early.
+    /// Those of the one before that cannot come any more.
+    fn close_cycles(&mut self, now_ns: u64) -> Result<(), Error> {
+        let asked_ns = now_ns.saturating_sub(self.config.lead_ns.into());
+        let mut result = Ok(());
+        if let Some(before) = self.cycles.before.take() {
+            result = self.close(&before);
+        }
+        match self.cycles.present.take() {
+            Some(present) if asked_ns >= present.trigger_ns.saturating_add(self.cycles.end_ns.into()) => {
+                result.and(self.close(&present))
+            }
+            present => {
+                self.cycles.before = present;
+                result
+            }
+        }
+    }
+
     /// The cycle is over: who has not answered?
-    fn close_cycle(&mut self) -> Result<(), Error> {
-        let Cycle { open, damaged, damaged_in_a_row, silent_in_a_row, .. } = self.cycle;
-        let missing = u32::from(self.network.devices()).saturating_sub(self.cycle.count());
-        let silent = open && missing > 0;
-        let next = Cycle {
-            open: true,
-            damaged_in_a_row: if damaged { damaged_in_a_row.saturating_add(1) } else { 0 },
-            silent_in_a_row: if silent { silent_in_a_row.saturating_add(1) } else { 0 },
-            ..Cycle::NEW
-        };
-        let before = core::mem::replace(&mut self.cycle, next);
-        self.good_cycles = if silent || damaged { 0 } else { self.good_cycles.saturating_add(open.into()) };
+    fn close(&mut self, cycle: &Cycle) -> Result<(), Error> {
+        let devices = self.network.devices();
+        let first = self.cycles.first == Some(cycle.number);
+        let missing = if first { 0 } else { u32::from(devices).saturating_sub(cycle.count()) };
+        let (silent, damaged) = (missing > 0, cycle.damaged);
+        let run = |bad: bool, before: u8| if bad { before.saturating_add(1) } else { 0 };
+        let Cycles { damaged_in_a_row, silent_in_a_row, .. } = self.cycles;
+        let (damaged_in_a_row, silent_in_a_row) = (run(damaged, damaged_in_a_row), run(silent, silent_in_a_row));
+        (self.cycles.damaged_in_a_row, self.cycles.silent_in_a_row) = (damaged_in_a_row, silent_in_a_row);
+        self.cycles.fault = silent || damaged || cycle.disorderly;
+        self.good_cycles = if silent || damaged { 0 } else { self.good_cycles.saturating_add(1) };
         if self.good_cycles >= 1000 {
             self.failures = 0;
         }
         if silent {
             self.counters.timing_errors = self.counters.timing_errors.saturating_add(1);
+            self.counters.frames.missed = self.counters.frames.missed.saturating_add(missing);
+            for (_, tally) in (1..=devices).zip(&mut self.tallies).filter(|(address, _)| !cycle.has(*address)) {
+                tally.add(Fault::Missed);
+            }
         }
         let limit = self.config.retrain_crc_errors;
-        if limit != 0 && next.damaged_in_a_row >= limit {
-            return Err(Error::TooManyCrcErrors { cycles: next.damaged_in_a_row });
+        if limit != 0 && damaged_in_a_row >= limit {
+            return Err(Error::TooManyCrcErrors { cycles: damaged_in_a_row });
         }
         let limit = self.config.retrain_timing_errors;
-        if limit != 0 && next.silent_in_a_row >= limit {
-            let first = (1..=self.network.devices()).find(|a| !before.has(*a)).unwrap_or_default();
+        if limit != 0 && silent_in_a_row >= limit {
+            let first = (1..=devices).find(|address| !cycle.has(*address)).unwrap_or_default();
             let count = u8::try_from(missing).unwrap_or(u8::MAX);
-            return Err(Error::DevicesMissing { first, count, cycles: next.silent_in_a_row });
+            return Err(Error::DevicesMissing { first, count, cycles: silent_in_a_row });
         }
         Ok(())
     }
 
-    /// Writes the master frame for an [`Action::Exchange`] and gives its length. Output bytes that are not given are 0.
+    /// Writes the master frame for an [`Action::Exchange`] and gives its length. Its STATUS has ERROR if the cycle closed last had a
+    /// device frame that was damaged, missing, doubled or not at its time: an addition of this crate, published devices do not look.
     ///
     /// # Errors
     /// [`Error::OutputLength`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
@@ -405,6 +459,7 @@ impl Master {
         if got != want {
             return Err(Error::OutputLength { got, want });
         }
-        emit_master_frame_into(output, time_stamp, into)
+        let status = if self.cycles.fault { Status::EXCHANGE.union(Status::ERROR) } else { Status::EXCHANGE };
+        write(status, output, time_stamp, into)
     }
 }

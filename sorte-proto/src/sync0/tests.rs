@@ -345,3 +345,13 @@ fn deferred_programming_misses_what_is_before_its_handler() {
         assert_ne!(rise(missed), Some(8000 + u64::from(missed) + 5), "{latency}");
     }
 }
+
+/// The lossless machine ends an overlapping pulse at 600 ns of the next cycle at the earliest: 3990 before the end of the pulse.
+#[test]
+fn an_overlapping_pulse_ends_600_ns_into_its_cycle_at_the_earliest() {
+    for (start, cmp6) in [(1389, 3389), (1390, 600), (2585, 600), (2590, 600), (2591, 601), (3990, 2000)] {
+        let mut generator = Sync0::new(Variant::Lossless);
+        let writes: Vec<Write> = generator.cmp7(StartTime::new(start)).into_iter().collect();
+        assert!(writes.contains(&Write { register: Register::Cmp6, value: cmp6 }), "{start}: {writes:?}");
+    }
+}

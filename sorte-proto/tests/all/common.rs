@@ -1,6 +1,7 @@
 //! A device on its way through the start-up, for several test programs.
 
 use sorte_proto::device::{Config, Device, FrameTimes, PortId, State, Trigger};
+use sorte_proto::master::Outgoing;
 use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place};
 
 /// A device in the state that waits for a frame, the last of the line or not. Its frames begin at 77,000 ns of its counter.
@@ -28,3 +29,14 @@ pub(crate) fn device_in(state: State, last: bool, parameters: Parameters) -> Dev
     assert_eq!(device.state(), state);
     device
 }
+
+/// From the first bit of a frame to the capture of its start, half a byte before the end of 0xD5: preambles of 8, 4 and 2 bytes.
+pub(crate) fn capture_ns(frame: &Outgoing) -> u64 {
+    match frame {
+        Outgoing::Sync(_) => 280,
+        _ => 600,
+    }
+}
+
+/// The same for the frames of the exchange.
+pub(crate) const EXCHANGE_CAPTURE_NS: u64 = 120;

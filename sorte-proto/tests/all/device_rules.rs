@@ -2,8 +2,8 @@
 
 use sorte_proto::Link;
 use sorte_proto::Place;
-use sorte_proto::device::{Config, Device, FrameTimes, HeardSync, Path, PortId, State, Trigger};
-use sorte_proto::{DelayReq, Discovery, Param, Parameters, Status, Sync, emit_master_frame_into};
+use sorte_proto::device::{Action, Config, Device, FrameTimes, HeardSync, Path, PortId, State, Trigger};
+use sorte_proto::{DelayReq, Discovery, Param, Parameters, Status, Sync};
 
 const OTHER: Parameters = Parameters { cycle_time_ns: 31_250, ..Parameters::STOCK };
 
@@ -124,30 +124,12 @@ fn a_start_up_state_waits_20_ms_for_its_own_frame() {
     let mut device = between(State::Param);
     feed(&mut device, PortId::A, &Discovery::request(Place::Inner).emit(), 19_000_000);
     feed(&mut device, PortId::B, &param(Parameters::STOCK, Place::Inner), 19_000_000);
-    assert!(!device.poll(20_000_000));
-    assert!(device.clone().poll(20_000_001));
+    assert_ne!(device.poll(0, 20_000_000), Action::Restart);
+    assert_eq!(device.clone().poll(0, 20_000_001), Action::Restart);
     feed(&mut device, PortId::A, &param(Parameters::STOCK, Place::Inner), 19_000_000);
-    assert!(!device.poll(39_000_000));
-    assert!(device.poll(39_000_001));
+    assert_ne!(device.poll(0, 39_000_000), Action::Restart);
+    assert_eq!(device.poll(0, 39_000_001), Action::Restart);
     assert_eq!(device.state(), State::Idle);
-}
-
-#[test]
-fn the_sixth_cycle_without_a_frame_restarts() {
-    let mut frame = [0; 21];
-    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
-    let mut device = last_in_exchange(Parameters::CNC, Sync::of_master(30_500, 76, Place::Last));
-    for _ in 0..2 {
-        device.hear_exchange(&frame, 576, 1300).unwrap();
-        assert!(!device.cycle_start());
-        assert_eq!(device.missed_frames(), 0);
-        for missed in 1..=5 {
-            assert!(!device.cycle_start());
-            assert_eq!(device.missed_frames(), missed);
-        }
-    }
-    assert!(device.cycle_start());
-    assert_eq!((device.state(), device.missed_frames()), (State::Idle, 0));
 }
 
 #[test]
@@ -215,5 +197,43 @@ fn what_comes_back_passes_unchanged() {
         let (mut device, mut passing) = (between(state), frame.clone());
         assert_eq!(device.hear(PortId::B, &mut passing, at(0)).path, Path::Forward);
         assert_eq!(passing, frame, "{state:?}");
+    }
+}
+
+/// A device was the last one at port A; then another was plugged in behind it, and the master came in at B.
+#[test]
+fn a_device_that_is_no_longer_last_looks_for_its_master_anew() {
+    let mut device = Device::new(Config::new());
+    device.set_links(Link::Up, Link::Down);
+    assert_eq!(device.master_port(), Some(PortId::A));
+    device.set_links(Link::Up, Link::Up);
+    assert_eq!((device.master_port(), device.is_last()), (None, false));
+    feed(&mut device, PortId::B, &Discovery::request(Place::Inner).emit(), 0);
+    assert_eq!(device.master_port(), Some(PortId::B));
+    assert_eq!(device.port(PortId::A).state, State::Idle);
+}
+
+/// What it has counted stays, whoever makes it start again.
+#[test]
+fn counters_outlive_a_restart() {
+    let mut device = between(State::Param);
+    let before = device.counters();
+    assert!(before.good_frames > 0 && before.a.good_frames > 0 && before.b.good_frames > 0);
+    device.reset();
+    let after = device.counters();
+    assert_eq!(
+        (after.good_frames, after.a, after.b, after.master),
+        (before.good_frames, before.a, before.b, before.master)
+    );
+    assert_eq!(after.retrains, before.retrains + 1);
+}
+
+/// 254 devices with the longest cables that can be measured are 8 times 65,536 ns away.
+#[test]
+fn the_long_delay_goes_up_to_eight_wraps() {
+    for wraps in 0..=9_u32 {
+        let delay = wraps * 65_536 + 85;
+        let sync = Sync { time_stamp_ns: 780 + delay, delay_ns: 85, ..Sync::of_master(0, 0, Place::Last) };
+        assert_eq!(sync.long_delay_ns(1_000_000), (wraps <= 8).then_some(delay), "{wraps}");
     }
 }

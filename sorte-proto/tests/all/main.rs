@@ -14,6 +14,7 @@ mod both_ends;
 mod common;
 mod device_rules;
 mod event_order;
+mod exchange_rules;
 mod master_rules;
 mod one_check;
 #[cfg(feature = "serde")]

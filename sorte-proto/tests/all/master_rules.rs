@@ -1,11 +1,13 @@
 //! Rules of the master, one by one: when it waits, what it counts as an answer, why it gives up, and what it counts.
 
+use crate::common::{EXCHANGE_CAPTURE_NS, capture_ns};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::master::{Action, Config, Counters, Heard, Master, Outgoing, State};
+use sorte_proto::timing::Slots;
 use sorte_proto::{
     DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, FrameType, Param, Parameters,
-    RoundTrips, Status, Sync, fcs,
+    RoundTrips, Status, Sync, Tally, fcs,
 };
 
 /// What device `n` of so many adds to STATUS.
@@ -63,7 +65,7 @@ impl Bench {
                 Action::Send { at_ns, frame } => {
                     self.sent.push((at_ns, frame));
                     if let Some(bytes) = reply(self.sent.len() - 1, frame) {
-                        let _: Result<_, _> = self.master.hear(&bytes, at_ns + ROUND_TRIP);
+                        let _: Result<_, _> = self.master.hear(&bytes, at_ns + capture_ns(&frame) + ROUND_TRIP);
                     }
                 }
                 Action::Exchange { at_ns, .. } => return Ok(at_ns),
@@ -81,7 +83,7 @@ impl Bench {
                 Action::Send { at_ns, frame } => {
                     bench.sent.push((at_ns, frame));
                     if kind(frame) != state {
-                        bench.master.hear(&answer(frame, 2), at_ns + ROUND_TRIP).unwrap();
+                        bench.master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + ROUND_TRIP).unwrap();
                     }
                 }
                 other => panic!("{other:?}"),
@@ -90,11 +92,17 @@ impl Bench {
         bench
     }
 
+    /// A device frame of the cycle that began last, at its published time: two devices 76 ns apart.
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let slot = if bytes[0] == 1 { 576 } else { 900 + 76 + 355 };
+        self.master.hear(bytes, self.now_ns - 500 + slot + EXCHANGE_CAPTURE_NS).map(|_| ())
+    }
+
     /// So many cycles with both devices heard; the last is still open.
     fn cycles(&mut self, count: u32) {
         for _ in 0..count {
             for address in [1, 2] {
-                self.master.hear(&device_frame(address), 0).unwrap();
+                self.hear(&device_frame(address)).unwrap();
             }
             self.now_ns += 4000;
             assert!(matches!(self.master.poll(self.now_ns), Action::Exchange { stop: false, .. }));
@@ -255,7 +263,7 @@ fn only_a_long_line_is_told_the_period_of_sync() {
     for (long, want) in [(false, 0), (true, 2000)] {
         let bench = Bench::until(Config::new().with_long_line(long), State::Param);
         let Some((_, Outgoing::Param(param))) = bench.sent.last() else { panic!("no PARAM") };
-        assert_eq!((param.parameters.sync_cycle, param.parameters.cycle_time_ns), (want, 10_000));
+        assert_eq!((param.parameters.sync_cycle, param.parameters.cycle_time_ns), (want, 4000));
     }
 }
 
@@ -263,14 +271,14 @@ fn only_a_long_line_is_told_the_period_of_sync() {
 fn a_delay_request_has_a_millisecond_to_come_back() {
     let mut bench = Bench::until(Config::new(), State::LineDelay);
     let (asked_ns, _) = *bench.sent.last().unwrap();
-    let until_ns = asked_ns + 1_000_000;
+    let until_ns = asked_ns + 600 + 1_000_000;
     assert_eq!(bench.master.poll(asked_ns), Action::Wait { until_ns });
     // DELAY_RESP tells nothing.
     let mut response = DelayReq::of_device(Place::Inner).emit();
     (response[2], response[3]) = (FrameType::DelayResp.code(), 0x30);
     let (body, trailer) = response.split_last_chunk_mut().unwrap();
     *trailer = fcs(body).to_le_bytes();
-    assert_eq!(bench.master.hear(&response, asked_ns + 500), Ok(Heard::StartUp));
+    assert_eq!(bench.master.hear(&response, asked_ns + 600 + 500), Ok(Heard::StartUp));
     assert_eq!(bench.master.line_delay().count(), 0);
     assert_eq!(bench.master.poll(until_ns - 1), Action::Wait { until_ns });
     let error = Error::NoAnswer { sent: FrameType::DelayReq, frame: 0 };
@@ -278,7 +286,7 @@ fn a_delay_request_has_a_millisecond_to_come_back() {
     // One answer to one request.
     let mut bench = Bench::until(Config::new(), State::LineDelay);
     for _ in 0..3 {
-        bench.master.hear(&DelayReq::of_master(Place::Inner).emit(), asked_ns + ROUND_TRIP).unwrap();
+        bench.master.hear(&DelayReq::of_master(Place::Inner).emit(), asked_ns + 600 + ROUND_TRIP).unwrap();
     }
     assert_eq!(
         (bench.master.line_delay().count(), bench.master.line_delay().extremes()),
@@ -289,7 +297,9 @@ fn a_delay_request_has_a_millisecond_to_come_back() {
 #[test]
 fn a_round_trip_that_cannot_be_ends_it() {
     let mut bench = Bench::new(Config::new());
-    let fast = |master: &mut Master, at_ns: u64, frame| master.hear(&answer(frame, 2), at_ns + 319).map(|_| ());
+    let fast = |master: &mut Master, at_ns: u64, frame| {
+        master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 319).map(|_| ())
+    };
     let error = loop {
         match bench.master.poll(bench.now_ns) {
             Action::Wait { until_ns } => bench.now_ns = until_ns,
@@ -367,11 +377,11 @@ fn a_thousand_good_cycles_forgive_a_failure() {
         bench.now_ns = bench.run(|_, frame| Some(answer(frame, 2))).unwrap();
         bench.cycles(999);
         for &address in heard {
-            bench.master.hear(&device_frame(address), 0).unwrap();
+            bench.hear(&device_frame(address)).unwrap();
         }
         let mut frame = device_frame(1);
         frame[3] ^= 1;
-        assert!(!damaged || bench.master.hear(&frame, 0).is_err());
+        assert!(!damaged || bench.hear(&frame).is_err());
         bench.now_ns += 4000;
         assert!(matches!(bench.master.poll(bench.now_ns), Action::Exchange { stop: false, .. }));
         bench.master.set_link(Link::Down);
@@ -388,7 +398,7 @@ fn what_is_missing_is_counted_and_named() {
     bench.cycles(5);
     let mut error = None;
     for n in 0..3 {
-        bench.master.hear(&device_frame(1), 0).unwrap();
+        bench.hear(&device_frame(1)).unwrap();
         bench.now_ns += 4000;
         match bench.master.poll(bench.now_ns) {
             Action::Exchange { .. } => assert!(n < 2),
@@ -399,13 +409,17 @@ fn what_is_missing_is_counted_and_named() {
     assert_eq!(error, Some(Error::DevicesMissing { first: 2, count: 1, cycles: 3 }));
     // Cycles 5, 6 and 7; the first was number 0.
     assert_eq!((counters(&bench).timing_errors, counters(&bench).cycles, counters(&bench).retrains), (3, 8, 1));
+    assert_eq!(
+        (counters(&bench).frames.missed, bench.master.tally(1), bench.master.tally(2).map(|t| t.missed)),
+        (3, Some(Tally::default()), Some(3))
+    );
 }
 
 #[test]
 fn a_device_frame_must_fit_what_discovery_found() {
     let changed = |bytes: [u8; 6]| {
         let mut bench = running(Config::new());
-        let result = bench.master.hear(&bytes, 0).map(|_| ());
+        let result = bench.hear(&bytes);
         (result, bench.master.poll(bench.now_ns))
     };
     let of = |address: u8, status: Status| {
@@ -421,13 +435,13 @@ fn a_device_frame_must_fit_what_discovery_found() {
     }
     assert_eq!(changed(device_frame(2)).0, Ok(()));
     let mut bench = running(Config::new());
-    bench.master.hear(&of(1, Status::ERROR), 0).unwrap();
-    bench.master.hear(&of(2, Status::LAST), 0).unwrap();
+    bench.hear(&of(1, Status::ERROR)).unwrap();
+    bench.hear(&of(2, Status::LAST)).unwrap();
     assert_eq!(counters(&bench).device_errors, 1);
     let mut damaged = device_frame(1);
     damaged[3] ^= 1;
-    assert!(bench.master.hear(&damaged, 0).is_err());
-    assert!(bench.master.hear(&damaged[..5], 0).is_err());
+    assert!(bench.hear(&damaged).is_err());
+    assert!(bench.hear(&damaged[..5]).is_err());
     assert_eq!((counters(&bench).crc_errors, counters(&bench).format_errors), (1, 1));
     let mut idle = Master::new(Config::new());
     assert_eq!(idle.hear(&device_frame(1), 0), Err(Error::WrongState));
@@ -463,7 +477,55 @@ fn the_master_frame_has_as_many_bytes_as_the_line_and_sixteen_at_least() {
     assert_eq!(bench.master.output_len(), 16);
     assert_eq!(bench.master.emit_into(&[1; 16], 7, &mut buffer), Ok(21));
     assert_eq!(bench.master.emit_into(&[1; 8], 7, &mut buffer), Err(Error::OutputLength { got: 8, want: 16 }));
-    bench = Bench::new(Config::new().with_cycle_ns(8000).with_sync_frames(2));
+    bench = Bench::new(Config::new().with_cycle_ns(8000).with_sync_frames(2).with_slots(Slots::rule(76)));
     bench.run(|_, frame| Some(answer(frame, 5))).unwrap();
     assert_eq!((bench.master.output_len(), bench.master.network().devices()), (20, 5));
+}
+
+/// Taking the enable bit away forgives what has failed before.
+#[test]
+fn a_disabled_master_has_not_failed() {
+    let mut bench = Bench::new(Config::new().with_max_failures(2));
+    for _ in 0..3 {
+        assert!(bench.run(|_, _| None).is_err());
+        assert_eq!(bench.master.state(), State::Idle);
+        bench.master.disable();
+        bench.master.enable();
+    }
+    assert!(bench.run(|_, _| None).is_err() && bench.run(|_, _| None).is_err());
+    assert_eq!(bench.master.state(), State::Error);
+}
+
+/// PARAM frames without an answer count from the start of their phase, not from the start-up before.
+#[test]
+fn unanswered_frames_of_a_start_up_before_are_forgotten() {
+    let mut bench = Bench::new(Config::new().with_param_tries(3));
+    for _ in 0..2 {
+        let (mut silent, mut bad) = (0, false);
+        let end = bench.run(|_, frame| {
+            let lost = matches!(frame, Outgoing::Param(_)) && silent < 2;
+            silent += u32::from(lost);
+            // The first start-up ends in LINE_DELAY, the second one runs.
+            bad |= matches!(frame, Outgoing::DelayReq(_));
+            (!lost).then(|| answer(frame, 2))
+        });
+        assert!(end.is_ok() && bad, "{end:?}");
+        bench.master.set_link(Link::Down);
+        assert!(matches!(bench.master.poll(bench.now_ns), Action::Restart { .. }));
+        bench.master.set_link(Link::Up);
+    }
+    // In the middle of the phase: two are open when the link goes.
+    let mut open = Bench::until(Config::new().with_param_tries(3), State::Param);
+    open.now_ns += 1_000_000;
+    assert!(matches!(open.master.poll(open.now_ns), Action::Send { .. }));
+    open.master.set_link(Link::Down);
+    open.master.set_link(Link::Up);
+    assert!(matches!(open.master.poll(open.now_ns), Action::Restart { .. }));
+    let mut silent = 0;
+    let end = open.run(|_, frame| {
+        let lost = matches!(frame, Outgoing::Param(_)) && silent < 2;
+        silent += u32::from(lost);
+        (!lost).then(|| answer(frame, 2))
+    });
+    assert!(end.is_ok(), "{end:?}");
 }

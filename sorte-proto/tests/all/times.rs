@@ -1,6 +1,6 @@
 //! Times and limits of master and device as numbers of the published firmware, not of the functions under test.
 
-use crate::common::device_in;
+use crate::common::{EXCHANGE_CAPTURE_NS, capture_ns, device_in};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, PortId};
@@ -43,7 +43,7 @@ fn running(config: master::Config) -> (Master, Vec<(u64, Outgoing)>, (u64, u16))
             Action::Send { at_ns, frame } => {
                 sent.push((at_ns, frame));
                 // 472 ns of round trip: a line of 76 ns.
-                assert_eq!(master.hear(&answer(frame, 2), at_ns + 472), Ok(Heard::StartUp));
+                assert_eq!(master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 472), Ok(Heard::StartUp));
             }
             Action::Exchange { at_ns, time_stamp, cycle, .. } => {
                 assert_eq!(cycle, 0);
@@ -75,9 +75,9 @@ fn the_start_up_has_the_published_times() {
             }
         }
     }
-    assert_eq!((first_ns, master.epoch_ns()), (46_240_500, 36_000_000));
-    // The time stamp is that of this frame: 10,240,500 modulo 65,536.
-    assert_eq!(stamp, 16_884);
+    assert_eq!((first_ns, master.epoch_ns()), (46_241_000, 36_000_000));
+    // The time stamp is that of this frame: 10,241,000 modulo 65,536.
+    assert_eq!(stamp, 17_384);
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn each_cycle_has_its_own_time_stamp() {
     let (mut master, _, (mut at_ns, mut stamp)) = running(master::Config::new());
     for cycle in 1..100 {
         for address in 1..=2 {
-            good_frame(&mut master, address);
+            good_frame(&mut master, address, at_ns);
         }
         let Action::Wait { until_ns } = master.poll(at_ns) else { panic!("no wait") };
         assert_eq!(until_ns, at_ns + 4000);
@@ -105,8 +105,13 @@ fn device_frame(address: u8) -> [u8; 6] {
     bytes
 }
 
-fn good_frame(master: &mut Master, address: u8) {
-    assert!(master.hear(&device_frame(address), 0).is_ok());
+/// Capture of a device's frame of the cycle that was triggered at `at_ns`: published times, 76 ns to the first device, none between.
+fn capture_of(address: u8, at_ns: u64) -> u64 {
+    at_ns - 500 + if address == 1 { 500 + 76 } else { 900 + 76 + 355 } + EXCHANGE_CAPTURE_NS
+}
+
+fn good_frame(master: &mut Master, address: u8, at_ns: u64) {
+    assert!(master.hear(&device_frame(address), capture_of(address, at_ns)).is_ok());
 }
 
 /// Runs cycles in which `bad(n)` devices are heard right; gives the cycle in which the master gave up.
@@ -116,7 +121,7 @@ fn cycles(master: &mut Master, mut at_ns: u64, frames: impl Fn(u32) -> [Option<b
             let mut bytes = device_frame(address);
             bytes[2] ^= u8::from(good == Some(false));
             if good.is_some() {
-                let _: Result<_, _> = master.hear(&bytes, 0);
+                let _: Result<_, _> = master.hear(&bytes, capture_of(address, at_ns));
             }
         }
         at_ns += 4000;
@@ -168,10 +173,10 @@ fn the_last_sync_needs_last_and_state_change() {
                 Action::Send { at_ns, frame: Outgoing::Sync(mut frame) } => {
                     frame.pass(0, Status::empty());
                     frame.status = Status::from_bits_retain(status);
-                    let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 472);
+                    let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 280 + 472);
                 }
                 Action::Send { at_ns, frame } => {
-                    let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + 472);
+                    let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 472);
                 }
                 Action::Exchange { .. } => break true,
                 Action::Restart { .. } => break false,
@@ -195,31 +200,48 @@ fn device_in_exchange() -> Device {
 fn a_device_enters_the_exchange_ten_microseconds_after_the_last_sync() {
     let device = device_in_exchange();
     assert_eq!(device.cycle_zero_ns(), Some(87_000));
-    // In the common time: triggered at 30,500, the next frame at 40,500, its cycle 500 ns before.
-    assert_eq!((device.first_cycle_ns(), device.delay_ns()), (Some(40_000), Some(76)));
+    // In the common time: triggered at 30,500, the first cycle 10 us later.
+    assert_eq!((device.first_cycle_ns(), device.delay_ns()), (Some(40_500), Some(76)));
     // The first address sends at 500 ns and owns the first bytes.
     let place = device.assignment().unwrap();
     assert_eq!((place.address.get(), place.in_offset, place.out_offset), (1, 0, 0));
     assert_eq!(device.send_time_ns(), Some(500));
 }
 
-/// The clock's target in the exchange is the delay plus 500, and the reference time is the stamp plus the delay.
+/// The master frame of a cycle: the device's cycle 0 begins at 40,500 ns.
+fn master_frame(cycle: u32, fill: u8) -> [u8; 21] {
+    let mut frame = [0; 21];
+    let trigger = 40_500 + 4000 * cycle + 500;
+    emit_master_frame_into(&[fill; 16], trigger as u16, &mut frame).unwrap();
+    frame
+}
+
+/// When it is captured at the device, which is 76 ns away: 120 ns after its first bit.
+fn captured(cycle: u32) -> FrameTimes {
+    let sof_ns = 40_500 + 4000 * cycle + 500 + 76 + 120;
+    FrameTimes { sof_ns, counter_ns: sof_ns + 2500, now_ns: u64::from(sof_ns) }
+}
+
+/// The clock's target in the exchange is the delay plus 500 plus the 120 ns to the capture; the reference time is the stamp plus the
+/// delay.
 #[test]
 fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
-    let mut device = device_in_exchange();
-    let mut frame = [0; 21];
-    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
-    for n in 1..=16 {
-        // 23 ns late each time.
-        let output = device.hear_exchange(&frame, 500 + 76 + 23, 2000).unwrap();
-        assert_eq!(output.reference_ns, 1076);
-        let want = if n == 16 { Correction::Rate { increment: 4, ticks: 23 } } else { Correction::None };
-        assert_eq!(output.correction, want);
-    }
-    // A sum of 0 counts as positive.
-    for n in 1..=16 {
-        let want = if n == 16 { Correction::Rate { increment: 6, ticks: 0 } } else { Correction::None };
-        assert_eq!(device.hear_exchange(&frame, 500 + 76, 2000).unwrap().correction, want);
+    for (late, ticks, increment) in [(23, 23, 4), (0, 0, 6)] {
+        let mut device = device_in_exchange();
+        for cycle in 0..16 {
+            let mut times = captured(cycle);
+            times.sof_ns += late;
+            let frame = master_frame(cycle, 7);
+            let output = device.hear_exchange(&frame, times).unwrap();
+            assert_eq!(
+                (output.reference_ns, output.cycle),
+                (u32::from((41_000 + 4000 * cycle) as u16) + 76, u64::from(cycle))
+            );
+            assert_eq!((output.trigger_ns, output.age_ns(times.counter_ns)), (41_000 + 4000 * cycle, 2500 + 196));
+            // A sum of 0 counts as positive.
+            let want = if cycle == 15 { Correction::Rate { increment, ticks } } else { Correction::None };
+            assert_eq!(output.correction, want);
+        }
     }
 }
 
@@ -227,14 +249,14 @@ fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
 #[test]
 fn an_error_is_told_once() {
     let mut device = device_in_exchange();
-    let mut frame = [0; 21];
-    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
+    device.hear_exchange(&master_frame(0, 7), captured(0)).unwrap();
+    let mut frame = master_frame(1, 7);
     frame[3] ^= 1;
     let mut told = Vec::new();
     for _ in 0..3 {
         told.push(device.answer([0; 3]).unwrap().status.bits());
         if told.len() == 1 {
-            assert!(matches!(device.hear_exchange(&frame, 576, 2000), Err(Error::BadCrc8 { .. })));
+            assert!(matches!(device.hear_exchange(&frame, captured(1)), Err(Error::BadCrc8 { .. })));
         }
     }
     // LAST; LAST and ERROR; LAST.

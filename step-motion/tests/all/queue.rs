@@ -94,7 +94,7 @@ fn compare(hz: u32, limits: Limits, target: i64, reach: u32) -> Result<(), TestC
     axis = axis.with_reach(reach);
     let mut machine = Machine::new(timer);
     axis.move_to(target).unwrap();
-    prop_assert_eq!(run(&mut axis, &mut machine, u64::from(reach) / 3 + 1, u64::MAX), Work::Rest);
+    prop_assert_eq!(run(&mut axis, &mut machine, u64::from(reach) / 16 + 1, u64::MAX), Work::Rest);
     prop_assert_eq!((machine.position, axis.commanded()), (target, target));
     prop_assert!(axis.is_at_rest());
     let most = (0.75 + 1.5 / f64::from(finer)).max(25e-9 * f64::from(hz));

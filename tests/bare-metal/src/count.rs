@@ -34,13 +34,25 @@ pub(crate) fn tenths<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I]) ->
 }
 
 /// The same of a kernel that works on a state.
-#[cfg(feature = "servowire-core")]
+#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
 pub(crate) fn tenths_on<S, I, O>(state: &mut S, kernel: fn(&mut S, &'static I) -> O, inputs: &'static [I]) -> u32 {
     let rounds = CALLS.div_ceil(inputs.len());
     let (kernel, empty) = black_box((kernel, nothing_on::<S, I, O> as fn(&mut S, &'static I) -> _));
     let with = ticks(|input| kernel(state, input), inputs, rounds);
     let without = ticks(|input| empty(state, input), inputs, rounds);
     each(with, without, rounds * inputs.len())
+}
+
+/// Tenths of an instruction of the dearest of many calls, to a tick, whatever comes with it between two looks at the clock.
+#[cfg(feature = "step-motion")]
+pub(crate) fn most_tenths(calls: usize, mut call: impl FnMut() -> bool) -> u32 {
+    let mut most = 0;
+    for _ in 0..calls {
+        let begin = SYST::get_current();
+        black_box(call());
+        most = most.max(begin.wrapping_sub(SYST::get_current()) & RELOAD);
+    }
+    most * INSTRUCTIONS_PER_TICK as u32 * 10
 }
 
 /// Tenths of an instruction for each call, from the ticks of all calls with and without what is measured.
@@ -69,7 +81,7 @@ fn nothing<I, O>(_: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()
 }
 
-#[cfg(feature = "servowire-core")]
+#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
 #[inline(never)]
 fn nothing_on<S, I, O>(_: &mut S, _: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()

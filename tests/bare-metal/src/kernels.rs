@@ -33,6 +33,8 @@ mod sorte;
 mod step_motion;
 #[cfg(feature = "step-profile")]
 mod step_profile;
+#[cfg(feature = "step-motion")]
+mod step_timer;
 #[cfg(feature = "tformat")]
 mod tformat;
 #[cfg(feature = "tformat")]
@@ -65,6 +67,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     rtex::KERNELS,
     #[cfg(feature = "sorte-proto")]
     sorte::KERNELS,
+    #[cfg(feature = "step-motion")]
+    step_timer::KERNELS,
     #[cfg(feature = "step-motion")]
     step_motion::KERNELS,
     #[cfg(feature = "step-profile")]
@@ -108,3 +112,21 @@ macro_rules! kernels {
     };
 }
 use kernels;
+
+/// As [`kernels`], for kernels that work on a state, each with how it is measured.
+#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+macro_rules! kernels_on_states {
+    ($($(#[$doc:meta])* fn $name:ident($state:tt: &mut $of:ty, $input:tt: &$from:ty) -> $to:ty $body:block as $tenths:block)*) => {
+        $(
+            $(#[$doc])*
+            #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+            #[inline(never)]
+            #[unsafe(no_mangle)]
+            fn $name($state: &mut $of, $input: &'static $from) -> $to $body
+        )*
+
+        pub(crate) const KERNELS: &[$crate::kernels::Kernel] = &[$($crate::kernels::Kernel { name: stringify!($name), tenths: || $tenths },)*];
+    };
+}
+#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+use kernels_on_states;

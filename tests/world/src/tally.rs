@@ -63,17 +63,11 @@ impl Tally {
 
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} events: {} transmissions, {} spurious, {} collisions; ",
-            self.events(),
-            self.sent,
-            self.spurious,
-            self.collisions
-        )?;
+        write!(f, "{} faults:", self.all_faults())?;
+        Kind::ALL.iter().try_for_each(|kind| write!(f, " {kind:?} {}", self.of(*kind)))?;
+        write!(f, "; {} transmissions, {} spurious, {} collisions; ", self.sent, self.spurious, self.collisions)?;
         write!(f, "units heard by devices {}, by the host {} (", self.heard, self.for_host)?;
         write!(f, "delivered {} in {} blocks, missed {}, ", self.delivered, self.blocks, self.missed)?;
-        write!(f, "swallowed {}, overrun {}); faults:", self.swallowed, self.overrun)?;
-        Kind::ALL.iter().try_for_each(|kind| write!(f, " {kind:?} {}", self.of(*kind)))
+        write!(f, "swallowed {}, overrun {})", self.swallowed, self.overrun)
     }
 }

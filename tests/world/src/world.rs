@@ -169,6 +169,11 @@ impl World {
         self.transmit(Speaker::Device(device), Some(request), message, at_ns)
     }
 
+    /// Somebody whom nobody asked sends, from `at_ns` on: a second master, for example.
+    pub fn intrude(&mut self, message: &Message, at_ns: u64) -> Id {
+        self.transmit(Speaker::Foreign, None, message, at_ns)
+    }
+
     /// A device did something that cannot be undone.
     pub fn act(&mut self, device: u8, what: &'static str, request: Id) {
         self.truth.acts.push(Act { device, what, at_ns: self.now_ns, request });

@@ -35,7 +35,7 @@ enum Sent {
     Confirmed,
 }
 
-/// Reads or writes one EEPROM byte of a page.
+/// Reads or writes one EEPROM byte of a page, at an address below that of the page register.
 ///
 /// An encoder that has started anew is on page 0 and does not say so. So the page register is read before and after every
 /// access; the page is selected if the register holds another one. A written byte is read back, and the access waits while
@@ -171,6 +171,8 @@ impl EepromAccess {
             Phase::CheckAfter if self.written != Sent::Not => {
                 Step::Failed { error: Error::EffectUnknown { because: ErrorClass::DataMismatch }, ready_ns }
             }
+            // Another page is not selected in vain yet.
+            Phase::CheckBefore if self.selection == Sent::Not => self.enter(Phase::Select, ready_ns),
             Phase::CheckBefore | Phase::CheckAfter => {
                 let confirmed = core::mem::replace(&mut self.selection, Sent::Not) == Sent::Confirmed;
                 self.differs(

@@ -92,6 +92,8 @@ pub struct Transaction {
     echo_fault: Option<u8>,
     /// Why the first bytes that were as many as a response has were none.
     refused: Option<Error>,
+    /// A framing error came where a response might have begun.
+    broken: bool,
     /// End of the last byte.
     heard_ns: u64,
     until_ns: u64,
@@ -127,6 +129,7 @@ impl Transaction {
             echoed: 0,
             echo_fault: None,
             refused: None,
+            broken: false,
             heard_ns: asked_ns,
             until_ns: waited_ns.saturating_add(field_ns),
             latest_ns: waited_ns.saturating_add(fields_ns),
@@ -183,10 +186,9 @@ impl Transaction {
             if end_ns < self.earliest_ns {
                 self.echo_fault = self.echo_fault.or(Some(0));
             } else {
-                let error = Error::Delimiter { field: self.len };
-                self.refused = self.refused.or(Some(error));
+                self.broken = true;
                 if self.len > 0 || end_ns > self.until_ns {
-                    self.finish(Err(error));
+                    self.finish(Err(Error::Delimiter { field: self.len }));
                 }
             }
         }
@@ -314,6 +316,7 @@ impl Transaction {
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
         let error = match (self.refused, heard, self.echo_fault) {
             (Some(error), ..) => error,
+            _ if self.broken => Error::Delimiter { field: 0 },
             (None, [], Some(got)) if self.line.echo => {
                 let want = self.frame.as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
                 Error::EchoMismatch { at: self.echoed, got, want }

@@ -115,7 +115,7 @@ fn hostile_turn_zeros() {
     });
 }
 
-/// A zero that is read back, in every scenario. In two of three runs up to nine requests of an attempt went before that nobody
+/// A zero that is read back, in every scenario. In every second run up to nine requests of an attempt went before that nobody
 /// saw the end of.
 fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
     let mut ends = Ends::default();
@@ -123,7 +123,9 @@ fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Resul
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(0x1000), Abm::truncate(0x100));
-        for _ in 0..if seed % 3 == 0 { 0 } else { 1 + seed % 9 } {
+        // A host that mixes requests up sends some of the ten by mistake besides.
+        let dropped = if seed % 3 == 0 || bench.astray.is_some() { 0 } else { 1 + seed % 9 };
+        for _ in 0..dropped {
             let at_ns = bench.ready_ns + 41_000;
             bench.wait(at_ns);
             let _ = bench.exchange(request, at_ns);
@@ -131,7 +133,12 @@ fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Resul
         let earlier = bench.device.effects();
         let end = set(&mut bench, seed);
         // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
-        if bench.forged_requests + bench.misread == 0 {
+        // So is a request of the attempt before that the line held back, or repeated: with nine more it is the tenth, or with
+        // nineteen the twentieth.
+        let tally = bench.tally();
+        let moved = tally.of(Kind::Repeat) + tally.of(Kind::Delay) > 0;
+        let inherited = dropped > 0 && (moved || bench.misheard > 0);
+        if bench.forged_requests + bench.misread == 0 && !inherited {
             done_once_at_most(&end, bench.device.effects() - earlier, seed);
             ends.count(&end);
         }

@@ -32,15 +32,39 @@ impl Quiet {
     }
 }
 
+/// A request of one block: it is on its way, or its outcome waits to be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Slot<H, T> {
+    Empty,
+    Asking(H),
+    Ended(Progress<T>),
+}
+
+impl<H: Copy, T: Copy> Slot<H, T> {
+    pub(super) const fn asking(&self) -> Option<&H> {
+        match self {
+            Self::Asking(handshake) => Some(handshake),
+            Self::Empty | Self::Ended(_) => None,
+        }
+    }
+
+    /// The outcome, once.
+    pub(super) const fn take(&mut self) -> Option<Progress<T>> {
+        let Self::Ended(progress) = *self else { return None };
+        *self = Self::Empty;
+        Some(progress)
+    }
+}
+
 /// The request in the main block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Main {
-    pub(super) asking: Option<Handshake>,
+    pub(super) slot: Slot<Handshake, NonCyclicResponse>,
     /// It must be over before the servo is switched on.
     pub(super) needs_servo_off: bool,
     pub(super) quiet: Quiet,
-    pub(super) outcome: Option<Progress<NonCyclicResponse>>,
     /// In_Progress was 0 in the last block of a motion.
     pub(super) fell: bool,
 }
@@ -49,16 +73,14 @@ pub(super) struct Main {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Sub {
-    pub(super) asking: Option<SubHandshake>,
+    pub(super) slot: Slot<SubHandshake, SubResponse>,
     pub(super) quiet: Quiet,
-    pub(super) outcome: Option<Progress<SubResponse>>,
 }
 
 impl Main {
-    pub(super) const NONE: Self =
-        Self { asking: None, needs_servo_off: false, quiet: Quiet::BROKEN, outcome: None, fell: false };
+    pub(super) const NONE: Self = Self { slot: Slot::Empty, needs_servo_off: false, quiet: Quiet::BROKEN, fell: false };
 }
 
 impl Sub {
-    pub(super) const NONE: Self = Self { asking: None, quiet: Quiet::BROKEN, outcome: None };
+    pub(super) const NONE: Self = Self { slot: Slot::Empty, quiet: Quiet::BROKEN };
 }

@@ -1,13 +1,13 @@
 //! Requests of an axis, in the main and in the sub block.
 
 use super::Axis;
-use super::asking::Quiet;
+use super::asking::{Quiet, Slot};
 use crate::control::ControlBits;
 use crate::error_code::ErrorCode;
 use crate::header::MacId;
 use crate::master::handshake::Handshake;
 use crate::master::profile_move::MoveStage;
-use crate::master::progress::{Failure, Progress};
+use crate::master::progress::Progress;
 use crate::master::servo_off::ActiveCode;
 use crate::master::state::{AskError, StopReason};
 use crate::master::sub_handshake::SubHandshake;
@@ -34,7 +34,7 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
 /// The drive goes on with the block before, so this is no answer: the request is in the next block again, and may be under way
 /// already.
 fn is_thrown_away(response: &Response) -> bool {
-    matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
+    response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
 }
 
 impl Axis {
@@ -95,12 +95,12 @@ impl Axis {
 
     /// Whether a request can be sent now.
     pub fn can_ask(&self) -> bool {
-        self.main.asking.is_none() && self.main.quiet.is_kept() && !self.is_moving()
+        self.main.slot.asking().is_none() && self.main.quiet.is_kept() && !self.is_moving()
     }
 
     /// Update periods until the present request times out; the whole limit if none is under way.
     pub(in crate::master) const fn answer_left(&self) -> u32 {
-        match &self.main.asking {
+        match self.main.slot.asking() {
             Some(handshake) => handshake.left(),
             None => self.config.limits.answer,
         }
@@ -108,7 +108,7 @@ impl Axis {
 
     /// The outcome of the last request, once.
     pub const fn take_outcome(&mut self) -> Option<Progress<NonCyclicResponse>> {
-        self.main.outcome.take()
+        self.main.slot.take()
     }
 
     /// Sends a sub-command (32-byte mode) and holds it until it is answered; it runs beside everything else.
@@ -116,18 +116,17 @@ impl Axis {
     /// # Errors
     /// [`AskError::Busy`], or [`AskError::NotARequest`] for the normal sub-command.
     pub fn ask_sub(&mut self, code: SubCode, type_code: u8, index: u16) -> Result<(), AskError> {
-        if self.sub.asking.is_some() || !self.sub.quiet.is_kept() {
+        if self.sub.slot.asking().is_some() || !self.sub.quiet.is_kept() {
             return Err(AskError::Busy);
         }
         let handshake = SubHandshake::new(code, type_code, index, self.config.limits.answer);
-        self.sub.asking = Some(handshake.ok_or(AskError::NotARequest)?);
-        self.sub.outcome = None;
+        self.sub.slot = Slot::Asking(handshake.ok_or(AskError::NotARequest)?);
         Ok(())
     }
 
     /// The outcome of the last sub-command, once.
     pub const fn take_sub_outcome(&mut self) -> Option<Progress<SubResponse>> {
-        self.sub.outcome.take()
+        self.sub.slot.take()
     }
 
     fn begin(&mut self, handshake: Handshake, servo_off: bool) -> Result<(), AskError> {
@@ -138,7 +137,7 @@ impl Axis {
         if active && servo_off {
             return Err(AskError::ServoOn);
         }
-        (self.main.asking, self.main.needs_servo_off, self.main.outcome) = (Some(handshake), servo_off, None);
+        (self.main.slot, self.main.needs_servo_off) = (Slot::Asking(handshake), servo_off);
         Ok(())
     }
 
@@ -151,10 +150,10 @@ impl Axis {
         if self.is_moving() {
             self.serve_motion(response);
         }
-        if let Some(handshake) = &mut self.main.asking {
+        if let Slot::Asking(handshake) = &mut self.main.slot {
             let progress = handshake.receive(response);
             if !progress.is_pending() {
-                (self.main.asking, self.main.outcome, self.main.quiet) = (None, Some(progress), Quiet::BROKEN);
+                (self.main.slot, self.main.quiet) = (Slot::Ended(progress), Quiet::BROKEN);
             }
         }
     }
@@ -163,7 +162,7 @@ impl Axis {
     fn serve_motion(&mut self, response: Option<&Response>) {
         let Some(profile) = &mut self.profile else { return };
         if self.control.intersects(ControlBits::HARD_STOP.union(ControlBits::SMOOTH_STOP)) {
-            profile.break_off(Failure::Stopped(StopReason::Requested), true, true);
+            profile.break_off(Some(StopReason::Requested), true, true);
         }
         // An old block tells neither the beginning nor, by itself, the end.
         let falls = response.is_some_and(|response| !response.status.contains(StatusFlags::IN_PROGRESS));
@@ -185,17 +184,17 @@ impl Axis {
         if let Some(response) = response {
             self.sub.quiet.hear(response.code.get() == 0);
         }
-        if let Some(handshake) = &mut self.sub.asking {
+        if let Slot::Asking(handshake) = &mut self.sub.slot {
             let progress = handshake.receive(response);
             if !progress.is_pending() {
-                (self.sub.asking, self.sub.outcome, self.sub.quiet) = (None, Some(progress), Quiet::BROKEN);
+                (self.sub.slot, self.sub.quiet) = (Slot::Ended(progress), Quiet::BROKEN);
             }
         }
     }
 
     /// Bytes 8-15: the request, the motion, or the normal command with its feed-forward.
     pub(super) fn noncyclic(&self, feed_forward: i32) -> NonCyclicCommand {
-        let command = match (&self.main.asking, &self.profile) {
+        let command = match (self.main.slot.asking(), &self.profile) {
             (Some(handshake), _) => handshake.request(),
             (None, Some(profile)) => profile.request(),
             (None, None) => NonCyclicCommand::IDLE,
@@ -205,7 +204,7 @@ impl Axis {
 
     /// Bytes 16-31, with Sub_Command_Data2 and 3.
     pub(super) fn sub_command(&self, [data2, data3]: [i32; 2]) -> SubCommand {
-        let asked = match &self.sub.asking {
+        let asked = match self.sub.slot.asking() {
             Some(handshake) => handshake.command(),
             None => SubCommand::IDLE,
         };

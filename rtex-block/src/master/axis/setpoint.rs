@@ -38,12 +38,14 @@ impl Axis {
     /// back and during a stop, [`SetpointError::NotStanding`]; the mode is kept then.
     pub fn set_mode(&mut self, mode: ActiveCode) -> Result<(), SetpointError> {
         let is_on = match self.state {
-            AxisState::SwitchingOn | AxisState::SwitchingOff => return Err(SetpointError::NotOn),
-            AxisState::Stopping(_) | AxisState::Held(_) => return Err(SetpointError::NotOn),
+            AxisState::SwitchingOn | AxisState::SwitchingOff | AxisState::Stopping(_) | AxisState::Held(_) => {
+                return Err(SetpointError::NotOn);
+            }
             AxisState::On => true,
             AxisState::Starting | AxisState::Off | AxisState::Stopped(_) => false,
         };
-        if self.main.asking.is_some() || is_on && (self.is_moving() || self.status().contains(StatusFlags::IN_PROGRESS))
+        if self.main.slot.asking().is_some()
+            || is_on && (self.is_moving() || self.status().contains(StatusFlags::IN_PROGRESS))
         {
             return Err(SetpointError::Busy);
         }
@@ -71,7 +73,7 @@ impl Axis {
             ActiveCode::ProfilePosition | ActiveCode::CyclicTorque => true,
         };
         // The actual position becomes the command position some periods after it was one.
-        let drift = self.travel.unsigned_abs().saturating_mul(TURN.into());
+        let drift = self.wire.step.unsigned_abs().saturating_mul(TURN.into());
         let known = self.arrival == Arrival::OnTime && drift <= self.max_step;
         commanded && (mode != ActiveCode::CyclicPosition || known)
     }
@@ -163,7 +165,7 @@ impl Axis {
         if self.mode != ActiveCode::ProfilePosition {
             return Err(SetpointError::Mode);
         }
-        if self.is_moving() || self.main.asking.is_some() {
+        if self.is_moving() || self.main.slot.asking().is_some() {
             return Err(SetpointError::Busy);
         }
         within(speed, self.config.max_speed)?;

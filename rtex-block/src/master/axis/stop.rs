@@ -3,7 +3,6 @@
 use super::Axis;
 use crate::control::ControlBits;
 use crate::master::config::StopCategory;
-use crate::master::progress::Failure;
 use crate::master::servo_off::ActiveCode;
 use crate::master::state::{AxisState, StopReason};
 use crate::status::StatusFlags;
@@ -134,10 +133,8 @@ impl Axis {
         }
         self.feed_forward = [0; 3];
         let reason = match state {
-            AxisState::Stopped(reason) | AxisState::Stopping(reason) | AxisState::Held(reason) => {
-                Failure::Stopped(reason)
-            }
-            _ => Failure::ServoOff,
+            AxisState::Stopped(reason) | AxisState::Stopping(reason) | AxisState::Held(reason) => Some(reason),
+            _ => None,
         };
         let confirmed = self.main.quiet.is_kept();
         if let Some(profile) = &mut self.profile {

@@ -49,7 +49,7 @@ impl Axis {
         }
         let NonCyclicResponse::CommandError(code) = response.noncyclic() else { return };
         let starts = self.profile.is_some_and(|profile| profile.stage() == MoveStage::Starting);
-        let asked = self.main.asking.is_some() || starts || !self.main.quiet.is_kept();
+        let asked = self.main.slot.asking().is_some() || starts || !self.main.quiet.is_kept();
         if response.code.noncyclic_bits() == 0 || !asked || code.discards_block() {
             self.refused = self.refused.saturating_add(1);
             if self.refused >= self.config.limits.command_errors.get() {
@@ -86,11 +86,12 @@ impl Axis {
 
     /// The limit of the present state.
     fn wait(&mut self, on_time: Option<&Response>) {
-        let alarm = on_time.map_or(self.status(), |response| response.status).contains(StatusFlags::ALARM);
         let reason = match self.state {
             AxisState::Starting if self.config.limits.ready.is_none() => return,
-            AxisState::Starting if alarm => StopReason::Alarm,
-            AxisState::Starting => StopReason::ReadyTimeout,
+            AxisState::Starting => {
+                let status = on_time.map_or(self.status(), |response| response.status);
+                if status.contains(StatusFlags::ALARM) { StopReason::Alarm } else { StopReason::ReadyTimeout }
+            }
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
             AxisState::Stopping(reason) => reason,

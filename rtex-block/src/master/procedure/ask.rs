@@ -101,7 +101,7 @@ pub(super) use procedure;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
     ask: Ask,
-    request: NonCyclicCommand,
+    sent: NonCyclicCommand,
     end: Option<Progress<NonCyclicResponse>>,
 }
 
@@ -110,7 +110,7 @@ procedure!(Request, NonCyclicResponse);
 impl Request {
     /// Of anything that [`Axis::ask`] sends.
     pub const fn new(request: NonCyclicCommand) -> Self {
-        Self { ask: Ask::NEW, request, end: None }
+        Self { ask: Ask::NEW, sent: request, end: None }
     }
 
     const fn reset(&mut self) {
@@ -118,6 +118,6 @@ impl Request {
     }
 
     fn next(&mut self, axis: &mut Axis) -> Progress<NonCyclicResponse> {
-        self.ask.receive(axis, self.request)
+        self.ask.receive(axis, self.sent)
     }
 }

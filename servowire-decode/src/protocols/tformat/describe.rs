@@ -208,7 +208,7 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
 /// With the places of its fields, which have these `names` on the line: ABS is ABS0 to ABS2.
 fn located(event: Event, frame: &Frame, names: &[&str]) -> Event {
     event.locate(|name| {
-        let part = |known: &&str| known.trim_end_matches(|digit: char| digit.is_ascii_digit()) == name;
+        let part = |known: &&str| known.strip_prefix(name).is_some_and(|rest| matches!(rest, "" | "0" | "1" | "2"));
         let first = names.iter().position(part)? as u32;
         let last = names.iter().rposition(part)? as u32;
         frame.span(8 * first, 8 * last + 7)

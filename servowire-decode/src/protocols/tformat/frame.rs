@@ -109,18 +109,10 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// When it ended; none in a log without times.
-    pub(super) fn end(&self) -> Option<Time> {
-        match self.place {
-            Place::Time { end, .. } => Some(end),
-            Place::Line(_) => None,
-        }
-    }
-
     /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins or for
     /// something else.
     pub(super) fn is_asked_again(&self, frame: &Frame) -> bool {
-        let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
+        let late = self.place.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
         let other = self.request.is_some_and(|request| frame.data_id().is_ok_and(|id| id != request.data_id()));
         (late || other)
             && frame.broken.is_none()

@@ -9,7 +9,7 @@ use nikon_aformat::master::{BusTransaction, Cycle, Detection, Exchange, Line};
 use nikon_aformat::{
     BitRate, Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
 };
-use servowire_core::Procedure;
+use servowire_core::{Procedure, Step};
 use servowire_drivers::nikon::{Frame, blocking};
 use servowire_drivers::{Clock, ClockError, Error};
 
@@ -244,10 +244,33 @@ contract!(
     answers_come_as_late_as_they_may,
     pauses_are_kept,
     a_cycle_keeps_its_grid,
+    the_line_is_left_alone_after_a_procedure,
     silence_ends
 );
 
 const ONE: EncoderAddress = EncoderAddress::truncate(1);
+
+/// One request, after which the encoder is at work for half a millisecond.
+struct Slow;
+
+impl Procedure for Slow {
+    type Request = Request;
+    type Response = Response;
+    type Value = ();
+    type Error = nikon_aformat::Error;
+
+    fn start(&mut self, now_ns: u64) -> Step<Request, (), nikon_aformat::Error> {
+        Step::Send { request: Request::new(ONE, Operation::Abs40), not_before_ns: now_ns }
+    }
+
+    fn receive(
+        &mut self,
+        _: Result<Response, nikon_aformat::Error>,
+        ready_ns: u64,
+    ) -> Step<Request, (), nikon_aformat::Error> {
+        Step::Done { value: (), ready_ns: ready_ns + 500_000 }
+    }
+}
 
 mod of_all {
     use super::*;
@@ -288,7 +311,7 @@ mod of_all {
             let all = driver.read_bus(Operation::Abs40Mt, asked).unwrap();
             for ea in asked.iter() {
                 let abs = all.exchange(ea).unwrap().response.abs40().unwrap().get();
-                assert_eq!(abs, 3 << 20 | 0x100 + u64::from(ea.get()));
+                assert_eq!(abs, (3 << 20) + 0x100 + u64::from(ea.get()));
             }
         }
     }
@@ -373,6 +396,15 @@ mod of_all {
             assert!((due_ns..due_ns + 1_000).contains(begun_ns), "{begun_ns} {due_ns}");
         }
         assert_eq!((sent.len(), cycle.missed()), (5, 0));
+    }
+
+    /// An encoder that needs half a millisecond after what it was asked for.
+    pub(super) fn the_line_is_left_alone_after_a_procedure<D: Calls>() {
+        let (bench, mut driver) = driver::<D>();
+        driver.run(&mut Slow).unwrap();
+        driver.read_abs40(ONE).unwrap();
+        let sent = bench.0.borrow().sent.clone();
+        assert!(sent[1].0 - sent[0].0 >= 500_000, "{sent:?}");
     }
 
     pub(super) fn silence_ends<D: Calls>() {

@@ -3,10 +3,11 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::rc::Rc;
 
+use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType};
-use servowire_core::Procedure;
+use servowire_core::{Procedure, Step};
 use servowire_drivers::tformat::blocking;
-use servowire_drivers::{Automatic, Clock, ClockError, Error};
+use servowire_drivers::{Automatic, Clock, ClockError, DirectionPin, Error, PinTooSlow, Worst};
 use tformat::master::{Detection, Exchange, Line, SingleTurnZero};
 use tformat::{
     Address, AllData, Almc, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
@@ -212,6 +213,8 @@ impl embedded_io::Read for Bench {
 
 /// Every call of a driver.
 trait Calls {
+    /// Whether it asks the port if something is there.
+    const ASKS: bool;
     fn open(bench: &Bench) -> Self;
     fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Called<Sample>;
     fn read_evidence(&mut self, resolution: Resolution) -> Called<Evidence>;
@@ -226,6 +229,7 @@ trait Calls {
     fn transact(&mut self, request: Request) -> Called<Exchange>;
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "the driver wants it so")]
 fn set_rate(bench: &mut Bench, rate: BitRate) -> Result<(), ErrorKind> {
     bench.0.borrow_mut().rate = rate;
     Ok(())
@@ -234,8 +238,9 @@ fn set_rate(bench: &mut Bench, rate: BitRate) -> Result<(), ErrorKind> {
 const LINE: Line = Line::new(BitRate::Mbit2_5);
 
 macro_rules! calls {
-    ($driver:ty, $open:expr, |$call:ident| $end:expr) => {
+    ($driver:ty, $asks:expr, $open:expr, |$call:ident| $end:expr) => {
         impl Calls for $driver {
+            const ASKS: bool = $asks;
             fn open(bench: &Bench) -> Self {
                 $open(bench)
             }
@@ -286,6 +291,7 @@ type Spinning = blocking::Driver<Bench, Automatic, Bench>;
 
 calls!(
     Spinning,
+    true,
     |bench: &Bench| blocking::Driver::new(bench.clone(), Automatic, bench.clone(), LINE).unwrap(),
     |called| called
 );
@@ -321,6 +327,7 @@ mod asynch {
 
     calls!(
         Waiting,
+        false,
         |bench: &Bench| Driver::new(bench.clone(), Automatic, Looks(bench.clone()), LINE).unwrap(),
         |called| run(called, usize::MAX).unwrap()
     );
@@ -351,6 +358,7 @@ contract!(
     pauses_of_the_procedures_are_kept,
     the_memory_has_pages,
     an_encoder_is_found_at_either_rate,
+    the_line_is_left_alone_after_a_procedure,
     silence_ends
 );
 
@@ -364,6 +372,76 @@ fn page(number: u8) -> Page {
 
 fn widths() -> Resolution {
     Resolution::new(23, 16).unwrap()
+}
+
+/// One request, after which the encoder is at work for half a millisecond.
+struct Slow {
+    fails: bool,
+}
+
+impl Procedure for Slow {
+    type Request = Request;
+    type Response = Response;
+    type Value = ();
+    type Error = tformat::Error;
+
+    fn start(&mut self, now_ns: u64) -> Step<Request, (), tformat::Error> {
+        Step::Send { request: Request::ReadAll, not_before_ns: now_ns }
+    }
+
+    fn receive(&mut self, _: Result<Response, tformat::Error>, ready_ns: u64) -> Step<Request, (), tformat::Error> {
+        let ready_ns = ready_ns + 500_000;
+        if self.fails {
+            Step::Failed { error: tformat::Error::NoResponse { echo: false }, ready_ns }
+        } else {
+            Step::Done { value: (), ready_ns }
+        }
+    }
+}
+
+/// The bits are longer at the rate that was found, and so is the silence that the line has to keep.
+#[test]
+fn a_line_is_silent_for_two_fields_of_the_rate_that_was_found() {
+    let bench = Bench::new(Port::good());
+    bench.0.borrow_mut().rate = BitRate::Mbit5;
+    let line = Line::new(BitRate::Mbit5);
+    let mut driver = blocking::Driver::new(bench.clone(), Automatic, bench.clone(), line).unwrap();
+    driver.detect(Detection::new(), set_rate).unwrap();
+    let begun_ns = {
+        let mut world = bench.0.borrow_mut();
+        world.received.push_back(0x55);
+        world.now_ns
+    };
+    driver.read_data().unwrap();
+    assert!(bench.0.borrow().requests().last().unwrap().0 >= begun_ns + 8_000);
+}
+
+/// A pin that keeps the window at 2.5 Mbit/s and not at 5.
+#[test]
+fn a_pin_that_is_too_slow_for_a_rate_ends_the_search() {
+    let bench = Bench::new(Port::good());
+    let pin = DirectionPin::new(Pin, Worst { uart_start_ns: 400, wake_ns: 500, clock_ns: 100 });
+    let mut driver = blocking::Driver::new(bench.clone(), pin, bench.clone(), LINE).unwrap();
+    let too_slow = PinTooSlow { missing_ns: 300, window_ns: 800 };
+    assert_eq!(driver.detect(Detection::new(), set_rate), Err(Error::PinTooSlow(too_slow)));
+    assert!(bench.0.borrow().sent.is_empty());
+    assert!(driver.detect(Detection::on([LINE, LINE]), set_rate).is_ok());
+}
+
+struct Pin;
+
+impl PinErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
 }
 
 mod of_all {
@@ -440,19 +518,10 @@ mod of_all {
                     }
                     assert_eq!(driver.read_data().map(|all| all.abs.get()), Ok(0x12_3456), "after {what}");
                 }
-                // Futures do not ask whether something is there.
-                let asks = bench_asks::<D>() || op != Op::Ready;
-                assert!(!asks || told + 3 >= calls, "{op:?}: {told} of {calls} told");
+                // Futures do not ask whether something is there, and before the request nothing is told.
+                assert!(op == Op::Ready && !D::ASKS || told + 3 >= calls, "{op:?}: {told} of {calls} told");
             }
         }
-    }
-
-    /// Whether this driver asks the port whether something is there.
-    fn bench_asks<D: Calls>() -> bool {
-        let (bench, mut driver) = driver::<D>(Port::good());
-        driver.read_data().unwrap();
-        let calls = bench.0.borrow().port.faults.calls.clone();
-        calls.iter().any(|(op, _)| *op == Op::Ready)
     }
 
     pub(super) fn a_fault_in_a_procedure_is_a_lost_answer<D: Calls>() {
@@ -559,6 +628,17 @@ mod of_all {
         assert!(matches!(driver.detect(Detection::new()), Err(Error::Protocol(_))));
         let count = bench.0.borrow().sent.len();
         assert_eq!(count, 6, "three tries at each rate");
+    }
+
+    /// An encoder that needs half a millisecond after what it was asked for.
+    pub(super) fn the_line_is_left_alone_after_a_procedure<D: Calls>() {
+        for fails in [false, true] {
+            let (bench, mut driver) = driver::<D>(Port::good());
+            assert_eq!(driver.run(&mut Slow { fails }).is_err(), fails);
+            driver.read_data().unwrap();
+            let requests = bench.0.borrow().requests();
+            assert!(requests[1].0 - requests[0].0 >= 500_000, "{requests:?}");
+        }
     }
 
     pub(super) fn silence_ends<D: Calls>() {

@@ -137,12 +137,11 @@ impl Encoder {
         let bytes = self.readout(cf);
         if self.reset.1 == 10 {
             self.reset = (0, 0);
-            match cf {
-                0xc2 => {
-                    (self.abs, self.zeros) = (0, self.zeros + 1);
-                    self.silent_until_ns = now_ns + 40_000;
-                }
-                _ => (self.almc, self.clears) = (0, self.clears + 1),
+            if cf == 0xc2 {
+                (self.abs, self.zeros) = (0, self.zeros + 1);
+                self.silent_until_ns = now_ns + 40_000;
+            } else {
+                (self.almc, self.clears) = (0, self.clears + 1);
             }
             if cf == 0x62 {
                 self.turns = 0;

@@ -5,7 +5,7 @@ use servowire_core::{
     ShaftWriter, Tolerance, Tracker, Words, Writer,
 };
 
-use super::Kernel;
+use super::kernels_on_states;
 use crate::count::tenths_on;
 
 /// Evidence as a protocol crate has it: a doubt that no policy lifts as a code, alarms that a policy may tolerate.
@@ -102,21 +102,6 @@ const USES: &[Use] = &[
     (GOOD.sampled_ns + 40_000, Policy::new(125_000).tolerating(Alarms(0x20))),
     (GOOD.sampled_ns - 700, Policy::new(125_000).tolerating(Alarms(0x60))),
 ];
-
-/// As `kernels!` of the module above, for kernels that work on a state, each with how it is measured.
-macro_rules! kernels_on_states {
-    ($($(#[$doc:meta])* fn $name:ident($state:tt: &mut $of:ty, $input:tt: &$from:ty) -> $to:ty $body:block as $tenths:block)*) => {
-        $(
-            $(#[$doc])*
-            #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
-            #[inline(never)]
-            #[unsafe(no_mangle)]
-            fn $name($state: &mut $of, $input: &'static $from) -> $to $body
-        )*
-
-        pub(crate) const KERNELS: &[Kernel] = &[$(Kernel { name: stringify!($name), tenths: || $tenths },)*];
-    };
-}
 
 kernels_on_states! {
     /// The newest evidence out of the cell, and its verdict.

@@ -196,7 +196,7 @@ kernels! {
     /// An update period of one axis: response in, command out.
     fn rtex_axis((axis, received): &(Axis, Heard)) -> Command32 {
         let mut axis = *axis;
-        axis.hear(Turn::Valid(COUNTER), received, 1_000_000);
+        axis.hear(Turn::Valid(COUNTER), received, 500_000);
         let _ = axis.set_position(1_010);
         axis.transmission(Turn::Valid(COUNTER))
     } over [(AXIS, Heard::Main(RESPONSE)), (AXIS, Heard::Nothing)];

@@ -11,7 +11,7 @@ use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::iep::{Channel, Edge};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
-use sorte_proto::timing::{Budget, Timing};
+use sorte_proto::timing::{Budget, Misfit, Timing};
 use sorte_proto::{
     Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction, Discovery,
     DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange, Param,
@@ -298,9 +298,9 @@ kernels! {
     } over [(10_856, 10_860)];
 
     /// What fits into a cycle.
-    fn sorte_timing((devices, delays): &(u8, [u16; 4])) -> (Budget, i64) {
-        let line = Timing { line_delays_ns: delays, devices: *devices, output_len: 16, payload_len: 3 };
-        (line.budget(), line.send_time_ns(DeviceAddress::MAX))
+    fn sorte_timing((devices, delays): &(u8, [u16; 4])) -> (Budget, Option<Misfit>) {
+        let line = Timing::new(delays, *devices).with_output_len(16);
+        (line.budget(), line.misfit(4000))
     } over [(4_u8, [85_u16; 4])];
 
     /// The master from IDLE to its first frame, and an answer that does not fit.
@@ -322,12 +322,12 @@ kernels! {
     } over [(SYNC, 3130_u64)];
 
     /// A device in IDLE takes a start-up frame.
-    fn sorte_device((frame, port): &([u8; 14], PortId)) -> (Reaction, bool) {
+    fn sorte_device((frame, port): &([u8; 14], PortId)) -> (Reaction, device::Action) {
         let mut device = Device::new(device::Config::default());
         device.set_links(Link::Up, Link::Down);
         let mut frame = *frame;
         let handled = device.hear(*port, &mut frame, FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: 0 });
-        let restarted = device.poll(u64::MAX) | device.cycle_start();
+        let restarted = device.poll(0, u64::MAX);
         let _ = device.hear_reflection(handled.trigger, &frame, 500);
         let _ = device.answer([0; 3]);
         let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
@@ -348,7 +348,7 @@ kernels! {
     fn sorte_device_exchange(frame: &[u8; 21]) -> bool {
         // A device in any state.
         let mut device = black_box(Device::new(device::Config::default()));
-        device.hear_exchange(frame, 940, 1640).is_ok()
+        device.hear_exchange(frame, FrameTimes { sof_ns: 1060, counter_ns: 1640, now_ns: 0 }).is_ok()
     } over FRAMES;
 
     /// Ten cycles of the timer model with a pulse each.

@@ -1,6 +1,8 @@
 //! step-motion: plans, their steps, an axis that is told something new, lines of two axes.
 
-use step_motion::{AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint};
+use step_motion::{
+    Axis, AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Queue, Reloads, Setpoint,
+};
 
 use super::kernels;
 
@@ -154,4 +156,11 @@ kernels! {
         }
         Some(sum)
     } over [TRAPEZOID, S_CURVE];
+
+    /// A request to an axis at rest, with its plan.
+    fn step_motion_axis_request(move_: &Limited) -> Option<bool> {
+        let queue = Queue::<9>::new();
+        let (mut axis, _) = Axis::new(&queue, Clock::MICROSECONDS, limits(move_)?).ok()?;
+        Some(axis.move_to(i64::from(move_.steps)).is_ok())
+    } over [S_SHORT, LONG_S_CURVE];
 }

@@ -3,14 +3,16 @@
 use sorte_proto::Link;
 use sorte_proto::device::{self, Device, FrameTimes, PortId};
 use sorte_proto::master::{Action, Config, Master};
-use sorte_proto::{DeviceFrame, Discovery};
+use sorte_proto::{DeviceAddress, DeviceFrame, Discovery, Status};
 
 use super::of;
 
 /// Cycles of the IO exchange; the last is without an answer.
 const CYCLES: u64 = 4;
-/// Round trip of a delay request in ns.
+/// Round trip of a delay request in ns: 90 ns of cable. A device frame that leaves with the master's is captured after these and the
+/// 120 ns from its first bit.
 const ROUND_TRIP: u64 = 500;
+const CAPTURED: u64 = 210;
 
 /// The deepest call of the master: what it is told to do, the frames that it writes, and those that it takes. The master
 /// itself, the buffer of a frame and the device are not counted.
@@ -32,21 +34,25 @@ pub(super) fn master() -> u32 {
                 let Some(bytes) = buffer.get_mut(..len) else { break };
                 let _ = device.hear(PortId::A, bytes, FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: at_ns });
                 let mut taken = Ok(());
-                deepest = deepest.max(of(|| taken = master.hear(bytes, at_ns + ROUND_TRIP).map(|_| ())));
+                deepest = deepest.max(of(|| {
+                    taken =
+                        master.hear(bytes, at_ns + u64::from(frame.preamble().capture_ns()) + ROUND_TRIP).map(|_| ())
+                }));
                 if taken.is_err() {
                     break;
                 }
             }
             Action::Exchange { cycle: CYCLES, .. } => return deepest,
-            Action::Exchange { time_stamp, cycle, .. } => {
+            Action::Exchange { at_ns, time_stamp, cycle, .. } => {
                 let mut len = 0;
                 deepest = deepest.max(of(|| {
                     len = master.emit_into(&[0; 16], time_stamp, &mut buffer).unwrap_or_default();
                 }));
-                let answer = device.answer([0; 3]).and_then(|frame| frame.emit_into(&mut buffer).ok());
+                let answer = DeviceFrame { address: DeviceAddress::FIRST, status: Status::LAST, payload: [0; 3] };
+                let answer = answer.emit_into(&mut buffer).ok();
                 let Some(bytes) = buffer.get(..answer.unwrap_or_default()) else { break };
                 let mut good = false;
-                deepest = deepest.max(of(|| good = master.hear(bytes, now_ns).is_ok()));
+                deepest = deepest.max(of(|| good = master.hear(bytes, at_ns + CAPTURED).is_ok()));
                 if !good || bytes.len() != DeviceFrame::<3>::LEN || len != 21 {
                     break;
                 }

@@ -36,5 +36,5 @@ log! { rtex_block: Command, Response, rtex_block::CyclicCode, rtex_block::master
 counters! { rtex_block }
 differs! {
     EXCHANGE: "an update period has its own clock: `Axis::new(AxisConfig)`, `transmission(Turn)`, `hear(Turn, &Heard, end_ns)`";
-    PROCEDURE: "counts update periods: `new` of `master::procedure::{Home, ClearAlarm, ..}`, then `receive(&mut axis)` in each";
+    PROCEDURE: "counts update periods: `start(&mut axis)` of `master::procedure::{Home, ClearAlarm, ..}`, then `receive(&mut axis)` in each; `master::Run` does both";
 }

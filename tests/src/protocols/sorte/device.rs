@@ -1,8 +1,8 @@
 //! State machine of a device.
 
 use serde::Deserialize;
-use sorte_proto::device::{Config, Device, FrameTimes, Port, PortFlags, PortId, Reaction, State, Trigger};
-use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place, Sync};
+use sorte_proto::device::{Action, Config, Device, FrameTimes, Port, PortFlags, PortId, Reaction, State, Trigger};
+use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place, Sync, emit_master_frame_into};
 
 use super::Origin;
 use crate::hex::Bytes;
@@ -90,17 +90,21 @@ pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
         }
         DeviceRow::Monitor(row) => {
             let mut device = taken_to(State::Exchange, true);
-            // The first cycle start after the last SYNC frame finds a frame before it.
-            let _: Result<_, _> = device.hear_exchange(&[], 0, 0);
-            device.cycle_start();
+            // It counts once it has had a frame.
+            let mut frame = [0; 21];
+            let stamp = CYCLE_ZERO_NS + 500;
+            assert_eq!(emit_master_frame_into(&[0; 16], stamp, &mut frame), Ok(21));
+            assert!(device.hear_exchange(&frame, captured(0)).is_ok());
+            assert!(!closed(&mut device, 0));
             for (index, cycle) in row.cycles.into_iter().enumerate() {
                 same("cycle", &cycle.number, &(index + 1))?;
+                let number = u32::try_from(index + 1).unwrap_or_default();
                 if cycle.frame_received {
                     // Whatever it is, it counts.
-                    let _: Result<_, _> = device.hear_exchange(&[], 0, 0);
+                    let _: Result<_, _> = device.hear_exchange(&[], captured(number));
                 }
                 let before = device.missed_frames();
-                let restart = device.cycle_start();
+                let restart = closed(&mut device, number);
                 let missed = if restart { before + 1 } else { device.missed_frames() };
                 same("missed_count", &cycle.missed_count, &missed)?;
                 same("restart", &cycle.restart, &restart)?;
@@ -109,6 +113,26 @@ pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
             Ok(())
         }
     })
+}
+
+/// Common time at the start of the device's first cycle: 10 us after its SYNC frame was sent at 500 ns. PARAM says 10 us.
+const CYCLE_ZERO_NS: u16 = 10_500;
+
+/// When the master frame of a cycle is captured 76 ns from the master, 120 ns after its first bit.
+fn captured(cycle: u32) -> FrameTimes {
+    heard(u32::from(CYCLE_ZERO_NS) + 10_000 * cycle + 500 + 76 + 120)
+}
+
+/// Nobody waits for the frame of this cycle any more; whether the device has started again.
+fn closed(device: &mut Device, cycle: u32) -> bool {
+    let now = u32::from(CYCLE_ZERO_NS) + 10_000 * cycle + 5000;
+    loop {
+        match device.poll(now, 0) {
+            Action::Wait { .. } => return false,
+            Action::Restart => return true,
+            _ => {}
+        }
+    }
 }
 
 /// A device, last in the line or not, taken to `state` by good frames.

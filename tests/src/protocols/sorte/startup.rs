@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use sorte_proto::master::{Action, Config, Heard, Master, Outgoing};
 use sorte_proto::{
-    Discovery, Entry, FrameType, LineDelay, Link, MasterFrameView, Place, Preamble, Status, Sync,
+    Discovery, Entry, FrameType, LineDelay, Link, MasterFrameView, Parameters, Place, Preamble, Status, Sync,
     emit_master_frame_into, strip_preamble,
 };
 
@@ -92,10 +92,10 @@ struct HostView {
     count: u16,
 }
 
-/// The default master with `devices` stock devices, whose delay requests come back after the times of `rtt_ns`: all
+/// The default master, with the parameters that the published one sends, with `devices` stock devices, whose delay requests come back after the times of `rtt_ns`: all
 /// frames until the first of the exchange, with the times at which they are triggered.
 fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
-    let mut master = Master::new(Config::default());
+    let mut master = Master::new(Config::default().with_parameters(Parameters::STOCK));
     master.set_link(Link::Up);
     let (mut sent, mut now_ns, mut rtt) = (Vec::new(), 0, rtt_ns.iter());
     loop {
@@ -105,7 +105,10 @@ fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
                 sent.push((at_ns, frame));
                 let answer = answer(frame, devices);
                 let after = if let Outgoing::DelayReq(_) = frame { rtt.next().copied().unwrap_or(400) } else { 400 };
-                assert_eq!(master.hear(&answer, at_ns + u64::from(after)), Ok(Heard::StartUp));
+                assert_eq!(
+                    master.hear(&answer, at_ns + u64::from(frame.preamble().capture_ns() + after)),
+                    Ok(Heard::StartUp)
+                );
             }
             Action::Exchange { .. } | Action::Restart { .. } => return (sent, master),
         }

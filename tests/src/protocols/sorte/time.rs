@@ -126,7 +126,7 @@ pub(super) fn timing_budget(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Budget| {
         let delays = [row.line_delay_ns];
         let output_len = u16::from(row.devices) * 4;
-        let line = Timing { line_delays_ns: &delays, devices: row.devices, output_len, payload_len: 3 };
+        let line = Timing::new(&delays, row.devices).with_output_len(output_len);
         let budget = line.budget();
         same("master_frame_bytes_with_preamble", &row.master_frame_bytes_with_preamble, &budget.master_frame_bytes)?;
         same("master_tx_end_ns", &row.master_tx_end_ns, &budget.master_sent_ns)?;
@@ -142,6 +142,6 @@ pub(super) fn timing_budget(rows: &[Row]) -> Vec<Verdict> {
         )?;
         same("fits_4000ns", &row.fits_4000ns, &budget.fits(CNC_CYCLE_NS))?;
         let addresses = (1..=row.devices.min(8)).filter_map(DeviceAddress::new);
-        same("tts_formula_ns", &row.tts_formula_ns, &addresses.map(|a| line.send_time_ns(a)).collect())
+        same("tts_formula_ns", &row.tts_formula_ns, &addresses.filter_map(|a| line.send_time_ns(a)).collect())
     })
 }

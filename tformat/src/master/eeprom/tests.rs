@@ -71,6 +71,13 @@ fn a_write_looks_at_the_page_before_and_after() {
     assert_eq!(access.receive(page(2), 1050), Step::Done { value: 0x5a, ready_ns: 1050 });
 }
 
+/// To find another page selected is no failure: one try is enough where nothing fails.
+#[test]
+fn one_try_is_enough_for_a_sound_line() {
+    let outcomes = [page(0), selected(false), page(2), wrote(false, 0x5a), read(false, 0x5a), page(2)];
+    assert_eq!(play(writing(1), &outcomes).1, Step::Done { value: 0x5a, ready_ns: 0 });
+}
+
 /// A page that is selected already is not selected again: each writes to the register.
 #[test]
 fn a_read_on_the_page_takes_three_requests() {
@@ -111,7 +118,7 @@ fn a_busy_answer_to_a_selection_is_followed_by_reading_the_register() {
 #[test]
 fn a_selection_that_is_lost_has_an_unknown_effect() {
     for access in [writing(3), EepromAccess::read(TWO, ADDRESS, POLLING)] {
-        let (_, end) = play(access, &[page(0), LOST, LOST]);
+        let (_, end) = play(access, &[page(0), LOST, LOST, LOST]);
         assert_eq!(end, unknown(ErrorClass::NoResponse, 1000));
     }
     // Without a selection nothing has happened.

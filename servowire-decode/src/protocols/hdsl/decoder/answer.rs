@@ -46,7 +46,7 @@ impl Decoder {
                 "SEC" => (51, 60),
                 _ => return None,
             };
-            Some(Span::even(place, ANSWER_BITS.into(), first, last))
+            Some(Span::even(place, ANSWER_BITS, first, last))
         });
         if let Some(sample) = self.sample() {
             // 40 bits, as the register shows it.

@@ -1,12 +1,14 @@
-//! All channels of a capture while it is read: which are decoded, which are nothing, which have hardly moved yet.
+//! All channels of a recording while it comes: which are decoded, which are nothing, which have hardly moved yet.
 
 use std::io;
 
 use super::lane::{LineDecoder, Tap, Wires};
-use super::nothing::Seen;
+use super::nothing::nothing;
 use super::survey::{Candidates, FEWEST, Found, Speech};
 use crate::capture::samples::Samples;
 use crate::capture::{Change, Hole};
+use crate::codec::Codec;
+use crate::fault::{At, Fault, Stop};
 use crate::output::Output;
 use crate::output::printer::Lane;
 use crate::recognition::Note;
@@ -28,11 +30,29 @@ const MOST_TRIED: usize = 4096;
 /// A channel that was nothing is looked at again after so many times the edges it was judged by.
 const PATIENCE: u64 = 8;
 
+/// An edge of a channel that is not judged yet: its time, and in the lowest bit the level. There may be very many of them.
+#[derive(Debug, Clone, Copy)]
+struct Kept(i128);
+
+impl Kept {
+    fn new(time: Time, level: bool) -> Self {
+        Self(time.ps() << 1 | i128::from(level))
+    }
+
+    fn edge(self) -> (Time, bool) {
+        (Time::from_ps(self.0 >> 1), self.0 & 1 == 1)
+    }
+}
+
+fn edges_of(kept: &[Kept]) -> Vec<(Time, bool)> {
+    kept.iter().map(|kept| kept.edge()).collect()
+}
+
 /// What a channel is.
 #[derive(Debug, Clone)]
 enum State {
     /// Not judged yet.
-    Open(Vec<(Time, bool)>),
+    Open(Vec<Kept>),
     /// Part of a line that is decoded.
     Taken(usize),
     /// Nothing, or more of what is decoded already; looked at again after so many edges, if at all.
@@ -45,14 +65,17 @@ struct Running {
     decoder: Box<dyn LineDecoder>,
 }
 
-/// The channels of a capture.
-pub(super) struct Watch {
+/// Decodes a recording of lines that is pushed in piece by piece: edges in, events out.
+pub struct PushDecoder {
     file: String,
     names: Vec<String>,
+    protocol: Option<&'static dyn Codec>,
+    /// The channels that the user named; everything else is of no interest.
+    only: Option<Vec<u16>>,
     candidates: Candidates,
     states: Vec<State>,
     lines: Vec<Running>,
-    pub(super) found: Vec<Found>,
+    found: Vec<Found>,
     /// Changes before the first survey, in their order.
     held: Option<Vec<Change>>,
     /// Holes between them, each with the number of changes before it.
@@ -62,26 +85,36 @@ pub(super) struct Watch {
     tried: usize,
     /// Channels that have enough edges to be judged.
     due: bool,
-    /// The user named the channels, and everything else is of no interest.
-    named: bool,
     /// For messages when nothing was found: the busiest channel's first edges.
     busiest: Option<(u16, Vec<(Time, bool)>)>,
     /// Edges by channel.
     moves: Vec<u64>,
 }
 
-impl Watch {
-    pub(super) fn new(file: &str, names: &[String], candidates: Candidates, only: Option<&[u16]>) -> Self {
-        let state = |channel: u16| match only {
+impl PushDecoder {
+    /// Of a recording called `file` with channels of these names; `protocol`: otherwise all are tried.
+    pub fn new(
+        file: &str,
+        names: &[String],
+        protocol: Option<&'static dyn Codec>,
+        settings: &Settings,
+    ) -> Result<Self, Fault> {
+        let only = wanted(&settings.line, names).map_err(|what| Fault::new(file, At::File, what))?;
+        let pair = match only.as_deref() {
+            Some([requests, answers]) => Some([*requests, *answers]),
+            _ => None,
+        };
+        let state = |channel: u16| match &only {
             Some(only) if !only.contains(&channel) => State::Passed(None),
             _ => State::Open(Vec::new()),
         };
-        let states = (0..u16::try_from(names.len()).unwrap_or(u16::MAX)).map(state).collect();
-        Self {
+        Ok(Self {
             file: file.to_owned(),
             names: names.to_vec(),
-            candidates,
-            states,
+            protocol,
+            states: (0..u16::try_from(names.len()).unwrap_or(u16::MAX)).map(state).collect(),
+            only,
+            candidates: Candidates::new(protocol, settings.clone(), pair),
             lines: Vec::new(),
             found: Vec::new(),
             held: Some(Vec::new()),
@@ -89,28 +122,13 @@ impl Watch {
             kept: 0,
             tried: 0,
             due: false,
-            named: only.is_some(),
             busiest: None,
             moves: vec![0; names.len()],
-        }
+        })
     }
 
-    pub(super) fn settings(&self) -> &Settings {
-        &self.candidates.settings
-    }
-
-    pub(super) fn file(&self) -> &str {
-        &self.file
-    }
-
-    /// What there is to say where nothing was found.
-    pub(super) fn seen(&self) -> Seen<'_> {
-        let busiest = self.busiest.as_ref().map(|(channel, edges)| (*channel, edges.as_slice()));
-        Seen { busiest, moves: &self.moves, names: &self.names }
-    }
-
-    /// The next changes of the capture.
-    pub(super) fn changes(&mut self, changes: &[Change], out: &mut Output<'_>) -> io::Result<()> {
+    /// The next changes, in the order of time; the first of a channel is its level at the beginning.
+    pub fn changes(&mut self, changes: &[Change], out: &mut Output<'_>) -> io::Result<()> {
         for change in changes {
             self.change(*change, out)?;
         }
@@ -121,7 +139,7 @@ impl Watch {
     }
 
     /// Whether it is time for a survey.
-    pub(super) fn is_due(&self) -> bool {
+    fn is_due(&self) -> bool {
         match &self.held {
             // Of each channel only the first edges are looked at.
             Some(held) => held.len() >= PREVIEW.min(self.names.len() * PREVIEW_OF_ONE),
@@ -143,7 +161,7 @@ impl Watch {
                 self.give(line, change, out)?;
             }
             State::Open(edges) => {
-                edges.push((change.time, change.level));
+                edges.push(Kept::new(change.time, change.level));
                 self.kept += 1;
                 self.due |= self.held.is_none() && edges.len() == ENOUGH;
             }
@@ -172,8 +190,23 @@ impl Watch {
         running.decoder.samples(samples.turned(taps.iter().any(|tap| tap.inverted)), out)
     }
 
-    /// Nothing has changed until `time`.
-    pub(super) fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
+    /// Nothing else has changed until `time`. To be called after each piece: what was held back to see what it is, is
+    /// judged here.
+    pub fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
+        if self.is_due() {
+            self.judge(false, false, out)?;
+        }
+        self.reach_lines(time, out)
+    }
+
+    /// Nothing comes for a while: what is certain so far is decoded and shown.
+    pub fn pause(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
+        self.early(out)?;
+        self.reach_lines(time, out)?;
+        out.flush()
+    }
+
+    fn reach_lines(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line);
             running.decoder.reach(time, out)?;
@@ -181,8 +214,8 @@ impl Watch {
         Ok(())
     }
 
-    /// A hole in the capture.
-    pub(super) fn hole(&mut self, hole: Hole, out: &mut Output<'_>) -> io::Result<()> {
+    /// A hole in the recording before the next changes.
+    pub fn hole(&mut self, hole: Hole, out: &mut Output<'_>) -> io::Result<()> {
         if let Some(held) = &self.held {
             self.holes.push((held.len(), hole));
         }
@@ -194,8 +227,14 @@ impl Watch {
         Ok(())
     }
 
-    /// The capture ends.
-    pub(super) fn finish(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
+    /// The recording ends at `time`. Lines of which nothing was found, or that were upside down, are a fault.
+    pub fn finish(mut self, time: Time, out: &mut Output<'_>) -> Result<(), Stop> {
+        self.end(time, out)?;
+        Ok(self.verdict(out)?)
+    }
+
+    pub(super) fn end(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
+        self.judge(true, false, out)?;
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line);
             running.decoder.finish(time, out)?;
@@ -203,9 +242,26 @@ impl Watch {
         Ok(())
     }
 
+    /// What there is to say against the recording as a whole.
+    pub(super) fn verdict(&self, out: &Output<'_>) -> Result<(), Fault> {
+        if self.found.is_empty() {
+            let busiest = self.busiest.as_ref().map(|(channel, edges)| (*channel, edges.as_slice()));
+            let what = nothing(busiest, &self.moves, &self.names, self.protocol, self.only.as_deref());
+            return Err(Fault::new(&self.file, At::File, what));
+        }
+        // A line that was found upside down is decoded, but it is not good: somebody has to look at the wires. Where
+        // hardly anything could be decoded, the polarity was only a guess and says nothing.
+        let inverted = self.found.iter().any(Found::is_inverted);
+        if !inverted || self.candidates.inverted.is_some() || out.tally.ok <= out.tally.faults() {
+            return Ok(());
+        }
+        let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";
+        Err(Fault::new(&self.file, At::File, what))
+    }
+
     /// What was held back may already do: judges it if it is twice as much as the last time, and goes on holding it back
     /// if no line is certain.
-    pub(super) fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
+    fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
         let held = self.held.as_ref().map_or(0, Vec::len);
         if held < FEWEST || held < 2 * self.tried {
             return Ok(());
@@ -216,10 +272,6 @@ impl Watch {
 
     /// Judges the open channels; at the `end` also those that have hardly moved. What holds is decoded from its
     /// first edge on.
-    pub(super) fn survey(&mut self, end: bool, out: &mut Output<'_>) -> io::Result<()> {
-        self.judge(end, false, out)
-    }
-
     fn judge(&mut self, end: bool, early: bool, out: &mut Output<'_>) -> io::Result<()> {
         let first = self.held.is_some();
         let (judged, many) = self.moving();
@@ -227,21 +279,21 @@ impl Watch {
         for channel in &judged {
             let Some(State::Open(edges)) = self.states.get(usize::from(*channel)) else { continue };
             if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
-                self.busiest = Some((*channel, edges.iter().take(3000).copied().collect()));
+                self.busiest = Some((*channel, edges.iter().take(3000).map(|kept| kept.edge()).collect()));
             }
             if self.candidates.pair().is_none() {
-                readings.extend(self.candidates.read(*channel, edges));
+                readings.extend(self.candidates.read(*channel, &edges_of(edges)));
             }
         }
         readings.extend(self.said_pair());
         let states = &self.states;
         let edges = |channel: u16| match states.get(usize::from(channel)) {
-            Some(State::Open(edges)) => edges.clone(),
+            Some(State::Open(edges)) => edges_of(edges),
             _ => Vec::new(),
         };
         let all = self.candidates.lines(readings, &judged, &edges);
         // The last chance of what is not certain, or the only one where the user says that it is a line.
-        let last = !early && self.found.is_empty() && (end || self.named && self.candidates.is_asked_for());
+        let last = !early && self.found.is_empty() && (end || self.only.is_some() && self.candidates.is_asked_for());
         let (taken, passed) = self.choose(all, last);
         if early && taken.is_empty() {
             return Ok(());
@@ -303,11 +355,11 @@ impl Watch {
     fn said_pair(&self) -> Option<Found> {
         let channels = self.candidates.pair()?;
         let edges = |channel: u16| match self.states.get(usize::from(channel)) {
-            Some(State::Open(edges)) => Some(edges.as_slice()),
+            Some(State::Open(edges)) => Some(edges_of(edges)),
             _ => None,
         };
         let [requests, answers] = channels;
-        self.candidates.read_pair(channels, [edges(requests)?, edges(answers)?])
+        self.candidates.read_pair(channels, [&edges(requests)?, &edges(answers)?])
     }
 
     /// Lines that are good enough; the last chance is that of the best one. Behind them the channels that only repeat
@@ -327,7 +379,7 @@ impl Watch {
             taken.extend(fresh.into_iter().next().filter(|best| best.evidence.score >= LEAST || sure));
         }
         // The user named one channel: whatever it is, it is one line.
-        if self.named {
+        if self.only.is_some() {
             taken.truncate(1);
         }
         (taken, passed)
@@ -348,7 +400,7 @@ impl Watch {
     /// Decodes a line from now on, and what was kept of its channels.
     fn take(&mut self, found: Found, out: &mut Output<'_>) -> io::Result<()> {
         let Speech { protocol, rate } = found.speech;
-        let Some(decoder) = protocol.line(rate, self.settings()) else { return Ok(()) };
+        let Some(decoder) = protocol.line(rate, &self.candidates.settings) else { return Ok(()) };
         let index = self.lines.len();
         let names = self.names(&found.taps);
         let lane = Lane {
@@ -367,7 +419,11 @@ impl Watch {
         for tap in &found.taps {
             if let Some(state) = self.states.get_mut(usize::from(tap.channel)) {
                 if let State::Open(kept) = std::mem::replace(state, State::Taken(index)) {
-                    edges.extend(kept.into_iter().map(|(time, level)| Change { time, channel: tap.channel, level }));
+                    edges.extend(kept.into_iter().map(Kept::edge).map(|(time, level)| Change {
+                        time,
+                        channel: tap.channel,
+                        level,
+                    }));
                 }
             }
         }
@@ -388,8 +444,8 @@ impl Watch {
         if found.is_certain() || !self.candidates.is_asked_for() {
             return None;
         }
-        let settings = Settings { line: Options::default(), ..self.settings().clone() };
-        let other = Candidates::new(None, settings, None).read(tap.channel, edges)?;
+        let settings = Settings { line: Options::default(), ..self.candidates.settings.clone() };
+        let other = Candidates::new(None, settings, None).read(tap.channel, &edges_of(edges))?;
         (other.is_certain() && other.evidence.score > 2 * found.evidence.score).then_some(other)
     }
 
@@ -420,4 +476,27 @@ impl Watch {
         }
         Ok(())
     }
+}
+
+/// The channels that the user named.
+fn wanted(options: &Options, names: &[String]) -> Result<Option<Vec<u16>>, String> {
+    match (&options.pair, &options.channel) {
+        (Some((requests, answers)), _) => Ok(Some(vec![find(requests, names)?, find(answers, names)?])),
+        (None, Some(channel)) => Ok(Some(vec![find(channel, names)?])),
+        (None, None) => Ok(None),
+    }
+}
+
+/// A channel by its name, or by its number from 0.
+fn find(name: &str, channels: &[String]) -> Result<u16, String> {
+    let by_name = channels.iter().position(|c| c == name).or_else(|| {
+        let last = |c: &String| c.rsplit('.').next().is_some_and(|end| end == name);
+        channels.iter().position(last)
+    });
+    let by_number = || name.parse().ok().filter(|&n: &usize| n < channels.len());
+    by_name.or_else(by_number).and_then(|index| u16::try_from(index).ok()).ok_or_else(|| {
+        let shown = channels.iter().take(20).map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
+        let more = if channels.len() > 20 { ", ..." } else { "" };
+        format!("no channel \"{name}\"; the file has {shown}{more}")
+    })
 }

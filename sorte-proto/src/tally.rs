@@ -1,0 +1,41 @@
+/// What became of the frames of one sender in the IO exchange, beside the good ones and those with a wrong checksum. All counts stay
+/// at their end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Tally {
+    /// Cycles in which no frame came at its time.
+    pub missed: u32,
+    /// Frames that came a second time in their cycle.
+    pub doubled: u32,
+    /// Frames that came at another time than theirs.
+    pub late: u32,
+    /// Frames of a cycle that is over.
+    pub stale: u32,
+}
+
+/// What may be wrong with a frame of the exchange whose checks are right, or that is not there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Fault {
+    Missed,
+    Doubled,
+    Late,
+    Stale,
+}
+
+impl Tally {
+    pub(crate) const ZERO: Self = Self { missed: 0, doubled: 0, late: 0, stale: 0 };
+
+    pub(crate) const fn add(&mut self, fault: Fault) {
+        let count = match fault {
+            Fault::Missed => &mut self.missed,
+            Fault::Doubled => &mut self.doubled,
+            Fault::Late => &mut self.late,
+            Fault::Stale => &mut self.stale,
+        };
+        *count = count.saturating_add(1);
+    }
+}
+
+servowire_core::one_line!(Tally {
+    Self { missed, doubled, late, stale } => "{} missed, {} doubled, {} late, {} stale", missed, doubled, late, stale;
+});

@@ -1,0 +1,115 @@
+//! The step interrupt of step-motion in each of its calls, and the background that feeds it.
+
+use step_motion::{Axis, Clock, Fired, Limits, Queue, StepTimer, Work};
+
+use super::kernels_on_states;
+use crate::count::{most_tenths, tenths_on};
+
+/// Segments long enough that none ends, and segments of a step: every call goes on to the next one. The lengths tell the kernels
+/// apart.
+static STEPS: Queue<9> = Queue::new();
+static SEGMENTS: Queue<11> = Queue::new();
+static EMPTY: Queue<13> = Queue::new();
+static HALTED: Queue<15> = Queue::new();
+static LONG: Queue<129> = Queue::new();
+static SHORT: Queue<129> = Queue::new();
+static SLICES: Queue<129> = Queue::new();
+
+/// An axis that goes back and forth, with its interrupt, and how far.
+struct Shuttle {
+    axis: Axis<'static, 129>,
+    timer: StepTimer<'static, 129>,
+    way: i64,
+}
+
+impl Shuttle {
+    /// At 168 MHz, to 50,000 steps/s if the way is long enough.
+    fn new(queue: &'static Queue<129>, way: i64, jerk: u64) -> Option<Self> {
+        let limits = Limits::new(50_000, 100_000).ok()?.with_jerk(jerk).ok()?;
+        let (axis, timer) = Axis::new(queue, Clock::new(168_000_000)?, limits).ok()?;
+        Some(Self { axis, timer, way })
+    }
+
+    fn slice(&mut self) -> Work {
+        let work = self.axis.poll();
+        if work == Work::Rest {
+            self.way = -self.way;
+            let _: Result<_, _> = self.axis.move_to(self.way);
+        }
+        work
+    }
+
+    /// An event, and all that the background has to do then.
+    fn event(&mut self) -> Fired {
+        while matches!(self.slice(), Work::More | Work::Rest) {}
+        self.timer.fire()
+    }
+}
+
+fn limits() -> Option<Limits> {
+    Limits::new(20_000, 100_000).ok()
+}
+
+kernels_on_states! {
+    /// A step within a segment.
+    fn step_timer_step(timer: &mut StepTimer<'static, 9>, _input: &()) -> Fired {
+        timer.fire()
+    } as {
+        StepTimer::endless(&STEPS, 65_535).map_or(0, |mut timer| tenths_on(&mut timer, step_timer_step, &[()]))
+    }
+
+    /// A step that goes on to the next segment.
+    fn step_timer_segment(timer: &mut StepTimer<'static, 11>, _input: &()) -> Fired {
+        timer.fire()
+    } as {
+        StepTimer::endless(&SEGMENTS, 1).map_or(0, |mut timer| tenths_on(&mut timer, step_timer_segment, &[()]))
+    }
+
+    /// A call that finds nothing to do.
+    fn step_timer_idle(timer: &mut StepTimer<'static, 13>, _input: &()) -> Fired {
+        timer.fire()
+    } as {
+        let Some(limits) = limits() else { return 0 };
+        let Ok((_, mut timer)) = Axis::new(&EMPTY, Clock::MICROSECONDS, limits) else { return 0 };
+        tenths_on(&mut timer, step_timer_idle, &[()])
+    }
+
+    /// A call after a halt.
+    fn step_timer_halt(timer: &mut StepTimer<'static, 15>, _input: &()) -> Fired {
+        timer.fire()
+    } as {
+        let Some(limits) = limits() else { return 0 };
+        let Ok((mut axis, mut timer)) = Axis::new(&HALTED, Clock::MICROSECONDS, limits) else { return 0 };
+        axis.halt();
+        tenths_on(&mut timer, step_timer_halt, &[()])
+    }
+
+    /// A step with all of its background, on ramps of 2500 steps of an S-curve.
+    fn step_motion_axis_long(shuttle: &mut Shuttle, _input: &()) -> Fired {
+        shuttle.event()
+    } as {
+        Shuttle::new(&LONG, 2500, 1_000_000).map_or(0, |mut own| tenths_on(&mut own, step_motion_axis_long, &[()]))
+    }
+
+    /// The same on ramps of 100 steps.
+    fn step_motion_axis_short(shuttle: &mut Shuttle, input: &u8) -> (Fired, u8) {
+        (shuttle.event(), *input)
+    } as {
+        Shuttle::new(&SHORT, 100, 5_000_000).map_or(0, |mut own| tenths_on(&mut own, step_motion_axis_short, &[0]))
+    }
+
+    /// The worst slice of the background, to 40 instructions.
+    fn step_motion_axis_slice(shuttle: &mut Shuttle, _input: &u8) -> Work {
+        shuttle.axis.poll()
+    } as {
+        let Some(mut own) = Shuttle::new(&SLICES, 1000, 2_000_000) else { return 0 };
+        most_tenths(4096, || match step_motion_axis_slice(&mut own, &0) {
+            Work::More => true,
+            Work::Rest => {
+                own.way = -own.way;
+                own.axis.move_to(own.way).is_ok()
+            }
+            _ => own.timer.fire().wait() > 0,
+        })
+    }
+}
