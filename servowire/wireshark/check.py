@@ -83,9 +83,9 @@ def dissected(folder, packets):
 def flipped(folder):
     whole = bytearray((folder / "m.pcapng").read_bytes())
     # The data of a packet in the middle, some bytes after its block header.
-    at = whole.find(struct.pack("<I", 6), len(whole) // 2)
-    while at % 4 or struct.unpack_from("<I", whole, at + 4)[0] > 200:
-        at = whole.find(struct.pack("<I", 6), at + 1)
+    at = 0
+    while at < len(whole) // 2 or struct.unpack_from("<I", whole, at)[0] != 6:
+        at += struct.unpack_from("<I", whole, at + 4)[0]
     whole[at + 30] ^= 1
     (folder / "flipped.pcapng").write_bytes(whole)
     rows = tshark(folder / "flipped.pcapng", "sorte.crc_good")
