@@ -180,6 +180,7 @@ impl Cable {
 pub(crate) const DOWN_WINDOW: usize = 48;
 
 // In words of 64 samples.
+#[allow(clippy::manual_is_multiple_of, reason = "the oldest Rust has it not")]
 const _: () = assert!(WINDOW % 8 == 0 && DOWN_WINDOW % 8 == 0);
 
 /// From edges to levels: every sample is the level before it, inverted at each edge. The line is high at first.

@@ -28,6 +28,7 @@ struct Cost {
 }
 
 /// Runs the program and watches it.
+#[expect(clippy::zombie_processes, reason = "it is waited for below, after its figures were read")]
 fn cost(arguments: &[&str]) -> Cost {
     let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
         .args(arguments)

@@ -87,7 +87,9 @@ impl Link {
             }
             // A wrong bit in each word, and in each bit a glitch that leaves an RSSI of 4.
             6..9 => {
-                samples.iter_mut().for_each(|byte| *byte ^= 0x10);
+                for byte in samples.iter_mut() {
+                    *byte ^= 0x10;
+                }
                 bits ^ 0x0402_0100_8040_2010
             }
             // Ten equal bits in each word.
@@ -102,12 +104,16 @@ impl Link {
             }
             // Noise.
             11..13 => {
-                samples.iter_mut().for_each(|byte| *byte = self.draw() as u8);
+                for byte in samples.iter_mut() {
+                    *byte = self.draw() as u8;
+                }
                 u64::from(self.draw()) << 37 | u64::from(self.draw()) << 20 | u64::from(self.draw())
             }
             // Glitches in the bits between the samples that are taken.
             13..16 => {
-                samples.iter_mut().for_each(|byte| *byte ^= 0x10);
+                for byte in samples.iter_mut() {
+                    *byte ^= 0x10;
+                }
                 bits
             }
             _ => bits,

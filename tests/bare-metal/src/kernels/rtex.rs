@@ -7,8 +7,8 @@ use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, Checked, CommandCounter, ControlError, ControlPhase, EchoWatch, Expected,
-    Handshake, Heard, Inputs, Led, Limits, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave,
-    SlaveInfo, Turn, compare, led,
+    Handshake, Heard, Inputs, Led, Limits, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};

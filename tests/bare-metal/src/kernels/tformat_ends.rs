@@ -123,7 +123,7 @@ kernels! {
         encoder.raise_alarms(Almc::CE);
         encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
         let (mut reply, mut now_ns) = (None, 0);
-        for byte in sent.iter() {
+        for byte in &**sent {
             now_ns += 4_000;
             if let Some(sent) = encoder.hear(&[*byte], now_ns) {
                 reply = Some(sent);

@@ -36,7 +36,7 @@ pub(super) fn master() -> u32 {
                 let mut taken = Ok(());
                 deepest = deepest.max(of(|| {
                     taken =
-                        master.hear(bytes, at_ns + u64::from(frame.preamble().capture_ns()) + ROUND_TRIP).map(|_| ())
+                        master.hear(bytes, at_ns + u64::from(frame.preamble().capture_ns()) + ROUND_TRIP).map(|_| ());
                 }));
                 if taken.is_err() {
                     break;
