@@ -86,9 +86,10 @@ impl Master {
             Command::Read { address } => {
                 (address, EepromAccess::read(Page::truncate(0), Address::truncate(address), EEPROM_POLLING))
             }
-            Command::Write { address, data } => {
-                (address, EepromAccess::write(Page::truncate(0), Address::truncate(address), data as u8, EEPROM_POLLING))
-            }
+            Command::Write { address, data } => (
+                address,
+                EepromAccess::write(Page::truncate(0), Address::truncate(address), data as u8, EEPROM_POLLING),
+            ),
             Command::LoseMultiTurnReference => {
                 return match self.run(MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1)) {
                     Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
