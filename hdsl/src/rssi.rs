@@ -165,8 +165,8 @@ pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
 fn of_four(edges: u32) -> u8 {
-    let [a, b, c, d] = edges.to_le_bytes().map(usize::from);
-    ONES[a] & ONES[b] & ONES[c] & ONES[d]
+    let at = |shift: u32| ONES[(edges >> shift & 0xff) as usize];
+    at(0) & at(8) & at(16) & at(24)
 }
 
 /// Four bit times one of which has several edges. What is as bad as it can be does not become worse.

@@ -383,7 +383,8 @@ impl Network {
 
     /// Whether an answer tells this line.
     pub(crate) fn is_told_by(&self, answer: DiscoveryView<'_>) -> bool {
-        answer.count() == u16::from(self.devices) && self.entries().iter().copied().eq(answer.entries())
+        let mut told = answer.entries();
+        answer.count() == u16::from(self.devices) && self.entries().iter().all(|entry| told.next() == Some(*entry))
     }
 
     /// Devices in the line, 0..=254.

@@ -111,7 +111,7 @@ fn run(devices: usize, cycles: u64, positions: bool, seed: u64) -> u64 {
     }
     let sent = line.master.counters().cycles * devices as u64 * 2;
     println!("{devices} devices: {sent} frames, {happened} lost or doubled, {}", line.master.counters());
-    assert!(sent < 50_000 || happened > 0, "{place}: nothing has happened");
+    assert!(sent < 100_000 || happened > 0, "{place}: nothing has happened");
     sent
 }
 

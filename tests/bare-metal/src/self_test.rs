@@ -16,6 +16,8 @@ mod nrz_line;
 pub(crate) mod rtex;
 #[cfg(feature = "sorte-proto")]
 pub(crate) mod sorte;
+#[cfg(feature = "step-motion")]
+mod step_motion;
 #[cfg(feature = "step-profile")]
 pub(crate) mod step_profile;
 #[cfg(feature = "tformat")]
@@ -44,6 +46,8 @@ pub(crate) const ALL: &[&[Topic]] = &[
     rtex::TOPICS,
     #[cfg(feature = "sorte-proto")]
     sorte::TOPICS,
+    #[cfg(feature = "step-motion")]
+    step_motion::TOPICS,
     #[cfg(feature = "step-profile")]
     step_profile::TOPICS,
     #[cfg(feature = "tformat")]
