@@ -29,10 +29,10 @@ fn durations() -> Tally {
         KNOWN,
         |row| row.name,
         |row| {
-            let limits = Limits::new(row.speed, row.acceleration);
-            let limits = if row.jerk == 0 { limits } else { limits.and_then(|limits| limits.with_jerk(row.jerk)) };
-            let plan = limits.and_then(|limits| Plan::new(Clock::MICROSECONDS, limits, row.steps));
-            plan.is_ok_and(|plan| plan.duration().abs_diff(row.us) <= 1 && plan.pulses().count() as u32 == row.steps)
+            let limits = Limits::new(row.speed, row.acceleration).ok();
+            let limits = if row.jerk == 0 { limits } else { limits.and_then(|limits| limits.with_jerk(row.jerk).ok()) };
+            let plan = limits.and_then(|limits| Plan::new(Clock::MICROSECONDS, limits, row.steps).ok());
+            plan.is_some_and(|plan| plan.duration().abs_diff(row.us) <= 1 && plan.pulses().count() as u32 == row.steps)
         },
     )
 }
