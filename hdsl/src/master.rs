@@ -371,7 +371,6 @@ impl Master {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
         self.h_frame.state = State::Running;
-        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };
         self.h_frame.long_free = self.requester.is_long_free();
         self.h_frame.short_free = self.requester.is_short_free();
         &self.h_frame
@@ -388,7 +387,7 @@ impl Master {
             self.present = next;
             self.lost = restarted;
             self.detour |= restarted.is_some();
-            self.longest_ns = self.usual_ns;
+            self.usual();
             return self.go_on();
         }
         self.counters.frames = self.counters.frames.wrapping_add(1);
@@ -402,15 +401,21 @@ impl Master {
             stuffing: next.map_or_else(|| self.search_time(was, restarted), |next| next.stuffing),
         };
         self.prepare(was, next.map(|next| next.extra), restarted.is_some());
-        self.longest_ns = match (self.state, self.sync) {
-            (State::Running, None) => self.usual_ns,
-            _ => self.present_ns(),
-        };
+        match (self.state, self.sync) {
+            (State::Running, None) => self.usual(),
+            _ => self.longest_ns = self.present_ns(),
+        }
         self.h_frame.restarted = restarted;
         self.h_frame.state = self.state;
         self.h_frame.long_free = self.state == State::Running && self.requester.is_long_free();
         self.h_frame.short_free = self.state == State::Running && self.requester.is_short_free();
         &self.h_frame
+    }
+
+    /// How the frames of a running link that is free running end, and how long they are.
+    const fn usual(&mut self) {
+        self.longest_ns = self.usual_ns;
+        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };
     }
 
     #[inline]
