@@ -40,6 +40,9 @@ struct Master {
     free_ns: u64,
 }
 
+/// How long a procedure waits for an answer.
+const PATIENT_NS: u32 = 40_000;
+
 impl Master {
     /// One request and its answer, when the line is free. How long they took.
     fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Response, Error>, u64) {
@@ -70,13 +73,16 @@ impl Master {
         &mut self,
         mut procedure: P,
     ) -> Result<P::Value, Error> {
+        // An encoder made of software, as that of this folder, takes more than 10 us for an answer that it has not made ahead.
+        let line = self.line;
+        self.line = line.with_response_timeout_ns(PATIENT_NS);
         let now_ns = self.clock.now_ns();
         let Ok(ended) = servowire_core::run(&mut procedure, now_ns, |request, not_before_ns| {
             while self.clock.now_ns() < not_before_ns {}
             let (outcome, _) = self.exchange(request, &message(request));
             Ok::<_, Infallible>(Ended { outcome, ready_ns: self.free_ns.max(self.clock.now_ns()) })
         });
-        self.free_ns = ended.ready_ns;
+        (self.line, self.free_ns) = (line, ended.ready_ns);
         ended.outcome
     }
 
