@@ -158,9 +158,9 @@ def main():
             first = first or edges
             same = min(len(first), len(edges))
             assert first[:same] == edges[:same], f"{name}: the line is another one"
-    # What would be seen if it were not so: processors that are too slow say that, and give no wrong position.
+    # What would be seen if it were not so: processors that are too slow begin anew and count it, and give no position.
     line, chip, begun, _ = run(image, scale=4.0)
-    assert b"this program was late" in chip.console, "four times as slow, and nothing was late"
+    assert chip.load(chip.symbol("4LATE17h"), 4) > 0, "four times as slow, and nothing was late"
     assert b"\nposition" not in chip.console
 
 

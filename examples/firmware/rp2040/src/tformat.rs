@@ -82,7 +82,10 @@ impl Master {
             let (outcome, _) = self.exchange(request, &message(request));
             Ok::<_, Infallible>(Ended { outcome, ready_ns: self.free_ns.max(self.clock.now_ns()) })
         });
-        (self.line, self.free_ns) = (line, ended.ready_ns);
+        self.free_ns = ended.ready_ns;
+        // Afterwards it has the answer to this one ready again.
+        let _ = self.exchange(Request::ReadAll, &message(Request::ReadAll));
+        self.line = line;
         ended.outcome
     }
 
