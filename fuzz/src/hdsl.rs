@@ -137,20 +137,26 @@ pub fn position(mut data: &[u8]) {
                 let safe = word(&mut data) & bits.mask();
                 tracker.align(safe);
                 other.align(safe);
-                fast.iter_mut().for_each(|fast| fast.align(Some(safe)));
+                for fast in &mut fast {
+                    fast.align(Some(safe));
+                }
                 safe_positions += 1;
             }
             1 => {
                 tracker.no_safe_position();
                 other.no_safe_position();
-                fast.iter_mut().for_each(|fast| fast.align(None));
+                for fast in &mut fast {
+                    fast.align(None);
+                }
             }
             event => {
                 let value = u16::from_le_bytes([byte(&mut data), byte(&mut data)]);
                 let value = DeltaDelta::from_word(value).ok().filter(|_| event != 2);
                 tracker.step(value);
                 other.step(value);
-                fast.iter_mut().for_each(|fast| fast.step(value));
+                for fast in &mut fast {
+                    fast.step(value);
+                }
                 let change = tracker.registers().vel.wrapping_sub(before).wrapping_shl(8) >> 8;
                 assert!((-1024..=1023).contains(&change), "{change}");
                 agree &= value.is_some() || (-1023..=1022).contains(&change);
