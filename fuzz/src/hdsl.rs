@@ -137,7 +137,7 @@ pub fn position(mut data: &[u8]) {
                 let safe = word(&mut data) & bits.mask();
                 tracker.align(safe);
                 other.align(safe);
-                for fast in &mut fast {
+                if let Some(fast) = &mut fast {
                     fast.align(Some(safe));
                 }
                 safe_positions += 1;
@@ -145,7 +145,7 @@ pub fn position(mut data: &[u8]) {
             1 => {
                 tracker.no_safe_position();
                 other.no_safe_position();
-                for fast in &mut fast {
+                if let Some(fast) = &mut fast {
                     fast.align(None);
                 }
             }
@@ -154,7 +154,7 @@ pub fn position(mut data: &[u8]) {
                 let value = DeltaDelta::from_word(value).ok().filter(|_| event != 2);
                 tracker.step(value);
                 other.step(value);
-                for fast in &mut fast {
+                if let Some(fast) = &mut fast {
                     fast.step(value);
                 }
                 let change = tracker.registers().vel.wrapping_sub(before).wrapping_shl(8) >> 8;
