@@ -111,7 +111,7 @@ fn run(devices: usize, cycles: u64, positions: bool, seed: u64) -> u64 {
     }
     let sent = line.master.counters().cycles * devices as u64 * 2;
     println!("{devices} devices: {sent} frames, {happened} lost or doubled, {}", line.master.counters());
-    assert!(sent < 100_000 || happened > 0, "{place}: nothing has happened");
+    assert!(sent < 50_000 || happened > 0, "{place}: nothing has happened");
     sent
 }
 
@@ -120,7 +120,7 @@ fn run(devices: usize, cycles: u64, positions: bool, seed: u64) -> u64 {
 fn nothing_is_stale_and_every_loss_is_counted() {
     let frames = servowire_world::wanted_events(200_000) as u64;
     for (n, devices) in (1..).zip([4, 16, 64, 254]) {
-        let cycles = (frames / 8 / (2 * devices as u64)).max(100);
+        let cycles = (frames / 8 / (2 * devices as u64)).max(200);
         let sent = run(devices, cycles, true, n) + run(devices, cycles, false, n + 10);
         assert!(sent >= frames / 5, "{sent} frames");
     }
