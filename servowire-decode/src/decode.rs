@@ -22,7 +22,8 @@ pub fn decode(
     match (capture, protocol) {
         // Whatever was asked for: what has packets.
         (Capture::Packets(mut packets), _) => {
-            while let Some(packet) = packets.packet()? {
+            while let Some(mut packet) = packets.packet()? {
+                packet.has_fcs = settings.fcs.unwrap_or(packet.has_fcs);
                 for event in CODECS.iter().filter_map(|codec| codec.packet(&packet)) {
                     out.event(&event)?;
                 }

@@ -20,10 +20,16 @@ pub struct Event {
     pub fields: Vec<Field>,
     /// The position that the frame carries.
     pub position: Option<Position>,
+    /// The address of the encoder, drive or device that it is of, where the frame itself tells it.
+    pub address: Option<u16>,
+    /// What happened with this frame that belongs in a list of events: an alarm, a servo that is switched on.
+    pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+    /// Whether the times of its place are counted, as by the update counter of a drive, and not measured.
+    pub counted: bool,
     /// Whether this is no frame but a word about the recording, which is counted nowhere.
     pub remark: bool,
 }
@@ -37,7 +43,19 @@ impl Event {
         fields: Vec<Field>,
         verdict: Verdict,
     ) -> Self {
-        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
+        Self {
+            place,
+            direction,
+            kind: kind.into(),
+            fields,
+            position: None,
+            address: None,
+            happened: Vec::new(),
+            delay: None,
+            verdict,
+            counted: false,
+            remark: false,
+        }
     }
 
     /// Says where fields are, by their names.

@@ -101,12 +101,15 @@ impl Printer for Picture {
     }
 }
 
+/// A line, and an address on it where the frames tell it.
+type Speaker = (usize, Option<u16>);
+
 /// Gathers what is drawn.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     title: String,
-    /// By line and by the counts after which the value begins again.
-    curves: BTreeMap<(usize, Option<u64>), Curve>,
+    /// By line and address, and by the counts after which the value begins again.
+    curves: BTreeMap<(Speaker, Option<u64>), Curve>,
     delays: Buckets<u64>,
     errors: BTreeMap<&'static str, Buckets<u64>>,
     /// First and last time.
@@ -139,14 +142,20 @@ impl Picture {
             self.errors.entry(class).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start.ps(), &1);
         }
         if let Some(position) = event.position {
-            self.position(origin, start, position);
+            self.position(origin, event.address, start, position);
         }
     }
 
-    fn position(&mut self, origin: &Origin, time: Time, position: Position) {
+    fn position(&mut self, origin: &Origin, address: Option<u16>, time: Time, position: Position) {
         let turns = position.turns();
-        let curve = self.curves.entry((origin.speaks, position.span)).or_insert_with(|| Curve {
-            name: origin.lane().map_or_else(String::new, |lane| lane.channel.clone()),
+        let curve = self.curves.entry(((origin.speaks, address), position.span)).or_insert_with(|| Curve {
+            name: match (origin.lane(), address) {
+                (lane, Some(address)) => {
+                    let line = lane.map_or_else(String::new, |lane| format!("{} ", lane.channel));
+                    format!("{line}axis {address}")
+                }
+                (lane, None) => lane.map_or_else(String::new, |lane| lane.channel.clone()),
+            },
             turns: turns.is_some(),
             count: 0,
             values: Buckets::new(FIRST, MOST),
@@ -186,10 +195,10 @@ impl Picture {
 
     fn draw_positions(&self, area: &Area<'_>) -> Drawn {
         // Of each line the curve that has most points; turns and counts do not go together.
-        let mut best: BTreeMap<usize, &Curve> = BTreeMap::new();
-        for ((lane, _), curve) in &self.curves {
-            if best.get(lane).is_none_or(|known| (known.turns, known.count) < (curve.turns, curve.count)) {
-                best.insert(*lane, curve);
+        let mut best: BTreeMap<Speaker, &Curve> = BTreeMap::new();
+        for ((speaker, _), curve) in &self.curves {
+            if best.get(speaker).is_none_or(|known| (known.turns, known.count) < (curve.turns, curve.count)) {
+                best.insert(*speaker, curve);
             }
         }
         let turns = best.values().any(|curve| curve.turns);

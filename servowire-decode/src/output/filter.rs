@@ -71,8 +71,7 @@ impl Filter {
             Value::Number { value, .. } => Some(value),
             _ => None,
         });
-        // RTEX has the address in the kind: `cmd 5`.
-        let said = said.or_else(|| event.kind.strip_prefix("cmd ").or(event.kind.strip_prefix("rsp "))?.parse().ok());
+        let said = event.address.map(i64::from).or(said);
         let passes = match said {
             Some(address) => address == wanted,
             None => event.direction == Some(Direction::Answer) && self.passed.get(&lane).copied().unwrap_or(false),
@@ -113,7 +112,10 @@ mod tests {
         assert!(filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
         // On another line nobody has asked.
         assert!(!filter.takes(1, &event(Direction::Answer, "ABS40", None, 0)));
-        assert!(filter.takes(0, &event(Direction::Answer, "rsp 2", None, 0)));
+        for address in [1, 2] {
+            let told = Event { address: Some(address), ..event(Direction::Answer, "rsp", None, 0) };
+            assert_eq!(filter.takes(0, &told), address == 2);
+        }
     }
 
     #[test]

@@ -11,6 +11,8 @@ use crate::time::Time;
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
+/// Events that are listed; further ones are counted.
+const EVENTS: usize = 1_000;
 
 /// Collects figures and prints them at the end of a file.
 pub struct Stats<W> {
@@ -29,11 +31,33 @@ struct Figures {
     ok: u64,
     kinds: BTreeMap<String, u64>,
     refused: BTreeMap<&'static str, u64>,
+    delay: Spread,
+    /// By address, where the frames tell it.
+    axes: BTreeMap<Option<u16>, Axis>,
+    happened: Vec<Happening>,
+    /// Of all lists together: what there was no room for.
+    unlisted: u64,
+}
+
+/// What happened, to whom and where.
+#[derive(Debug, Clone)]
+struct Happening {
+    place: Place,
+    address: Option<u16>,
+    what: String,
+}
+
+/// Figures of an encoder or a drive.
+#[derive(Debug, Default)]
+struct Axis {
     /// Start of the last frame of the side that keeps the cycle.
     last_start: Option<(Option<Direction>, Time)>,
     cycle: Spread,
-    delay: Spread,
+    /// Times are counted and say nothing of a cycle.
+    counted: bool,
     position: Option<(Time, Position)>,
+    /// Least and most of the positions.
+    range: Option<(i64, i64)>,
     /// Positions in frames without a time.
     untimed: u64,
     largest: u64,
@@ -101,6 +125,7 @@ impl Spread {
 
 impl Figures {
     fn add(&mut self, event: &Event, limit: Option<u64>) {
+        self.list(event);
         if event.remark {
             return;
         }
@@ -123,6 +148,28 @@ impl Figures {
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
+        self.axes.entry(event.address).or_default().add(event, limit);
+    }
+
+    /// What belongs in the list of events.
+    fn list(&mut self, event: &Event) {
+        for what in &event.happened {
+            if self.happened.len() < EVENTS {
+                self.happened.push(Happening { place: event.place, address: event.address, what: what.clone() });
+            } else {
+                self.unlisted += 1;
+            }
+        }
+    }
+}
+
+impl Axis {
+    fn add(&mut self, event: &Event, limit: Option<u64>) {
+        self.counted |= event.counted;
+        if let Some(Position { counts, .. }) = event.position {
+            let (least, most) = self.range.unwrap_or((counts, counts));
+            self.range = Some((least.min(counts), most.max(counts)));
+        }
         let Place::Time { start, .. } = event.place else {
             self.untimed += u64::from(event.position.is_some());
             return;
@@ -140,8 +187,8 @@ impl Figures {
     fn missing(&self) -> Option<&'static str> {
         match (self.position, self.untimed) {
             (Some(_), _) => None,
-            (None, 0) => Some("no position of a single axis is seen (a log of RTEX blocks needs --mac-id)"),
-            (None, _) => Some("the positions have no times (a log of RTEX blocks needs --period)"),
+            (None, 0) => Some("no position is seen"),
+            (None, _) => Some("the positions have no times (a log of RTEX blocks needs times, or --period)"),
         }
     }
 
@@ -169,6 +216,46 @@ impl Figures {
             }
         }
     }
+
+    fn cycle_text(&self) -> String {
+        match self.cycle {
+            Spread { count: 1.., mean, .. } if self.counted => {
+                format!("{:.3} us on average as counted: the log has no times", mean / 1e6)
+            }
+            cycle => cycle.text(),
+        }
+    }
+
+    fn print_range(&self, out: &mut impl Write) -> io::Result<()> {
+        let Some((least, most)) = self.range else { return Ok(()) };
+        writeln!(out, "    position      {least} to {most} counts")
+    }
+
+    fn print(&self, out: &mut impl Write, limit: Option<u64>, indent: &str) -> io::Result<()> {
+        if self.position.is_some() {
+            writeln!(out, "{indent}largest move  {} counts", self.largest)?;
+        }
+        if let (Some(_), Some(missing)) = (limit, self.missing()) {
+            writeln!(out, "{indent}jumps         not known: {missing}")?;
+        } else if let Some(limit) = limit {
+            writeln!(out, "{indent}jumps         {} of more than {limit} counts", self.jumps)?;
+            for Jump { time, from, to, moved } in &self.listed {
+                writeln!(out, "{indent}  {:>14.3} us  {from} to {to}: {moved:+}", time.us())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn json(&self, limit: Option<u64>) -> Json {
+        let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
+        json!({
+            "cycle": if self.counted { Json::Null } else { self.cycle.json() },
+            "largest_move": self.position.map(|_| self.largest),
+            "least_position": self.range.map(|range| range.0), "most_position": self.range.map(|range| range.1),
+            "jumps": limit.filter(|_| self.missing().is_none()).map(|_| self.jumps),
+            "jumps_listed": self.listed.iter().map(jump).collect::<Vec<_>>(),
+        })
+    }
 }
 
 impl<W: Write> Stats<W> {
@@ -190,35 +277,93 @@ impl<W: Write> Stats<W> {
         for (class, count) in &f.refused {
             writeln!(self.out, "    {class:<17} {count}")?;
         }
-        writeln!(self.out, "  cycle         {}", f.cycle.text())?;
-        writeln!(self.out, "  answer delay  {}", f.delay.text())?;
-        if f.position.is_some() {
-            writeln!(self.out, "  largest move  {} counts", f.largest)?;
+        let addressed = f.axes.len() > 1 || f.axes.keys().any(Option::is_some);
+        if !addressed {
+            let cycle = f.axes.values().next().map_or_else(|| Spread::default().text(), Axis::cycle_text);
+            writeln!(self.out, "  cycle         {cycle}")?;
         }
-        if let (Some(_), Some(missing)) = (self.limit, f.missing()) {
-            writeln!(self.out, "  jumps         not known: {missing}")?;
-        } else if let Some(limit) = self.limit {
-            writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
-            for Jump { time, from, to, moved } in &f.listed {
-                writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", time.us())?;
+        writeln!(self.out, "  answer delay  {}", f.delay.text())?;
+        for (address, axis) in &f.axes {
+            match address {
+                Some(address) => {
+                    writeln!(self.out, "  axis {address}")?;
+                    writeln!(self.out, "    cycle         {}", axis.cycle_text())?;
+                    axis.print_range(&mut self.out)?;
+                    axis.print(&mut self.out, self.limit, "    ")?;
+                }
+                None if !addressed => axis.print(&mut self.out, self.limit, "  ")?,
+                None => {}
             }
+        }
+        self.print_events()
+    }
+
+    fn print_events(&mut self) -> io::Result<()> {
+        let Figures { happened, unlisted, .. } = &self.figures;
+        if happened.is_empty() {
+            return Ok(());
+        }
+        writeln!(self.out, "  events        {}", happened.len() as u64 + unlisted)?;
+        for Happening { place, address, what } in happened {
+            match place {
+                Place::Line(line) => write!(self.out, "    line {line:>9}")?,
+                Place::Time { start, .. } => write!(self.out, "    {:>14.3} us", start.us())?,
+            }
+            if let Some(address) = address {
+                write!(self.out, "  axis {address}")?;
+            }
+            writeln!(self.out, "  {what}")?;
+        }
+        if *unlisted > 0 {
+            writeln!(self.out, "    and {unlisted} more")?;
         }
         Ok(())
     }
 
     fn print_json(&mut self, file: &str) -> io::Result<()> {
         let f = &self.figures;
-        let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
-        let object = json!({
+        let mut object = json!({
             "file": file, "requests": f.requests, "answers": f.answers, "others": f.others,
-            "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
-            "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
-            "largest_move": f.position.map(|_| f.largest),
-            "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
-            "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
+            "ok": f.ok, "refused": f.refused, "kinds": f.kinds, "answer_delay": f.delay.json(),
         });
+        let axis = |axis: &Axis| axis.json(self.limit);
+        let mut entry = |key: &str, value: Json| {
+            if let Some(object) = object.as_object_mut() {
+                object.insert(key.to_owned(), value);
+            }
+        };
+        // Of a line with one encoder that needs no address, its figures are those of the line.
+        let addressed = f.axes.iter().filter_map(|(address, figures)| Some(((*address)?, figures)));
+        let axes: Vec<Json> = addressed
+            .map(|(address, figures)| {
+                let mut object = axis(figures);
+                object.as_object_mut().map(|object| object.insert("address".to_owned(), address.into()));
+                object
+            })
+            .collect();
+        let alone = if axes.is_empty() { f.axes.values().next() } else { None };
+        if let Json::Object(figures) = alone.map_or_else(|| axis(&Axis::default()), axis) {
+            figures.into_iter().for_each(|(key, value)| entry(&key, value));
+        }
+        if !axes.is_empty() {
+            entry("axes", axes.into());
+        }
+        if !f.happened.is_empty() {
+            entry("events", f.happened.iter().map(Happening::json).collect());
+            entry("events_unlisted", f.unlisted.into());
+        }
         serde_json::to_writer(&mut self.out, &object)?;
         self.out.write_all(b"\n")
+    }
+}
+
+impl Happening {
+    fn json(&self) -> Json {
+        let (key, at) = match self.place {
+            Place::Line(line) => ("line", json!(line)),
+            Place::Time { start, .. } => ("time_ps", json!(start)),
+        };
+        json!({ key: at, "address": self.address, "what": self.what })
     }
 }
 

@@ -7,7 +7,7 @@ use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Value, Verdict};
 
 /// Columns that every file has; those of the fields follow, and at last what has none.
-const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 17] = [
     "file",
     "channel",
     "protocol",
@@ -15,6 +15,7 @@ const COLUMNS: [&str; 16] = [
     "start_us",
     "end_us",
     "direction",
+    "address",
     "kind",
     "position",
     "turns",
@@ -84,6 +85,7 @@ impl<W: Write> Csv<W> {
             Some(Direction::Answer) => "answer",
             None => "",
         })?;
+        out.write_field(event.address.map_or_else(String::new, |address| address.to_string()))?;
         out.write_field(event.kind.as_bytes())?;
         out.write_field(event.position.map_or_else(String::new, |position| position.counts.to_string()))?;
         let turns = event.position.and_then(|position| position.turns());

@@ -63,7 +63,8 @@ fn guarded(call: &mut dyn FnMut()) {
 ///
 /// Prints a transaction a line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
 /// polarity and bit rate are found from the capture; what was found is said on the error output. Exit code 0: all
-/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
+/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use; 4: all frames good, and a drive reported
+/// an alarm, did not answer or stood still; 5: both 1 and 4.
 #[derive(Debug, Args)]
 pub(crate) struct Decode {
     /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
@@ -151,6 +152,10 @@ pub(crate) struct FileArgs {
     /// The file still grows: what comes to it is decoded too, until the program is stopped.
     #[arg(long)]
     pub(super) follow: bool,
+    /// Whether the packets of a network capture end with their frame check sequence, which most network cards take off;
+    /// otherwise as the file says.
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    pub(super) fcs: Option<bool>,
     /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     pub(super) threshold: Option<f64>,
@@ -205,7 +210,7 @@ pub(crate) struct RtexArgs {
     /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
     #[arg(long, value_name = "BYTES", value_parser = block_size)]
     pub(super) block_size: Option<u8>,
-    /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
+    /// Update period, as 500us or 0.5ms: gives a log without times its times, and checks the steps of the position.
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(super) period: Option<u32>,
     /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
@@ -214,6 +219,14 @@ pub(crate) struct RtexArgs {
     /// Only the blocks of this drive.
     #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub(super) mac_id: Option<u8>,
+}
+
+fn yes_or_no(text: &str) -> Result<bool, &'static str> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("yes or no"),
+    }
 }
 
 /// A time of the capture.
@@ -252,6 +265,7 @@ impl Decode {
             (self.file.record_size.is_some(), "--record-size"),
             (self.file.threshold.is_some(), "--threshold"),
             (self.file.follow, "--follow"),
+            (self.file.fcs.is_some(), "--fcs"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
             (self.file.unit_size.is_some(), "--unit-size"),
@@ -302,7 +316,10 @@ impl Decode {
                 mac_id: self.rtex.mac_id,
                 period_ns: self.rtex.period,
                 gear: self.rtex.gear.unwrap_or(Gear::UNITY),
+                // A row of a table stands alone.
+                whole: self.csv,
             },
+            fcs: self.file.fcs,
         }
     }
 }
