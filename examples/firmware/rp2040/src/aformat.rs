@@ -38,10 +38,10 @@ const fn rate_of(rate: BitRate) -> Option<Rate> {
     }
 }
 
-type Encoders = Driver<Frames, Clock>;
+type Encoders<'a> = Driver<Frames<'a>, &'a Clock>;
 
 /// Does what was typed, and says what came of it.
-fn command(encoders: &mut Encoders, command: Command, console: &mut Console) -> fmt::Result {
+fn command(encoders: &mut Encoders<'_>, command: Command, console: &mut Console) -> fmt::Result {
     let ea = EncoderAddress::ZERO;
     match command {
         Command::Read { address } => say_word(encoders, address, console),
@@ -60,7 +60,7 @@ fn command(encoders: &mut Encoders, command: Command, console: &mut Console) -> 
     }
 }
 
-fn say_word(encoders: &mut Encoders, address: u8, console: &mut Console) -> fmt::Result {
+fn say_word(encoders: &mut Encoders<'_>, address: u8, console: &mut Console) -> fmt::Result {
     match encoders.read_eeprom(EncoderAddress::ZERO, address) {
         Ok(word) => writeln!(console, "EEPROM {address:02x}: {word:04x}"),
         Err(error) => say(console, "EEPROM", error),
@@ -78,11 +78,11 @@ fn say(console: &mut Console, what: &str, error: impl Display) -> fmt::Result {
 pub fn master(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
     let mut board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
-    let (clock, console) = (&mut board.clock, &mut board.console);
+    let (mut clock, console) = (&board.clock, &mut board.console);
     let receiver = RingReceiver::new(board.channel, board.receiver);
-    let port = Frames::new(board.transmitter, receiver, *clock, rate.bits_ns(FRAME_BITS));
+    let port = Frames::new(board.transmitter, receiver, clock, rate.bits_ns(FRAME_BITS));
     let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_hand_over_ns(LATENCY_NS);
-    let mut encoders = Driver::new(port, *clock, Resolution::default(), line);
+    let mut encoders = Driver::new(port, clock, Resolution::default(), line);
     let mut cell = EvidenceCell::new();
     let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
@@ -157,7 +157,7 @@ impl Ahead {
 /// At 16 Mbit/s, or if a clock does not start.
 pub fn encoder(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
-    let Board { mut clock, transmitter, receiver, watchdog, .. } =
+    let Board { clock, transmitter, receiver, watchdog, .. } =
         Board::new(image, rate.bits_per_second(), port, frames::BITS);
     let device = Device::new(EncoderAddress::ZERO, Resolution::default(), rate);
     let wait_cycles = programs::wait_cycles(port, TURN_NS);

@@ -16,10 +16,10 @@ const MOST: usize = 8;
 
 /// Transmitter and receiver of units of [`BITS`] bits. Frames are given when the line is quiet again, with the times at which they ended:
 /// this processor takes longer for one than the line.
-pub struct Frames {
+pub struct Frames<'a> {
     transmitter: Transmitter,
     receiver: RingReceiver,
-    clock: Clock,
+    clock: &'a Clock,
     frame_ns: u64,
     block: [Option<Unit>; MOST],
     len: usize,
@@ -28,9 +28,9 @@ pub struct Frames {
     end_ns: u64,
 }
 
-impl Frames {
+impl<'a> Frames<'a> {
     /// A port made of these. `clock` is that of the driver; a frame of its rate lasts `frame_ns`.
-    pub fn new(transmitter: Transmitter, receiver: RingReceiver, clock: Clock, frame_ns: u32) -> Self {
+    pub fn new(transmitter: Transmitter, receiver: RingReceiver, clock: &'a Clock, frame_ns: u32) -> Self {
         let frame_ns = frame_ns.into();
         Self { transmitter, receiver, clock, frame_ns, block: [None; MOST], len: 0, next: 0, end_ns: 0 }
     }
@@ -55,7 +55,7 @@ impl Frames {
     }
 }
 
-impl FramePort for Frames {
+impl FramePort for Frames<'_> {
     type Error = Infallible;
 
     fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Infallible> {

@@ -34,10 +34,10 @@ const fn rate_of(rate: BitRate) -> Rate {
     }
 }
 
-type Encoder = Driver<Uart, Automatic, Clock>;
+type Encoder<'a> = Driver<Uart, Automatic, &'a Clock>;
 
 /// Does what was typed, and says what came of it.
-fn command(encoder: &mut Encoder, command: Command, console: &mut Console) -> fmt::Result {
+fn command(encoder: &mut Encoder<'_>, command: Command, console: &mut Console) -> fmt::Result {
     let page = Page::truncate(0);
     let (address, byte) = match command {
         Command::Read { address } => (address, encoder.read_eeprom(page, Address::truncate(address))),
@@ -69,9 +69,9 @@ fn say(console: &mut Console, what: &str, error: Failure<Uart, Automatic>) -> fm
 /// If a clock does not start.
 pub fn master(image: &'static str, rate: BitRate) -> ! {
     let mut board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
-    let (clock, console) = (&mut board.clock, &mut board.console);
+    let (mut clock, console) = (&board.clock, &mut board.console);
     let uart = Uart::new(board.transmitter, RingReceiver::new(board.channel, board.receiver));
-    let mut encoder = Driver::new(uart, Automatic, *clock, Line::new(rate)).expect("the PIO switches the driver");
+    let mut encoder = Driver::new(uart, Automatic, clock, Line::new(rate)).expect("the PIO switches the driver");
     let mut cell = EvidenceCell::new();
     let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
@@ -179,7 +179,7 @@ const fn fields(control_field: u8) -> usize {
 /// If a clock does not start.
 pub fn encoder(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate);
-    let Board { mut clock, transmitter, receiver, watchdog, .. } =
+    let Board { clock, transmitter, receiver, watchdog, .. } =
         Board::new(image, rate.bits_per_second(), port, uart::BITS);
     let mut device = Device::new(ENCODER_ID, rate);
     device.set_position(Abs::truncate(0), TURNS);
