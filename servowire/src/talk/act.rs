@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs;
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
@@ -66,6 +66,8 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
     let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
     let (mut gone, mut out) = (None, io::stdout());
+    // Over the line before, to the end of the line; in a file or pipe a line each.
+    let (from, to) = if out.is_terminal() { ("\r", "\x1b[K") } else { ("", "\n") };
     while watch.count.is_none_or(|count| good + bad < count) {
         let reading = match read_data(link) {
             Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
@@ -93,14 +95,14 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
             csv.write_record(record).map_err(io::Error::from).map_err(Fault::file(path))?;
         }
         let errors = bad as f64 * 100.0 / (good + bad) as f64;
-        // Over the line before, to the end of the line.
-        match write!(out, "\r{text}  {errors:.1} % errors\x1b[K").and_then(|()| out.flush()) {
+        match write!(out, "{from}{text}  {errors:.1} % errors{to}").and_then(|()| out.flush()) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
             written => written.map_err(Fault::Output)?,
         }
         thread::sleep(Duration::from_millis(watch.period));
     }
-    say(format_args!("\n{good} good, {bad} refused or missing\n"))?;
+    let end = if from.is_empty() { "" } else { "\n" };
+    say(format_args!("{end}{good} good, {bad} refused or missing\n"))?;
     if let Some((mut csv, path)) = csv {
         csv.flush().map_err(Fault::file(path))?;
     }
