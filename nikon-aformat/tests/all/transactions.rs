@@ -159,7 +159,7 @@ fn a_repeated_frame_is_no_part_of_a_response() {
     assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
 }
 
-/// Two frames belong together if the stamps leave no more than the idle time in a response and the latency between them.
+/// Two frames belong together if the stamps leave at most the idle time in a response and the latency between them.
 #[test]
 fn pauses_in_a_response() {
     let contents = frames(Command::Abs40, 3);

@@ -24,7 +24,7 @@ enum Room {
     All,
     /// It has a register besides the one that shifts; `write` waits for it.
     One,
-    /// It takes so many at a time.
+    /// It takes this many at a time.
     Pieces(usize),
 }
 
