@@ -2,7 +2,7 @@
 # The C side of this crate: `.ci/run c` runs all of it.
 #
 #   servowire-c/check.sh           all steps
-#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host
+#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host, rows
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -53,5 +53,12 @@ host() {
     "$out/border++"
 }
 
-[ "$#" -gt 0 ] || set -- stale host
+# All rows of the vectors through the C interface.
+rows() {
+    [ -e "$out/libservowire_c.a" ] || library
+    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/rows.c tests/c/rows_*.c "$out/libservowire_c.a" -o "$out/rows"
+    python3 tests/rows.py "$out/rows" ../tests/vectors
+}
+
+[ "$#" -gt 0 ] || set -- stale host rows
 for step; do "$step"; done

@@ -411,6 +411,35 @@ typedef struct {
 } sw_clock_t;
 
 /**
+ * A receiver of start-stop fields from an oversampled line. Its content is private.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_nrz_t;
+
+/**
+ * A field that was received.
+ */
+typedef struct {
+    /**
+     * The sample with which its start bit begins, from the first of the line.
+     */
+    uint64_t start;
+    /**
+     * Spikes that were dropped before it.
+     */
+    uint32_t spikes;
+    /**
+     * The data bits, first of the line in bit 0.
+     */
+    uint16_t content;
+    /**
+     * The level of its delimiter: 1 in a sound field.
+     */
+    uint8_t delimiter;
+} sw_nrz_field_t;
+
+/**
  * What a master sends.
  */
 typedef struct {
@@ -712,6 +741,19 @@ sw_result_t sw_clock_start(sw_clock_t *clock,
  */
 uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
+
+/**
+ * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
+ */
+sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
+
+/**
+ * `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field, SW_PENDING without.
+ */
+sw_result_t sw_nrz_run(sw_nrz_t *receiver,
+                       uint8_t level,
+                       uint64_t samples,
+                       sw_nrz_field_t *field);
 
 /**
  * The name of a result in `snake_case`, as logs and test vectors of servowire spell it; "unknown" for a number that is none.
@@ -1023,6 +1065,38 @@ sw_result_t sw_tformat_next(sw_tformat_procedure_t *p,
 sw_result_t sw_tformat_value(const sw_tformat_procedure_t *p,
                              uint32_t *value,
                              uint64_t *ready_ns);
+
+/**
+ * The request in 10-bit SPI words, sent most significant bit first, one a field, at most 4. The idle word 0x3ff follows.
+ */
+sw_result_t sw_tformat_build_spi10(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from 10-bit SPI words, without the idle words received during the request.
+ */
+sw_result_t sw_tformat_parse_spi10(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
+
+/**
+ * What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
+ */
+sw_result_t sw_tformat_build_spi16(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from the 16-bit SPI words received over a whole transaction.
+ */
+sw_result_t sw_tformat_parse_spi16(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
 
 /**
  * The response to ID 0 from UART bytes.

@@ -7,7 +7,10 @@ extern crate std;
 
 mod border;
 mod clock;
+pub mod nrz;
 mod result;
+#[cfg(test)]
+mod tests;
 pub mod tformat;
 
 pub use clock::{SW_NO_TIME, sw_clock_ns, sw_clock_start, sw_clock_t};
