@@ -17,7 +17,7 @@ pub(super) const HEAD: usize = 1 << 12;
 
 /// Files inside files are unpacked so deep.
 const DEEPEST: u8 = 4;
-/// What has to be read backwards and cannot is held in memory, up to so many bytes.
+/// What has to be read backwards and cannot be is held in memory, up to this many bytes.
 const MOST_HELD: u64 = 1 << 28;
 
 /// A reader that can go back.
@@ -210,7 +210,7 @@ impl Input {
         }
     }
 
-    /// Appends the next line, with its end, to `text`; how many bytes it has. One of `most` is none: `what` says so.
+    /// Appends the next line, with its end, to `text`; how many bytes it has. A line of `most` bytes or more is refused, in the words of `what`.
     pub(super) fn line(
         &mut self,
         text: &mut Vec<u8>,

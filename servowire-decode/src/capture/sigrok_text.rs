@@ -5,7 +5,7 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::{self, Clock, Time};
 
-/// Longer lines are none of this format.
+/// A longer line cannot belong to this format.
 const LONGEST: usize = 1 << 20;
 /// More channels has no device.
 const CHANNELS: usize = 1024;

@@ -434,7 +434,7 @@ fn a_man_in_the_middle_passes_on_and_logs() {
     assert!(log.contains("no request: [55]"), "{log}");
 }
 
-/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is none.
+/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is no longer one.
 #[test]
 fn only_good_answers_are_passed_on() {
     for echo in [false, true] {

@@ -206,7 +206,7 @@ fn string(text: &str) -> Option<Result<Vec<u8>, String>> {
         let byte = if letter == '\\' { escape(&mut letters) } else { u8::try_from(u32::from(letter)).ok() };
         match byte {
             Some(byte) => out.push(byte),
-            None => return Some(Err(format!("{text} has an escape that is none"))),
+            None => return Some(Err(format!("{text} contains an invalid escape"))),
         }
     }
     Some(Ok(out))
