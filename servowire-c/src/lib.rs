@@ -5,6 +5,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod aformat;
 mod border;
 mod clock;
 pub mod nrz;
