@@ -15,6 +15,246 @@
 #define SW_NO_TIME UINT64_MAX
 
 /**
+ * Refusals of A-format, in the order of their numbers.
+ */
+enum sw_aformat_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The response ends too early.
+     */
+    SW_E_AFORMAT_TRUNCATED = -513,
+    /**
+     * A start bit reads 1.
+     */
+    SW_E_AFORMAT_START_BIT = -514,
+    /**
+     * A delimiter reads 0.
+     */
+    SW_E_AFORMAT_DELIMITER = -515,
+    /**
+     * The CRC-8 of a response is wrong.
+     */
+    SW_E_AFORMAT_CRC = -516,
+    /**
+     * The CRC-3 of a request is wrong.
+     */
+    SW_E_AFORMAT_CRC3 = -517,
+    /**
+     * The sync code is wrong.
+     */
+    SW_E_AFORMAT_SYNC_CODE = -518,
+    /**
+     * The fixed bit reads 1.
+     */
+    SW_E_AFORMAT_FIXED_BIT = -519,
+    /**
+     * Another address answers.
+     */
+    SW_E_AFORMAT_ADDRESS_MISMATCH = -520,
+    /**
+     * Another command is answered.
+     */
+    SW_E_AFORMAT_COMMAND_MISMATCH = -521,
+    /**
+     * There is no such bank.
+     */
+    SW_E_AFORMAT_BANK_ERROR = -522,
+    /**
+     * An argument comes back as another.
+     */
+    SW_E_AFORMAT_ECHO_MISMATCH = -523,
+    /**
+     * The frame code is wrong.
+     */
+    SW_E_AFORMAT_FRAME_CODE = -524,
+    /**
+     * There is no such command.
+     */
+    SW_E_AFORMAT_UNKNOWN_COMMAND = -525,
+    /**
+     * The encoder's version does not have this.
+     */
+    SW_E_AFORMAT_UNSUPPORTED_IN_VERSION = -526,
+    /**
+     * An address is out of its range.
+     */
+    SW_E_AFORMAT_ADDRESS_RANGE = -527,
+    /**
+     * Data is out of its range.
+     */
+    SW_E_AFORMAT_DATA_RANGE = -528,
+    /**
+     * No response in time.
+     */
+    SW_E_AFORMAT_NO_RESPONSE = -529,
+    /**
+     * The encoder stayed busy.
+     */
+    SW_E_AFORMAT_BUSY = -530,
+    /**
+     * Another request came in between.
+     */
+    SW_E_AFORMAT_INTERRUPTED = -531,
+    /**
+     * Whether the act was done is not known.
+     */
+    SW_E_AFORMAT_EFFECT_UNKNOWN = -532,
+    /**
+     * The act was not done.
+     */
+    SW_E_AFORMAT_NOT_DONE = -533,
+    /**
+     * The encoder reports a fault of its memory.
+     */
+    SW_E_AFORMAT_MEMORY_FAULT = -534,
+    /**
+     * A request does not carry this.
+     */
+    SW_E_AFORMAT_NOT_CARRIED = -536,
+    /**
+     * Two sound responses in one block.
+     */
+    SW_E_AFORMAT_TWO_RESPONSES = -538,
+    /**
+     * The settings of the line leave no time for a response.
+     */
+    SW_E_AFORMAT_LINE = -539,
+};
+#ifndef __cplusplus
+typedef int32_t sw_aformat_error_t;
+#endif // __cplusplus
+
+/**
+ * Bits of the encoder status ES.
+ */
+enum sw_aformat_es_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The encoder is busy.
+     */
+    SW_AFORMAT_ES_BUSY = 1,
+    /**
+     * Battery.
+     */
+    SW_AFORMAT_ES_BATT = 2,
+    /**
+     * Warning.
+     */
+    SW_AFORMAT_ES_WARNING = 4,
+    /**
+     * Error.
+     */
+    SW_AFORMAT_ES_ERROR = 8,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_es_t;
+#endif // __cplusplus
+
+/**
+ * What a response carries.
+ */
+enum sw_aformat_layout_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * 40 position bits.
+     */
+    SW_AFORMAT_ABS40 = 0,
+    /**
+     * Position bits 0 to 23.
+     */
+    SW_AFORMAT_ABS24 = 1,
+    /**
+     * Position bits 16 to 39.
+     */
+    SW_AFORMAT_ABS24H = 2,
+    /**
+     * Position bits 0 to 16.
+     */
+    SW_AFORMAT_ABS17 = 3,
+    /**
+     * ALM and PM-ALM.
+     */
+    SW_AFORMAT_STATUS = 4,
+    /**
+     * A word of the EEPROM.
+     */
+    SW_AFORMAT_EEPROM = 5,
+    /**
+     * A word of a bank of the EEPROM. Version 3.0.
+     */
+    SW_AFORMAT_EEPROM_BANK = 6,
+    /**
+     * Temperature.
+     */
+    SW_AFORMAT_TEMP = 7,
+    /**
+     * Identification code.
+     */
+    SW_AFORMAT_ID = 8,
+    /**
+     * Velocity coefficient. Version 3.0.
+     */
+    SW_AFORMAT_VELCOEF = 9,
+    /**
+     * ABS24 and ALM.
+     */
+    SW_AFORMAT_ABS24_ALM = 10,
+    /**
+     * ABS24 and temperature.
+     */
+    SW_AFORMAT_ABS24_TEMP = 11,
+    /**
+     * ABS24 and velocity. Version 3.0.
+     */
+    SW_AFORMAT_ABS24_VEL = 12,
+    /**
+     * ABS24, velocity and acceleration. Version 3.0.
+     */
+    SW_AFORMAT_ABS24_VEL_ACC = 13,
+    /**
+     * ABS40 and velocity. Version 3.0.
+     */
+    SW_AFORMAT_ABS40_VEL = 14,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_layout_t;
+#endif // __cplusplus
+
+/**
+ * What version 3.0 leaves to the factory setting of an encoder; may be added.
+ */
+enum sw_aformat_option_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The encoder speaks version 3.0, not 2.1.
+     */
+    SW_AFORMAT_VERSION_3_0 = 1,
+    /**
+     * Commands for the lower 24 bits are answered with velocity.
+     */
+    SW_AFORMAT_VELOCITY_IN_LOW = 2,
+    /**
+     * Resets are answered with the position.
+     */
+    SW_AFORMAT_POSITION_IN_RESETS = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_option_t;
+#endif // __cplusplus
+
+/**
  * In which bit of a byte the first bit of the line stands.
  */
 enum sw_bit_order_t
@@ -404,11 +644,206 @@ typedef uint8_t sw_tformat_turns_t;
 typedef int32_t sw_result_t;
 
 /**
+ * A line with up to eight encoders of one kind: one request, the responses, and the newest position of each. Its content is
+ * private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[112];
+} sw_aformat_t;
+
+/**
+ * Widths of an encoder, and what its factory has set.
+ */
+typedef struct {
+    /**
+     * Bits of the single turn.
+     */
+    uint8_t st_bits;
+    /**
+     * Bits of the turns; 40 with those of the single turn at most.
+     */
+    uint8_t mt_bits;
+    /**
+     * sw_aformat_option_t, added.
+     */
+    uint8_t options;
+} sw_aformat_encoder_t;
+
+/**
+ * What is to be sent, and when.
+ */
+typedef struct {
+    /**
+     * When the first start bit is on the line.
+     */
+    uint64_t start_ns;
+    /**
+     * When the last delimiter ends.
+     */
+    uint64_t end_ns;
+    /**
+     * The content of the frames, the first bit of the line in bit 0.
+     */
+    uint16_t contents[4];
+    /**
+     * How many.
+     */
+    uint8_t len;
+} sw_aformat_transmission_t;
+
+/**
+ * What an encoder sends. Fields that the layout does not have are 0.
+ */
+typedef struct {
+    /**
+     * Position bits as received, from bit 0 up; of ABS24H from bit 16 up.
+     */
+    uint64_t abs;
+    /**
+     * Velocity.
+     */
+    int32_t velocity;
+    /**
+     * EEPROM word, identification code or velocity coefficient.
+     */
+    uint32_t data;
+    /**
+     * ALM.
+     */
+    uint16_t alm;
+    /**
+     * Acceleration.
+     */
+    int16_t acceleration;
+    /**
+     * Temperature, 10 bits.
+     */
+    uint16_t temperature;
+    /**
+     * sw_aformat_layout_t.
+     */
+    uint8_t layout;
+    /**
+     * CC; 0 in ABS17, which does not have it.
+     */
+    uint8_t command;
+    /**
+     * EA.
+     */
+    uint8_t ea;
+    /**
+     * ES: sw_aformat_es_t. ABS17 has one bit for all of them: all or none are set.
+     */
+    uint8_t es;
+    /**
+     * PM-ALM.
+     */
+    uint8_t pm_alm;
+    /**
+     * EEPROM address.
+     */
+    uint8_t address;
+    /**
+     * EEPROM bank.
+     */
+    uint8_t bank;
+} sw_aformat_response_t;
+
+/**
+ * A position that may be used.
+ */
+typedef struct {
+    /**
+     * Turns times the counts of a turn, and the single turn.
+     */
+    int64_t counts;
+    /**
+     * When it was sampled.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Counts in the turn.
+     */
+    uint32_t single_turn;
+    /**
+     * Turns.
+     */
+    int32_t turns;
+} sw_position_t;
+
+/**
+ * What a master sends. Fields that the command does not take are not looked at.
+ */
+typedef struct {
+    /**
+     * Data of a write: a word (command 14), an identification code (18, 19, 20), a coefficient (18 with frame code 3).
+     */
+    uint32_t data;
+    /**
+     * CC, 0..30.
+     */
+    uint8_t command;
+    /**
+     * EA, 0..7.
+     */
+    uint8_t ea;
+    /**
+     * Frame code: 3 for banks (13, 14) and the velocity coefficient (16, 18) of version 3.0, else 0.
+     */
+    uint8_t fc;
+    /**
+     * Address of commands 13 and 14.
+     */
+    uint8_t address;
+    /**
+     * Bank of commands 13 and 14 with frame code 3.
+     */
+    uint8_t bank;
+} sw_aformat_request_t;
+
+/**
+ * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
+ * private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[36];
+} sw_aformat_bus_t;
+
+/**
  * Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
  */
 typedef struct {
     uint64_t _private[6];
 } sw_clock_t;
+
+/**
+ * A receiver of start-stop fields from an oversampled line. Its content is private.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_nrz_t;
+
+/**
+ * A field that was received.
+ */
+typedef struct {
+    /**
+     * The sample with which its start bit begins, from the first of the line.
+     */
+    uint64_t start;
+    /**
+     * Spikes that were dropped before it.
+     */
+    uint32_t spikes;
+    /**
+     * The data bits, first of the line in bit 0.
+     */
+    uint16_t content;
+    /**
+     * The level of its delimiter: 1 in a sound field.
+     */
+    uint8_t delimiter;
+} sw_nrz_field_t;
 
 /**
  * What a master sends.
@@ -595,28 +1030,6 @@ typedef struct {
 } sw_tformat_transmission_t;
 
 /**
- * A position that may be used.
- */
-typedef struct {
-    /**
-     * Turns times the counts of a turn, and the single turn.
-     */
-    int64_t counts;
-    /**
-     * When it was sampled.
-     */
-    uint64_t sampled_ns;
-    /**
-     * Counts in the turn.
-     */
-    uint32_t single_turn;
-    /**
-     * Turns.
-     */
-    int32_t turns;
-} sw_position_t;
-
-/**
  * A procedure of several exchanges: it says what to send, and decides what to repeat. Its content is private.
  */
 typedef struct {
@@ -696,6 +1109,153 @@ extern "C" {
 #endif // __cplusplus
 
 /**
+ * Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and what its encoders are.
+ */
+sw_result_t sw_aformat_init(sw_aformat_t *m,
+                            uint32_t bits_per_second,
+                            const sw_aformat_encoder_t *encoder);
+
+/**
+ * From the end of a frame to its hand-over, at most, ns; and the highest address on the line, 0..7.
+ */
+sw_result_t sw_aformat_set_hand_over(sw_aformat_t *m, uint32_t hand_over_ns, uint8_t highest_ea);
+
+/**
+ * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
+ * way, and those with one answer to one encoder. SW_SEND with `to_send` filled.
+ */
+sw_result_t sw_aformat_read(sw_aformat_t *m,
+                            uint8_t command,
+                            uint8_t asked,
+                            uint64_t start_ns,
+                            sw_aformat_transmission_t *to_send);
+
+/**
+ * Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
+ * has a byte for each, 0 for a frame whose delimiter reads 0; NULL says that all are framed. At most 48 frames at once. SW_OK once all
+ * that were asked have answered; sw_aformat_missing() tells at any time who has not.
+ */
+sw_result_t sw_aformat_hear(sw_aformat_t *m,
+                            const uint16_t *contents,
+                            const uint8_t *framed,
+                            size_t count,
+                            uint64_t end_ns);
+
+/**
+ * It is `now_ns`: ends an exchange whose time is over, with SW_OK. Hand over what was received first.
+ */
+sw_result_t sw_aformat_poll(sw_aformat_t *m, uint64_t now_ns);
+
+/**
+ * While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
+ * SW_NO_TIME for a state that was not started.
+ */
+uint64_t sw_aformat_until_ns(const sw_aformat_t *m);
+
+/**
+ * Who was asked and has not answered, a bit each; 0xff for a state that was not started or has not asked.
+ */
+uint8_t sw_aformat_missing(const sw_aformat_t *m);
+
+/**
+ * The good response of an encoder to the newest request: raw fields. SW_E_NO_VALUE if there is none.
+ */
+sw_result_t sw_aformat_response(const sw_aformat_t *m, uint8_t ea, sw_aformat_response_t *response);
+
+/**
+ * The angle of a shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.** It is
+ * judged now, as by sw_tformat_angle(); the battery is tolerated.
+ */
+bool sw_aformat_angle(const sw_aformat_t *m,
+                      uint8_t ea,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      uint32_t *angle);
+
+/**
+ * The position with its turns, judged now, nothing tolerated: false if it must not be used.
+ */
+bool sw_aformat_position(const sw_aformat_t *m,
+                         uint8_t ea,
+                         uint64_t now_ns,
+                         uint64_t max_age_ns,
+                         sw_position_t *position);
+
+/**
+ * The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15 (sw_bit_order_t), at most 4: start bit and
+ * delimiter are left to the port.
+ */
+sw_result_t sw_aformat_build(const sw_aformat_request_t *asked,
+                             uint8_t order,
+                             uint16_t *words,
+                             size_t size,
+                             size_t *count);
+
+/**
+ * With which layout an encoder answers a request: sw_aformat_layout_t, and how many frames that has.
+ */
+sw_result_t sw_aformat_layout(const sw_aformat_request_t *asked,
+                              const sw_aformat_encoder_t *encoder,
+                              uint8_t *layout,
+                              uint8_t *frames);
+
+/**
+ * The response to a request from 16-bit words, a frame each, with all checks.
+ */
+sw_result_t sw_aformat_parse(const sw_aformat_request_t *asked,
+                             const sw_aformat_encoder_t *encoder,
+                             const uint16_t *words,
+                             size_t count,
+                             uint8_t order,
+                             sw_aformat_response_t *response);
+
+/**
+ * A response of this layout to this command, whose request is not at hand; `ea` 255 is any.
+ */
+sw_result_t sw_aformat_parse_as(uint8_t command,
+                                uint8_t layout,
+                                uint8_t ea,
+                                const uint16_t *words,
+                                size_t count,
+                                uint8_t order,
+                                sw_aformat_response_t *response);
+
+/**
+ * The same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after the 128th are left alone.
+ */
+sw_result_t sw_aformat_parse_line(uint8_t command,
+                                  uint8_t layout,
+                                  uint8_t ea,
+                                  const uint8_t *bytes,
+                                  size_t bits,
+                                  uint8_t order,
+                                  sw_aformat_response_t *response);
+
+/**
+ * Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
+ */
+sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
+                                 const sw_aformat_request_t *asked,
+                                 const sw_aformat_encoder_t *encoder,
+                                 uint8_t addresses);
+
+/**
+ * One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
+ * good one from the same address is SW_E_AFORMAT_TWO_RESPONSES: two encoders have it; one from an address that was not asked is
+ * SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for a look.
+ */
+sw_result_t sw_aformat_bus_push(sw_aformat_bus_t *bus,
+                                const uint16_t *words,
+                                size_t count,
+                                uint8_t order,
+                                sw_aformat_response_t *response);
+
+/**
+ * Who was asked and has not given a good response, a bit each; 0xff for a state that was not started.
+ */
+uint8_t sw_aformat_bus_missing(const sw_aformat_bus_t *bus);
+
+/**
  * Tells the rate of the timer, once: at least 1 MHz (a coarser one cannot tell one field from the next: SW_E_ARGUMENT). The time is
  * 0 ns now, when the timer reads `ticks`.
  */
@@ -712,6 +1272,19 @@ sw_result_t sw_clock_start(sw_clock_t *clock,
  */
 uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
+
+/**
+ * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
+ */
+sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
+
+/**
+ * `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field, SW_PENDING without.
+ */
+sw_result_t sw_nrz_run(sw_nrz_t *receiver,
+                       uint8_t level,
+                       uint64_t samples,
+                       sw_nrz_field_t *field);
 
 /**
  * The name of a result in `snake_case`, as logs and test vectors of servowire spell it; "unknown" for a number that is none.
@@ -1023,6 +1596,38 @@ sw_result_t sw_tformat_next(sw_tformat_procedure_t *p,
 sw_result_t sw_tformat_value(const sw_tformat_procedure_t *p,
                              uint32_t *value,
                              uint64_t *ready_ns);
+
+/**
+ * The request in 10-bit SPI words, sent most significant bit first, one a field, at most 4. The idle word 0x3ff follows.
+ */
+sw_result_t sw_tformat_build_spi10(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from 10-bit SPI words, without the idle words received during the request.
+ */
+sw_result_t sw_tformat_parse_spi10(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
+
+/**
+ * What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
+ */
+sw_result_t sw_tformat_build_spi16(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from the 16-bit SPI words received over a whole transaction.
+ */
+sw_result_t sw_tformat_parse_spi16(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
 
 /**
  * The response to ID 0 from UART bytes.

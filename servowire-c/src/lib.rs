@@ -5,9 +5,13 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod aformat;
 mod border;
 mod clock;
+pub mod nrz;
 mod result;
+#[cfg(test)]
+mod tests;
 pub mod tformat;
 
 pub use clock::{SW_NO_TIME, sw_clock_ns, sw_clock_start, sw_clock_t};

@@ -37,6 +37,7 @@ pub enum sw_code_t {
 #[derive(Clone, Copy)]
 pub(crate) enum Protocol {
     Tformat = 1,
+    Aformat = 2,
 }
 
 /// The result for a class of a protocol.
@@ -117,6 +118,7 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
     let [number, protocol, 0, 0] = code.checked_neg()?.to_le_bytes() else { return None };
     let names: &'static [u8] = match protocol {
         1 => names!(tformat::ErrorClass),
+        2 => names!(nikon_aformat::ErrorClass),
         _ => return None,
     };
     if number == 0 { None } else { nth(names, number) }
@@ -137,6 +139,10 @@ mod tests {
     fn every_class_has_its_text_and_nothing_else_has() {
         for class in tformat::ErrorClass::ALL {
             let code = refused(Protocol::Tformat, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in nikon_aformat::ErrorClass::ALL {
+            let code = refused(Protocol::Aformat, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
         assert_eq!(text(-0x101).map(CStr::to_bytes), Some(b"start_bit".as_slice()));

@@ -5,6 +5,7 @@ mod device;
 mod master;
 mod names;
 mod procedure;
+mod spi;
 mod typed;
 
 pub use codec::{
@@ -32,6 +33,7 @@ pub use procedure::{
     sw_tformat_eeprom_read, sw_tformat_eeprom_write, sw_tformat_next, sw_tformat_procedure_t, sw_tformat_value,
     sw_tformat_zero_single_turn_and_shift_commutation_angle,
 };
+pub use spi::{sw_tformat_build_spi10, sw_tformat_build_spi16, sw_tformat_parse_spi10, sw_tformat_parse_spi16};
 pub use typed::{
     sw_tformat_all_t, sw_tformat_encoder_id_t, sw_tformat_multi_turn_t, sw_tformat_parse_all,
     sw_tformat_parse_encoder_id, sw_tformat_parse_multi_turn, sw_tformat_parse_single_turn, sw_tformat_single_turn_t,

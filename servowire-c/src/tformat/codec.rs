@@ -135,7 +135,7 @@ fn detail(error: Error) -> sw_detail_t {
 
 /// A refusal by its error, a value by writing it.
 #[inline(always)]
-fn written<T, U>(
+pub(super) fn written<T, U>(
     outcome: Result<T, Error>,
     out: Option<&mut MaybeUninit<U>>,
     to: impl FnOnce(&T) -> U,

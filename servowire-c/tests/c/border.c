@@ -180,6 +180,61 @@ static void procedures(void)
     CHECK(run(&p, &encoder, &value) == SW_OK && value == 0x11);
 }
 
+/* Two encoders of 17 and 16 bits answer command 4 at 4 Mbit/s: EA 0 with published words that show an error, EA 1 without one. */
+static void bus(void)
+{
+    static const uint16_t words[8] = {0x2085, 0xf64a, 0x8009, 0x80a1, 0x3080, 0x599f, 0xdd68, 0x009a};
+    static const sw_aformat_encoder_t encoder = {17, 16, 0};
+    static const sw_aformat_request_t asked = {0, 4, 0, 0, 0, 0};
+    static sw_aformat_t zeroed_bus;
+    static sw_aformat_bus_t light;
+    sw_aformat_t m;
+    sw_aformat_transmission_t tx;
+    sw_aformat_response_t response;
+    sw_position_t position;
+    uint16_t contents[8];
+    uint8_t framed[4] = {1, 1, 1, 1};
+    uint32_t angle = 1;
+    int k, bit;
+
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 4, SW_MSB_FIRST, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 3, SW_MSB_FIRST, &response) == SW_E_AFORMAT_TRUNCATED);
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 4, 2, &response) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_parse(&asked, NULL, words, 4, SW_MSB_FIRST, &response) == SW_E_NULL);
+    CHECK(sw_aformat_bus_push(&light, words, 4, SW_MSB_FIRST, &response) == SW_E_STATE && sw_aformat_bus_missing(&light) == 0xff);
+    CHECK(sw_aformat_bus_start(&light, &asked, &encoder, 0) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_bus_start(&light, &asked, &encoder, 6) == SW_OK && sw_aformat_bus_missing(&light) == 6);
+    CHECK(sw_aformat_bus_push(&light, words + 4, 4, SW_MSB_FIRST, &response) == SW_OK && response.ea == 1);
+    CHECK(sw_aformat_bus_missing(&light) == 4);
+    CHECK(sw_aformat_bus_push(&light, words + 4, 4, SW_MSB_FIRST, &response) == SW_E_AFORMAT_TWO_RESPONSES);
+    CHECK(sw_aformat_bus_push(&light, words, 4, SW_MSB_FIRST, &response) == SW_E_AFORMAT_ADDRESS_MISMATCH);
+    for (k = 0; k < 8; k++) {
+        for (contents[k] = 0, bit = 0; bit < 16; bit++) {
+            contents[k] = (uint16_t)(contents[k] | (words[k] >> bit & 1) << (15 - bit));
+        }
+    }
+    CHECK(sw_aformat_poll(&zeroed_bus, 0) == SW_E_STATE && sw_aformat_missing(&zeroed_bus) == 0xff);
+    CHECK(sw_aformat_init(&m, 5000000, &encoder) == SW_E_ARGUMENT && sw_aformat_init(&m, 4000000, NULL) == SW_E_NULL);
+    CHECK(sw_aformat_init(&m, 4000000, &encoder) == SW_OK);
+    CHECK(sw_aformat_read(&m, 12, 3, 0, &tx) == SW_E_ARGUMENT && sw_aformat_read(&m, 0, 3, 0, &tx) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_read(&m, 4, 0, 0, &tx) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_read(&m, 4, 3, 0, &tx) == SW_SEND && tx.len == 1 && tx.end_ns == 4500);
+    CHECK(sw_aformat_hear(&m, contents, framed, 49, 25500) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_hear(&m, contents, framed, 4, 25500) == SW_PENDING && sw_aformat_missing(&m) == 2);
+    CHECK(sw_aformat_response(&m, 0, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));
+    CHECK(response.es == (SW_AFORMAT_ES_BATT | SW_AFORMAT_ES_ERROR) && !sw_aformat_angle(&m, 0, 60000, 60000, &angle));
+    CHECK(sw_aformat_response(&m, 1, &response) == SW_E_NO_VALUE && sw_aformat_response(&m, 8, &response) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_hear(&m, contents + 4, NULL, 4, 49000) == SW_OK && sw_aformat_missing(&m) == 0);
+    CHECK(sw_aformat_angle(&m, 1, 100000, 95500, &angle) && angle == 129434u << 15);
+    CHECK(!sw_aformat_angle(&m, 1, 100001, 95500, &angle) && !sw_aformat_angle(&m, 8, 100000, 95500, &angle));
+    CHECK(sw_aformat_position(&m, 1, 100000, 95500, &position) && position.turns == 2909 && position.sampled_ns == 4500);
+    CHECK(sw_aformat_read(&m, 4, 2, 1000000, &tx) == SW_SEND);
+    framed[3] = 0;
+    CHECK(sw_aformat_hear(&m, contents + 4, framed, 4, 1025500) == SW_PENDING && sw_aformat_missing(&m) == 2);
+    CHECK(!sw_aformat_angle(&m, 1, 1100000, 95500, &angle));
+    CHECK(sw_aformat_poll(&m, sw_aformat_until_ns(&m)) == SW_OK && sw_aformat_missing(&m) == 2);
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -196,6 +251,7 @@ int main(void)
     states();
     exchange();
     procedures();
+    bus();
     clock_of_32_bits();
     puts("border: good");
     return 0;
