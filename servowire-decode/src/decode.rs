@@ -31,6 +31,9 @@ pub fn decode(
                     out.flush()?;
                 }
                 out.tick();
+                if out.is_done() {
+                    break;
+                }
             }
             Ok(())
         }

@@ -50,7 +50,7 @@ pub enum Stop {
     Fault(Fault),
     /// All was decoded, and shows something that somebody has to look after.
     Trouble(Fault),
-    /// The output takes no more.
+    /// The output takes nothing more.
     Output(io::Error),
 }
 

@@ -122,7 +122,7 @@ impl Decoder {
     fn piece(&mut self, piece: &Piece, out: &mut dyn Sink) -> io::Result<()> {
         let block = self.blocks.in_order(&piece.bytes);
         let report = inspect(&block);
-        if let Some(event) = self.block(piece, &block, report) {
+        if let Some(event) = self.block(piece, &block, &report) {
             out.event(&event)?;
         }
         // A NOP is mostly zeros, whatever their order.
@@ -148,7 +148,7 @@ impl Decoder {
         }
     }
 
-    fn block(&mut self, piece: &Piece, block: &[u8], report: Report) -> Option<Event> {
+    fn block(&mut self, piece: &Piece, block: &[u8], report: &Report) -> Option<Event> {
         let header = Header::parse(block.first().copied()?);
         if self.settings.mac_id.is_some_and(|only| only != header.mac_id.get()) {
             return None;
@@ -156,17 +156,17 @@ impl Decoder {
         let (place, counted) = self.place(piece, header);
         self.place = place;
         let (mut fields, mut happened) = (Vec::new(), Vec::new());
-        if is_block(&report) {
+        if is_block(report) {
             let findings: Vec<LogFinding> = self.analysis.block(block).collect();
-            let before = self.last.insert(header.emit() & 0x9f, report);
+            let before = self.last.insert(header.emit() & 0x9f, *report);
             match &before {
-                Some(before) if !self.settings.whole => describe::changed(&report, before, &mut fields),
-                _ => describe::whole(&report, block, self.settings.whole, &mut fields),
+                Some(before) if !self.settings.whole => describe::changed(report, before, &mut fields),
+                _ => describe::whole(report, block, self.settings.whole, &mut fields),
             }
             let said: Vec<String> = findings.iter().map(LogFinding::to_string).collect();
-            happened = events(&report, before.as_ref());
+            happened = events(report, before.as_ref());
             happened.extend(said.iter().cloned());
-            describe::notes(&report, said, &mut fields);
+            describe::notes(report, said, &mut fields);
         } else {
             fields.push(Field::digits("bytes", block.iter().copied(), 2));
         }
@@ -174,7 +174,7 @@ impl Decoder {
         let kind = format!("{word} {}", header.mac_id);
         let verdict = match piece.direction.filter(|told| *told != direction) {
             Some(_) => turned_round(header.response),
-            None => verdict(&report),
+            None => verdict(report),
         };
         if let Verdict::Refused(refusal) = &verdict {
             happened.push(format!("refused: {}", refusal.reason));
@@ -186,7 +186,7 @@ impl Decoder {
             Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
         });
         let address = Some(header.mac_id.get().into());
-        Some(Event { position: position(&report), address, happened, counted, ..event })
+        Some(Event { position: position(report), address, happened, counted, ..event })
     }
 }
 

@@ -385,7 +385,7 @@ fn a_drive_that_never_answers() {
 #[test]
 fn a_remark_on_the_log_is_counted_nowhere() {
     let bench = Bench::new();
-    // A drive that never answers, and eight blocks that are none.
+    // A drive that never answers, and eight blocks that are not valid.
     let mut all = exchanges();
     for (command, _) in &mut all {
         command[0] ^= 2;
@@ -553,7 +553,7 @@ fn a_log_that_begins_or_goes_on_in_the_middle_of_a_block() {
     let dump = |bytes: &[u8]| {
         bytes
             .chunks(16)
-            .map(|line| line.iter().map(|b| format!("{b:02x}")).collect::<String>() + "\n")
+            .map(|line| line.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")) + "\n")
             .collect::<String>()
     };
     let of_5 = |run: &common::Run| {

@@ -41,12 +41,12 @@ pub(crate) fn capture_ns(frame: &Outgoing) -> u64 {
 /// The same for the frames of the exchange.
 pub(crate) const EXCHANGE_CAPTURE_NS: u64 = 120;
 
-/// What device `n` of so many adds to STATUS.
+/// What device `n` of this many adds to STATUS.
 pub(crate) fn last_of(n: u8, devices: u8) -> Status {
     if n == devices { Status::LAST } else { Status::empty() }
 }
 
-/// DISCOVERY behind so many devices.
+/// DISCOVERY behind this many devices.
 pub(crate) fn discovery(devices: u8, place: Place) -> Vec<u8> {
     let mut frame = Discovery::request(place);
     for n in 1..=devices {
@@ -55,7 +55,7 @@ pub(crate) fn discovery(devices: u8, place: Place) -> Vec<u8> {
     frame.emit().to_vec()
 }
 
-/// What a line of so many devices without cables between them answers.
+/// What a line of this many devices without cables between them answers.
 pub(crate) fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
         Outgoing::Discovery { place } => discovery(devices, place),

@@ -129,7 +129,7 @@ fn ten_param_frames_must_be_answered_and_ten_in_a_row_may_not_be() {
         (!lost).then(|| answer(frame, 2))
     });
     assert!(patient.is_ok());
-    // A damaged answer is none, and no reason to give up either.
+    // A damaged answer is not an answer, and no reason to give up either.
     let mut bench = Bench::until(Config::new(), State::Param);
     let mut damaged = Param::request(Parameters::STOCK, Place::Inner).emit();
     damaged[8] ^= 1;

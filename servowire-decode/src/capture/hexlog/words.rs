@@ -85,8 +85,7 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
         }
     }
     out.retain(|said| !said.bytes.is_empty());
-    out.iter_mut().for_each(|said| said.time = time);
-    Ok(out)
+    Ok(out.into_iter().map(|said| Said { time, ..said }).collect())
 }
 
 /// When a line says that it was, by the words that stand before its bytes: a date with a time of day, a time of day, seconds with a
@@ -231,7 +230,7 @@ pub(super) fn numbers(inside: &str) -> Option<Vec<u8>> {
         return None;
     }
     let cells = inside.split(',').map(str::trim).filter(|cell| !cell.is_empty());
-    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse().ok() } else { None }).collect()
+    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse::<u8>().ok() } else { None }).collect()
 }
 
 /// A string of Python or C with its escapes: `b'\x02Hello'`.
@@ -251,7 +250,7 @@ fn string(text: &str) -> Option<Result<Vec<u8>, String>> {
         let byte = if letter == '\\' { escape(&mut letters) } else { u8::try_from(u32::from(letter)).ok() };
         match byte {
             Some(byte) => out.push(byte),
-            None => return Some(Err(format!("{text} has an escape that is none"))),
+            None => return Some(Err(format!("{text} contains an invalid escape"))),
         }
     }
     Some(Ok(out))

@@ -32,7 +32,7 @@ pub(super) struct Blocks {
     lost: bool,
     /// The last blocks as they were read, and how many of them are what no encoder writes, or NOPs.
     window: Vec<u8>,
-    blocks: usize,
+    seen: usize,
     unsound: usize,
 }
 
@@ -53,7 +53,7 @@ impl Blocks {
             began: Burst::new(0, Vec::new()),
             lost: false,
             window: Vec::new(),
-            blocks: 0,
+            seen: 0,
             unsound: 0,
         }
     }
@@ -86,7 +86,7 @@ impl Blocks {
         self.flow |= halves;
     }
 
-    /// Cuts in this shape from now on, after so many bytes.
+    /// Cuts in this shape from now on, after this many bytes.
     fn take(&mut self, shape: Option<LogShape>, skip: usize) {
         // Lines or records of one block are what they are; a size is guessed where the lines allow both.
         let guessed = shape.map_or(LEN, |shape| shape.size.bytes());
@@ -158,13 +158,13 @@ impl Blocks {
     /// of another shape, the log goes on in that.
     pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Option<LogShape> {
         self.window.extend_from_slice(read);
-        self.blocks += 1;
+        self.seen += 1;
         self.unsound += usize::from(!sound);
-        if self.blocks < WINDOW {
+        if self.seen < WINDOW {
             return None;
         }
         let (window, unsound) = (std::mem::take(&mut self.window), std::mem::take(&mut self.unsound));
-        self.blocks = 0;
+        self.seen = 0;
         let now = LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) };
         if self.said.is_some() || unsound * 10 < WINDOW {
             return None;
