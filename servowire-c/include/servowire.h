@@ -325,6 +325,352 @@ typedef int32_t sw_code_t;
 #endif // __cplusplus
 
 /**
+ * Where an axis stands.
+ */
+enum sw_rtex_axis_code_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Its drive has not answered yet.
+     */
+    SW_RTEX_STARTING = 0,
+    /**
+     * Servo off.
+     */
+    SW_RTEX_OFF = 1,
+    /**
+     * Servo_On is sent, Servo_Active has not come yet.
+     */
+    SW_RTEX_SWITCHING_ON = 2,
+    /**
+     * Servo on.
+     */
+    SW_RTEX_ON = 3,
+    /**
+     * Slows down; there is a reason.
+     */
+    SW_RTEX_STOPPING = 4,
+    /**
+     * Stands with the servo on; there is a reason.
+     */
+    SW_RTEX_HELD = 5,
+    /**
+     * Servo_On is 0, Servo_Active has not gone yet.
+     */
+    SW_RTEX_SWITCHING_OFF = 6,
+    /**
+     * Servo off for a reason.
+     */
+    SW_RTEX_STOPPED = 7,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_axis_code_t;
+#endif // __cplusplus
+
+/**
+ * Control bits of a command, bytes 2 and 3.
+ */
+enum sw_rtex_control_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Homing_Ctrl.
+     */
+    SW_RTEX_HOMING_CTRL = (1 << 2),
+    /**
+     * TL_SW: first or second torque limit.
+     */
+    SW_RTEX_TL_SW = (1 << 3),
+    /**
+     * Gain_SW: first or second gain.
+     */
+    SW_RTEX_GAIN_SW = (1 << 4),
+    /**
+     * Servo_On. An axis sets it by itself.
+     */
+    SW_RTEX_SERVO_ON = (1 << 7),
+    /**
+     * EX-OUT1.
+     */
+    SW_RTEX_EX_OUT1 = (1 << 8),
+    /**
+     * EX-OUT2.
+     */
+    SW_RTEX_EX_OUT2 = (1 << 9),
+    /**
+     * SL_SW.
+     */
+    SW_RTEX_SL_SW = (1 << 11),
+    /**
+     * Pause.
+     */
+    SW_RTEX_PAUSE = (1 << 13),
+    /**
+     * Smooth_Stop.
+     */
+    SW_RTEX_SMOOTH_STOP = (1 << 14),
+    /**
+     * Hard_Stop.
+     */
+    SW_RTEX_HARD_STOP = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_control_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of RTEX, in the order of their numbers; the last two are of axes.
+ */
+enum sw_rtex_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The block is too short.
+     */
+    SW_E_RTEX_TRUNCATED = -1025,
+    /**
+     * The block is too long.
+     */
+    SW_E_RTEX_TOO_LONG = -1026,
+    /**
+     * A command where a response is due, or the other way round.
+     */
+    SW_E_RTEX_DIRECTION = -1027,
+    /**
+     * Another MAC-ID.
+     */
+    SW_E_RTEX_MAC_ID = -1028,
+    /**
+     * There is no such cyclic code.
+     */
+    SW_E_RTEX_CYCLIC_CODE = -1029,
+    /**
+     * There is no such non-cyclic code.
+     */
+    SW_E_RTEX_NON_CYCLIC_CODE = -1030,
+    /**
+     * Sub_Chk is wrong.
+     */
+    SW_E_RTEX_SUB_CHK = -1031,
+    /**
+     * There is no such sub-command.
+     */
+    SW_E_RTEX_SUB_COMMAND_CODE = -1032,
+    /**
+     * The two codes do not go together.
+     */
+    SW_E_RTEX_CODE_PAIR = -1033,
+    /**
+     * A reserved bit is set.
+     */
+    SW_E_RTEX_RESERVED = -1034,
+    /**
+     * The axis is in another state or mode, or its drive is not ready.
+     */
+    SW_E_RTEX_NOT_NOW = -1264,
+    /**
+     * The step or the rate is beyond the limits of the axis; nothing has changed.
+     */
+    SW_E_RTEX_TOO_FAR = -1265,
+};
+#ifndef __cplusplus
+typedef int32_t sw_rtex_error_t;
+#endif // __cplusplus
+
+/**
+ * Cyclic codes, which are the control modes.
+ */
+enum sw_rtex_mode_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Nothing.
+     */
+    SW_RTEX_NOP = 0,
+    /**
+     * Profile position.
+     */
+    SW_RTEX_PP = 1,
+    /**
+     * Cyclic position.
+     */
+    SW_RTEX_CP = 2,
+    /**
+     * Cyclic velocity.
+     */
+    SW_RTEX_CV = 3,
+    /**
+     * Cyclic torque.
+     */
+    SW_RTEX_CT = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_mode_t;
+#endif // __cplusplus
+
+/**
+ * Why an axis stops.
+ */
+enum sw_rtex_reason_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * It does not.
+     */
+    SW_RTEX_NO_REASON = 0,
+    /**
+     * No new echo.
+     */
+    SW_RTEX_ECHO_TIMEOUT = 1,
+    /**
+     * Another drive answers; the detail is its MAC-ID.
+     */
+    SW_RTEX_WRONG_MAC_ID = 2,
+    /**
+     * Blocks were refused; the detail is the number of the class.
+     */
+    SW_RTEX_REFUSED = 3,
+    /**
+     * No block.
+     */
+    SW_RTEX_RECEIVE_TIMEOUT = 4,
+    /**
+     * The drive reports an alarm.
+     */
+    SW_RTEX_ALARM = 5,
+    /**
+     * Servo_Ready went to 0.
+     */
+    SW_RTEX_NOT_READY = 6,
+    /**
+     * Servo_Active went to 0.
+     */
+    SW_RTEX_NOT_ACTIVE = 7,
+    /**
+     * Servo_Ready did not come.
+     */
+    SW_RTEX_READY_TIMEOUT = 8,
+    /**
+     * Servo_Active did not come.
+     */
+    SW_RTEX_ACTIVE_TIMEOUT = 9,
+    /**
+     * Servo_Active did not go.
+     */
+    SW_RTEX_INACTIVE_TIMEOUT = 10,
+    /**
+     * The drive does not accept the command; the detail is its error code.
+     */
+    SW_RTEX_COMMAND_ERROR = 11,
+    /**
+     * Another axis has failed; the detail is its place.
+     */
+    SW_RTEX_OTHER_AXIS = 12,
+    /**
+     * It was asked to.
+     */
+    SW_RTEX_REQUESTED = 13,
+    /**
+     * Homing did not end in time.
+     */
+    SW_RTEX_HOMING_TIMEOUT = 14,
+    /**
+     * Another reason, of a later release.
+     */
+    SW_RTEX_OTHER_REASON = 255,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_reason_t;
+#endif // __cplusplus
+
+/**
+ * Status flags of a response, bytes 2 and 3.
+ */
+enum sw_rtex_status_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * In_Position.
+     */
+    SW_RTEX_IN_POSITION = (1 << 0),
+    /**
+     * In_Progress.
+     */
+    SW_RTEX_IN_PROGRESS = (1 << 1),
+    /**
+     * Homing_Complete.
+     */
+    SW_RTEX_HOMING_COMPLETE = (1 << 2),
+    /**
+     * Torque_Limited.
+     */
+    SW_RTEX_TORQUE_LIMITED = (1 << 3),
+    /**
+     * Warning.
+     */
+    SW_RTEX_WARNING = (1 << 4),
+    /**
+     * Alarm.
+     */
+    SW_RTEX_ALARM_FLAG = (1 << 5),
+    /**
+     * Servo_Ready.
+     */
+    SW_RTEX_SERVO_READY = (1 << 6),
+    /**
+     * Servo_Active: the motor is energised.
+     */
+    SW_RTEX_SERVO_ACTIVE = (1 << 7),
+    /**
+     * NOT.
+     */
+    SW_RTEX_NOT = (1 << 8),
+    /**
+     * POT.
+     */
+    SW_RTEX_POT = (1 << 9),
+    /**
+     * HOME.
+     */
+    SW_RTEX_HOME = (1 << 10),
+    /**
+     * SI-MON1.
+     */
+    SW_RTEX_SI_MON1 = (1 << 11),
+    /**
+     * SI-MON2.
+     */
+    SW_RTEX_SI_MON2 = (1 << 12),
+    /**
+     * SI-MON3.
+     */
+    SW_RTEX_SI_MON3 = (1 << 13),
+    /**
+     * SI-MON4.
+     */
+    SW_RTEX_SI_MON4 = (1 << 14),
+    /**
+     * SI-MON5.
+     */
+    SW_RTEX_SI_MON5 = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
  * Bits of the address field ADF.
  */
 enum sw_tformat_adf_t
@@ -846,6 +1192,172 @@ typedef struct {
 } sw_nrz_field_t;
 
 /**
+ * One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be copied. One context at a
+ * time.
+ */
+typedef struct {
+    uint64_t _private[60];
+} sw_rtex_axis_t;
+
+/**
+ * What an axis is set up with. Limits are counted in update periods.
+ */
+typedef struct {
+    /**
+     * Update period, ns.
+     */
+    uint32_t update_ns;
+    /**
+     * Update periods of invalid data at the start; 0 if somebody else has sent them.
+     */
+    uint32_t invalid;
+    /**
+     * Waits for Servo_Active, for an answer, for a stop.
+     */
+    uint32_t wait;
+    /**
+     * Wait for Servo_Ready; 0 waits for ever.
+     */
+    uint32_t ready;
+    /**
+     * Wait for Servo_Active to go; 0 is `wait`.
+     */
+    uint32_t inactive;
+    /**
+     * Electronic gear of the drive, numerator.
+     */
+    uint32_t gear_numerator;
+    /**
+     * Electronic gear of the drive, denominator.
+     */
+    uint32_t gear_denominator;
+    /**
+     * Responses without a new echo after which the axis stops, 1 or more.
+     */
+    uint16_t echo;
+    /**
+     * Responses with CMD_Error after which it stops, 1 or more.
+     */
+    uint16_t command_errors;
+    /**
+     * MAC-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * sw_rtex_mode_t.
+     */
+    uint8_t mode;
+} sw_rtex_config_t;
+
+/**
+ * Where an axis stands.
+ */
+typedef struct {
+    /**
+     * MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, where the reason has one.
+     */
+    uint16_t detail;
+    /**
+     * sw_rtex_axis_code_t.
+     */
+    uint8_t code;
+    /**
+     * sw_rtex_reason_t.
+     */
+    uint8_t reason;
+} sw_rtex_state_of_t;
+
+/**
+ * Feedback that may be used.
+ */
+typedef struct {
+    /**
+     * When the block was heard.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Actual position in command units.
+     */
+    int32_t position;
+} sw_rtex_feedback_t;
+
+/**
+ * What a drive sends: as received, not yet a position.
+ */
+typedef struct {
+    /**
+     * Response_Data1.
+     */
+    int32_t response_data1;
+    /**
+     * Status flags: sw_rtex_status_t; byte 2 is the low one.
+     */
+    uint16_t status;
+    /**
+     * Bytes 8 to 15, as the non-cyclic response lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Actual_MAC-ID.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter_Echo.
+     */
+    uint8_t update_counter_echo;
+    /**
+     * CMD_Error, 0 or 1.
+     */
+    uint8_t cmd_error;
+    /**
+     * Cyclic code, 0..15.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code, 0..7.
+     */
+    uint8_t noncyclic;
+} sw_rtex_response_t;
+
+/**
+ * What a controller sends.
+ */
+typedef struct {
+    /**
+     * Command_Data1.
+     */
+    int32_t command_data1;
+    /**
+     * Control bits: sw_rtex_control_t; byte 2 is the low one.
+     */
+    uint16_t control;
+    /**
+     * Bytes 8 to 15, as the non-cyclic command lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Mac-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter, 0..3.
+     */
+    uint8_t update_counter;
+    /**
+     * TMG_CNT, 0 or 1.
+     */
+    uint8_t tmg_cnt;
+    /**
+     * Cyclic code: sw_rtex_mode_t, 0 for NOP.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code.
+     */
+    uint8_t noncyclic;
+} sw_rtex_command_t;
+
+/**
  * What a master sends.
  */
 typedef struct {
@@ -1291,6 +1803,96 @@ sw_result_t sw_nrz_run(sw_nrz_t *receiver,
  * Never NULL, valid for ever.
  */
 const char *sw_text(sw_result_t result);
+
+/**
+ * Prepares an axis whose drive has not answered yet.
+ */
+sw_result_t sw_rtex_axis_start(sw_rtex_axis_t *axis, const sw_rtex_config_t *config);
+
+/**
+ * Takes what an update period brought: the block of this axis, or NULL if there was none, heard until `end_ns`. A block of another
+ * length is a refused one.
+ */
+sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis,
+                              const uint8_t *bytes,
+                              size_t len,
+                              uint64_t end_ns);
+
+/**
+ * The block of the next update period, 16 bytes, which counts as sent.
+ */
+sw_result_t sw_rtex_axis_transmit(sw_rtex_axis_t *axis, uint8_t *bytes, size_t size);
+
+/**
+ * Switches the servo on: SW_E_RTEX_NOT_NOW if the axis is not off, no new position has come, or the drive is not ready.
+ */
+sw_result_t sw_rtex_axis_switch_on(sw_rtex_axis_t *axis);
+
+/**
+ * Switches the servo off.
+ */
+sw_result_t sw_rtex_axis_switch_off(sw_rtex_axis_t *axis);
+
+/**
+ * Stops by category 0 (servo off at once), 1 (slow down, then off) or 2 (slow down and hold), as far as the limits of the axis allow.
+ */
+sw_result_t sw_rtex_axis_stop(sw_rtex_axis_t *axis,
+                              uint8_t category);
+
+/**
+ * Leaves the stop: the axis may be switched on again when its drive allows.
+ */
+sw_result_t sw_rtex_axis_clear(sw_rtex_axis_t *axis);
+
+/**
+ * The target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the drive's gear and the limits
+ * allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the set-point stays then.
+ */
+sw_result_t sw_rtex_axis_set_position(sw_rtex_axis_t *axis,
+                                      int32_t position);
+
+/**
+ * The speed of CV or the torque of CT, in the units of the drive.
+ */
+sw_result_t sw_rtex_axis_set_rate(sw_rtex_axis_t *axis, int32_t rate);
+
+/**
+ * Control bits beside Servo_On and the stops (sw_rtex_control_t, added), from the next block on.
+ */
+sw_result_t sw_rtex_axis_set_control(sw_rtex_axis_t *axis, uint16_t control);
+
+/**
+ * The set-point: in CP the target in command units; 0 for a state that was not started.
+ */
+int32_t sw_rtex_axis_setpoint(const sw_rtex_axis_t *axis);
+
+/**
+ * Where the axis stands, and why.
+ */
+sw_result_t sw_rtex_axis_state(const sw_rtex_axis_t *axis, sw_rtex_state_of_t *state);
+
+/**
+ * The actual position, judged now: **false if it must not be used**: never heard, older than `max_age_ns`, an alarm of the drive.
+ */
+bool sw_rtex_feedback(const sw_rtex_axis_t *axis,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      sw_rtex_feedback_t *feedback);
+
+/**
+ * The response in a block of 16 bytes.
+ */
+sw_result_t sw_rtex_parse_response(const uint8_t *bytes, size_t len, sw_rtex_response_t *response);
+
+/**
+ * The command in a block of 16 bytes, as a drive receives it.
+ */
+sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_command_t *command);
+
+/**
+ * The block of a command, 16 bytes. Reserved bits are sent as 0.
+ */
+sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.

@@ -10,6 +10,7 @@ mod border;
 mod clock;
 pub mod nrz;
 mod result;
+pub mod rtex;
 #[cfg(test)]
 mod tests;
 pub mod tformat;

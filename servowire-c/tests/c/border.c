@@ -235,6 +235,39 @@ static void bus(void)
     CHECK(sw_aformat_poll(&m, sw_aformat_until_ns(&m)) == SW_OK && sw_aformat_missing(&m) == 2);
 }
 
+/* One axis: MAC-ID 11, CP; the drive answers with position 100. */
+static void axis(void)
+{
+    static const uint8_t rsp[16] = {0x8b, 0x20, 0x40, 0x00, 100};
+    static sw_rtex_axis_t zeroed_axis;
+    sw_rtex_axis_t a;
+    sw_rtex_config_t config = {500000, 0, 4, 9, 5, 1, 1, 3, 2, 11, SW_RTEX_CP};
+    sw_rtex_state_of_t state;
+    sw_rtex_feedback_t feedback;
+    sw_rtex_response_t response;
+    uint8_t block[16];
+
+    CHECK(sw_rtex_parse_response(rsp, 15, &response) == SW_E_RTEX_TRUNCATED);
+    CHECK(sw_rtex_parse_response(NULL, 16, &response) == SW_E_NULL);
+    CHECK(sw_rtex_axis_hear(&zeroed_axis, rsp, 16, 0) == SW_E_STATE && sw_rtex_axis_stop(&zeroed_axis, 0) == SW_E_STATE);
+    CHECK(!sw_rtex_feedback(&zeroed_axis, 0, 1, &feedback));
+    config.echo = 0;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_E_ARGUMENT);
+    config.echo = 3;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_OK && sw_rtex_axis_start(&a, NULL) == SW_E_NULL);
+    CHECK(!sw_rtex_feedback(&a, 0, UINT64_MAX, &feedback));
+    CHECK(sw_rtex_axis_switch_on(&a) == SW_E_RTEX_NOT_NOW && strcmp(sw_text(SW_E_RTEX_NOT_NOW), "not_now") == 0);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, SW_NO_TIME) == SW_E_CLOCK);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, 1000000) == SW_OK);
+    /* A period that cannot be written is not begun: the counter of the next block is 1. */
+    CHECK(sw_rtex_axis_transmit(&a, block, 15) == SW_E_SHORT_BUFFER);
+    CHECK(sw_rtex_axis_transmit(&a, block, 16) == SW_OK && block[0] == 0x2b && block[1] == 0x20 && block[4] == 100);
+    CHECK(sw_rtex_axis_state(&a, &state) == SW_OK && state.code == SW_RTEX_OFF && state.reason == SW_RTEX_NO_REASON);
+    CHECK(sw_rtex_feedback(&a, 1500000, 500000, &feedback) && feedback.position == 100 && feedback.sampled_ns == 1000000);
+    CHECK(!sw_rtex_feedback(&a, 1500001, 500000, &feedback));
+    CHECK(sw_rtex_axis_set_position(&a, 200) == SW_E_RTEX_NOT_NOW && sw_rtex_axis_setpoint(&a) == 100);
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -252,6 +285,7 @@ int main(void)
     exchange();
     procedures();
     bus();
+    axis();
     clock_of_32_bits();
     puts("border: good");
     return 0;
