@@ -325,6 +325,76 @@ typedef int32_t sw_code_t;
 #endif // __cplusplus
 
 /**
+ * Refusals of motion, in the order of their numbers.
+ */
+enum sw_motion_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The axis is still moving.
+     */
+    SW_E_MOTION_MOVING = -1537,
+    /**
+     * Two steps could fall into one tick of the clock.
+     */
+    SW_E_MOTION_SPEED_ABOVE_CLOCK = -1538,
+    /**
+     * More steps than 31 bits count.
+     */
+    SW_E_MOTION_TOO_MANY_STEPS = -1539,
+    /**
+     * No room.
+     */
+    SW_E_MOTION_QUEUE_FULL = -1540,
+    /**
+     * A target outside the soft limits.
+     */
+    SW_E_MOTION_SOFT_LIMIT = -1543,
+    /**
+     * Too few steps for the change of speed.
+     */
+    SW_E_MOTION_TOO_SHORT = -1544,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_error_t;
+#endif // __cplusplus
+
+/**
+ * What the background has left to do.
+ */
+enum sw_motion_work_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * At rest where it is to be.
+     */
+    SW_MOTION_REST = 0,
+    /**
+     * Poll again.
+     */
+    SW_MOTION_MORE = 1,
+    /**
+     * Fire the interrupt now: it stands, and there is something for it.
+     */
+    SW_MOTION_START = 2,
+    /**
+     * Nothing before the interrupt has gone on.
+     */
+    SW_MOTION_LATER = 3,
+    /**
+     * The stop needs more slots than the queue has: the axis comes to rest.
+     */
+    SW_MOTION_TOO_FEW_SLOTS = 4,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_work_t;
+#endif // __cplusplus
+
+/**
  * Where an axis stands.
  */
 enum sw_rtex_axis_code_t
@@ -1163,6 +1233,63 @@ typedef struct {
 } sw_clock_t;
 
 /**
+ * The end of the background. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[460];
+} sw_motion_axis_t;
+
+/**
+ * The end of the interrupt. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_motion_timer_t;
+
+/**
+ * What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+ */
+typedef struct {
+    uint64_t _private[656];
+} sw_motion_queue_t;
+
+/**
+ * How fast an axis may go.
+ */
+typedef struct {
+    /**
+     * Steps/s³; 0 for a trapezoid.
+     */
+    uint64_t jerk;
+    /**
+     * Steps/s.
+     */
+    uint32_t speed;
+    /**
+     * Steps/s².
+     */
+    uint32_t acceleration;
+} sw_motion_limits_t;
+
+/**
+ * What the interrupt does.
+ */
+typedef struct {
+    /**
+     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+     */
+    uint32_t wait;
+    /**
+     * 1: make a step now. DIR has been right for the time that the driver needs.
+     */
+    uint8_t step;
+    /**
+     * The level of DIR from now on, 1 for reverse. It never changes together with a step.
+     */
+    uint8_t reverse;
+} sw_motion_fired_t;
+
+/**
  * A receiver of start-stop fields from an oversampled line. Its content is private.
  */
 typedef struct {
@@ -1784,6 +1911,67 @@ sw_result_t sw_clock_start(sw_clock_t *clock,
  */
 uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
+
+/**
+ * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
+ * second. While it is called neither end is in use.
+ */
+sw_result_t sw_motion_start(sw_motion_axis_t *axis,
+                            sw_motion_timer_t *timer,
+                            sw_motion_queue_t *queue,
+                            uint32_t clock_hz,
+                            const sw_motion_limits_t *limit);
+
+/**
+ * The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+ */
+sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
+                           sw_motion_fired_t *fired);
+
+/**
+ * A slice of planning, in the background: sw_motion_work_t, or a refusal.
+ */
+sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
+
+/**
+ * To a position in steps.
+ */
+sw_result_t sw_motion_move_to(sw_motion_axis_t *axis, int64_t target);
+
+/**
+ * On and on at this speed, steps/s; `reverse` is 0 or 1.
+ */
+sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t speed);
+
+/**
+ * To rest within the limits; the target is forgotten.
+ */
+sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
+
+/**
+ * No step any more, at once.
+ */
+sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
+
+/**
+ * To rest within the limits; sw_motion_resume() goes on.
+ */
+sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
+
+/**
+ * Goes on after sw_motion_hold().
+ */
+sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
+
+/**
+ * Where the axis is commanded to be, in steps.
+ */
+sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
+
+/**
+ * Whether the axis stands; false for a state that was not started.
+ */
+bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
 
 /**
  * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).

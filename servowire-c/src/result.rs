@@ -41,6 +41,7 @@ pub(crate) enum Protocol {
     Tformat = 1,
     Aformat = 2,
     Rtex = 4,
+    Motion = 6,
 }
 
 /// The result for a class of a protocol.
@@ -125,6 +126,7 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
         1 => names!(tformat::ErrorClass),
         2 => names!(nikon_aformat::ErrorClass),
         4 => names!(rtex_block::ErrorClass),
+        6 => names!(step_motion::ErrorClass),
         _ => return None,
     };
     if number == 0 { None } else { nth(names, number) }
@@ -149,6 +151,10 @@ mod tests {
         }
         for class in rtex_block::ErrorClass::ALL {
             let code = refused(Protocol::Rtex, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in step_motion::ErrorClass::ALL {
+            let code = refused(Protocol::Motion, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
         for class in nikon_aformat::ErrorClass::ALL {

@@ -268,6 +268,56 @@ static void axis(void)
     CHECK(sw_rtex_axis_set_position(&a, 200) == SW_E_RTEX_NOT_NOW && sw_rtex_axis_setpoint(&a) == 100);
 }
 
+/* 3000 steps and back, made by a timer of 1 MHz. */
+static void motion(void)
+{
+    static sw_motion_queue_t queue;
+    static sw_motion_axis_t a;
+    static sw_motion_timer_t timer;
+    sw_motion_limits_t limits = {4000000, 20000, 200000};
+    sw_motion_fired_t fired = {0, 0, 0};
+    int64_t made = 0, commanded = 99;
+    uint64_t ticks = 0, shortest = UINT64_MAX, last = 0;
+    int way;
+
+    CHECK(sw_motion_poll(&a) == SW_E_STATE && sw_motion_fire(&timer, &fired) == SW_E_STATE && !sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_start(&a, &timer, NULL, 1000000, &limits) == SW_E_NULL);
+    CHECK(sw_motion_start(&a, &timer, &queue, 999, &limits) == SW_E_ARGUMENT);
+    limits.speed = 500001;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_E_MOTION_SPEED_ABOVE_CLOCK);
+    limits.speed = 20000;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_OK && sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_commanded(&a, NULL) == SW_E_NULL && sw_motion_run(&a, 2, 100) == SW_E_ARGUMENT);
+    for (way = 0; way < 2; way++) {
+        sw_result_t work;
+        unsigned calls = 0;
+        CHECK(sw_motion_move_to(&a, way == 0 ? 3000 : -500) == SW_OK);
+        while ((work = sw_motion_poll(&a)) != SW_MOTION_REST) {
+            CHECK(work > 0 && ++calls < 1000000);
+            if (work == SW_MOTION_MORE) {
+                continue;
+            }
+            ticks += fired.wait;
+            CHECK(sw_motion_fire(&timer, &fired) == SW_OK);
+            if (fired.step) {
+                made += fired.reverse ? -1 : 1;
+                if (made > 1 && last > 0 && ticks - last < shortest) {
+                    shortest = ticks - last;
+                }
+                last = ticks;
+            }
+        }
+        CHECK(sw_motion_commanded(&a, &commanded) == SW_OK && commanded == made && made == (way == 0 ? 3000 : -500));
+        fired.wait = 0;
+    }
+    /* 20000 steps a second are 50 us. */
+    CHECK(shortest >= 49 && shortest <= 51);
+    CHECK(sw_motion_run(&a, 1, 10000) == SW_OK && sw_motion_halt(&a) == SW_OK);
+    while (sw_motion_poll(&a) != SW_MOTION_REST) {
+        CHECK(sw_motion_fire(&timer, &fired) == SW_OK && !fired.step);
+    }
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -286,6 +336,7 @@ int main(void)
     procedures();
     bus();
     axis();
+    motion();
     clock_of_32_bits();
     puts("border: good");
     return 0;
