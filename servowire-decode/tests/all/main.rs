@@ -11,6 +11,8 @@
 
 mod places;
 mod push;
+mod traffic;
+mod truth;
 
 use std::io;
 
