@@ -38,6 +38,9 @@ pub fn decode(
                     out.flush()?;
                 }
                 out.tick();
+                if out.is_done() {
+                    break;
+                }
             }
             if foreign.is_empty() {
                 return Ok(());
