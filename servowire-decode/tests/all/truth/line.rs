@@ -65,6 +65,8 @@ pub(crate) fn record(wire: &Wire, how: Recording, rng: &mut Rng) -> Vec<(i64, bo
         }
     }
     out.dedup_by_key(|(_, level)| *level);
-    out.iter_mut().for_each(|(_, level)| *level ^= how.inverted);
+    for (_, level) in &mut out {
+        *level ^= how.inverted;
+    }
     out
 }
