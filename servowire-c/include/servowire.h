@@ -15,6 +15,12 @@
 #define SW_NO_TIME UINT64_MAX
 
 /**
+ * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
+ * frame.
+ */
+#define SW_SORTE_DATA_AT 2
+
+/**
  * Refusals of A-format, in the order of their numbers.
  */
 enum sw_aformat_error_t
@@ -322,6 +328,76 @@ enum sw_code_t
 };
 #ifndef __cplusplus
 typedef int32_t sw_code_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of motion, in the order of their numbers.
+ */
+enum sw_motion_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The axis is still moving.
+     */
+    SW_E_MOTION_MOVING = -1537,
+    /**
+     * Two steps could fall into one tick of the clock.
+     */
+    SW_E_MOTION_SPEED_ABOVE_CLOCK = -1538,
+    /**
+     * More steps than 31 bits count.
+     */
+    SW_E_MOTION_TOO_MANY_STEPS = -1539,
+    /**
+     * No room.
+     */
+    SW_E_MOTION_QUEUE_FULL = -1540,
+    /**
+     * A target outside the soft limits.
+     */
+    SW_E_MOTION_SOFT_LIMIT = -1543,
+    /**
+     * Too few steps for the change of speed.
+     */
+    SW_E_MOTION_TOO_SHORT = -1544,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_error_t;
+#endif // __cplusplus
+
+/**
+ * What the background has left to do.
+ */
+enum sw_motion_work_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * At rest where it is to be.
+     */
+    SW_MOTION_REST = 0,
+    /**
+     * Poll again.
+     */
+    SW_MOTION_MORE = 1,
+    /**
+     * Fire the interrupt now: it stands, and there is something for it.
+     */
+    SW_MOTION_START = 2,
+    /**
+     * Nothing before the interrupt has gone on.
+     */
+    SW_MOTION_LATER = 3,
+    /**
+     * The stop needs more slots than the queue has: the axis comes to rest.
+     */
+    SW_MOTION_TOO_FEW_SLOTS = 4,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_work_t;
 #endif // __cplusplus
 
 /**
@@ -668,6 +744,117 @@ enum sw_rtex_status_t
 };
 #ifndef __cplusplus
 typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of SORTE frames, in the order of their numbers.
+ */
+enum sw_sorte_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The frame is too short.
+     */
+    SW_E_SORTE_TRUNCATED = -1281,
+    /**
+     * The frame check sequence is wrong.
+     */
+    SW_E_SORTE_BAD_FCS = -1282,
+    /**
+     * The type is not the one that is due.
+     */
+    SW_E_SORTE_UNEXPECTED_TYPE = -1285,
+    /**
+     * The frame is too long.
+     */
+    SW_E_SORTE_TOO_LONG = -1286,
+    /**
+     * The CRC-8 is wrong.
+     */
+    SW_E_SORTE_BAD_CRC8 = -1287,
+    /**
+     * Another source than the one that is due.
+     */
+    SW_E_SORTE_WRONG_SOURCE = -1288,
+    /**
+     * The buffer is too small.
+     */
+    SW_E_SORTE_BUFFER_TOO_SMALL = -1294,
+    /**
+     * A PTO word that is reserved.
+     */
+    SW_E_SORTE_RESERVED_PTO_VALUE = -1295,
+};
+#ifndef __cplusplus
+typedef int32_t sw_sorte_error_t;
+#endif // __cplusplus
+
+/**
+ * What a PTO word says.
+ */
+enum sw_sorte_pto_kind_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * No pulse in this cycle.
+     */
+    SW_SORTE_NO_PULSE = 0,
+    /**
+     * A pulse.
+     */
+    SW_SORTE_PULSE = 1,
+    /**
+     * The driver is switched off.
+     */
+    SW_SORTE_DRIVER_OFF = 2,
+    /**
+     * A reserved value.
+     */
+    SW_SORTE_RESERVED = 3,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_sorte_pto_kind_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of step-profile, in the order of their numbers.
+ */
+enum sw_step_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * No steps an entry.
+     */
+    SW_E_STEP_ZERO_SEGMENT_LENGTH = -1793,
+    /**
+     * Too many steps an entry.
+     */
+    SW_E_STEP_SEGMENT_TOO_LONG = -1794,
+    /**
+     * Two steps could fall into one cycle.
+     */
+    SW_E_STEP_STEP_RATE_TOO_HIGH = -1795,
+    /**
+     * The first step takes longer than 32 bits count.
+     */
+    SW_E_STEP_STEP_TIME_OVERFLOW = -1796,
+    /**
+     * The sync time does not lie in a cycle.
+     */
+    SW_E_STEP_SYNC_TIME_OUT_OF_RANGE = -1797,
+    /**
+     * The frequency is too low.
+     */
+    SW_E_STEP_FREQUENCY_TOO_LOW = -1800,
+};
+#ifndef __cplusplus
+typedef int32_t sw_step_error_t;
 #endif // __cplusplus
 
 /**
@@ -1163,6 +1350,63 @@ typedef struct {
 } sw_clock_t;
 
 /**
+ * The end of the background. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[460];
+} sw_motion_axis_t;
+
+/**
+ * The end of the interrupt. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_motion_timer_t;
+
+/**
+ * What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+ */
+typedef struct {
+    uint64_t _private[656];
+} sw_motion_queue_t;
+
+/**
+ * How fast an axis may go.
+ */
+typedef struct {
+    /**
+     * Steps/s³; 0 for a trapezoid.
+     */
+    uint64_t jerk;
+    /**
+     * Steps/s.
+     */
+    uint32_t speed;
+    /**
+     * Steps/s².
+     */
+    uint32_t acceleration;
+} sw_motion_limits_t;
+
+/**
+ * What the interrupt does.
+ */
+typedef struct {
+    /**
+     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+     */
+    uint32_t wait;
+    /**
+     * 1: make a step now. DIR has been right for the time that the driver needs.
+     */
+    uint8_t step;
+    /**
+     * The level of DIR from now on, 1 for reverse. It never changes together with a step.
+     */
+    uint8_t reverse;
+} sw_motion_fired_t;
+
+/**
  * A receiver of start-stop fields from an oversampled line. Its content is private.
  */
 typedef struct {
@@ -1356,6 +1600,66 @@ typedef struct {
      */
     uint8_t noncyclic;
 } sw_rtex_command_t;
+
+/**
+ * A frame from the master: its output lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Time stamp of its transmission, ns.
+     */
+    uint16_t time_stamp;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+} sw_sorte_master_frame_t;
+
+/**
+ * A frame from a device: its payload lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Who sends it.
+     */
+    uint8_t address;
+    /**
+     * STATUS: LAST and ERROR.
+     */
+    uint8_t status;
+} sw_sorte_device_frame_t;
+
+/**
+ * A PTO word.
+ */
+typedef struct {
+    /**
+     * Start of the pulse in the cycle, ns; 0 without one. Of a reserved word: its time, which must not be used.
+     */
+    uint16_t start_ns;
+    /**
+     * sw_sorte_pto_kind_t.
+     */
+    uint8_t kind;
+    /**
+     * DIR, 0 or 1; 0 where the driver is off.
+     */
+    uint8_t direction;
+} sw_sorte_pto_t;
+
+/**
+ * When a step comes.
+ */
+typedef struct {
+    /**
+     * Cycles of 4 us to wait.
+     */
+    uint32_t cnt;
+    /**
+     * Time in that cycle, ns.
+     */
+    uint32_t sync;
+} sw_step_time_t;
 
 /**
  * What a master sends.
@@ -1786,6 +2090,67 @@ uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
 
 /**
+ * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
+ * second. While it is called neither end is in use.
+ */
+sw_result_t sw_motion_start(sw_motion_axis_t *axis,
+                            sw_motion_timer_t *timer,
+                            sw_motion_queue_t *queue,
+                            uint32_t clock_hz,
+                            const sw_motion_limits_t *limit);
+
+/**
+ * The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+ */
+sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
+                           sw_motion_fired_t *fired);
+
+/**
+ * A slice of planning, in the background: sw_motion_work_t, or a refusal.
+ */
+sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
+
+/**
+ * To a position in steps.
+ */
+sw_result_t sw_motion_move_to(sw_motion_axis_t *axis, int64_t target);
+
+/**
+ * On and on at this speed, steps/s; `reverse` is 0 or 1.
+ */
+sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t speed);
+
+/**
+ * To rest within the limits; the target is forgotten.
+ */
+sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
+
+/**
+ * No step any more, at once.
+ */
+sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
+
+/**
+ * To rest within the limits; sw_motion_resume() goes on.
+ */
+sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
+
+/**
+ * Goes on after sw_motion_hold().
+ */
+sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
+
+/**
+ * Where the axis is commanded to be, in steps.
+ */
+sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
+
+/**
+ * Whether the axis stands; false for a state that was not started.
+ */
+bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
+
+/**
  * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
  */
 sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
@@ -1893,6 +2258,89 @@ sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_comm
  * The block of a command, 16 bytes. Reserved bits are sent as 0.
  */
 sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The frame of a master with this many bytes of output, from its source address to its time stamp, without preamble.
+ */
+sw_result_t sw_sorte_parse_master_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t output_len,
+                                        sw_sorte_master_frame_t *frame);
+
+/**
+ * The frame of the IO exchange with this output: 5 bytes more.
+ */
+sw_result_t sw_sorte_build_master_frame(const uint8_t *output,
+                                        size_t output_len,
+                                        uint16_t time_stamp,
+                                        uint8_t *bytes,
+                                        size_t size,
+                                        size_t *len);
+
+/**
+ * The frame of a device with this many bytes of payload, from its source address to its CRC.
+ */
+sw_result_t sw_sorte_parse_device_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t payload_len,
+                                        sw_sorte_device_frame_t *frame);
+
+/**
+ * The frame of a device with the three bytes of payload of the published application: 6 bytes.
+ */
+sw_result_t sw_sorte_build_device_frame(const sw_sorte_device_frame_t *frame,
+                                        const uint8_t *payload,
+                                        uint8_t *bytes,
+                                        size_t size);
+
+/**
+ * The word for a pulse that starts `sync_ns` into the cycle, 0..3990; 0 and 1 are sent as 1 ns.
+ */
+sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *word);
+
+/**
+ * What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
+ */
+sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
+
+/**
+ * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.
+ */
+uint32_t sw_step_ramp(uint8_t i);
+
+/**
+ * The speed constant for a step frequency in Hz.
+ */
+sw_result_t sw_step_speed(uint32_t hz, uint32_t *speed);
+
+/**
+ * The time of a step in ns: an entry of the ramp at a speed; modulo 2^32.
+ */
+uint32_t sw_step_time_ns(uint32_t entry, uint32_t speed);
+
+/**
+ * The next step, `t_step` ns after one that came `prev` ns into its cycle.
+ */
+sw_result_t sw_step_next(uint32_t t_step, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * The same as the PRU computes it, its errors included, for an entry of the ramp at a speed.
+ */
+sw_result_t sw_step_next_as_pru(uint32_t entry, uint32_t speed, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * Whether a move with the published ramp is possible: `k` steps an entry, the first step `init_sync` ns into its cycle. `pru_is_exact`
+ * (may be NULL) tells whether the PRU computes it without error.
+ */
+sw_result_t sw_step_check(uint32_t speed,
+                          uint32_t k,
+                          uint32_t init_sync,
+                          bool *pru_is_exact);
+
+/**
+ * How long a move of `steps` with the published ramp takes, ns.
+ */
+sw_result_t sw_step_duration_ns(uint32_t speed, uint32_t k, uint32_t init_sync, uint32_t steps, uint64_t *ns);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.
