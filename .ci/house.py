@@ -11,6 +11,7 @@
    every line of the drawing is a dependency. Dependencies of tests do not count. An arrow leads to the name under it; if no other one
    leads to that row, to the whole row.
 3. CONTRIBUTING.md lists the folder of every package.
+4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder.
 """
 
 import json
@@ -344,6 +345,11 @@ def faults_of_map(text, packages):
             yield f"CONTRIBUTING.md: the map lacks {folder}/"
 
 
+def faults_of_links(name, text):
+    for found in re.finditer(r"\]\((\.\./[^)]*)\)", text):
+        yield f"{name}: the link {found[1]} leads nowhere on docs.rs"
+
+
 def check():
     workspace = metadata(ROOT / "Cargo.toml")
     others = [ROOT / "fuzz/Cargo.toml", ROOT / "tests/bare-metal/Cargo.toml", *ROOT.glob("examples/firmware/*/Cargo.toml")]
@@ -353,6 +359,11 @@ def check():
         *faults_of_imports(roots),
         *faults_of_drawing((ROOT / "README.md").read_text(), dependencies(packages), {name_of(p) for p in packages}),
         *faults_of_map((ROOT / "CONTRIBUTING.md").read_text(), workspace),
+        *(
+            fault
+            for file in (Path(package["manifest_path"]).with_name("README.md") for package in workspace if package["publish"] is None)
+            for fault in faults_of_links(short(file), file.read_text())
+        ),
     ]
     for fault in faults:
         print(fault, file=sys.stderr)
@@ -420,6 +431,7 @@ def self_test():
         faults = list(faults_of_drawing(DRAWING, wrong, names | extra))
         equal(f"a drawing that is wrong ({words})", True, any(words in fault for fault in faults))
     places = [{"manifest_path": str(ROOT / name / "Cargo.toml")} for name in "ab"]
+    equal("links", 1, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f)"))))
     equal("the map", 1, len(list(faults_of_map("| `a/` |", places))))
     print("house: the checks see what they look for")
 

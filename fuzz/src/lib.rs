@@ -4,6 +4,7 @@
 //! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
+pub mod c;
 pub mod capture;
 pub mod hdsl;
 pub mod nikon;
@@ -19,6 +20,7 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("c_tformat", c::tformat),
     ("capture_vcd", capture::vcd),
     ("capture_table", capture::table),
     ("capture_analyzer", capture::analyzer),

@@ -246,7 +246,7 @@ impl Device {
         i16::try_from(value).ok()
     }
 
-    /// Bits of the position: those of the acceleration, 8 more than bits 3:0 of the identifier say, and so many more as bits 9:4
+    /// Bits of the position: those of the acceleration, 8 more than bits 3:0 of the identifier say, and as many more as bits 9:4
     /// say; 40 at most.
     fn bits(&self) -> u32 {
         (self.id & 15).wrapping_add(8).wrapping_add(self.id >> 4 & 0x3f).min(40)

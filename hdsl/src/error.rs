@@ -140,7 +140,7 @@ servowire_core::errors! {
         /// The link is not in the state that the operation needs.
         #[error("the link is not up")]
         NotLocked = 23,
-        /// The number of data bytes is none of 0, 2, 4 and 8.
+        /// The number of data bytes is not 0, 2, 4 or 8.
         #[error("{len} data bytes: a long message carries 0, 2, 4 or 8")]
         DataLength = 24 {
             /// Bytes given.
@@ -152,7 +152,7 @@ servowire_core::errors! {
             /// Bits that are missing, rounded up.
             missing: u32,
         },
-        /// The name of a user file is none: 1 to 8 characters 20h..=7Eh, then 00h.
+        /// The name of a user file is invalid: it has 1 to 8 characters 20h..=7Eh, then 00h.
         #[error("this is no name of a user file")]
         FileName = 26,
         /// No pulse period is known that the frames could be synchronised with.

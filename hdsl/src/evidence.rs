@@ -4,7 +4,7 @@ use servowire_core::{Angle, Feedback, Shaft, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
-/// In spite of what a position may be used: up to so many acceleration words that are missing.
+/// What a position may be used in spite of: up to this many missing acceleration words.
 ///
 /// One wrong bit takes an acceleration word away, and with it the exact position for 17 to 24 frames, until a safe position has shown
 /// what was in the word and another one has agreed. In the meantime the position is estimated, with a bound that grows.

@@ -328,7 +328,7 @@ impl Master {
         self.end(bits, signal)
     }
 
-    /// The external pulse of the present frame came so many eighths of a bit after its sampling edge (negative: before it); to
+    /// The external pulse of the present frame came this many eighths of a bit after its sampling edge (negative: before it); to
     /// be told before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
     pub const fn hear_pulse(&mut self, late: i16) {
         self.late = Some(late);

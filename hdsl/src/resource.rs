@@ -65,7 +65,7 @@ addresses! {
     ERRORLOG = 0x0cc,
     /// Usage histogram, 4 bytes a class.
     USAGEHIS = 0x0cd,
-    /// **Reset or shut-down of the encoder**, see [`LongRequest::reset_encoder`](crate::message::LongRequest::reset_encoder).
+    /// **Reset or shut-down of the encoder**, see `LongRequest::reset_encoder` (feature `files`).
     RESET = 0x100,
     /// **Counting direction**; the encoder resets itself afterwards.
     COUNTDIR = 0x102,

@@ -24,7 +24,7 @@ impl Rssi {
         Self::of_ones(ONES[edges as usize])
     }
 
-    /// Half of it as so many ones: the smaller of two is both of them.
+    /// Half of it, as a row of that many ones: the smaller of two is their bitwise and.
     #[expect(clippy::cast_possible_truncation, reason = "at most six ones")]
     pub(crate) const fn of_ones(ones: u8) -> Self {
         Self(2_u8.wrapping_mul(ones.count_ones() as u8))
@@ -60,7 +60,7 @@ pub const fn longest_gap(edges: u8) -> Option<u8> {
 /// Of a bit time with one edge or none.
 const PERFECT: u8 = 0x3f;
 
-/// Half the RSSI of an edge byte, as so many ones.
+/// Half the RSSI of an edge byte, as a row of that many ones.
 #[expect(clippy::indexing_slicing, clippy::cast_possible_truncation, reason = "runs at compile time")]
 static ONES: [u8; 256] = {
     let mut table = [0; 256];
@@ -82,7 +82,7 @@ static ONES: [u8; 256] = {
 pub struct EdgeWatch {
     previous: bool,
     seen: u8,
-    /// Half the lowest RSSI, as so many ones.
+    /// Half the lowest RSSI, as a row of that many ones.
     ones: u8,
 }
 
@@ -148,7 +148,7 @@ impl WordWatch {
     }
 }
 
-/// The lowest RSSI, as so many ones, of the bit times in four words after the one with the samples before them.
+/// The lowest RSSI, as a row of that many ones, of the bit times in four words after the one with the samples before them.
 #[inline(always)]
 pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -> u8 {
     let (mut previous, mut ones) = (before, PERFECT);

@@ -258,7 +258,7 @@ impl Bus {
         self.damaged
     }
 
-    /// How many fewer responses arrived than were asked for, good or not: so many never started.
+    /// How many fewer responses arrived than were asked for, good or not: this many never started.
     pub const fn not_started(&self) -> u8 {
         self.asked.len().saturating_sub(self.arrived())
     }

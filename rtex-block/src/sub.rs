@@ -29,7 +29,7 @@ servowire_core::codes! {
 ///  Sub_Chk = 1 | code   Sub_Type_Code   Sub_Index  Sub_Command_Data1   Sub_Command_Data2   Sub_Command_Data3
 /// ```
 /// SX-DSV02310, "Command data block, 32-byte mode". There is no view of it: with all fields in fixed places,
-/// decoding it is no more than the loads.
+/// decoding it takes only the loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -20,7 +20,7 @@ impl Direction {
         matches!(self, Self::Reverse)
     }
 
-    /// The way of so many steps; forward for 0.
+    /// The direction of this many steps; forward for 0.
     pub const fn of(steps: i64) -> Self {
         if steps < 0 { Self::Reverse } else { Self::Forward }
     }

@@ -148,7 +148,7 @@ impl Field {
         Self::new(name, Value::Number { value: value.into(), unit })
     }
 
-    /// A code or check value of so many hex digits.
+    /// A code or check value of this many hex digits.
     pub fn hex(name: &'static str, value: impl Into<u64>, digits: usize) -> Self {
         Self::new(name, Value::Hex { value: value.into(), digits })
     }
@@ -164,7 +164,7 @@ impl Field {
         Self::new(name, Value::Text(what.to_string()))
     }
 
-    /// Bytes or words in hex, so many digits each, a space between them.
+    /// Bytes or words in hex, this many digits each, a space between them.
     pub fn digits(name: &'static str, values: impl IntoIterator<Item = impl Into<u64>>, digits: usize) -> Self {
         let mut text = String::new();
         for value in values {

@@ -48,7 +48,7 @@ impl Fault {
 pub enum Stop {
     /// The input is broken from here on, or nothing in it can be decoded.
     Fault(Fault),
-    /// The output takes no more.
+    /// The output takes nothing more.
     Output(io::Error),
 }
 

@@ -6,7 +6,7 @@ use crate::codec::Codec;
 use crate::line::receive::Rates;
 use crate::sink::Tally;
 
-/// Spikes are worth a word from one in so many edges on.
+/// Spikes are worth a word from one in this many edges on.
 const SPIKY: u64 = 50;
 
 /// A rate in bits a second as Mbit/s.

@@ -103,7 +103,7 @@ impl Serialize for Time {
     }
 }
 
-/// Longer times are none: 30 million years.
+/// The longest time there is: 30 million years.
 const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
 
 /// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
@@ -177,7 +177,7 @@ pub fn duration(text: &str) -> Option<Time> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clock {
     rate: u64,
-    /// So many samples take so many picoseconds, in the smallest whole numbers.
+    /// A number of samples and the picoseconds that they take, in the smallest whole numbers.
     samples: u64,
     picoseconds: u64,
 }

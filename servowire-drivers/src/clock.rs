@@ -59,7 +59,7 @@ impl<F: FnMut() -> u32, const BITS: u32> CounterClock<F, BITS> {
 }
 
 impl<F, const BITS: u32> CounterClock<F, BITS> {
-    /// The clock has to be looked at again within so many ns; a driver that is not called for longer gives
+    /// The clock has to be looked at again within this many ns; a driver that is not called for longer gives
     /// [`ClockError::Backwards`].
     pub const fn read_within_ns(&self) -> u64 {
         self.time.read_within_ns()
@@ -77,7 +77,7 @@ impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
 #[cfg(feature = "async")]
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
-    /// Ends after so many ns, better later than earlier. What it is then the driver asks the clock: a wait that ends too early is
+    /// Ends after this many ns, better later than earlier. What it is then the driver asks the clock: a wait that ends too early is
     /// followed by another, and a clock that does not go on ends the call.
     async fn wait_ns(&mut self, ns: u64);
 }

@@ -24,7 +24,7 @@ impl Leaving {
         Self { worst, field_ns: field_ns.into(), window_ns: window_ns.into(), ends: None }
     }
 
-    /// A `write` that was begun by the reading `before_ns` and had ended by `after_ns` has taken so many fields.
+    /// A `write` that was begun by the reading `before_ns` and had ended by `after_ns` has taken this many fields.
     ///
     /// The first one is not asked to take more than one field. It waits for nothing, so whatever time it took may have passed before the
     /// UART had the field, and nothing else would keep the last bit of a request of one field from being cut off. A later one

@@ -3,7 +3,7 @@
 //! Frames have 18 bits, which hardly any UART can do: what sends and receives them is a `FramePort`, made of a PIO, an SPI
 //! that samples ([`spi`](crate::spi)), or a FIFO in an FPGA.
 //!
-//! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
+//! [`blocking`] spins while it waits, some tens of microseconds a call; `asynch` (feature `async`) gives the time back. Both have the same
 //! `Driver` with the same calls.
 
 #[macro_use]

@@ -109,8 +109,8 @@ impl Line {
         }
     }
 
-    /// A request begins to go out that can keep the line busy for so long, from whenever it leaves: to be called before its
-    /// first byte. A fault or a dropped future leaves it so until the next call, for nobody has read the clock.
+    /// Call before the first byte of a request; it may keep the line busy for `longest_ns` after it leaves. A fault or a dropped
+    /// future leaves it so until the next call, because nobody has read the clock.
     pub(crate) const fn begin(&mut self, longest_ns: u64) {
         self.leaving_ns = Some(longest_ns);
     }

@@ -70,7 +70,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(now_ns)
     }
 
-    /// It was asked at `before_ns` and has taken so many.
+    /// It was asked at `before_ns` and has taken this many.
     #[inline]
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64) -> Result<(), ClockError> {
         let after_ns = self.line.now_ns(self.clock)?;

@@ -1,6 +1,6 @@
 //! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, at a plain UART (8N1).
 //!
-//! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
+//! [`blocking`] spins while it waits, some tens of microseconds a call; `asynch` (feature `async`) gives the time back. Both have the same
 //! `Driver` with the same calls.
 
 #[macro_use]

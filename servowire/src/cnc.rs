@@ -83,7 +83,7 @@ pub struct Arguments {
     /// Moves, each back from the one before.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["cycles", "dance"])]
     moves: u64,
-    /// Move there and back for so many cycles, then come to rest.
+    /// Move there and back for this many cycles, then come to rest.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     cycles: Option<u64>,
     /// Each axis its own move: other lengths, and the frequencies in turn.
@@ -116,13 +116,13 @@ pub struct Arguments {
     /// Time of each register write of the handler, in ns.
     #[arg(long, value_name = "NS", default_value_t = 20, value_parser = clap::value_parser!(u16).range(0..=200))]
     write_time: u16,
-    /// Error of the devices' crystals, up to so many ppm either way.
+    /// Largest error of the devices' crystals, in ppm either way.
     #[arg(long, value_name = "PPM", default_value_t = 50.0, value_parser = amount)]
     crystal: f64,
-    /// What a crystal's error gains in a second, up to so many ppm.
+    /// Largest growth of a crystal's error in a second, in ppm.
     #[arg(long, value_name = "PPM", default_value_t = 1.0, value_parser = amount)]
     drift: f64,
-    /// Error of the capture of a frame's start, up to so many ns either way.
+    /// Largest error of the capture of a frame's start, in ns either way.
     #[arg(long, value_name = "NS", default_value_t = 5.0, value_parser = amount)]
     jitter: f64,
     /// Rms of what each port adds to a frame that passes it, in ns. 1.443 is a port that samples at 200 MHz, 11.547 one that
@@ -154,7 +154,7 @@ pub struct Arguments {
     /// or =reset.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = driver_fault)]
     driver_fault: Option<(usize, u64, Fault)>,
-    /// Switch a motor driver off when its axis has had no step for so many cycles; it needs 1 ms to wake.
+    /// Switch a motor driver off when its axis has had no step for this many cycles; it needs 1 ms to wake.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
     power_save: Option<u32>,
     /// Seed of bit errors, crystals and counters.
@@ -219,7 +219,7 @@ fn driver_fault(text: &str) -> Result<(usize, u64, Fault), String> {
     let (device, cycle) = incident(place)?;
     let fault = Fault::parse(name);
     let names = "OTS, AOCP, BOCP, APDF, BPDF, UVLO, STD, STDLAT, unpowered, reset";
-    fault.map(|fault| (device, cycle, fault)).ok_or_else(|| format!("\"{name}\" is none of {names}"))
+    fault.map(|fault| (device, cycle, fault)).ok_or_else(|| format!("\"{name}\" is not one of {names}"))
 }
 
 impl Arguments {

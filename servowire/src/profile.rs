@@ -271,7 +271,7 @@ fn frequency(text: &str) -> Result<Frequency, String> {
 fn tone(text: &str) -> Result<Tone, String> {
     Tone::from_name(text).ok_or_else(|| {
         let names: Vec<_> = Tone::ALL.iter().map(|tone| tone.name()).collect();
-        format!("\"{text}\" is none of {}", names.join(", "))
+        format!("\"{text}\" is not one of {}", names.join(", "))
     })
 }
 

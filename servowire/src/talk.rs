@@ -1,9 +1,12 @@
 //! `servowire talk`: a T-Format encoder at a USB-RS485 adapter.
 
 mod act;
+pub mod backup;
+pub mod encoder;
 pub mod fault;
 pub mod link;
 pub mod port;
+pub mod record;
 pub mod relay;
 pub mod simulate;
 
@@ -14,7 +17,12 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use tformat::BitRate;
 
+use act::Print;
+use encoder::Encoder;
 use link::Link;
+use record::Recorded;
+
+use crate::units::tformat_rate;
 
 /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
 ///
@@ -25,11 +33,17 @@ pub struct Arguments {
     #[arg(long)]
     port: String,
     /// Bits a second, 2.5M or 5M.
-    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
     /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.
     #[arg(long, value_name = "MS", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     timeout: u64,
+    /// Print JSON, an object a line.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Write all bytes sent and received into this file, with their times; servowire decode reads it.
+    #[arg(long, value_name = "FILE", global = true)]
+    log: Option<PathBuf>,
     #[command(subcommand)]
     what: What,
 }
@@ -44,6 +58,31 @@ enum What {
     Info,
     /// Clear latched alarms. Position and turns stay.
     ClearErrors,
+    /// Set the turns to 0, clear all errors and read both back. The multi-turn reference of the machine is lost.
+    ZeroTurns {
+        /// Has to be given: the machine does not know any more where it is.
+        #[arg(long, required = true)]
+        lose_multi_turn_reference: bool,
+        /// Turns that the count may be from 0 afterwards: a shaft on the boundary of a turn trembles.
+        #[arg(long, value_name = "TURNS", default_value_t = 1)]
+        tolerance: u32,
+        /// Do not ask.
+        #[arg(long)]
+        yes: bool,
+    },
+    /// Make the present position the zero of the turn and read it back. This shifts the commutation angle: a motor whose drive
+    /// commutates by this encoder gets its current into the wrong phases and may run away. The shaft has to stand still.
+    ZeroSingleTurn {
+        /// Has to be given: it is for encoders that are being fitted, never for a motor in service.
+        #[arg(long, required = true)]
+        shift_commutation_angle: bool,
+        /// Counts that the position may be from 0 afterwards.
+        #[arg(long, value_name = "COUNTS")]
+        tolerance: u32,
+        /// Do not ask.
+        #[arg(long)]
+        yes: bool,
+    },
     /// Read or write the EEPROM.
     #[command(subcommand)]
     Eeprom(Eeprom),
@@ -66,22 +105,26 @@ struct Watch {
 
 #[derive(Debug, Subcommand)]
 enum Eeprom {
-    /// Write all pages into a file of text, a line a page.
-    Dump {
-        /// The file; the standard output without it.
+    /// Write all pages into a file, with encoder ID, widths, date and check sum. The page that was selected is selected again.
+    #[command(visible_alias = "dump")]
+    Backup {
+        /// The file, which must not be there yet; the standard output without it.
         file: Option<PathBuf>,
         /// Pages: six in Tamagawa's encoders, eight in a compatible one.
         #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=8))]
         pages: u8,
     },
-    /// Write the bytes of such a file that differ. Motor makers keep name plate and commutation data in this memory: a motor
-    /// may not run any more with the data of another.
+    /// Write the bytes of a backup that differ, into an encoder of the same kind. Motor makers keep name plate and commutation
+    /// data in this memory: a motor may not run any more with the data of another.
     Restore {
-        /// The file.
+        /// The backup.
         file: PathBuf,
         /// Has to be given: the memory is overwritten.
         #[arg(long, required = true)]
         overwrite_eeprom: bool,
+        /// Where the memory goes before it is overwritten; beside the backup, with the time in its name, without it.
+        #[arg(long, value_name = "FILE")]
+        before: Option<PathBuf>,
         /// Do not ask.
         #[arg(long)]
         yes: bool,
@@ -115,14 +158,6 @@ fn encoder_id(text: &str) -> Result<u8, String> {
     parsed.map_err(|_| format!("\"{text}\" is not a byte, as 0x17 or 23"))
 }
 
-fn rate(text: &str) -> Result<BitRate, String> {
-    match text.trim_end_matches("Hz") {
-        "2.5M" | "2500000" => Ok(BitRate::Mbit2_5),
-        "5M" | "5000000" => Ok(BitRate::Mbit5),
-        _ => Err(format!("\"{text}\" is neither 2.5M nor 5M, the rates of T-Format")),
-    }
-}
-
 impl Arguments {
     /// Does what was asked.
     pub fn run(&self) -> ExitCode {
@@ -146,6 +181,7 @@ impl Arguments {
 
     fn perform(&self) -> Result<ExitCode, fault::Fault> {
         let port = port::open(&self.port, self.rate)?;
+        let print = if self.json { Print::Json } else { Print::Text };
         if let What::Simulate(simulate) = &self.what {
             let Simulate { id, rpm, echo, .. } = *simulate;
             let done = if let Some(encoder) = &simulate.encoder {
@@ -153,21 +189,29 @@ impl Arguments {
                     fault if fault.names_itself() => fault,
                     fault => fault::Fault::Port(format!("{encoder}: {fault}")),
                 };
-                let mut link = self.link(port::open(encoder, self.rate)?).map_err(named)?;
-                act::relay(port, &mut link, echo, simulate.csv.as_deref())
+                let encoder = Recorded::new(port::open(encoder, self.rate)?, self.log.as_deref())?;
+                let mut link = self.link(encoder).map_err(named)?;
+                act::relay(port, &mut link, echo, simulate.csv.as_deref(), print)
             } else {
-                simulate::run(port, simulate::Encoder { rate: self.rate, id, rpm, echo }, None)
+                let port = Recorded::new(port, self.log.as_deref())?;
+                simulate::run(port, simulate::Simulated { rate: self.rate, id, rpm, echo }, None)
             };
             return done.map(|()| ExitCode::SUCCESS);
         }
-        let mut link = self.link(port)?;
+        let encoder = &mut Encoder::from(self.link(Recorded::new(port, self.log.as_deref())?)?);
         match &self.what {
-            What::Read => act::read(&mut link),
-            What::Watch(watch) => act::watch(&mut link, watch),
-            What::Info => act::info(&mut link, &self.port, self.rate),
-            What::ClearErrors => act::clear_errors(&mut link),
-            What::Eeprom(Eeprom::Dump { file, pages }) => act::dump(&mut link, file.as_deref(), *pages),
-            What::Eeprom(Eeprom::Restore { file, yes, .. }) => act::restore(&mut link, file, *yes),
+            What::Read => act::read(encoder, print),
+            What::Watch(watch) => act::watch(encoder, watch, print),
+            What::Info => act::info(encoder, &self.port, self.rate, print),
+            What::ClearErrors => act::clear_errors(encoder, print),
+            What::ZeroTurns { tolerance, yes, .. } => act::zero_turns(encoder, *yes, *tolerance, print),
+            What::ZeroSingleTurn { tolerance, yes, .. } => act::zero_single_turn(encoder, *yes, *tolerance, print),
+            What::Eeprom(Eeprom::Backup { file, pages }) => {
+                act::memory::backup(encoder, file.as_deref(), *pages, print)
+            }
+            What::Eeprom(Eeprom::Restore { file, before, yes, .. }) => {
+                act::memory::restore(encoder, file, before.as_deref(), *yes, print)
+            }
             What::Simulate(_) => Ok(ExitCode::SUCCESS),
         }
     }

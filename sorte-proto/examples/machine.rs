@@ -156,7 +156,7 @@ fn exchange(
     Ok(())
 }
 
-/// Start-up and so many cycles of the exchange; the time of the last one.
+/// Start-up and this many cycles of the exchange; the time of the last one.
 fn run(master: &mut Master, axes: &mut [Axis], nodes: &mut [Node], mut cycles: u32) -> Result<u64, Error> {
     let mut now_ns = 0;
     while cycles > 0 {

@@ -52,7 +52,7 @@ impl Clock {
         Self::averaging(AVERAGE)
     }
 
-    /// Not yet set; a correction is made from so many frames, 16 in the published device. The clock runs free between two
+    /// Not yet set; a correction is made from this many frames, 16 in the published device. The clock runs free between two
     /// corrections: at 50 ppm 3 ns in 16 cycles of 4 us, and 180 ns in 16 of 224 us, which no gap between two device
     /// frames bears. 0 counts as 1.
     pub const fn averaging(frames: u8) -> Self {

@@ -50,7 +50,7 @@ bitflags::bitflags! {
 servowire_core::show_flags!(Status);
 
 impl Status {
-    /// The six faults; the stall bits are none.
+    /// The six faults; the stall bits are not faults.
     pub const FAULTS: Self = Self(0x3f);
     /// The value that clears the six fault bits and leaves the stall bits: writing 0 clears.
     pub const CLEAR_FAULTS: u16 = 0xfc0;

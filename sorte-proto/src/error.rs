@@ -157,13 +157,13 @@ servowire_core::errors! {
             first: u8,
             /// How many are.
             count: u8,
-            /// For so many cycles.
+            /// For this many cycles.
             cycles: u8,
         },
         /// Device frames were damaged in too many cycles one after the other.
         #[error("damaged device frames in {cycles} cycles one after the other")]
         TooManyCrcErrors = 24 {
-            /// For so many cycles.
+            /// For this many cycles.
             cycles: u8,
         },
         /// A device frame comes from beyond the line, or LAST is set or missing where it was not before.
@@ -213,7 +213,7 @@ servowire_core::errors! {
             /// So much before.
             early_ns: u32,
         },
-        /// A frame of the IO exchange began at a time that is none of its sender's.
+        /// A frame of the IO exchange began at a time that does not belong to its sender.
         #[error("the frame began {off_ns} ns away from its time")]
         OutsideWindow = 33 {
             /// From the nearest time at which it was expected.

@@ -72,7 +72,7 @@ impl Asked {
         u16::from_le_bytes([low, high])
     }
 
-    /// How many steps a device that has ordered so many, modulo 2^16, has still to make. Words that are on their way count too:
+    /// How many steps a device that has ordered this many, modulo 2^16, still has to make. Words that are on their way count too:
     /// two cycles with the published timing.
     pub const fn lag(&self, ordered: u16) -> i16 {
         difference(self.low(), ordered)

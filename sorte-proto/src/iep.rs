@@ -235,7 +235,7 @@ impl Channel {
         self.fall = earlier(self.fall, ticks);
         self.write = earlier(self.write, ticks);
         self.busy_until = self.busy_until.saturating_sub(ticks);
-        // The tick dealt with last is of no more interest.
+        // The tick dealt with last is no longer of interest.
         self.now = 0;
         self
     }

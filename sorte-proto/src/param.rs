@@ -81,7 +81,7 @@ impl CrcMode {
 pub struct Parameters {
     /// Cycle time in ns.
     pub cycle_time_ns: u32,
-    /// 0: no synchronisation; 1..=1000: every so many cycles; above: its own period in units of 5 ns.
+    /// 0: no synchronisation; 1..=1000: every this many cycles; above: its own period in units of 5 ns.
     pub sync_cycle: u32,
     /// Time between line-delay measurements in ms.
     pub delay_period_ms: u16,

@@ -15,7 +15,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// Of frame `frame`, counted from 0, among so many.
+    /// Of frame `frame`, counted from 0, among this many.
     pub(crate) const fn of(frame: u16, frames: u16) -> Self {
         if frame.saturating_add(1) >= frames { Self::Last } else { Self::Inner }
     }

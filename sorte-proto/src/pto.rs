@@ -281,7 +281,7 @@ impl arbitrary::Arbitrary<'_> for Pto {
     }
 }
 
-// `+1234`, `-1`: a pulse so many ns into the cycle, DIR 0 or 1; `+.`, `-.`: no pulse; `off`; `0FA0h?`: reserved.
+// `+1234`, `-1`: a pulse this many ns into the cycle, DIR 0 or 1; `+.`, `-.`: no pulse; `off`; `0FA0h?`: reserved.
 servowire_core::one_line!(Pto {
     Self::NoPulse { direction } => "{}.", direction.sign();
     Self::Pulse { start, direction } => "{}{}", direction.sign(), start.ns();

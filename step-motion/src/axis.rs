@@ -157,7 +157,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok((axis, timer))
     }
 
-    /// With so many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
+    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }

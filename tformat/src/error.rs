@@ -48,7 +48,7 @@ servowire_core::errors! {
             /// The control field.
             cf: u8,
         },
-        /// The control field is well formed, but its data ID is none of the nine documented ones.
+        /// The control field is well formed, but its data ID is not one of the nine documented ones.
         #[error("data ID {code:X} is not documented")]
         UnknownDataId = 6 {
             /// The four bits of the data ID.

@@ -1,6 +1,7 @@
-//! Hands the linker its script; the memory is that of the chip, from the HAL.
+//! Hands the linker its scripts; the memory is that of the chip, from the HAL.
 
 fn main() {
-    println!("cargo:rustc-link-arg-bins=-Tlink.x");
-    println!("cargo:rustc-link-arg-bins=--nmagic");
+    for argument in ["-Tlink.x", "-Tdefmt.x", "--nmagic"] {
+        println!("cargo:rustc-link-arg-bins={argument}");
+    }
 }

@@ -5,6 +5,8 @@ use serde_json::Value;
 use crate::{Source, hex, packed};
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_tformat", "tformat/responses.jsonl", bytes),
+    ("c_tformat", "tformat/procedures.jsonl", procedure),
     ("tformat_request", "tformat/request_decode.jsonl", request),
     ("tformat_response", "tformat/responses.jsonl", bytes),
     ("tformat_response", "tformat/negatives.jsonl", line),

@@ -159,7 +159,7 @@ impl Channel {
         None
     }
 
-    /// The request is answered so many H-frames later.
+    /// The request is answered this many H-frames later.
     pub(super) fn wait(&mut self, request: Message, frames: u16) {
         let [short, long] = &mut self.waiting;
         *(if request.is_long() { long } else { short }) = Some((request, frames));

@@ -135,7 +135,7 @@ pub struct CarriedDisparity {
 impl CarriedDisparity {
     /// Answers that have to go on from each other before it is taken for a rule.
     const LEAST: u32 = 8;
-    /// Of so many one may not.
+    /// One of this many may not.
     const OF: u32 = 8;
 
     /// Two answers followed each other; `goes_on` as by [`Chain::goes_on_in`](super::Chain::goes_on_in).

@@ -176,7 +176,7 @@ pub(super) const fn sub_blocks(word: u16) -> u8 {
     if x == 0xff || y == 0xff { 0xff } else { y << 5 | x }
 }
 
-/// Marks a block with as many ones as zeros.
+/// Marks a block with equally many ones and zeros.
 pub(crate) const NEUTRAL: u8 = 0x80;
 
 /// 6-bit blocks for the line disparity code in line order: x = 0..=31, the version with more zeros, or [`NEUTRAL`].

@@ -61,7 +61,7 @@ impl Motion {
     }
 }
 
-/// 11 bits of acceleration, so many of position.
+/// 11 bits of acceleration, and this many of position.
 fn id_of(bits: u32) -> EncoderId {
     EncoderId::truncate(3 | (bits - 11) << 4)
 }

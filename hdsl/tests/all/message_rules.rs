@@ -1,4 +1,4 @@
-//! Messages nibble by nibble: what ends one, what is none, and how long one is waited for; and the estimate of a position.
+//! Messages nibble by nibble: what ends one, what is not one, and how long one is waited for; and the estimate of a position.
 
 use hdsl::message::{
     Access, Data, Length, Limits, LongAnswer, LongRequest, Offset, RemoteRegister, Requester, ResourceAddress,
@@ -67,7 +67,7 @@ fn where_an_answer_ends() {
     }
 }
 
-/// 64 frames without an answer may pass for a short message, and so many as were set for a long one; the next one ends it.
+/// 64 frames without an answer may pass for a short message, and as many as were set for a long one; the next one ends it.
 #[test]
 fn how_long_to_wait() {
     let limits = Limits::DEFAULT.with_short_tries(1).with_short_frames(64).with_long_frames(100);
@@ -115,7 +115,7 @@ fn a_write_without_an_offset() {
     assert_eq!(LongRequest::parse(bytes.as_bytes()), Ok(request));
 }
 
-/// OFF_H is 1 and bits 14 to 8 of the offset; without that 1 it is none.
+/// OFF_H is 1 and bits 14 to 8 of the offset; without that 1 it is not an offset.
 #[test]
 fn the_marker_of_an_offset() {
     let request = LongRequest {

@@ -206,7 +206,7 @@ mod tests {
         }
     }
 
-    /// A response to something else is none to the reset, and none to STATUS.
+    /// A response to something else does not answer the reset, nor STATUS.
     #[test]
     fn only_its_own_responses_count() {
         let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle(EA);

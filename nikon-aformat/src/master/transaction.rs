@@ -18,7 +18,7 @@ pub struct Exchange {
     pub response: Response,
     /// The earliest instant of sampling, in ns: the end of the request. Its age counts from here.
     pub sampled_ns: u64,
-    /// The latest one, in ns: the first start bit of the response; late by no more than [`Line::latency_budget_ns`].
+    /// The latest one, in ns: the first start bit of the response; late by at most [`Line::latency_budget_ns`].
     pub began_ns: u64,
 }
 

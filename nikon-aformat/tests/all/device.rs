@@ -232,7 +232,7 @@ fn nothing_is_written_while_it_is_busy() {
         let word = data(&mut device, Operation::EepromWrite { address, data: 5 }, now_ns);
         assert_eq!(word, Data::Eeprom { data: 5, address: 0x42 });
         assert_eq!(device.eeprom(0, 0x42), Some(if busy { 0xffff } else { 5 }));
-        // Of a write it is busy for 30 ms, of the read no more.
+        // Of a write it is busy for 30 ms, of the read no longer.
         let at_ns = if busy { now_ns + 50_000 } else { now_ns + 100_000_000 };
         let _ = ask(&mut device, Operation::IdWrite1 { id }, at_ns);
         assert_eq!(device.id(), if busy { EncoderId::truncate(0x11_2233) } else { id });

@@ -45,7 +45,7 @@ fn hostile_buses() {
 }
 
 /// A line on which nothing happens: eight encoders with any positions and status, and with shafts at rest of which one looks
-/// like the begin of a response, frame by frame and all in one block. `HOSTILE_EVENTS=100000000` runs as many cycles.
+/// like the start of a response, frame by frame and all in one block. `HOSTILE_EVENTS=100000000` runs as many cycles.
 #[test]
 fn a_perfect_line_loses_nothing() {
     let line = Line::new(BitRate::Mbit16);

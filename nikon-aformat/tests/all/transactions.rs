@@ -113,7 +113,7 @@ fn two_responses_in_a_block() {
 }
 
 /// A shaft at rest: inside the responses of a bus that lost nothing there may be another sound one, made of the end of one
-/// response and the begin of the next, in every cycle again. All turns and positions that make one are heard.
+/// response and the start of the next, in every cycle again. All turns and positions that make one are heard.
 #[test]
 fn no_response_is_lost_on_a_sound_line() {
     let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
@@ -159,7 +159,7 @@ fn a_repeated_frame_is_no_part_of_a_response() {
     assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
 }
 
-/// Two frames belong together if the stamps leave no more than the idle time in a response and the latency between them.
+/// Two frames belong together if the stamps leave at most the idle time in a response and the latency between them.
 #[test]
 fn pauses_in_a_response() {
     let contents = frames(Command::Abs40, 3);
@@ -182,7 +182,7 @@ fn pauses_in_a_response() {
     assert!(matches!(feed(&mut transaction, &contents[1..], 8_000 + FRAME_NS + 2_500), Progress::Done { .. }));
 }
 
-/// 274.5 us after its begin a transaction is over; the line is free 10 us later.
+/// 274.5 us after its start a transaction is over; the line is free 10 us later.
 #[test]
 fn when_it_is_over() {
     let mut silent = start(LINE);

@@ -64,7 +64,7 @@ pub struct Drive {
     target_speed: i32,
     /// What the next response echoes.
     echo: u8,
-    /// Byte 1 of the block taken last; one that was thrown away is none.
+    /// Byte 1 of the block taken last; one that was thrown away does not count.
     taken: u8,
     error: Option<u16>,
     job: Option<Job>,

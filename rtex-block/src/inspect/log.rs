@@ -352,7 +352,7 @@ impl LogAnalysis {
         Self { max_step, tracks: [Track::NEW; MacId::COUNT] }
     }
 
-    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in no more than five findings.
+    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in at most five findings.
     pub fn block(&mut self, bytes: &[u8]) -> impl Iterator<Item = LogFinding> + use<> {
         let mut found = [None; 5];
         if let Some(main) = bytes.first_chunk::<LEN>() {

@@ -258,7 +258,7 @@ impl Axis {
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
     }
 
-    /// Update periods since the last one in which nothing was exchanged, by the clock; three at the most, for the counter has no more.
+    /// Update periods since the last one in which nothing was exchanged, by the clock; three at most, because the counter does not go further.
     /// Whether it was more than four seconds does not matter: no block is on time then, or it has been for long.
     #[expect(clippy::cast_possible_truncation, reason = "the difference counts")]
     fn missed(&mut self, end_ns: u64) -> u8 {

@@ -186,7 +186,7 @@ fn sub_blocks_byte_by_byte() {
     assert_eq!((found.sub_error.map(|code| code.0), found.alarm, found.is_discarded()), (Some(0x22), None, false));
     block[0] = 0x89;
     assert!(verdict(&block, BlockSize::Bytes32).is_discarded());
-    // A block of another size is none for this drive.
+    // A block of another size is not for this drive.
     assert_eq!(verdict(&block[..16], BlockSize::Bytes32).error.map(|code| code.0), Some(0x11));
     assert_eq!(verdict(&block, BlockSize::Bytes16).error.map(|code| code.0), Some(0x11));
     assert_eq!(verdict(&block[..1], BlockSize::Bytes16).error.map(|code| code.0), Some(0x11));

@@ -139,7 +139,7 @@ fn hears(pair: &mut Pair, received: Heard, periods: u32) {
 }
 
 /// The line fails for longer than a request is waited for, just after a write was answered: the drive has not seen the request go,
-/// so to it the next one is the same still, and its old answer is none to the new one. Once it has seen the normal command, it
+/// so to it the next one is still the same, and its old answer does not belong to the new one. Once it has seen the normal command, it
 /// is asked again.
 #[test]
 fn an_answer_is_not_taken_twice() {

@@ -159,7 +159,7 @@ fn requests_without_an_answer() {
         assert_eq!(findings(&mut log, &[with(command(1, 0x26, 0), 7), last]), [(1, answered)]);
         assert_eq!(log.end().count(), 0);
     }
-    // Answers to another type, or with another code, are none to this request.
+    // Answers to another type, or with another code, do not belong to this request.
     let mut log = analysis();
     findings(&mut log, &busy(1));
     let others = [with(response(1, 0x26, 0), 6), with(response(2, 0x2a, 0), 7), with(response(3, 0x26, 0), 6)];
@@ -218,7 +218,7 @@ fn attributes_are_no_alarm_codes() {
     // An answer to another type is an older one, and one that is busy has no data yet.
     assert_eq!(about(ask(0, 7), alarm(answer, 1, 8)), []);
     assert_eq!(about(ask(0, 7), alarm(response(2, 0x25, 0x10), 1, 7)), []);
-    // A monitor value is none either.
+    // Nor does a monitor value.
     assert_eq!(about(alarm(command(2, 0x2a, 0), 0, 7), alarm(response(2, 0x2a, 0), 1, 7)), [(3, answered)]);
     assert_eq!(attributes.to_string(), "attributes 80000101h of the alarm with index 2601h");
 }

@@ -40,7 +40,7 @@ const RATES: [u32; 31] = [
 
 const YEAR_S: u128 = 31_557_600;
 
-/// Whether `got_ns` is 1 ns and 1 ppb from the time of so many ticks at the most; all of it in units of 1e-9 ns / hz.
+/// Whether `got_ns` is 1 ns and 1 ppb from the time of this many ticks at most; all of it in units of 1e-9 ns / hz.
 fn is_true(got_ns: u64, ticks: u128, hz: u32) -> bool {
     let exact = ticks * 1_000_000_000;
     let got = u128::from(got_ns) * u128::from(hz);

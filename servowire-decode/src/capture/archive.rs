@@ -16,7 +16,7 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::{self, Clock, Time};
 
-/// Longer lists of keys are none.
+/// A longer list of keys cannot be one.
 const MOST_KEYS: u64 = 1 << 20;
 
 type Archive = ZipArchive<Box<dyn SeekRead>>;
@@ -219,7 +219,7 @@ impl Read for Chunks {
 
 /// Samples of a block of a DSView channel at most; blocks are shorter at the beginning and at the end.
 const DSVIEW_BLOCK: u64 = 1 << 24;
-/// Changes looked for in so many bytes of all channels at once.
+/// How many bytes of all channels are searched for changes at once.
 const PIECE: usize = 1 << 12;
 
 /// A DSView session, version 2 or 3.

@@ -13,7 +13,7 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::Time;
 
-/// The file is read in so many parts, so that not all of it is in memory.
+/// The file is read in this many parts, so that it is never in memory as a whole.
 const PARTS: u64 = 64;
 /// The most channels.
 const CHANNELS: usize = 65_535;

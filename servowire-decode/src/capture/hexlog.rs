@@ -19,7 +19,7 @@ const LONGEST: usize = 1 << 16;
 const MOST: usize = 1 << 24;
 /// Lines by which a log is known where nothing else says that it is one.
 const SEEN: usize = 24;
-/// Lines of bytes for each that is none, where nothing else says that it is a log.
+/// Lines of bytes for each line that is not, where nothing else says that it is a log.
 const SOUND: usize = 8;
 
 /// A log of bytes.

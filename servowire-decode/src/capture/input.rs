@@ -17,7 +17,7 @@ pub(super) const HEAD: usize = 1 << 12;
 
 /// Files inside files are unpacked so deep.
 const DEEPEST: u8 = 4;
-/// What has to be read backwards and cannot is held in memory, up to so many bytes.
+/// What has to be read backwards and cannot be is held in memory, up to this many bytes.
 const MOST_HELD: u64 = 1 << 28;
 
 /// A reader that can go back.
@@ -165,7 +165,10 @@ impl Input {
 
     /// The beginning of the file without taking it: 4 KiB, or all there are.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
-        while self.head.len() < HEAD && self.head_taken == 0 && (self.head.is_empty() || !self.waits()) {
+        // What was taken of the beginning is no longer it.
+        self.head.drain(..self.head_taken);
+        self.head_taken = 0;
+        while self.head.len() < HEAD && (self.head.is_empty() || !self.waits()) {
             let name = &self.name;
             let more = self.reader.fill_buf();
             let more = more.map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))?;
@@ -176,7 +179,7 @@ impl Input {
                 break;
             }
         }
-        Ok(self.head.get(self.head_taken..).unwrap_or_default())
+        Ok(&self.head)
     }
 
     /// Whether nothing more than the head is there for a moment.
@@ -210,7 +213,7 @@ impl Input {
         }
     }
 
-    /// Appends the next line, with its end, to `text`; how many bytes it has. One of `most` is none: `what` says so.
+    /// Appends the next line, with its end, to `text`; how many bytes it has. A line of `most` bytes or more is refused, in the words of `what`.
     pub(super) fn line(
         &mut self,
         text: &mut Vec<u8>,

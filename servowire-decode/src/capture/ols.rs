@@ -7,7 +7,7 @@ use crate::time::{self, Clock, Time};
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
-/// Longer lines are none of this format.
+/// A longer line cannot belong to this format.
 const LONGEST: usize = 1 << 12;
 /// The most channels.
 const CHANNELS: u32 = 64;

@@ -33,7 +33,7 @@ pub trait Line {
     /// Appends the next changes, in the order of time, and says whether there may be more.
     ///
     /// The first change of a channel is its level at the beginning. With a fault, the changes before it were
-    /// appended; no more will come.
+    /// appended; nothing more will come.
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
 
     /// The next samples instead of the next changes, of a recording that is one channel of packed samples; nothing of

@@ -54,7 +54,7 @@ pub struct Table {
     turned: VecDeque<Change>,
 }
 
-/// Changes of a table that is written backwards are held in memory, up to so many.
+/// Changes of a table that is written backwards are held in memory, up to this many.
 const MOST_TURNED: usize = 1 << 20;
 
 /// A channel: a column, or one line of the pod that a column is.

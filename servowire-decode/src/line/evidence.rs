@@ -22,7 +22,7 @@ pub struct Weights {
 const ONLY_THE_CHECK: i64 = 4;
 /// The encoder's own refusal is a sound frame.
 const REJECTED: i64 = 10;
-/// A frame that is none.
+/// A frame that is not one.
 const NO_FRAME: i64 = -6;
 /// Worse than this, more does not help.
 const HOPELESS: i64 = -90;

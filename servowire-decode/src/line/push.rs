@@ -27,7 +27,7 @@ const MOST_KEPT: usize = 1 << 20;
 const LEAST: i64 = 4;
 /// Channels that are tried in one survey, the busiest first.
 const MOST_TRIED: usize = 4096;
-/// A channel that was nothing is looked at again after so many times the edges it was judged by.
+/// A channel in which nothing was found is looked at again after this many times the edges it was judged by.
 const PATIENCE: u64 = 8;
 
 /// An edge of a channel that is not judged yet: its time, and in the lowest bit the level. There may be very many of them.
@@ -55,7 +55,7 @@ enum State {
     Open(Vec<Kept>),
     /// Part of a line that is decoded.
     Taken(usize),
-    /// Nothing, or more of what is decoded already; looked at again after so many edges, if at all.
+    /// Nothing, or more of what is decoded already; looked at again after this many edges, if at all.
     Passed(Option<u64>),
 }
 

@@ -74,7 +74,7 @@ impl Rates {
         (self.weight > 0.0).then(|| self.sum / self.weight)
     }
 
-    /// Of a line with so many edges and spikes.
+    /// Of a line with this many edges and spikes.
     pub(crate) fn of(edges: u64, spikes: u64) -> Self {
         Self { spikes, edges, ..Self::default() }
     }
@@ -117,7 +117,7 @@ impl EdgeReceiver {
         }
     }
 
-    /// The capture begins inside a field: so many falling edges are passed over before the first start bit.
+    /// The capture begins inside a field: this many falling edges are passed over before the first start bit.
     #[must_use]
     pub(crate) fn beginning_at(self, skipped: u32) -> Self {
         Self { skipped, ..self }

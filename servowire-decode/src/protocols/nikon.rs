@@ -248,7 +248,7 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     found.map(|cause| cause.to_string())
 }
 
-/// What a reply has to be: as asked, in the layout that has so many frames; without a request, as it says itself.
+/// What a reply has to be: as asked, in the layout that has this many frames; without a request, as it says itself.
 fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
     let frames = group.len();
     let fits = |layout: &Layout| usize::from(layout.frames()) == frames;

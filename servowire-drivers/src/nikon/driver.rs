@@ -1,4 +1,4 @@
-//! The text of both drivers. What they wait with is in [`blocking`](super::blocking) and [`asynch`](super::asynch).
+//! The text of both drivers. What they wait with is in [`blocking`](super::blocking) and `asynch` (feature `async`).
 
 macro_rules! driver {
     ($wait:ident, $clock:path $(, $asynch:tt)?) => {

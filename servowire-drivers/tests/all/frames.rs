@@ -234,7 +234,7 @@ pub fn host(echo: bool, delivery: Delivery) -> Host {
     Host { echo, delivery, fifo: 6, ..Host::IDEAL }
 }
 
-/// A host and its faults, for calls with so many encoders: one or two a call.
+/// A host and its faults, for calls with this many encoders: one or two a call.
 pub fn scenario(seed: u64, encoders: u32, delivery: Delivery) -> Scenario {
     let scenario = Scenario::random(seed, rates(2 + 2 * encoders));
     Scenario { host: host(scenario.host.echo, delivery), ..scenario }

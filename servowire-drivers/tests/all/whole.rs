@@ -24,7 +24,7 @@ enum Room {
     All,
     /// It has a register besides the one that shifts; `write` waits for it.
     One,
-    /// It takes so many at a time.
+    /// It takes this many at a time.
     Pieces(usize),
 }
 
@@ -78,7 +78,7 @@ struct World {
     board: Board,
     draw: Draw,
     now_ns: u64,
-    /// Bytes on the way out of the UART, each with its begin.
+    /// Bytes on the way out of the UART, each with its start.
     sent: Vec<(u64, u8)>,
     /// When the driver was switched, and whether on.
     switched: Vec<(u64, bool)>,

@@ -218,7 +218,7 @@ mod tests {
 
     const BUILD: Build = Build { variant: Variant::Lossless, latency_ns: 0, write_ns: 0, tolerance_ns: 100.0 };
 
-    /// An awake axis after so many changes: at a time, of STEP or the pins.
+    /// An awake axis after this many changes: at a time, of STEP or the pins.
     fn after(changes: &[(u32, Change)]) -> Axis {
         let mut axis = Axis::new(BUILD);
         axis.driver.set_up().unwrap();

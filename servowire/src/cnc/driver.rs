@@ -15,7 +15,7 @@ const ENABLED: u16 = 1;
 /// Something that happens to a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// It sets bits of STATUS and drives the motor no more.
+    /// It sets bits of STATUS and stops driving the motor.
     Reports(Status),
     /// It has no supply: every register reads all ones.
     Unpowered,

@@ -67,7 +67,7 @@ fn wrong(tally: Tally) -> u32 {
     tally.doubled + tally.late + tally.stale
 }
 
-/// Runs so many cycles; frames of the exchange that were sent.
+/// Runs this many cycles; returns how many frames of the exchange were sent.
 fn run(devices: usize, cycles: u64, positions: bool, seed: u64) -> u64 {
     let share = 4e-3 / devices as f64;
     let physics = Physics { loss: share, duplicates: share, ..QUIET };

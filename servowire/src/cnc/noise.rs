@@ -27,7 +27,7 @@ impl Noise {
         if self.ln_good == 0.0 { u64::MAX } else { (self.random.unit().ln() / self.ln_good) as u64 }
     }
 
-    /// A frame passes so many cables, one after the other.
+    /// A frame passes this many cables, one after the other.
     pub(super) fn travel(&mut self, frame: &mut [u8], cables: usize) {
         let bits = frame.len() as u64 * 8 * cables as u64;
         if self.good >= bits {

@@ -1,4 +1,4 @@
-//! Generators that remember: what happens in a period of 4 us depends on the state at its begin and on the word, and most
+//! Generators that remember: what happens in a period of 4 us depends on the state at its start and on the word, and most
 //! periods of a move are alike.
 
 use std::hash::{BuildHasher, Hasher};
@@ -231,7 +231,7 @@ impl Generator {
         if let Some((_, pto)) = coming {
             self.channel.set_word(pto);
         }
-        // A word that comes before anybody looks might as well have been there from the begin.
+        // A word that comes before anybody looks might as well have been there from the start.
         let fits = |period: &&Period| coming.is_none_or(|(at, _)| begin.saturating_add(period.read) >= at);
         let link = periods.of(self.last, &self.channel);
         let Some(period) = link.and_then(|link| periods.at(link)).filter(fits) else {

@@ -193,7 +193,9 @@ impl State<'_> {
         let units = |[x, y]: [f64; 2]| [(x * 1e4).round() as i32, (y * 1e4).round() as i32];
         let arc = Arc::new(units([from[0], from[1]]), units([to[0], to[1]]), units(center), turning, CHORD);
         let chords: Vec<_> = arc
-            .map_err(|e| format!("{e}, in 0.1 um: begin and end are not on one circle around I and J, or it is none"))?
+            .map_err(|e| {
+                format!("{e}, in 0.1 um: start and end are not on one circle around I and J, or the circle is not one")
+            })?
             .collect();
         // Z rises with the angle, for chords differ in that.
         let mut before = [from[0], from[1]];

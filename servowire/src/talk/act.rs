@@ -1,73 +1,117 @@
 //! The commands.
 
-use std::fmt;
+pub(super) mod memory;
+
+use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tformat::master::{EEPROM_POLLING, EepromAccess, Reset};
-use tformat::{
-    Address, AllData, Almc, BitRate, Evidence, Hint, Page, Policy, Request, Resolution, Response, Tolerated,
-};
+use serde_json::{Value, json};
+use tformat::{AllData, Almc, BitRate, Evidence, Hint, Policy, Resolution, Response, Sample, Tolerated};
 
 use super::Watch;
+use super::encoder::{Changed, Encoder};
 use super::fault::Fault;
 use super::link::Link;
 use super::port::{self, Port};
 use super::relay::{self, Said};
 use crate::terminal;
 
-/// Bytes of a page; the address after them selects the page.
-const PAGE_LEN: u8 = 127;
-
 type Done = Result<ExitCode, Fault>;
 
-/// Says something to the user. Who reads no further has read enough.
-fn say(text: fmt::Arguments) -> Result<(), Fault> {
-    terminal::say(text).map_err(Fault::Output)
+/// How results are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Print {
+    Text,
+    /// An object a line.
+    Json,
 }
 
-fn read_data<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
-    match link.exchange(Request::ReadAll)? {
-        Response::ReadAll(all) => Ok(all),
-        _ => Err(Fault::Input("the answer is to another request".to_owned())),
+impl Print {
+    /// Says something to the user. Who reads no further has read enough.
+    fn say(self, text: impl Display, value: impl FnOnce() -> Value) -> Result<(), Fault> {
+        match self {
+            Self::Text => terminal::say(format_args!("{text}\n")),
+            Self::Json => terminal::say(format_args!("{}\n", value())),
+        }
+        .map_err(Fault::Output)
     }
 }
 
-pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
-    say(format_args!("{}\n", line(&read_data(link)?)))?;
+/// Asks before something that cannot be undone.
+fn confirm(yes: bool, what: &str) -> Result<(), Fault> {
+    if yes {
+        return Ok(());
+    }
+    eprint!("{what} Type yes: ");
+    let mut answer = String::new();
+    let read = io::stdin().lock().read_line(&mut answer);
+    read.map_err(|error| Fault::Input(format!("no answer can be read: {error}")))?;
+    if answer.trim() == "yes" { Ok(()) } else { Err(Fault::Input("nothing was written".to_owned())) }
+}
+
+pub(super) fn read<P: Port>(encoder: &mut Encoder<P>, print: Print) -> Done {
+    let all = encoder.read()?;
+    print.say(line(&all), || object(&all))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// It was read just now, and the alarms stand beside it.
 const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
 
+/// The position and the degrees that it is, if it may be shown; why not otherwise.
+fn place(all: &AllData) -> Result<(Sample, f64), String> {
+    let Some(Hint { resolution, .. }) = Resolution::from_enid(all.enid) else {
+        return Err(format!(" (encoder ID {:#04x} says nothing of their widths)", all.enid));
+    };
+    let judged = Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN);
+    let sample = judged.map_err(|doubt| format!(": {doubt}"))?;
+    Ok((sample, f64::from(sample.single_turn()) * 360.0 / f64::from(resolution.counts_per_turn())))
+}
+
 /// Position, turns and alarms in words.
 fn line(all: &AllData) -> String {
-    let place = match Resolution::from_enid(all.enid) {
-        Some(Hint { resolution, .. }) => match Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN) {
-            Ok(sample) => {
-                let (counts, turns) = (sample.single_turn(), sample.turns().unwrap_or(0));
-                let degrees = f64::from(counts) * 360.0 / f64::from(resolution.counts_per_turn());
-                format!("{degrees:>10.5} deg  {counts:>8} counts  turn {turns}")
-            }
-            Err(doubt) => format!("ABS {} ABM {}: {doubt}", all.abs, all.abm),
-        },
-        None => format!("ABS {} ABM {} (encoder ID {:#04x} says nothing of their widths)", all.abs, all.abm, all.enid),
+    let place = match place(all) {
+        Ok((sample, degrees)) => {
+            let (counts, turns) = (sample.single_turn(), sample.turns().unwrap_or(0));
+            format!("{degrees:>10.5} deg  {counts:>8} counts  turn {turns}")
+        }
+        Err(why) => format!("ABS {} ABM {}{why}", all.abs, all.abm),
     };
     let alarms = if all.almc.is_empty() { "no alarms".to_owned() } else { format!("alarms {}", all.almc) };
     format!("{place}  {alarms}")
 }
 
-pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
+/// The same as an object; a position that must not be used is not in it.
+fn object(all: &AllData) -> Value {
+    let place = place(all).ok();
+    json!({
+        "encoder_id": all.enid,
+        "abs": all.abs.get(),
+        "abm": all.abm.get(),
+        "counts": place.map(|(sample, _)| sample.single_turn()),
+        "degrees": place.map(|(_, degrees)| degrees),
+        "turns": place.and_then(|(sample, _)| sample.turns()),
+        "alarms": names(all.almc),
+    })
+}
+
+fn names(almc: Almc) -> Vec<&'static str> {
+    almc.iter_names().map(|(name, _)| name).collect()
+}
+
+pub(super) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Print) -> Done {
     let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
     let (mut gone, mut out) = (None, io::stdout());
+    // Over the line before, to the end of the line; in a file or pipe a line each.
+    let (from, to) = if out.is_terminal() { ("\r", "\x1b[K") } else { ("", "\n") };
     while watch.count.is_none_or(|count| good + bad < count) {
-        let reading = match read_data(link) {
+        let reading = match encoder.read() {
             Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
                 gone = Some(fault);
                 break;
@@ -93,14 +137,19 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
             csv.write_record(record).map_err(io::Error::from).map_err(Fault::file(path))?;
         }
         let errors = bad as f64 * 100.0 / (good + bad) as f64;
-        // Over the line before, to the end of the line.
-        match write!(out, "\r{text}  {errors:.1} % errors\x1b[K").and_then(|()| out.flush()) {
+        let written = match (print, &reading) {
+            (Print::Text, _) => write!(out, "{from}{text}  {errors:.1} % errors{to}"),
+            (Print::Json, Ok(all)) => writeln!(out, "{}", json!({ "time_s": time, "reading": object(all) })),
+            (Print::Json, Err(fault)) => writeln!(out, "{}", json!({ "time_s": time, "fault": fault.to_string() })),
+        };
+        match written.and_then(|()| out.flush()) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
             written => written.map_err(Fault::Output)?,
         }
         thread::sleep(Duration::from_millis(watch.period));
     }
-    say(format_args!("\n{good} good, {bad} refused or missing\n"))?;
+    let said = format!("{}{good} good, {bad} refused or missing", if from.is_empty() { "" } else { "\n" });
+    print.say(said, || json!({ "good": good, "bad": bad }))?;
     if let Some((mut csv, path)) = csv {
         csv.flush().map_err(Fault::file(path))?;
     }
@@ -125,6 +174,7 @@ pub(super) fn relay<M: Port, E: Port>(
     encoder: &mut Link<E>,
     hears_itself: bool,
     csv: Option<&Path>,
+    print: Print,
 ) -> Result<(), Fault> {
     let mut csv = table(csv, &["time_s", "request", "answer", "fault"])?;
     let begin = Instant::now();
@@ -135,7 +185,8 @@ pub(super) fn relay<M: Port, E: Port>(
             Said::Junk(bytes) => (String::new(), String::new(), format!("no request: {bytes:02x?}")),
         };
         let time = format!("{:.6}", begin.elapsed().as_secs_f64());
-        say(format_args!("{time}  {request}  {answer}{fault}\n"))?;
+        let said = || json!({ "time_s": time, "request": request, "answer": answer, "fault": fault });
+        print.say(format_args!("{time}  {request}  {answer}{fault}"), said)?;
         if let Some((csv, path)) = &mut csv {
             csv.write_record([time, request, answer, fault]).map_err(io::Error::from).map_err(Fault::file(path))?;
             csv.flush().map_err(Fault::file(path))?;
@@ -145,139 +196,63 @@ pub(super) fn relay<M: Port, E: Port>(
     relay::run(master, encoder, hears_itself, log, None)
 }
 
-pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Done {
-    let all = read_data(link)?;
-    let widths = match Resolution::from_enid(all.enid) {
-        Some(hint) if hint.documented => {
-            format!("{} bits a turn, {} of turns", hint.resolution.abs_bits(), hint.resolution.abm_bits())
-        }
-        Some(hint) => {
-            format!("probably {} bits a turn, {} of turns", hint.resolution.abs_bits(), hint.resolution.abm_bits())
-        }
-        None => "not documented".to_owned(),
-    };
-    say(format_args!("encoder ID {:#04x}: {widths}\n", all.enid))?;
-    say(format_args!("{}\n", line(&all)))?;
-    say(format_args!("the adapter {}\n", if link.echo() { "hears itself" } else { "does not hear itself" }))?;
-    for line in port::about(name, rate) {
-        say(format_args!("{line}\n"))?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
-    let before = read_data(link)?.almc;
-    link.run(Reset::clear_errors())?;
-    let after = read_data(link)?.almc;
-    say(format_args!("alarms before: {}; after: {}\n", name(before), name(after)))?;
-    Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-fn name(almc: tformat::Almc) -> String {
-    if almc.is_empty() { "none".to_owned() } else { almc.to_string() }
-}
-
-fn page(number: u8) -> Result<Page, Fault> {
-    Page::new(number).ok_or_else(|| Fault::Input(format!("there is no page {number}")))
-}
-
-/// The bytes of a page. The procedure looks at the selection before and after each.
-fn read_page<P: Port>(link: &mut Link<P>, number: u8) -> Result<Vec<u8>, Fault> {
-    let page = page(number)?;
-    let read = |address| {
-        link.run(EepromAccess::read(page, Address::truncate(address), EEPROM_POLLING)).map_err(|fault| match fault {
-            Fault::Encoder(tformat::Error::DataMismatch { got, .. }) => {
-                Fault::Input(format!("the encoder stays on page {got}: it has no page {number}"))
-            }
-            fault => fault,
+pub(super) fn info<P: Port>(encoder: &mut Encoder<P>, name: &str, rate: BitRate, print: Print) -> Done {
+    let all = encoder.read()?;
+    let hint = Resolution::from_enid(all.enid);
+    let widths = hint.map_or_else(
+        || "not documented".to_owned(),
+        |Hint { resolution, documented }| {
+            let probably = if documented { "" } else { "probably " };
+            format!("{probably}{} bits a turn, {} of turns", resolution.abs_bits(), resolution.abm_bits())
+        },
+    );
+    let (echo, about) = (encoder.echo(), port::about(name, rate));
+    let hears = if echo { "hears itself" } else { "does not hear itself" };
+    let lines = [format!("encoder ID {:#04x}: {widths}", all.enid), line(&all), format!("the adapter {hears}")];
+    let lines: Vec<_> = lines.into_iter().chain(about.iter().cloned()).collect();
+    print.say(lines.join("\n"), || {
+        json!({
+            "reading": object(&all),
+            "abs_bits": hint.map(|hint| hint.resolution.abs_bits()),
+            "abm_bits": hint.map(|hint| hint.resolution.abm_bits()),
+            "documented": hint.is_some_and(|hint| hint.documented),
+            "hears_itself": echo,
+            "adapter": about,
         })
-    };
-    (0..PAGE_LEN).map(read).collect()
-}
-
-pub(super) fn dump<P: Port>(link: &mut Link<P>, file: Option<&Path>, pages: u8) -> Done {
-    let mut lines = Vec::new();
-    for number in 0..pages {
-        let bytes = read_page(link, number)?;
-        let hex: Vec<_> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        lines.push(format!("{number}: {}\n", hex.join(" ")));
-    }
-    let text = lines.concat();
-    match file {
-        Some(file) => fs::write(file, text).map_err(Fault::file(file))?,
-        None => say(format_args!("{text}"))?,
-    }
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// The pages of a dump.
-fn parse(text: &str) -> Result<Vec<(u8, Vec<u8>)>, Fault> {
-    let page = |(at, line): (usize, &str)| {
-        let wrong = |what: &str| Fault::Input(format!("line {}: {what}", at + 1));
-        let (number, bytes) = line.split_once(": ").ok_or_else(|| wrong("no page number"))?;
-        let number = number.parse().map_err(|_| wrong("no page number"))?;
-        let bytes: Result<Vec<u8>, _> = bytes.split_whitespace().map(|byte| u8::from_str_radix(byte, 16)).collect();
-        let bytes = bytes.map_err(|_| wrong("not a byte in hex"))?;
-        if bytes.len() != usize::from(PAGE_LEN) {
-            return Err(wrong(&format!("{} bytes instead of {}", bytes.len(), PAGE_LEN)));
-        }
-        Ok((number, bytes))
-    };
-    let pages: Vec<_> = text.lines().enumerate().map(page).collect::<Result<_, Fault>>()?;
-    if pages.is_empty() { Err(Fault::Input("there is no page in it".to_owned())) } else { Ok(pages) }
+pub(super) fn clear_errors<P: Port>(encoder: &mut Encoder<P>, print: Print) -> Done {
+    let changed = encoder.clear_errors()?;
+    let Changed { before, after } = changed;
+    let named = |almc: Almc| if almc.is_empty() { "none".to_owned() } else { almc.to_string() };
+    let said = format!("alarms before: {}; after: {}", named(before.almc), named(after.almc));
+    print.say(said, || change(&changed))?;
+    Ok(if after.almc.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Done {
-    let text = fs::read_to_string(file).map_err(Fault::file(file))?;
-    let pages = parse(&text).map_err(|fault| Fault::File(format!("{}: {fault}", file.display())))?;
-    let all = read_data(link)?;
-    if !yes && !confirmed(all.enid)? {
-        return Err(Fault::Input("nothing was written".to_owned()));
-    }
-    let mut written = 0;
-    let done = pages.into_iter().try_for_each(|page| write_page(link, page, &mut written));
-    let plural = if written == 1 { " was" } else { "s were" };
-    let said = if done.is_err() {
-        say(format_args!("broken off: {written} byte{plural} written and read back, one more may be; restore again\n"))
-    } else {
-        say(format_args!("{written} byte{plural} different, written and read back\n"))
-    };
-    done.and(said).map(|()| ExitCode::SUCCESS)
+pub(super) fn zero_turns<P: Port>(encoder: &mut Encoder<P>, yes: bool, tolerance: u32, print: Print) -> Done {
+    confirm(yes, "The turns will be 0, and the machine's multi-turn reference is lost.")?;
+    said(&encoder.zero_turns_and_lose_multi_turn_reference(tolerance)?, print)
 }
 
-/// Writes the bytes of a page that differ, and counts them.
-fn write_page<P: Port>(link: &mut Link<P>, (number, want): (u8, Vec<u8>), written: &mut u32) -> Result<(), Fault> {
-    let (have, page) = (read_page(link, number)?, page(number)?);
-    for ((address, want), have) in (0..PAGE_LEN).zip(want).zip(have) {
-        if want != have {
-            let _ = link.run(EepromAccess::write(page, Address::truncate(address), want, EEPROM_POLLING))?;
-            *written += 1;
-        }
-    }
-    Ok(())
+pub(super) fn zero_single_turn<P: Port>(encoder: &mut Encoder<P>, yes: bool, tolerance: u32, print: Print) -> Done {
+    confirm(
+        yes,
+        "The present position will be the zero of the turn. This shifts the commutation angle: a drive that commutates by this \
+         encoder puts its current into the wrong phases, and the motor may run away.",
+    )?;
+    said(&encoder.zero_single_turn_and_shift_commutation_angle(tolerance)?, print)
 }
 
-fn confirmed(enid: u8) -> Result<bool, Fault> {
-    say(format_args!("The EEPROM of encoder ID {enid:#04x} will be overwritten. Type yes: "))?;
-    let mut answer = String::new();
-    io::stdin()
-        .lock()
-        .read_line(&mut answer)
-        .map_err(|error| Fault::Input(format!("no answer can be read: {error}")))?;
-    Ok(answer.trim() == "yes")
+/// What was read before and after.
+fn said(changed: &Changed, print: Print) -> Done {
+    let text = format!("before: {}\nafter:  {}", line(&changed.before), line(&changed.after));
+    print.say(text, || change(changed))?;
+    Ok(ExitCode::SUCCESS)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dumps_are_read_back() {
-        let bytes: Vec<_> = (0..127_u8).map(|byte| format!("{byte:02x}")).collect();
-        let text = format!("3: {}\n", bytes.join(" "));
-        assert_eq!(parse(&text).unwrap(), [(3, (0..127).collect())]);
-        for wrong in ["", "3 00", "x: 00", "3: 0g", "3: 00 01"] {
-            assert!(parse(wrong).is_err(), "{wrong}");
-        }
-    }
+fn change(changed: &Changed) -> Value {
+    json!({ "before": object(&changed.before), "after": object(&changed.after) })
 }

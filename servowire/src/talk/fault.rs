@@ -27,6 +27,14 @@ pub enum Fault {
     /// The request came back, and nothing else.
     #[error("only the own request came back: no encoder is there, it has no power, or A and B are swapped")]
     OnlyEcho,
+    /// The page register holds another page than before, and could not be put back.
+    #[error("{because}; the page register could not be put back, it held {page}")]
+    PageLeft {
+        /// What it held.
+        page: u8,
+        /// What happened first.
+        because: Box<Fault>,
+    },
     /// The input is not what it has to be.
     #[error("{0}")]
     Input(String),

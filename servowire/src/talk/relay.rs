@@ -53,7 +53,7 @@ impl Echo {
 pub enum Said {
     /// A request, and what came of it.
     Request(Request, Result<Response, Fault>),
-    /// Bytes that are none.
+    /// Bytes that are not one.
     Junk(Vec<u8>),
 }
 

@@ -16,7 +16,7 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// What is simulated.
 #[derive(Debug, Clone, Copy)]
-pub struct Encoder {
+pub struct Simulated {
     /// Bit rate.
     pub rate: BitRate,
     /// Encoder ID.
@@ -34,8 +34,8 @@ pub struct Encoder {
 ///
 /// # Errors
 /// [`Fault::Io`].
-pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) -> Result<(), Fault> {
-    let Encoder { rate, id, rpm, echo: hears_itself } = encoder;
+pub fn run<P: Port>(mut port: P, encoder: Simulated, stop: Option<&AtomicBool>) -> Result<(), Fault> {
+    let Simulated { rate, id, rpm, echo: hears_itself } = encoder;
     let mut device = Device::<6>::new(id, rate);
     let bits = Resolution::from_enid(id).map_or(24, |hint| hint.resolution.abs_bits());
     let begin = Instant::now();

@@ -382,7 +382,7 @@ fn wrong_use_is_explained() {
     for (arguments, word) in [
         (["--unplug", "9@1"], "device 9 of 4"),
         (["--driver-fault", "300@1"], "device from 1 to 254"),
-        (["--driver-fault", "3@1=XYZ"], "is none of OTS"),
+        (["--driver-fault", "3@1=XYZ"], "is not one of OTS"),
         (["--cycle-time", "5000"], "multiple of 4000"),
         (["--bit-error-rate", "2"], "probability"),
         (["--freq", "300000"], "error"),

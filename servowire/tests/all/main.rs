@@ -41,4 +41,5 @@ mod rtex;
 mod samples;
 mod scopes;
 mod talk;
+mod talk_memory;
 mod talk_ports;

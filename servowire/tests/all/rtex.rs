@@ -388,7 +388,7 @@ fn a_drive_that_never_answers() {
 #[test]
 fn a_remark_on_the_log_is_counted_nowhere() {
     let bench = Bench::new();
-    // A drive that never answers, and eight blocks that are none.
+    // A drive that never answers, and eight blocks that are not valid.
     let mut all = exchanges();
     for (command, _) in &mut all {
         command[0] ^= 2;

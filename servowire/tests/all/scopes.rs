@@ -261,7 +261,7 @@ fn tables_of_analysers() {
         assert!(run.json().iter().all(|event| event["verdict"] == "ok" && event["channel"] == channel), "{}", run.out);
         assert_eq!(run.json()[1]["delay_ps"].as_i64().map(|delay| (delay + 50_000) / 100_000), Some(30), "{name}");
     }
-    // What the analyser says of a delimiter is kept; a row that is none costs a row.
+    // What the analyser says of a delimiter is kept; a row that is not one costs a row.
     let lines: Vec<&str> = single.lines().collect();
     let framed = single.replacen(",0xE8,,", ",0xE8,,Error", 1);
     bench.decode("framing.csv", &framed, &[]).fails_with("1 of 40 frames refused: delimiter 1");

@@ -9,9 +9,10 @@ use std::process::{Command, Output};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use serialport::{SerialPort, TTYPort};
+use servowire::talk::backup::Backup;
 use servowire::talk::fault::Fault;
 use servowire::talk::link::Link;
 use servowire::talk::{relay, simulate};
@@ -57,7 +58,7 @@ impl Bench {
 /// The encoder of `talk simulate`.
 fn simulated(id: u8) -> (Bench, TTYPort) {
     Bench::new(move |master, stop| {
-        let encoder = simulate::Encoder { rate: BitRate::Mbit2_5, id, rpm: 0.0, echo: false };
+        let encoder = simulate::Simulated { rate: BitRate::Mbit2_5, id, rpm: 0.0, echo: false };
         simulate::run(Box::new(master), encoder, Some(stop)).unwrap();
         Tally::default()
     })
@@ -118,31 +119,97 @@ fn the_program_reads_what_its_own_encoder_says() {
     let csv = folder.path().join("out.csv");
     let output = bench.talk(&["watch", "--count", "3", "--period", "1", "--csv", csv.to_str().unwrap()]);
     assert!(text(&output).ends_with("3 good, 0 refused or missing\n"), "{}", text(&output));
+    // In a pipe a line each, and no escape code.
+    assert!(text(&output).lines().count() == 4 && !text(&output).contains(['\x1b', '\r']), "{}", text(&output));
     assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 4);
     bench.end();
 }
 
 #[test]
-fn eeproms_are_dumped_and_restored_only_when_one_insists() {
+fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     let (bench, port) = simulated(0x11);
     drop(port);
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("eeprom");
-    let file = file.to_str().unwrap();
-    let output = bench.talk(&["eeprom", "dump", "--pages", "2", file]);
-    assert!(output.status.success(), "{}", text(&output));
-    let dump = std::fs::read_to_string(file).unwrap();
-    assert_eq!(dump.lines().count(), 2);
-    assert!(dump.starts_with("0: ff ff"));
-    std::fs::write(file, dump.replacen("1: ff ff", "1: 12 ff", 1)).unwrap();
-    let output = bench.talk(&["eeprom", "restore", file]);
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (first, second, before) = (at("first.json"), at("second.json"), at("before.json"));
+    let output = bench.talk(&["eeprom", "backup", "--pages", "2", &first]);
+    assert_eq!(text(&output), format!("2 pages of encoder ID 0x11 are in {first}\n"));
+    let backup = Backup::parse(&std::fs::read_to_string(&first).unwrap()).unwrap();
+    assert_eq!((backup.encoder_id(), backup.pages()), (0x11, &[[0xff; 127]; 2][..]));
+    // A backup is not overwritten.
+    let output = bench.talk(&["eeprom", "backup", "--pages", "1", &first]);
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(text(&output), format!("{first}: there is such a file already; backups are not overwritten\n"));
+
+    let mut pages = backup.pages().to_vec();
+    pages[1][0] = 0x12;
+    std::fs::write(&second, Backup::new(SystemTime::UNIX_EPOCH, 0x11, pages.clone()).emit()).unwrap();
+    let output = bench.talk(&["eeprom", "restore", &second]);
     assert_eq!(output.status.code(), Some(2), "without the option it is wrong use");
-    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", file]);
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", &second]);
     assert!(text(&output).contains("nothing was written"), "{}", text(&output));
-    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", file]);
-    assert!(text(&output).starts_with("1 byte was different"), "{}", text(&output));
+    // Where the memory would go is a file already: nothing is written.
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &first, &second]);
+    assert_eq!(text(&output), format!("{first}: there is such a file already; backups are not overwritten\n"));
+    let output =
+        bench.talk(&["--json", "eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &before, &second]);
+    assert_eq!(text(&output), format!("{{\"backup\":\"{before}\",\"differed\":1,\"written\":1}}\n"));
+    let kept = Backup::parse(&std::fs::read_to_string(&before).unwrap()).unwrap();
+    assert_eq!(kept.pages(), backup.pages(), "what was there before");
     let output = bench.talk(&["eeprom", "dump", "--pages", "2"]);
-    assert_eq!(text(&output), dump.replacen("1: ff ff", "1: 12 ff", 1));
+    assert_eq!(Backup::parse(&text(&output)).unwrap().pages(), pages);
+    // And back, with the name that the tool chooses.
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", &before]);
+    assert!(text(&output).starts_with("1 of 1 bytes that differed are written and read back; "), "{}", text(&output));
+    let names =
+        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(names.filter(|name| name.starts_with("before.before-20")).count(), 1);
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", &first]);
+    assert_eq!(text(&output), "the memory holds this already: nothing was written\n");
+    // A file that was touched by hand.
+    let touched = std::fs::read_to_string(&second).unwrap().replacen("12 ff", "13 ff", 1);
+    std::fs::write(&second, touched).unwrap();
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", &second]);
+    assert!(text(&output).contains("it was changed or damaged"), "{}", text(&output));
+    bench.end();
+}
+
+#[test]
+fn zeros_want_a_word_of_danger_and_are_read_back() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    for arguments in [&["zero-turns"] as &[_], &["zero-single-turn", "--tolerance", "0"]] {
+        assert_eq!(bench.talk(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    let single = ["zero-single-turn", "--shift-commutation-angle", "--tolerance", "0"];
+    let output = bench.talk(&single);
+    assert!(text(&output).contains("shifts the commutation angle") && text(&output).ends_with("nothing was written\n"));
+    let output = bench.talk(&[&single[..], &["--yes", "--json"]].concat());
+    let said: serde_json::Value = serde_json::from_str(&text(&output)).unwrap();
+    assert_eq!((&said["after"]["counts"], &said["after"]["encoder_id"]), (&0.into(), &0x17.into()));
+    let output = bench.talk(&["zero-turns", "--lose-multi-turn-reference", "--yes"]);
+    assert!(output.status.success() && text(&output).contains("\nafter:  "), "{}", text(&output));
+    bench.end();
+}
+
+/// What the log holds is decoded by the same program.
+#[test]
+fn the_log_of_bytes_is_decoded() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("bytes.txt");
+    let log = log.to_str().unwrap();
+    let output = bench.talk(&["--json", "--log", log, "read"]);
+    let said: serde_json::Value = serde_json::from_str(&text(&output)).unwrap();
+    assert_eq!((&said["counts"], &said["turns"], &said["alarms"]), (&0.into(), &0.into(), &serde_json::json!([])));
+    let output = Command::new(env!("CARGO_BIN_EXE_servowire")).args(["decode", log]).output().unwrap();
+    let decoded = text(&output);
+    assert!(
+        output.status.success() && decoded.contains("ENID"),
+        "{decoded}\n{}",
+        std::fs::read_to_string(log).unwrap()
+    );
     bench.end();
 }
 
@@ -269,7 +336,7 @@ fn what_is_wrong_is_said() {
     File::create(&empty).unwrap();
     let empty = empty.to_str().unwrap();
     let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
-    assert_eq!(said, format!("{empty}: there is no page in it\n"));
+    assert!(said.starts_with(&format!("{empty}: this is no backup: ")), "{said}");
     let said = at(&bench.name, &["eeprom", "dump", "--pages", "7"]);
     assert!(said.ends_with("it has no page 6\n"), "{said}");
     bench.end();
@@ -369,7 +436,7 @@ fn a_man_in_the_middle_passes_on_and_logs() {
     assert!(log.contains("no request: [55]"), "{log}");
 }
 
-/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is none.
+/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is no longer one.
 #[test]
 fn only_good_answers_are_passed_on() {
     for echo in [false, true] {

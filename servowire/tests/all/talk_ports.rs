@@ -72,7 +72,7 @@ impl Port for Adapter {
     }
 }
 
-/// An adapter holds answers back for longer than the program waits: the answer to a request that was given up is none to the next one.
+/// An adapter holds answers back for longer than the program waits: the answer to a request that was given up does not answer the next one.
 /// Nor is one to a request of somebody before.
 #[test]
 fn a_late_answer_is_none_to_the_next_request() {

@@ -11,11 +11,11 @@ pub struct Scene {
     pub samples: Option<(f64, f64)>,
     /// The nominal rate in bits a second; none for any of the protocol's.
     pub nominal: Option<f64>,
-    /// Both rates, and that of the encoder alone, off by up to so many parts.
+    /// Both rates, and that of the encoder alone, off by up to this fraction.
     pub rate: f64,
     pub encoder: f64,
     pub inverted: bool,
-    /// Edges move by up to so many bits, either way.
+    /// Edges move by up to this many bits, either way.
     pub jitter: f64,
     /// Spikes of 0.05 to 0.2 bit anywhere: least and most.
     pub spikes: (u64, u64),

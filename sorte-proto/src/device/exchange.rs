@@ -139,7 +139,7 @@ impl Device {
     }
 
     /// Finds the cycle of a frame by its time, and by its time stamp, which nothing else checks. `view`: `None` for a damaged one,
-    /// which is in time or not, and no more.
+    /// which is in time or not, nothing else.
     fn arrive(&mut self, times: FrameTimes, view: Option<MasterFrameView<'_>>) -> Result<(), Error> {
         let Some(raster) = &mut self.raster else { return Err(Error::WrongState) };
         let (ahead, off_ns) = raster.place(times.sof_ns);
@@ -183,7 +183,7 @@ impl Device {
                 tally.add(Fault::Doubled);
                 Err(Error::Doubled { address: MASTER })
             }
-            // Of a damaged one no more is known.
+            // Nothing more is known of a damaged one.
             _ => Ok(()),
         }
     }

@@ -347,7 +347,7 @@ fn a_link_that_is_lost_in_error_restarts_nothing() {
 const ARRIVAL: FrameTimes = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
 
 /// A frame is on its way through the device when its host resets it, its link goes or its time is over: what the rest of the
-/// frame says belongs to a start-up that is no more. A clock that is set then would not be set in the next one.
+/// frame says belongs to a start-up that has ended. A clock that is set then would not be set in the next one.
 #[test]
 fn a_frame_that_began_before_a_restart_teaches_nothing_after_it() {
     let restarts: [fn(&mut Device); 4] = [

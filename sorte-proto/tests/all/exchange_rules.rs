@@ -240,7 +240,7 @@ fn a_device_that_waits_for_ever_gives_up() {
     assert_eq!(running.poll(ZERO_NS + 1000, 21_000_000), Action::Restart);
 }
 
-/// A slot before the cycle is none: the device says nothing, and the plan refuses such a line.
+/// A slot before the cycle is not one: the device says nothing, and the plan refuses such a line.
 #[test]
 fn a_slot_before_the_cycle_is_not_used() {
     for (first_ns, slot) in [(76, Some(0)), (75, None)] {

@@ -10,7 +10,7 @@ use sorte_proto::{
     RoundTrips, Status, Sync, Tally, fcs,
 };
 
-/// What device `n` of so many adds to STATUS.
+/// What device `n` of this many adds to STATUS.
 fn last_of(n: u8, devices: u8) -> Status {
     if n == devices { Status::LAST } else { Status::empty() }
 }
@@ -27,7 +27,7 @@ fn discovery(devices: u8, place: Place) -> Vec<u8> {
     frame.emit().to_vec()
 }
 
-/// What a line of so many devices without cables between them answers.
+/// What a line of this many devices without cables between them answers.
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
         Outgoing::Discovery { place } => discovery(devices, place),
@@ -250,7 +250,7 @@ fn ten_param_frames_must_be_answered_and_ten_in_a_row_may_not_be() {
         (!lost).then(|| answer(frame, 2))
     });
     assert!(patient.is_ok());
-    // A damaged answer is none, and no reason to give up either.
+    // A damaged answer is not an answer, and no reason to give up either.
     let mut bench = Bench::until(Config::new(), State::Param);
     let mut damaged = Param::request(Parameters::STOCK, Place::Inner).emit();
     damaged[8] ^= 1;

@@ -9,7 +9,7 @@ use sorte_proto::{
     Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, emit_master_frame_into,
 };
 
-/// What device `n` of so many adds to STATUS.
+/// What device `n` of this many adds to STATUS.
 fn last_of(n: u8, devices: u8) -> Status {
     if n == devices { Status::LAST } else { Status::empty() }
 }

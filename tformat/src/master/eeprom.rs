@@ -131,7 +131,7 @@ impl EepromAccess {
         )
     }
 
-    /// The response to the request that was sent last; all else is none.
+    /// The response to the request that was sent last; anything else does not count.
     fn memory(&self, outcome: Result<Response, Error>) -> Result<Memory, Error> {
         let memory = match (outcome?, self.phase) {
             (Response::WriteEeprom(memory), Phase::Select | Phase::Write)

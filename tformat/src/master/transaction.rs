@@ -15,7 +15,7 @@ pub struct Exchange {
     /// The response.
     pub response: Response,
     /// The instant of sampling by [`Line::sampling_ns`], for extrapolation: it lies between the end of the request and
-    /// the begin of the response. Its age counts from here.
+    /// the start of the response. Its age counts from here.
     pub sampled_ns: u64,
     /// When the first start bit of the response was on the line at the latest, in ns: by then the position had been taken.
     pub began_ns: u64,

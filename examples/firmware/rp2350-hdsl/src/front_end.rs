@@ -27,7 +27,7 @@ const RO: u8 = 4;
 
 /// Frames and blocks of samples in memory.
 const DEPTH: usize = 4;
-/// Addresses in a ring: so many blocks can be counted before the count begins anew.
+/// Addresses in a ring: this many blocks can be counted before the count begins anew.
 const RING: usize = 32;
 /// Bits from the beginning of a frame to the end of its window.
 const WINDOW_END_BITS: u32 = Head::BITS + 1 + WINDOW as u32;

@@ -38,7 +38,7 @@ fn program(code: &[u16], wrap: Wrap) -> Program<32> {
     }
 }
 
-/// X of the sampler, which waits for so many bits.
+/// X of the sampler, which waits for this many bits.
 pub const fn wait_bits(bits: u8) -> Instruction {
     let operands = InstructionOperands::SET { destination: SetDestination::X, data: bits - 1 };
     Instruction { operands, delay: 0, side_set: None }

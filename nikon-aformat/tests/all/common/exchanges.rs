@@ -185,7 +185,7 @@ fn is_echo_alone<const N: usize>(bench: &Bench<N>, id: Id, shown: &mut Shown) ->
     alone
 }
 
-/// A response of so many frames with all the idle time between them that a master allows.
+/// A response of this many frames with all the idle time between them that a master allows.
 fn longest_ns(rate: BitRate, frames: u64) -> u64 {
     frames * frame_ns(rate) + (frames - 1) * idle_ns(rate)
 }
@@ -346,7 +346,7 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
         let place_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * turn_ns - between_ns(rate);
         let last_ns = first_ns.map_or(place_ns, |end_ns| place_ns.min(end_ns + turns_ns));
         let missing = transaction.bus().missing();
-        // Whoever puts a sound response on the line that is none makes the master wait from there on.
+        // Whoever puts a sound response on the line that nobody asked for makes the master wait from there on.
         let is_forged = |ea: &EncoderAddress| match transaction.bus().of(*ea) {
             Outcome::Good(response) | Outcome::Extra(response) | Outcome::Duplicate { first: response } => {
                 bench.world.truth().verdict(id, value_of(response.emit().contents())) != Verdict::Fresh

@@ -119,7 +119,7 @@ pub const fn idle_ns(rate: BitRate) -> u64 {
     }
 }
 
-/// A host that is told the end times of the line, or is late by no more than `latency_ns`.
+/// A host that is told the end times of the line, or is late by at most `latency_ns`.
 pub fn host_within(scenario: Scenario, latency_ns: u32) -> Scenario {
     let Scenario { host, mut script } = scenario;
     let late = host.stamp == Stamp::Handler;

@@ -129,7 +129,7 @@ impl<const N: usize> Run<N> {
         let mut sent = 0;
         let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, now_ns, |request, not_before_ns| {
             assert!(sent < 200, "seed {}: a procedure without end", self.seed);
-            // What guards a procedure stands at its begin.
+            // What guards a procedure stands at its start.
             let request = self.sent_for(request, if sent == 0 { 2 } else { 12 });
             sent += 1;
             let (outcome, ready_ns) = self.transact(request, not_before_ns);

@@ -5,7 +5,7 @@ use std::io::SeekFrom;
 
 use super::super::input::SeekRead;
 
-/// What a block holds when unpacked is at most so many times as long as the block: more than deflate can do.
+/// What a block holds when unpacked is at most this many times as long as the block: more than deflate can do.
 const PACKED: u64 = 1100;
 /// The most that a list of variables may hold.
 const MOST: u64 = 1 << 28;

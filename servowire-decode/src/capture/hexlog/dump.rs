@@ -7,7 +7,7 @@ pub(super) enum Dump {
     InOrder,
     /// Words of two bytes, the lower one last (`hexdump`).
     Swapped,
-    /// Words, the lowest byte last, in so many columns after the address (`xxd -e`): a short word stands at the right end
+    /// Words, the lowest byte last, in this many columns after the address (`xxd -e`): a short word stands at the right end
     /// of its place.
     Little(usize),
     /// Bits (`xxd -b`).

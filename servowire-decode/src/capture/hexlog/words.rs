@@ -186,7 +186,7 @@ pub(super) fn numbers(inside: &str) -> Option<Vec<u8>> {
         return None;
     }
     let cells = inside.split(',').map(str::trim).filter(|cell| !cell.is_empty());
-    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse().ok() } else { None }).collect()
+    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse::<u8>().ok() } else { None }).collect()
 }
 
 /// A string of Python or C with its escapes: `b'\x02Hello'`.
@@ -206,7 +206,7 @@ fn string(text: &str) -> Option<Result<Vec<u8>, String>> {
         let byte = if letter == '\\' { escape(&mut letters) } else { u8::try_from(u32::from(letter)).ok() };
         match byte {
             Some(byte) => out.push(byte),
-            None => return Some(Err(format!("{text} has an escape that is none"))),
+            None => return Some(Err(format!("{text} contains an invalid escape"))),
         }
     }
     Some(Ok(out))

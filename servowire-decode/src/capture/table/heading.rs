@@ -11,7 +11,7 @@ pub(super) const LONGEST: usize = 512;
 /// When a row was taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Times {
-    /// By a column, in so many parts of a second.
+    /// By a column, in this fraction of a second.
     Column { index: usize, divisor: i64 },
     /// By a column of dates.
     Dates { index: usize },
@@ -144,7 +144,7 @@ impl Heading {
         } else {
             None
         };
-        // A line of units may be the only heading; a key with its value is none.
+        // A line of units may be the only heading; a key with its value is not.
         let is_heading = |cells: &&Vec<String>| {
             let number = |cell: &String| cell::number(cell.as_bytes(), false).is_some();
             cells.len() >= count.min(2)
@@ -280,7 +280,7 @@ impl Heading {
         if bare.is_empty() { format!("column {}", index + 1) } else { bare.to_owned() }
     }
 
-    /// The names of the lines of a pod of so many bits, the lowest first: those of `D7-D0` are `D0` to `D7`.
+    /// The names of the lines of a pod of this many bits, the lowest first: those of `D7-D0` are `D0` to `D7`.
     pub(super) fn pod(&self, index: usize, bits: u8) -> Vec<String> {
         let name = self.name(index);
         let part = |text: &str| {

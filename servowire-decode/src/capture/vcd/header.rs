@@ -7,11 +7,11 @@ use super::codes::{Code, Codes};
 use crate::capture::input::Input;
 use crate::fault::{At, Fault};
 
-/// Longer headers are none.
+/// A longer header cannot be one.
 const LONGEST: usize = 1 << 26;
 /// The most channels.
 const CHANNELS: usize = 65_535;
-/// Vectors of up to so many bits are channels bit by bit, as long as there are fewer channels than this.
+/// Vectors of up to this many bits are channels bit by bit, as long as there are fewer channels than this.
 const WIDEST: u16 = 64;
 const FEW: usize = 4096;
 

@@ -219,7 +219,7 @@ impl Bits {
         self.mark(time);
     }
 
-    /// The bit becomes longer by so many parts of a picosecond.
+    /// The bit becomes longer by this many parts of a picosecond.
     #[inline]
     fn adapt(&mut self, parts: i64) {
         let most = self.fine / 100 * OFF;
@@ -319,7 +319,7 @@ impl Bits {
         Place::Time { start, end: start + ((bits.end - bits.start) as f64 * self.length()) as i64 }
     }
 
-    /// Bits before `at` are of no more interest.
+    /// Bits before `at` are no longer of interest.
     pub(super) fn forget(&mut self, at: u64) {
         let words = (at.saturating_sub(self.first) / 64).min(self.words.len() as u64);
         if words < 64 {

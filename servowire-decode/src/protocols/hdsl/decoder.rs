@@ -25,7 +25,7 @@ use crate::sink::Sink;
 
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
 const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
-/// Bits that are taken together where there are so many.
+/// Bits that are taken together where there are enough.
 const MANY: u64 = 16 * NEED;
 /// Bits that are kept to say what there was instead of a frame.
 const KEPT: u64 = 4096;

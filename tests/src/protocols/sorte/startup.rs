@@ -115,7 +115,7 @@ fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
     }
 }
 
-/// What device `n` of so many adds to STATUS.
+/// What device `n` of this many adds to STATUS.
 fn last_of<T: PartialEq>(n: T, devices: T) -> Status {
     if n == devices { Status::LAST } else { Status::empty() }
 }

@@ -197,7 +197,7 @@ proptest! {
     }
 }
 
-/// A response that ended before the request had left, or that the request before is owed, is none.
+/// A response that ended before the request had left, or that belongs to the request before, is not one.
 #[test]
 fn what_is_older_than_the_request_is_not_a_response() {
     let early: Vec<_> = RESPONSE.iter().zip(1..).map(|(byte, k)| (*byte, 500 * k)).collect();

@@ -29,7 +29,7 @@ fn edges_in(word: u64, level: bool) -> Option<u64> {
     (edges & !FIRST == 0).then(|| gather(edges))
 }
 
-/// Whether each edge of eight bits, of which there is one at least, is no more than `longest` bits after the one before.
+/// Whether each edge of eight bits, of which there is at least one, is at most `longest` bits after the one before.
 fn are_near(edges: u64, longest: u64) -> bool {
     if longest >= SAMPLES - 1 {
         return true;
@@ -47,7 +47,7 @@ impl Bits {
     }
 
     /// Takes samples from number `at` on as long as they are on the grid of the last change, that at sample `since`, and
-    /// no more than `most` bits are there then.
+    /// at most `most` bits are there then.
     pub(in super::super) fn on_grid(&mut self, samples: &Samples<'_>, since: u64, at: u64, most: u64) -> Option<Taken> {
         let clock = samples.clock();
         let (changed, mut level) = self.spikes.last_change()?;

@@ -1,0 +1,117 @@
+//! The clock tree, made from the crystal of the board; time; the watchdog.
+
+use cortex_m::peripheral::DWT;
+use embassy_stm32::pac::RCC;
+use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::wdg::IndependentWatchdog;
+use servowire_boards::{Oscillator, PllLimits, Source, start};
+use servowire_core::{ClockError, TickRate, TimeBase};
+use servowire_drivers::Clock;
+
+use crate::board::{self, BOARD, Parts};
+
+/// 2.5 Mbit/s are 64 clocks of it, exactly.
+pub const CORE_HZ: u32 = 160_000_000;
+/// Of the oscillator in the chip.
+const INTERNAL_HZ: u32 = 16_000_000;
+/// Looks at the crystal before it is given up: some 50 ms; the data sheet says 2 ms.
+const LOOKS: u32 = 100_000;
+/// Longer than anything here waits.
+const WATCHDOG_US: u32 = 100_000;
+
+/// Time from the cycle counter, which has to be looked at every 13 s. Copies have the same origin.
+#[derive(Clone, Copy)]
+pub struct Cycles(TimeBase<32>);
+
+impl Clock for Cycles {
+    #[inline]
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        self.0.now_ns(DWT::cycle_count())
+    }
+}
+
+struct Crystal;
+
+impl Oscillator for Crystal {
+    fn start(&mut self) {
+        RCC.cr().modify(|w| w.set_hseon(true));
+    }
+
+    fn is_ready(&self) -> bool {
+        RCC.cr().read().hserdy()
+    }
+
+    fn stop(&mut self) {
+        RCC.cr().modify(|w| w.set_hseon(false));
+    }
+}
+
+/// The PLL that makes [`CORE_HZ`]: without one this does not compile.
+const fn pll(source: PllSource, hz: u32) -> Pll {
+    let Some(pll) = servowire_boards::Pll::solve(PllLimits::STM32G4, hz, CORE_HZ) else {
+        panic!("no PLL makes the core clock of this crystal");
+    };
+    let divr = match pll.r {
+        2 => PllRDiv::DIV2,
+        4 => PllRDiv::DIV4,
+        6 => PllRDiv::DIV6,
+        _ => PllRDiv::DIV8,
+    };
+    // The field for the divider begins at 1.
+    let (prediv, mul) = (PllPreDiv::from_bits(pll.m as u8 - 1), PllMul::from_bits(pll.n as u8));
+    Pll { source, prediv, mul, divp: None, divq: None, divr: Some(divr) }
+}
+
+const OF_CRYSTAL: Pll = pll(PllSource::HSE, board::CRYSTAL_HZ);
+const OF_INTERNAL: Pll = pll(PllSource::HSI, INTERNAL_HZ);
+
+/// What an image begins with.
+pub struct Start {
+    /// Its part of the chip.
+    pub parts: Parts,
+    /// From what the core runs.
+    pub source: Source,
+    /// Time.
+    pub clock: Cycles,
+}
+
+impl Start {
+    /// Clocks and time.
+    ///
+    /// # Panics
+    /// If called twice.
+    pub fn new() -> Self {
+        let source = start(&mut Crystal, LOOKS);
+        let mut config = embassy_stm32::Config::default();
+        (config.rcc.hse, config.rcc.pll) = match source {
+            Source::Crystal => {
+                (Some(Hse { freq: Hertz(BOARD.crystal_hz), mode: HseMode::Oscillator }), Some(OF_CRYSTAL))
+            }
+            Source::Internal => (None, Some(OF_INTERNAL)),
+        };
+        config.rcc.sys = Sysclk::PLL1_R;
+        config.rcc.boost = true;
+        let parts = board::take(embassy_stm32::init(config));
+        let mut core = cortex_m::Peripherals::take().expect("called once");
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+        let clock = Cycles(TimeBase::new(TickRate::of::<CORE_HZ>(), DWT::cycle_count()));
+        Self { parts, source, clock }
+    }
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The watchdog, running.
+pub fn watchdog(
+    part: embassy_stm32::Peri<'static, embassy_stm32::peripherals::IWDG>,
+) -> IndependentWatchdog<'static, embassy_stm32::peripherals::IWDG> {
+    let mut watchdog = IndependentWatchdog::new(part, WATCHDOG_US);
+    watchdog.unleash();
+    watchdog
+}

@@ -1,0 +1,50 @@
+//! What the console says, once a second.
+
+use core::fmt::Display;
+
+use defmt::{Display2Format, info, warn};
+use servowire_boards::{FirstLine, Source};
+
+use crate::board::BOARD;
+use crate::clocks::CORE_HZ;
+use crate::control;
+
+/// Readings of a second.
+pub const READ_HZ: u32 = 5_000;
+
+/// The first line.
+pub fn first_line(image: &'static str, source: Source, bits_per_second: u32) {
+    let version = env!("CARGO_PKG_VERSION");
+    let line = FirstLine { image, version, board: &BOARD, core_hz: CORE_HZ, source, bits_per_second };
+    info!("{}", Display2Format(&line));
+}
+
+/// Readings since the last report.
+#[derive(Default)]
+pub struct Report {
+    good: u32,
+    bad: u32,
+}
+
+impl Report {
+    /// Counts a reading; says every second what came of the last one.
+    pub fn reading<S: Display, E: Display>(&mut self, position: &Result<S, E>) {
+        match position {
+            Ok(_) => self.good += 1,
+            Err(_) => self.bad += 1,
+        }
+        let Self { good, bad } = *self;
+        if good + bad < READ_HZ {
+            return;
+        }
+        match position {
+            Ok(sample) => info!("{}, {} good, {} bad", Display2Format(sample), good, bad),
+            Err(error) => warn!("no position: {}, {} good, {} bad", Display2Format(error), good, bad),
+        }
+        match control::field() {
+            Some(field) => info!("ENABLE on, field at {} millidegrees", field.millidegrees()),
+            None => info!("ENABLE off"),
+        }
+        *self = Self::default();
+    }
+}

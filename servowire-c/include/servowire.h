@@ -1,0 +1,2446 @@
+/* The C interface of servowire. Made from servowire-c/src by cbindgen; do not edit.
+ *
+ * Licence: MIT OR Apache-2.0. */
+
+#ifndef SERVOWIRE_H
+#define SERVOWIRE_H
+
+#include <stdint.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+/**
+ * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`.
+ */
+#define SW_NO_TIME UINT64_MAX
+
+/**
+ * Refusals of A-format, in the order of their numbers.
+ */
+enum sw_aformat_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The response ends too early.
+     */
+    SW_E_AFORMAT_TRUNCATED = -513,
+    /**
+     * A start bit reads 1.
+     */
+    SW_E_AFORMAT_START_BIT = -514,
+    /**
+     * A delimiter reads 0.
+     */
+    SW_E_AFORMAT_DELIMITER = -515,
+    /**
+     * The CRC-8 of a response is wrong.
+     */
+    SW_E_AFORMAT_CRC = -516,
+    /**
+     * The CRC-3 of a request is wrong.
+     */
+    SW_E_AFORMAT_CRC3 = -517,
+    /**
+     * The sync code is wrong.
+     */
+    SW_E_AFORMAT_SYNC_CODE = -518,
+    /**
+     * The fixed bit reads 1.
+     */
+    SW_E_AFORMAT_FIXED_BIT = -519,
+    /**
+     * Another address answers.
+     */
+    SW_E_AFORMAT_ADDRESS_MISMATCH = -520,
+    /**
+     * Another command is answered.
+     */
+    SW_E_AFORMAT_COMMAND_MISMATCH = -521,
+    /**
+     * There is no such bank.
+     */
+    SW_E_AFORMAT_BANK_ERROR = -522,
+    /**
+     * An argument comes back as another.
+     */
+    SW_E_AFORMAT_ECHO_MISMATCH = -523,
+    /**
+     * The frame code is wrong.
+     */
+    SW_E_AFORMAT_FRAME_CODE = -524,
+    /**
+     * There is no such command.
+     */
+    SW_E_AFORMAT_UNKNOWN_COMMAND = -525,
+    /**
+     * The encoder's version does not have this.
+     */
+    SW_E_AFORMAT_UNSUPPORTED_IN_VERSION = -526,
+    /**
+     * An address is out of its range.
+     */
+    SW_E_AFORMAT_ADDRESS_RANGE = -527,
+    /**
+     * Data is out of its range.
+     */
+    SW_E_AFORMAT_DATA_RANGE = -528,
+    /**
+     * No response in time.
+     */
+    SW_E_AFORMAT_NO_RESPONSE = -529,
+    /**
+     * The encoder stayed busy.
+     */
+    SW_E_AFORMAT_BUSY = -530,
+    /**
+     * Another request came in between.
+     */
+    SW_E_AFORMAT_INTERRUPTED = -531,
+    /**
+     * Whether the act was done is not known.
+     */
+    SW_E_AFORMAT_EFFECT_UNKNOWN = -532,
+    /**
+     * The act was not done.
+     */
+    SW_E_AFORMAT_NOT_DONE = -533,
+    /**
+     * The encoder reports a fault of its memory.
+     */
+    SW_E_AFORMAT_MEMORY_FAULT = -534,
+    /**
+     * A request does not carry this.
+     */
+    SW_E_AFORMAT_NOT_CARRIED = -536,
+    /**
+     * Two sound responses in one block.
+     */
+    SW_E_AFORMAT_TWO_RESPONSES = -538,
+    /**
+     * The settings of the line leave no time for a response.
+     */
+    SW_E_AFORMAT_LINE = -539,
+};
+#ifndef __cplusplus
+typedef int32_t sw_aformat_error_t;
+#endif // __cplusplus
+
+/**
+ * Bits of the encoder status ES.
+ */
+enum sw_aformat_es_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The encoder is busy.
+     */
+    SW_AFORMAT_ES_BUSY = 1,
+    /**
+     * Battery.
+     */
+    SW_AFORMAT_ES_BATT = 2,
+    /**
+     * Warning.
+     */
+    SW_AFORMAT_ES_WARNING = 4,
+    /**
+     * Error.
+     */
+    SW_AFORMAT_ES_ERROR = 8,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_es_t;
+#endif // __cplusplus
+
+/**
+ * What a response carries.
+ */
+enum sw_aformat_layout_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * 40 position bits.
+     */
+    SW_AFORMAT_ABS40 = 0,
+    /**
+     * Position bits 0 to 23.
+     */
+    SW_AFORMAT_ABS24 = 1,
+    /**
+     * Position bits 16 to 39.
+     */
+    SW_AFORMAT_ABS24H = 2,
+    /**
+     * Position bits 0 to 16.
+     */
+    SW_AFORMAT_ABS17 = 3,
+    /**
+     * ALM and PM-ALM.
+     */
+    SW_AFORMAT_STATUS = 4,
+    /**
+     * A word of the EEPROM.
+     */
+    SW_AFORMAT_EEPROM = 5,
+    /**
+     * A word of a bank of the EEPROM. Version 3.0.
+     */
+    SW_AFORMAT_EEPROM_BANK = 6,
+    /**
+     * Temperature.
+     */
+    SW_AFORMAT_TEMP = 7,
+    /**
+     * Identification code.
+     */
+    SW_AFORMAT_ID = 8,
+    /**
+     * Velocity coefficient. Version 3.0.
+     */
+    SW_AFORMAT_VELCOEF = 9,
+    /**
+     * ABS24 and ALM.
+     */
+    SW_AFORMAT_ABS24_ALM = 10,
+    /**
+     * ABS24 and temperature.
+     */
+    SW_AFORMAT_ABS24_TEMP = 11,
+    /**
+     * ABS24 and velocity. Version 3.0.
+     */
+    SW_AFORMAT_ABS24_VEL = 12,
+    /**
+     * ABS24, velocity and acceleration. Version 3.0.
+     */
+    SW_AFORMAT_ABS24_VEL_ACC = 13,
+    /**
+     * ABS40 and velocity. Version 3.0.
+     */
+    SW_AFORMAT_ABS40_VEL = 14,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_layout_t;
+#endif // __cplusplus
+
+/**
+ * What version 3.0 leaves to the factory setting of an encoder; may be added.
+ */
+enum sw_aformat_option_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The encoder speaks version 3.0, not 2.1.
+     */
+    SW_AFORMAT_VERSION_3_0 = 1,
+    /**
+     * Commands for the lower 24 bits are answered with velocity.
+     */
+    SW_AFORMAT_VELOCITY_IN_LOW = 2,
+    /**
+     * Resets are answered with the position.
+     */
+    SW_AFORMAT_POSITION_IN_RESETS = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_aformat_option_t;
+#endif // __cplusplus
+
+/**
+ * In which bit of a byte the first bit of the line stands.
+ */
+enum sw_bit_order_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * In bit 0.
+     */
+    SW_LSB_FIRST = 0,
+    /**
+     * In bit 7.
+     */
+    SW_MSB_FIRST = 1,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_bit_order_t;
+#endif // __cplusplus
+
+/**
+ * Results that all protocols share.
+ */
+enum sw_code_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * Done.
+     */
+    SW_OK = 0,
+    /**
+     * Not finished: wait, hear, poll.
+     */
+    SW_PENDING = 1,
+    /**
+     * Something is to be sent: look at the transmission.
+     */
+    SW_SEND = 2,
+    /**
+     * A pointer is NULL.
+     */
+    SW_E_NULL = -1,
+    /**
+     * An argument is out of its range.
+     */
+    SW_E_ARGUMENT = -2,
+    /**
+     * The state was not started, or it is of another kind.
+     */
+    SW_E_STATE = -3,
+    /**
+     * The buffer of the caller is too short; nothing was written.
+     */
+    SW_E_SHORT_BUFFER = -4,
+    /**
+     * The clock went back or was not read in time, or `SW_NO_TIME` was handed on.
+     */
+    SW_E_CLOCK = -5,
+    /**
+     * There is no such value now: nothing was exchanged yet, or it was something else.
+     */
+    SW_E_NO_VALUE = -6,
+};
+#ifndef __cplusplus
+typedef int32_t sw_code_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of motion, in the order of their numbers.
+ */
+enum sw_motion_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The axis is still moving.
+     */
+    SW_E_MOTION_MOVING = -1537,
+    /**
+     * Two steps could fall into one tick of the clock.
+     */
+    SW_E_MOTION_SPEED_ABOVE_CLOCK = -1538,
+    /**
+     * More steps than 31 bits count.
+     */
+    SW_E_MOTION_TOO_MANY_STEPS = -1539,
+    /**
+     * No room.
+     */
+    SW_E_MOTION_QUEUE_FULL = -1540,
+    /**
+     * A target outside the soft limits.
+     */
+    SW_E_MOTION_SOFT_LIMIT = -1543,
+    /**
+     * Too few steps for the change of speed.
+     */
+    SW_E_MOTION_TOO_SHORT = -1544,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_error_t;
+#endif // __cplusplus
+
+/**
+ * What the background has left to do.
+ */
+enum sw_motion_work_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * At rest where it is to be.
+     */
+    SW_MOTION_REST = 0,
+    /**
+     * Poll again.
+     */
+    SW_MOTION_MORE = 1,
+    /**
+     * Fire the interrupt now: it stands, and there is something for it.
+     */
+    SW_MOTION_START = 2,
+    /**
+     * Nothing before the interrupt has gone on.
+     */
+    SW_MOTION_LATER = 3,
+    /**
+     * The stop needs more slots than the queue has: the axis comes to rest.
+     */
+    SW_MOTION_TOO_FEW_SLOTS = 4,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_work_t;
+#endif // __cplusplus
+
+/**
+ * Where an axis stands.
+ */
+enum sw_rtex_axis_code_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Its drive has not answered yet.
+     */
+    SW_RTEX_STARTING = 0,
+    /**
+     * Servo off.
+     */
+    SW_RTEX_OFF = 1,
+    /**
+     * Servo_On is sent, Servo_Active has not come yet.
+     */
+    SW_RTEX_SWITCHING_ON = 2,
+    /**
+     * Servo on.
+     */
+    SW_RTEX_ON = 3,
+    /**
+     * Slows down; there is a reason.
+     */
+    SW_RTEX_STOPPING = 4,
+    /**
+     * Stands with the servo on; there is a reason.
+     */
+    SW_RTEX_HELD = 5,
+    /**
+     * Servo_On is 0, Servo_Active has not gone yet.
+     */
+    SW_RTEX_SWITCHING_OFF = 6,
+    /**
+     * Servo off for a reason.
+     */
+    SW_RTEX_STOPPED = 7,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_axis_code_t;
+#endif // __cplusplus
+
+/**
+ * Control bits of a command, bytes 2 and 3.
+ */
+enum sw_rtex_control_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Homing_Ctrl.
+     */
+    SW_RTEX_HOMING_CTRL = (1 << 2),
+    /**
+     * TL_SW: first or second torque limit.
+     */
+    SW_RTEX_TL_SW = (1 << 3),
+    /**
+     * Gain_SW: first or second gain.
+     */
+    SW_RTEX_GAIN_SW = (1 << 4),
+    /**
+     * Servo_On. An axis sets it by itself.
+     */
+    SW_RTEX_SERVO_ON = (1 << 7),
+    /**
+     * EX-OUT1.
+     */
+    SW_RTEX_EX_OUT1 = (1 << 8),
+    /**
+     * EX-OUT2.
+     */
+    SW_RTEX_EX_OUT2 = (1 << 9),
+    /**
+     * SL_SW.
+     */
+    SW_RTEX_SL_SW = (1 << 11),
+    /**
+     * Pause.
+     */
+    SW_RTEX_PAUSE = (1 << 13),
+    /**
+     * Smooth_Stop.
+     */
+    SW_RTEX_SMOOTH_STOP = (1 << 14),
+    /**
+     * Hard_Stop.
+     */
+    SW_RTEX_HARD_STOP = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_control_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of RTEX, in the order of their numbers; the last two are of axes.
+ */
+enum sw_rtex_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The block is too short.
+     */
+    SW_E_RTEX_TRUNCATED = -1025,
+    /**
+     * The block is too long.
+     */
+    SW_E_RTEX_TOO_LONG = -1026,
+    /**
+     * A command where a response is due, or the other way round.
+     */
+    SW_E_RTEX_DIRECTION = -1027,
+    /**
+     * Another MAC-ID.
+     */
+    SW_E_RTEX_MAC_ID = -1028,
+    /**
+     * There is no such cyclic code.
+     */
+    SW_E_RTEX_CYCLIC_CODE = -1029,
+    /**
+     * There is no such non-cyclic code.
+     */
+    SW_E_RTEX_NON_CYCLIC_CODE = -1030,
+    /**
+     * Sub_Chk is wrong.
+     */
+    SW_E_RTEX_SUB_CHK = -1031,
+    /**
+     * There is no such sub-command.
+     */
+    SW_E_RTEX_SUB_COMMAND_CODE = -1032,
+    /**
+     * The two codes do not go together.
+     */
+    SW_E_RTEX_CODE_PAIR = -1033,
+    /**
+     * A reserved bit is set.
+     */
+    SW_E_RTEX_RESERVED = -1034,
+    /**
+     * The axis is in another state or mode, or its drive is not ready.
+     */
+    SW_E_RTEX_NOT_NOW = -1264,
+    /**
+     * The step or the rate is beyond the limits of the axis; nothing has changed.
+     */
+    SW_E_RTEX_TOO_FAR = -1265,
+};
+#ifndef __cplusplus
+typedef int32_t sw_rtex_error_t;
+#endif // __cplusplus
+
+/**
+ * Cyclic codes, which are the control modes.
+ */
+enum sw_rtex_mode_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Nothing.
+     */
+    SW_RTEX_NOP = 0,
+    /**
+     * Profile position.
+     */
+    SW_RTEX_PP = 1,
+    /**
+     * Cyclic position.
+     */
+    SW_RTEX_CP = 2,
+    /**
+     * Cyclic velocity.
+     */
+    SW_RTEX_CV = 3,
+    /**
+     * Cyclic torque.
+     */
+    SW_RTEX_CT = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_mode_t;
+#endif // __cplusplus
+
+/**
+ * Why an axis stops.
+ */
+enum sw_rtex_reason_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * It does not.
+     */
+    SW_RTEX_NO_REASON = 0,
+    /**
+     * No new echo.
+     */
+    SW_RTEX_ECHO_TIMEOUT = 1,
+    /**
+     * Another drive answers; the detail is its MAC-ID.
+     */
+    SW_RTEX_WRONG_MAC_ID = 2,
+    /**
+     * Blocks were refused; the detail is the number of the class.
+     */
+    SW_RTEX_REFUSED = 3,
+    /**
+     * No block.
+     */
+    SW_RTEX_RECEIVE_TIMEOUT = 4,
+    /**
+     * The drive reports an alarm.
+     */
+    SW_RTEX_ALARM = 5,
+    /**
+     * Servo_Ready went to 0.
+     */
+    SW_RTEX_NOT_READY = 6,
+    /**
+     * Servo_Active went to 0.
+     */
+    SW_RTEX_NOT_ACTIVE = 7,
+    /**
+     * Servo_Ready did not come.
+     */
+    SW_RTEX_READY_TIMEOUT = 8,
+    /**
+     * Servo_Active did not come.
+     */
+    SW_RTEX_ACTIVE_TIMEOUT = 9,
+    /**
+     * Servo_Active did not go.
+     */
+    SW_RTEX_INACTIVE_TIMEOUT = 10,
+    /**
+     * The drive does not accept the command; the detail is its error code.
+     */
+    SW_RTEX_COMMAND_ERROR = 11,
+    /**
+     * Another axis has failed; the detail is its place.
+     */
+    SW_RTEX_OTHER_AXIS = 12,
+    /**
+     * It was asked to.
+     */
+    SW_RTEX_REQUESTED = 13,
+    /**
+     * Homing did not end in time.
+     */
+    SW_RTEX_HOMING_TIMEOUT = 14,
+    /**
+     * Another reason, of a later release.
+     */
+    SW_RTEX_OTHER_REASON = 255,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_reason_t;
+#endif // __cplusplus
+
+/**
+ * Status flags of a response, bytes 2 and 3.
+ */
+enum sw_rtex_status_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * In_Position.
+     */
+    SW_RTEX_IN_POSITION = (1 << 0),
+    /**
+     * In_Progress.
+     */
+    SW_RTEX_IN_PROGRESS = (1 << 1),
+    /**
+     * Homing_Complete.
+     */
+    SW_RTEX_HOMING_COMPLETE = (1 << 2),
+    /**
+     * Torque_Limited.
+     */
+    SW_RTEX_TORQUE_LIMITED = (1 << 3),
+    /**
+     * Warning.
+     */
+    SW_RTEX_WARNING = (1 << 4),
+    /**
+     * Alarm.
+     */
+    SW_RTEX_ALARM_FLAG = (1 << 5),
+    /**
+     * Servo_Ready.
+     */
+    SW_RTEX_SERVO_READY = (1 << 6),
+    /**
+     * Servo_Active: the motor is energised.
+     */
+    SW_RTEX_SERVO_ACTIVE = (1 << 7),
+    /**
+     * NOT.
+     */
+    SW_RTEX_NOT = (1 << 8),
+    /**
+     * POT.
+     */
+    SW_RTEX_POT = (1 << 9),
+    /**
+     * HOME.
+     */
+    SW_RTEX_HOME = (1 << 10),
+    /**
+     * SI-MON1.
+     */
+    SW_RTEX_SI_MON1 = (1 << 11),
+    /**
+     * SI-MON2.
+     */
+    SW_RTEX_SI_MON2 = (1 << 12),
+    /**
+     * SI-MON3.
+     */
+    SW_RTEX_SI_MON3 = (1 << 13),
+    /**
+     * SI-MON4.
+     */
+    SW_RTEX_SI_MON4 = (1 << 14),
+    /**
+     * SI-MON5.
+     */
+    SW_RTEX_SI_MON5 = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
+ * Bits of the address field ADF.
+ */
+enum sw_tformat_adf_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The address, 0..126; 127 is the page register.
+     */
+    SW_TFORMAT_ADF_ADDRESS = 127,
+    /**
+     * The memory is busy.
+     */
+    SW_TFORMAT_ADF_BUSY = 128,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_tformat_adf_t;
+#endif // __cplusplus
+
+/**
+ * Bits of the error byte ALMC.
+ */
+enum sw_tformat_almc_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Over-speed.
+     */
+    SW_TFORMAT_ALMC_OS = 1,
+    /**
+     * Full absolute status: the single-turn accuracy is not yet guaranteed.
+     */
+    SW_TFORMAT_ALMC_FS = 2,
+    /**
+     * Counting error.
+     */
+    SW_TFORMAT_ALMC_CE = 4,
+    /**
+     * Overflow of the multi-turn counter.
+     */
+    SW_TFORMAT_ALMC_OF = 8,
+    /**
+     * Over-heat.
+     */
+    SW_TFORMAT_ALMC_OH = 16,
+    /**
+     * Multi-turn error.
+     */
+    SW_TFORMAT_ALMC_ME = 32,
+    /**
+     * Battery error; the turns cannot be trusted.
+     */
+    SW_TFORMAT_ALMC_BE = 64,
+    /**
+     * Battery alarm: the voltage is low.
+     */
+    SW_TFORMAT_ALMC_BA = 128,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_tformat_almc_t;
+#endif // __cplusplus
+
+/**
+ * Why a position must not be used.
+ */
+enum sw_tformat_doubt_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * It may be used.
+     */
+    SW_TFORMAT_NO_DOUBT = 0,
+    /**
+     * Nothing was heard yet.
+     */
+    SW_TFORMAT_DOUBT_NEVER = 1,
+    /**
+     * It is too old.
+     */
+    SW_TFORMAT_DOUBT_OLD = 2,
+    /**
+     * The response carries no such position.
+     */
+    SW_TFORMAT_DOUBT_ABSENT = 3,
+    /**
+     * Information bits of SF are set: the fields are not where they should be.
+     */
+    SW_TFORMAT_DOUBT_SHIFTED = 4,
+    /**
+     * CA0 or CA1: the request was damaged.
+     */
+    SW_TFORMAT_DOUBT_REQUEST_DAMAGED = 5,
+    /**
+     * ENID names an encoder with other widths.
+     */
+    SW_TFORMAT_DOUBT_OTHER_ENCODER = 6,
+    /**
+     * Bits above the width are set.
+     */
+    SW_TFORMAT_DOUBT_UPPER_BITS = 7,
+    /**
+     * ALMC reports what is not tolerated.
+     */
+    SW_TFORMAT_DOUBT_ALARMS = 8,
+    /**
+     * SF reports what is not tolerated.
+     */
+    SW_TFORMAT_DOUBT_STATUS = 9,
+    /**
+     * Another reason, of a later release.
+     */
+    SW_TFORMAT_DOUBT_OTHER = 255,
+};
+#ifndef __cplusplus
+typedef int32_t sw_tformat_doubt_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of T-Format, in the order of their numbers. Fields count from 0, the control field.
+ */
+enum sw_tformat_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * A start bit reads 1.
+     */
+    SW_E_TFORMAT_START_BIT = -257,
+    /**
+     * A delimiter reads 0.
+     */
+    SW_E_TFORMAT_DELIMITER = -258,
+    /**
+     * The frame ends too early.
+     */
+    SW_E_TFORMAT_TRUNCATED = -259,
+    /**
+     * The sink code is not 0, 1, 0.
+     */
+    SW_E_TFORMAT_SINK_CODE = -260,
+    /**
+     * The parity of the control field is odd.
+     */
+    SW_E_TFORMAT_PARITY = -261,
+    /**
+     * The data ID is none of the nine documented ones.
+     */
+    SW_E_TFORMAT_UNKNOWN_DATA_ID = -262,
+    /**
+     * The response answers another data ID.
+     */
+    SW_E_TFORMAT_CF_MISMATCH = -263,
+    /**
+     * The encoder refused the request.
+     */
+    SW_E_TFORMAT_REJECTED = -264,
+    /**
+     * The check field is wrong.
+     */
+    SW_E_TFORMAT_CRC = -265,
+    /**
+     * The response is for another EEPROM address.
+     */
+    SW_E_TFORMAT_ADDRESS_MISMATCH = -266,
+    /**
+     * Another data byte than was written.
+     */
+    SW_E_TFORMAT_DATA_MISMATCH = -267,
+    /**
+     * The request did not come back as it was sent.
+     */
+    SW_E_TFORMAT_ECHO_MISMATCH = -268,
+    /**
+     * No response in time.
+     */
+    SW_E_TFORMAT_NO_RESPONSE = -269,
+    /**
+     * The EEPROM stayed busy.
+     */
+    SW_E_TFORMAT_BUSY = -270,
+    /**
+     * The act was not done: reading back shows it.
+     */
+    SW_E_TFORMAT_NOT_DONE = -271,
+    /**
+     * Whether the act was done is not known: read back before it is tried again.
+     */
+    SW_E_TFORMAT_EFFECT_UNKNOWN = -272,
+    /**
+     * A data field has bits above the width of the encoder.
+     */
+    SW_E_TFORMAT_UPPER_BITS = -273,
+    /**
+     * Two sound responses in one block.
+     */
+    SW_E_TFORMAT_TWO_RESPONSES = -275,
+    /**
+     * The settings of the line leave no time for a response.
+     */
+    SW_E_TFORMAT_LINE = -276,
+};
+#ifndef __cplusplus
+typedef int32_t sw_tformat_error_t;
+#endif // __cplusplus
+
+/**
+ * Data IDs (TIDM-1011, table 2-4).
+ */
+enum sw_tformat_id_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * ABS.
+     */
+    SW_TFORMAT_READ_SINGLE_TURN = 0,
+    /**
+     * ABM.
+     */
+    SW_TFORMAT_READ_MULTI_TURN = 1,
+    /**
+     * ENID.
+     */
+    SW_TFORMAT_READ_ENCODER_ID = 2,
+    /**
+     * ABS, ENID, ABM and ALMC.
+     */
+    SW_TFORMAT_READ_ALL = 3,
+    /**
+     * A byte into the EEPROM.
+     */
+    SW_TFORMAT_WRITE_EEPROM = 6,
+    /**
+     * Clears errors; ten times.
+     */
+    SW_TFORMAT_RESET_ERRORS = 7,
+    /**
+     * Makes this position the zero of the turn; ten times. Shifts the commutation angle.
+     */
+    SW_TFORMAT_SET_SINGLE_TURN_ZERO = 8,
+    /**
+     * Clears turns and errors; ten times. The machine loses its multi-turn reference.
+     */
+    SW_TFORMAT_RESET_TURNS_AND_ERRORS = 12,
+    /**
+     * A byte of the EEPROM.
+     */
+    SW_TFORMAT_READ_EEPROM = 13,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_tformat_id_t;
+#endif // __cplusplus
+
+/**
+ * Bits of the status field SF.
+ */
+enum sw_tformat_sf_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Counting error.
+     */
+    SW_TFORMAT_SF_EA0 = 16,
+    /**
+     * Over-heat, multi-turn error, battery error or battery alarm.
+     */
+    SW_TFORMAT_SF_EA1 = 32,
+    /**
+     * The request had a parity error.
+     */
+    SW_TFORMAT_SF_CA0 = 64,
+    /**
+     * The request had a delimiter error.
+     */
+    SW_TFORMAT_SF_CA1 = 128,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_tformat_sf_t;
+#endif // __cplusplus
+
+/**
+ * What the widths of an encoder leave open, for sw_tformat_set_resolution(); may be added.
+ */
+enum sw_tformat_turns_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Turns count from 0 up; otherwise they are two's complement.
+     */
+    SW_TFORMAT_UNSIGNED_TURNS = 1,
+    /**
+     * Bits above the widths are cut off; otherwise a position that has such bits is in doubt.
+     */
+    SW_TFORMAT_UPPER_BITS_IGNORED = 2,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_tformat_turns_t;
+#endif // __cplusplus
+
+/**
+ * What a call came to: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the `sw_..._error_t` of the
+ * protocols; `sw_text()` has a text for each.
+ *
+ * A refusal of a protocol is `-(256 * protocol + number)`. The numbers never change.
+ */
+typedef int32_t sw_result_t;
+
+/**
+ * A line with up to eight encoders of one kind: one request, the responses, and the newest position of each. Its content is
+ * private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[112];
+} sw_aformat_t;
+
+/**
+ * Widths of an encoder, and what its factory has set.
+ */
+typedef struct {
+    /**
+     * Bits of the single turn.
+     */
+    uint8_t st_bits;
+    /**
+     * Bits of the turns; 40 with those of the single turn at most.
+     */
+    uint8_t mt_bits;
+    /**
+     * sw_aformat_option_t, added.
+     */
+    uint8_t options;
+} sw_aformat_encoder_t;
+
+/**
+ * What is to be sent, and when.
+ */
+typedef struct {
+    /**
+     * When the first start bit is on the line.
+     */
+    uint64_t start_ns;
+    /**
+     * When the last delimiter ends.
+     */
+    uint64_t end_ns;
+    /**
+     * The content of the frames, the first bit of the line in bit 0.
+     */
+    uint16_t contents[4];
+    /**
+     * How many.
+     */
+    uint8_t len;
+} sw_aformat_transmission_t;
+
+/**
+ * What an encoder sends. Fields that the layout does not have are 0.
+ */
+typedef struct {
+    /**
+     * Position bits as received, from bit 0 up; of ABS24H from bit 16 up.
+     */
+    uint64_t abs;
+    /**
+     * Velocity.
+     */
+    int32_t velocity;
+    /**
+     * EEPROM word, identification code or velocity coefficient.
+     */
+    uint32_t data;
+    /**
+     * ALM.
+     */
+    uint16_t alm;
+    /**
+     * Acceleration.
+     */
+    int16_t acceleration;
+    /**
+     * Temperature, 10 bits.
+     */
+    uint16_t temperature;
+    /**
+     * sw_aformat_layout_t.
+     */
+    uint8_t layout;
+    /**
+     * CC; 0 in ABS17, which does not have it.
+     */
+    uint8_t command;
+    /**
+     * EA.
+     */
+    uint8_t ea;
+    /**
+     * ES: sw_aformat_es_t. ABS17 has one bit for all of them: all or none are set.
+     */
+    uint8_t es;
+    /**
+     * PM-ALM.
+     */
+    uint8_t pm_alm;
+    /**
+     * EEPROM address.
+     */
+    uint8_t address;
+    /**
+     * EEPROM bank.
+     */
+    uint8_t bank;
+} sw_aformat_response_t;
+
+/**
+ * A position that may be used.
+ */
+typedef struct {
+    /**
+     * Turns times the counts of a turn, and the single turn.
+     */
+    int64_t counts;
+    /**
+     * When it was sampled.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Counts in the turn.
+     */
+    uint32_t single_turn;
+    /**
+     * Turns.
+     */
+    int32_t turns;
+} sw_position_t;
+
+/**
+ * What a master sends. Fields that the command does not take are not looked at.
+ */
+typedef struct {
+    /**
+     * Data of a write: a word (command 14), an identification code (18, 19, 20), a coefficient (18 with frame code 3).
+     */
+    uint32_t data;
+    /**
+     * CC, 0..30.
+     */
+    uint8_t command;
+    /**
+     * EA, 0..7.
+     */
+    uint8_t ea;
+    /**
+     * Frame code: 3 for banks (13, 14) and the velocity coefficient (16, 18) of version 3.0, else 0.
+     */
+    uint8_t fc;
+    /**
+     * Address of commands 13 and 14.
+     */
+    uint8_t address;
+    /**
+     * Bank of commands 13 and 14 with frame code 3.
+     */
+    uint8_t bank;
+} sw_aformat_request_t;
+
+/**
+ * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
+ * private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[36];
+} sw_aformat_bus_t;
+
+/**
+ * Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[6];
+} sw_clock_t;
+
+/**
+ * The end of the background. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[460];
+} sw_motion_axis_t;
+
+/**
+ * The end of the interrupt. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_motion_timer_t;
+
+/**
+ * What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+ */
+typedef struct {
+    uint64_t _private[656];
+} sw_motion_queue_t;
+
+/**
+ * How fast an axis may go.
+ */
+typedef struct {
+    /**
+     * Steps/s³; 0 for a trapezoid.
+     */
+    uint64_t jerk;
+    /**
+     * Steps/s.
+     */
+    uint32_t speed;
+    /**
+     * Steps/s².
+     */
+    uint32_t acceleration;
+} sw_motion_limits_t;
+
+/**
+ * What the interrupt does.
+ */
+typedef struct {
+    /**
+     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+     */
+    uint32_t wait;
+    /**
+     * 1: make a step now. DIR has been right for the time that the driver needs.
+     */
+    uint8_t step;
+    /**
+     * The level of DIR from now on, 1 for reverse. It never changes together with a step.
+     */
+    uint8_t reverse;
+} sw_motion_fired_t;
+
+/**
+ * A receiver of start-stop fields from an oversampled line. Its content is private.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_nrz_t;
+
+/**
+ * A field that was received.
+ */
+typedef struct {
+    /**
+     * The sample with which its start bit begins, from the first of the line.
+     */
+    uint64_t start;
+    /**
+     * Spikes that were dropped before it.
+     */
+    uint32_t spikes;
+    /**
+     * The data bits, first of the line in bit 0.
+     */
+    uint16_t content;
+    /**
+     * The level of its delimiter: 1 in a sound field.
+     */
+    uint8_t delimiter;
+} sw_nrz_field_t;
+
+/**
+ * One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be copied. One context at a
+ * time.
+ */
+typedef struct {
+    uint64_t _private[60];
+} sw_rtex_axis_t;
+
+/**
+ * What an axis is set up with. Limits are counted in update periods.
+ */
+typedef struct {
+    /**
+     * Update period, ns.
+     */
+    uint32_t update_ns;
+    /**
+     * Update periods of invalid data at the start; 0 if somebody else has sent them.
+     */
+    uint32_t invalid;
+    /**
+     * Waits for Servo_Active, for an answer, for a stop.
+     */
+    uint32_t wait;
+    /**
+     * Wait for Servo_Ready; 0 waits for ever.
+     */
+    uint32_t ready;
+    /**
+     * Wait for Servo_Active to go; 0 is `wait`.
+     */
+    uint32_t inactive;
+    /**
+     * Electronic gear of the drive, numerator.
+     */
+    uint32_t gear_numerator;
+    /**
+     * Electronic gear of the drive, denominator.
+     */
+    uint32_t gear_denominator;
+    /**
+     * Responses without a new echo after which the axis stops, 1 or more.
+     */
+    uint16_t echo;
+    /**
+     * Responses with CMD_Error after which it stops, 1 or more.
+     */
+    uint16_t command_errors;
+    /**
+     * MAC-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * sw_rtex_mode_t.
+     */
+    uint8_t mode;
+} sw_rtex_config_t;
+
+/**
+ * Where an axis stands.
+ */
+typedef struct {
+    /**
+     * MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, where the reason has one.
+     */
+    uint16_t detail;
+    /**
+     * sw_rtex_axis_code_t.
+     */
+    uint8_t code;
+    /**
+     * sw_rtex_reason_t.
+     */
+    uint8_t reason;
+} sw_rtex_state_of_t;
+
+/**
+ * Feedback that may be used.
+ */
+typedef struct {
+    /**
+     * When the block was heard.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Actual position in command units.
+     */
+    int32_t position;
+} sw_rtex_feedback_t;
+
+/**
+ * What a drive sends: as received, not yet a position.
+ */
+typedef struct {
+    /**
+     * Response_Data1.
+     */
+    int32_t response_data1;
+    /**
+     * Status flags: sw_rtex_status_t; byte 2 is the low one.
+     */
+    uint16_t status;
+    /**
+     * Bytes 8 to 15, as the non-cyclic response lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Actual_MAC-ID.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter_Echo.
+     */
+    uint8_t update_counter_echo;
+    /**
+     * CMD_Error, 0 or 1.
+     */
+    uint8_t cmd_error;
+    /**
+     * Cyclic code, 0..15.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code, 0..7.
+     */
+    uint8_t noncyclic;
+} sw_rtex_response_t;
+
+/**
+ * What a controller sends.
+ */
+typedef struct {
+    /**
+     * Command_Data1.
+     */
+    int32_t command_data1;
+    /**
+     * Control bits: sw_rtex_control_t; byte 2 is the low one.
+     */
+    uint16_t control;
+    /**
+     * Bytes 8 to 15, as the non-cyclic command lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Mac-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter, 0..3.
+     */
+    uint8_t update_counter;
+    /**
+     * TMG_CNT, 0 or 1.
+     */
+    uint8_t tmg_cnt;
+    /**
+     * Cyclic code: sw_rtex_mode_t, 0 for NOP.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code.
+     */
+    uint8_t noncyclic;
+} sw_rtex_command_t;
+
+/**
+ * What a master sends.
+ */
+typedef struct {
+    /**
+     * Data ID: sw_tformat_id_t.
+     */
+    uint8_t id;
+    /**
+     * Address field of IDs 6 and D.
+     */
+    uint8_t adf;
+    /**
+     * Data field of ID 6.
+     */
+    uint8_t edf;
+} sw_tformat_request_t;
+
+/**
+ * What an encoder sends. Fields that the response to this data ID does not have are 0.
+ */
+typedef struct {
+    /**
+     * Single-turn data, 24 bits, right-aligned: as received, not yet a position.
+     */
+    uint32_t abs;
+    /**
+     * Multi-turn data, 24 bits, as received.
+     */
+    uint32_t abm;
+    /**
+     * Data ID: sw_tformat_id_t.
+     */
+    uint8_t id;
+    /**
+     * Status field: sw_tformat_sf_t.
+     */
+    uint8_t sf;
+    /**
+     * Encoder ID.
+     */
+    uint8_t enid;
+    /**
+     * Error byte: sw_tformat_almc_t.
+     */
+    uint8_t almc;
+    /**
+     * Address field: sw_tformat_adf_t.
+     */
+    uint8_t adf;
+    /**
+     * Data field of the EEPROM.
+     */
+    uint8_t edf;
+} sw_tformat_response_t;
+
+/**
+ * Where and how a frame is wrong.
+ */
+typedef struct {
+    /**
+     * What was received: a byte, a count of fields; 0 where the error has none.
+     */
+    uint32_t got;
+    /**
+     * What it should have been, or which of its bits must be 0.
+     */
+    uint32_t want;
+    /**
+     * The field in which the fault shows, 0 for the control field; 255 if it is not in one field.
+     */
+    uint8_t field;
+    /**
+     * The first wrong bit of that field: 0 is the start bit, 1 to 8 are data, 9 is the delimiter; 255 if it cannot be told.
+     */
+    uint8_t bit;
+} sw_detail_t;
+
+/**
+ * A modelled encoder with six pages of EEPROM. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[128];
+} sw_tformat_device_t;
+
+/**
+ * What an encoder sends, and when.
+ */
+typedef struct {
+    /**
+     * When the first start bit is on the line.
+     */
+    uint64_t start_ns;
+    /**
+     * When the last bit ends.
+     */
+    uint64_t end_ns;
+    /**
+     * The fields, one byte each.
+     */
+    uint8_t bytes[11];
+    /**
+     * How many.
+     */
+    uint8_t len;
+} sw_tformat_answer_t;
+
+/**
+ * A master: the line, one request and its response, and the newest position. Its content is private; it may be copied.
+ *
+ * One context at a time: an interrupt that calls it while another call runs is a race.
+ */
+typedef struct {
+    uint64_t _private[36];
+} sw_tformat_t;
+
+/**
+ * The times of a line, in ns: sw_tformat_get_line() gives the defaults, change what differs.
+ */
+typedef struct {
+    /**
+     * 2500000 or 5000000.
+     */
+    uint32_t bits_per_second;
+    /**
+     * From the end of the request to the start bit of the response, at most; default 10 000.
+     */
+    uint32_t response_timeout_ns;
+    /**
+     * From the end of a field to the end of the next, at most; default one and a half field times.
+     */
+    uint32_t field_timeout_ns;
+    /**
+     * From the end of the request to the start bit of the response, at least; default four bits.
+     */
+    uint32_t turn_around_ns;
+    /**
+     * From the end of a byte to its hand-over, at most: interrupt latency, or the time after which an idle line is reported.
+     */
+    uint32_t hand_over_ns;
+    /**
+     * The driver is on for this time before the request; default 1000.
+     */
+    uint32_t driver_lead_ns;
+    /**
+     * From the end of the request to the instant at which the position is taken; default 480.
+     */
+    uint32_t sampling_ns;
+    /**
+     * 1 if the own request is received: it makes the errors clearer, and nothing depends on it.
+     */
+    uint8_t echo;
+} sw_tformat_line_t;
+
+/**
+ * What is to be sent, and when.
+ */
+typedef struct {
+    /**
+     * When the start bit is on the line.
+     */
+    uint64_t start_ns;
+    /**
+     * When the last bit ends.
+     */
+    uint64_t end_ns;
+    /**
+     * When the driver is to be switched on.
+     */
+    uint64_t driver_on_ns;
+    /**
+     * When the driver is to be switched off at the latest; at `end_ns` at the earliest.
+     */
+    uint64_t driver_off_ns;
+    /**
+     * The fields, one byte each.
+     */
+    uint8_t bytes[4];
+    /**
+     * How many.
+     */
+    uint8_t len;
+} sw_tformat_transmission_t;
+
+/**
+ * A procedure of several exchanges: it says what to send, and decides what to repeat. Its content is private.
+ */
+typedef struct {
+    uint64_t _private[20];
+} sw_tformat_procedure_t;
+
+/**
+ * ID 0.
+ */
+typedef struct {
+    /**
+     * Single-turn data, 24 bits, as received.
+     */
+    uint32_t abs;
+    /**
+     * Status field: sw_tformat_sf_t.
+     */
+    uint8_t sf;
+} sw_tformat_single_turn_t;
+
+/**
+ * ID 1.
+ */
+typedef struct {
+    /**
+     * Multi-turn data, 24 bits, as received.
+     */
+    uint32_t abm;
+    /**
+     * Status field: sw_tformat_sf_t.
+     */
+    uint8_t sf;
+} sw_tformat_multi_turn_t;
+
+/**
+ * ID 2.
+ */
+typedef struct {
+    /**
+     * Status field: sw_tformat_sf_t.
+     */
+    uint8_t sf;
+    /**
+     * Encoder ID.
+     */
+    uint8_t enid;
+} sw_tformat_encoder_id_t;
+
+/**
+ * ID 3.
+ */
+typedef struct {
+    /**
+     * Single-turn data, 24 bits, as received.
+     */
+    uint32_t abs;
+    /**
+     * Multi-turn data, 24 bits, as received.
+     */
+    uint32_t abm;
+    /**
+     * Status field: sw_tformat_sf_t.
+     */
+    uint8_t sf;
+    /**
+     * Encoder ID.
+     */
+    uint8_t enid;
+    /**
+     * Error byte: sw_tformat_almc_t.
+     */
+    uint8_t almc;
+} sw_tformat_all_t;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and what its encoders are.
+ */
+sw_result_t sw_aformat_init(sw_aformat_t *m,
+                            uint32_t bits_per_second,
+                            const sw_aformat_encoder_t *encoder);
+
+/**
+ * From the end of a frame to its hand-over, at most, ns; and the highest address on the line, 0..7.
+ */
+sw_result_t sw_aformat_set_hand_over(sw_aformat_t *m, uint32_t hand_over_ns, uint8_t highest_ea);
+
+/**
+ * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
+ * way, and those with one answer to one encoder. SW_SEND with `to_send` filled.
+ */
+sw_result_t sw_aformat_read(sw_aformat_t *m,
+                            uint8_t command,
+                            uint8_t asked,
+                            uint64_t start_ns,
+                            sw_aformat_transmission_t *to_send);
+
+/**
+ * Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
+ * has a byte for each, 0 for a frame whose delimiter reads 0; NULL says that all are framed. At most 48 frames at once. SW_OK once all
+ * that were asked have answered; sw_aformat_missing() tells at any time who has not.
+ */
+sw_result_t sw_aformat_hear(sw_aformat_t *m,
+                            const uint16_t *contents,
+                            const uint8_t *framed,
+                            size_t count,
+                            uint64_t end_ns);
+
+/**
+ * It is `now_ns`: ends an exchange whose time is over, with SW_OK. Hand over what was received first.
+ */
+sw_result_t sw_aformat_poll(sw_aformat_t *m, uint64_t now_ns);
+
+/**
+ * While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
+ * SW_NO_TIME for a state that was not started.
+ */
+uint64_t sw_aformat_until_ns(const sw_aformat_t *m);
+
+/**
+ * Who was asked and has not answered, a bit each; 0xff for a state that was not started or has not asked.
+ */
+uint8_t sw_aformat_missing(const sw_aformat_t *m);
+
+/**
+ * The good response of an encoder to the newest request: raw fields. SW_E_NO_VALUE if there is none.
+ */
+sw_result_t sw_aformat_response(const sw_aformat_t *m, uint8_t ea, sw_aformat_response_t *response);
+
+/**
+ * The angle of a shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.** It is
+ * judged now, as by sw_tformat_angle(); the battery is tolerated.
+ */
+bool sw_aformat_angle(const sw_aformat_t *m,
+                      uint8_t ea,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      uint32_t *angle);
+
+/**
+ * The position with its turns, judged now, nothing tolerated: false if it must not be used.
+ */
+bool sw_aformat_position(const sw_aformat_t *m,
+                         uint8_t ea,
+                         uint64_t now_ns,
+                         uint64_t max_age_ns,
+                         sw_position_t *position);
+
+/**
+ * The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15 (sw_bit_order_t), at most 4: start bit and
+ * delimiter are left to the port.
+ */
+sw_result_t sw_aformat_build(const sw_aformat_request_t *asked,
+                             uint8_t order,
+                             uint16_t *words,
+                             size_t size,
+                             size_t *count);
+
+/**
+ * With which layout an encoder answers a request: sw_aformat_layout_t, and how many frames that has.
+ */
+sw_result_t sw_aformat_layout(const sw_aformat_request_t *asked,
+                              const sw_aformat_encoder_t *encoder,
+                              uint8_t *layout,
+                              uint8_t *frames);
+
+/**
+ * The response to a request from 16-bit words, a frame each, with all checks.
+ */
+sw_result_t sw_aformat_parse(const sw_aformat_request_t *asked,
+                             const sw_aformat_encoder_t *encoder,
+                             const uint16_t *words,
+                             size_t count,
+                             uint8_t order,
+                             sw_aformat_response_t *response);
+
+/**
+ * A response of this layout to this command, whose request is not at hand; `ea` 255 is any.
+ */
+sw_result_t sw_aformat_parse_as(uint8_t command,
+                                uint8_t layout,
+                                uint8_t ea,
+                                const uint16_t *words,
+                                size_t count,
+                                uint8_t order,
+                                sw_aformat_response_t *response);
+
+/**
+ * The same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after the 128th are left alone.
+ */
+sw_result_t sw_aformat_parse_line(uint8_t command,
+                                  uint8_t layout,
+                                  uint8_t ea,
+                                  const uint8_t *bytes,
+                                  size_t bits,
+                                  uint8_t order,
+                                  sw_aformat_response_t *response);
+
+/**
+ * Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
+ */
+sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
+                                 const sw_aformat_request_t *asked,
+                                 const sw_aformat_encoder_t *encoder,
+                                 uint8_t addresses);
+
+/**
+ * One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
+ * good one from the same address is SW_E_AFORMAT_TWO_RESPONSES: two encoders have it; one from an address that was not asked is
+ * SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for a look.
+ */
+sw_result_t sw_aformat_bus_push(sw_aformat_bus_t *bus,
+                                const uint16_t *words,
+                                size_t count,
+                                uint8_t order,
+                                sw_aformat_response_t *response);
+
+/**
+ * Who was asked and has not given a good response, a bit each; 0xff for a state that was not started.
+ */
+uint8_t sw_aformat_bus_missing(const sw_aformat_bus_t *bus);
+
+/**
+ * Tells the rate of the timer, once: at least 1 MHz (a coarser one cannot tell one field from the next: SW_E_ARGUMENT). The time is
+ * 0 ns now, when the timer reads `ticks`.
+ */
+sw_result_t sw_clock_start(sw_clock_t *clock,
+                           uint32_t timer_hz,
+                           uint32_t ticks);
+
+/**
+ * The time in ns since the start, from a reading of the timer. It never goes back and wraps after 584 years.
+ *
+ * The timer has to be read within half of its range, 12.6 s at 170 MHz. A timer that went back or was not read for too long gives
+ * SW_NO_TIME, once, which all other functions refuse; then time goes on from where it was. Reading the timer and this call belong
+ * into one critical section where several priorities do it.
+ */
+uint64_t sw_clock_ns(sw_clock_t *clock,
+                     uint32_t ticks);
+
+/**
+ * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
+ * second. While it is called neither end is in use.
+ */
+sw_result_t sw_motion_start(sw_motion_axis_t *axis,
+                            sw_motion_timer_t *timer,
+                            sw_motion_queue_t *queue,
+                            uint32_t clock_hz,
+                            const sw_motion_limits_t *limit);
+
+/**
+ * The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+ */
+sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
+                           sw_motion_fired_t *fired);
+
+/**
+ * A slice of planning, in the background: sw_motion_work_t, or a refusal.
+ */
+sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
+
+/**
+ * To a position in steps.
+ */
+sw_result_t sw_motion_move_to(sw_motion_axis_t *axis, int64_t target);
+
+/**
+ * On and on at this speed, steps/s; `reverse` is 0 or 1.
+ */
+sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t speed);
+
+/**
+ * To rest within the limits; the target is forgotten.
+ */
+sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
+
+/**
+ * No step any more, at once.
+ */
+sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
+
+/**
+ * To rest within the limits; sw_motion_resume() goes on.
+ */
+sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
+
+/**
+ * Goes on after sw_motion_hold().
+ */
+sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
+
+/**
+ * Where the axis is commanded to be, in steps.
+ */
+sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
+
+/**
+ * Whether the axis stands; false for a state that was not started.
+ */
+bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
+
+/**
+ * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
+ */
+sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
+
+/**
+ * `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field, SW_PENDING without.
+ */
+sw_result_t sw_nrz_run(sw_nrz_t *receiver,
+                       uint8_t level,
+                       uint64_t samples,
+                       sw_nrz_field_t *field);
+
+/**
+ * The name of a result in `snake_case`, as logs and test vectors of servowire spell it; "unknown" for a number that is none.
+ * Never NULL, valid for ever.
+ */
+const char *sw_text(sw_result_t result);
+
+/**
+ * Prepares an axis whose drive has not answered yet.
+ */
+sw_result_t sw_rtex_axis_start(sw_rtex_axis_t *axis, const sw_rtex_config_t *config);
+
+/**
+ * Takes what an update period brought: the block of this axis, or NULL if there was none, heard until `end_ns`. A block of another
+ * length is a refused one.
+ */
+sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis,
+                              const uint8_t *bytes,
+                              size_t len,
+                              uint64_t end_ns);
+
+/**
+ * The block of the next update period, 16 bytes, which counts as sent.
+ */
+sw_result_t sw_rtex_axis_transmit(sw_rtex_axis_t *axis, uint8_t *bytes, size_t size);
+
+/**
+ * Switches the servo on: SW_E_RTEX_NOT_NOW if the axis is not off, no new position has come, or the drive is not ready.
+ */
+sw_result_t sw_rtex_axis_switch_on(sw_rtex_axis_t *axis);
+
+/**
+ * Switches the servo off.
+ */
+sw_result_t sw_rtex_axis_switch_off(sw_rtex_axis_t *axis);
+
+/**
+ * Stops by category 0 (servo off at once), 1 (slow down, then off) or 2 (slow down and hold), as far as the limits of the axis allow.
+ */
+sw_result_t sw_rtex_axis_stop(sw_rtex_axis_t *axis,
+                              uint8_t category);
+
+/**
+ * Leaves the stop: the axis may be switched on again when its drive allows.
+ */
+sw_result_t sw_rtex_axis_clear(sw_rtex_axis_t *axis);
+
+/**
+ * The target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the drive's gear and the limits
+ * allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the set-point stays then.
+ */
+sw_result_t sw_rtex_axis_set_position(sw_rtex_axis_t *axis,
+                                      int32_t position);
+
+/**
+ * The speed of CV or the torque of CT, in the units of the drive.
+ */
+sw_result_t sw_rtex_axis_set_rate(sw_rtex_axis_t *axis, int32_t rate);
+
+/**
+ * Control bits beside Servo_On and the stops (sw_rtex_control_t, added), from the next block on.
+ */
+sw_result_t sw_rtex_axis_set_control(sw_rtex_axis_t *axis, uint16_t control);
+
+/**
+ * The set-point: in CP the target in command units; 0 for a state that was not started.
+ */
+int32_t sw_rtex_axis_setpoint(const sw_rtex_axis_t *axis);
+
+/**
+ * Where the axis stands, and why.
+ */
+sw_result_t sw_rtex_axis_state(const sw_rtex_axis_t *axis, sw_rtex_state_of_t *state);
+
+/**
+ * The actual position, judged now: **false if it must not be used**: never heard, older than `max_age_ns`, an alarm of the drive.
+ */
+bool sw_rtex_feedback(const sw_rtex_axis_t *axis,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      sw_rtex_feedback_t *feedback);
+
+/**
+ * The response in a block of 16 bytes.
+ */
+sw_result_t sw_rtex_parse_response(const uint8_t *bytes, size_t len, sw_rtex_response_t *response);
+
+/**
+ * The command in a block of 16 bytes, as a drive receives it.
+ */
+sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_command_t *command);
+
+/**
+ * The block of a command, 16 bytes. Reserved bits are sent as 0.
+ */
+sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.
+ */
+sw_result_t sw_tformat_parse(const sw_tformat_request_t *asked,
+                             const uint8_t *bytes,
+                             size_t len,
+                             sw_tformat_response_t *response);
+
+/**
+ * The response from what a UART received since the request began, with the receiver on all the time: the own request, then the
+ * response.
+ */
+sw_result_t sw_tformat_parse_echoed(const sw_tformat_request_t *asked,
+                                    const uint8_t *bytes,
+                                    size_t len,
+                                    sw_tformat_response_t *response);
+
+/**
+ * The response from line bits on a grid of ten bits a field, start bits and delimiters included: `bits` of them in `bytes`, in the
+ * order of sw_bit_order_t. What follows the response, and bits after the 128th, are left alone.
+ */
+sw_result_t sw_tformat_parse_line(const sw_tformat_request_t *asked,
+                                  const uint8_t *bytes,
+                                  size_t bits,
+                                  uint8_t order,
+                                  sw_tformat_response_t *response);
+
+/**
+ * What an encoder makes of received fields: the request at the front.
+ */
+sw_result_t sw_tformat_parse_request(const uint8_t *bytes, size_t len, sw_tformat_request_t *asked);
+
+/**
+ * Why sw_tformat_parse() refuses these bytes. The result is the same as there.
+ */
+sw_result_t sw_tformat_why(const sw_tformat_request_t *asked,
+                           const uint8_t *bytes,
+                           size_t len,
+                           sw_detail_t *why);
+
+/**
+ * The fields to send for a request, at most 4 bytes.
+ */
+sw_result_t sw_tformat_build(const sw_tformat_request_t *asked, uint8_t *bytes, size_t size, size_t *len);
+
+/**
+ * The line bits of a request, start bits and delimiters included, in the order of sw_bit_order_t, at most 40 bits in 5 bytes; `bits`
+ * is how many. Bits after the last are 0.
+ */
+sw_result_t sw_tformat_build_line(const sw_tformat_request_t *asked,
+                                  uint8_t order,
+                                  uint8_t *bytes,
+                                  size_t size,
+                                  size_t *bits);
+
+/**
+ * The fields that an encoder sends, at most 11 bytes.
+ */
+sw_result_t sw_tformat_build_response(const sw_tformat_response_t *response,
+                                      uint8_t *bytes,
+                                      size_t size,
+                                      size_t *len);
+
+/**
+ * The control field of a data ID, 0..15: sink code, ID and parity. IDs above 15 are cut.
+ */
+uint8_t sw_tformat_control_field(uint8_t id);
+
+/**
+ * The data ID of a control field, with its checks.
+ */
+sw_result_t sw_tformat_parse_control_field(uint8_t cf, uint8_t *id);
+
+/**
+ * The check field over these bytes, their XOR; 0 for NULL.
+ */
+uint8_t sw_tformat_crc(const uint8_t *bytes, size_t len);
+
+/**
+ * The widths that an encoder ID suggests; true if a document or a log shows them, false if they follow from a rule. Without a
+ * suggestion the result is SW_E_NO_VALUE.
+ */
+sw_result_t sw_tformat_widths(uint8_t enid,
+                              uint8_t *abs_bits,
+                              uint8_t *abm_bits,
+                              bool *documented);
+
+/**
+ * Switches an encoder on: position 0, no alarms. `bits_per_second` is 2500000 or 5000000.
+ */
+sw_result_t sw_tformat_device_start(sw_tformat_device_t *device, uint8_t enid, uint32_t bits_per_second);
+
+/**
+ * Turns the shaft: ABS before the zero of ID 8 is applied, and ABM, 24 bits each.
+ */
+sw_result_t sw_tformat_device_set_position(sw_tformat_device_t *device, uint32_t abs, uint32_t abm);
+
+/**
+ * The causes of these alarms (sw_tformat_almc_t, added) come, and those of all others go. A latched alarm stays until ID 7 or C.
+ */
+sw_result_t sw_tformat_device_set_alarms(sw_tformat_device_t *device,
+                                         uint8_t almc);
+
+/**
+ * The EEPROM page that is selected, 0..5; 255 for a state that was not started.
+ */
+uint8_t sw_tformat_device_page(const sw_tformat_device_t *device);
+
+/**
+ * A sound request that ended at `now_ns`: what it does, and its response. SW_E_NO_VALUE where the encoder is silent.
+ */
+sw_result_t sw_tformat_device_answer(sw_tformat_device_t *device,
+                                     const sw_tformat_request_t *asked,
+                                     uint64_t now_ns,
+                                     sw_tformat_response_t *response);
+
+/**
+ * Bytes were received without framing error, the last one ended at `end_ns`. SW_SEND with `answer` filled, or SW_PENDING.
+ */
+sw_result_t sw_tformat_device_hear(sw_tformat_device_t *device,
+                                   const uint8_t *bytes,
+                                   size_t len,
+                                   uint64_t end_ns,
+                                   sw_tformat_answer_t *answer);
+
+/**
+ * A byte that ended at `end_ns` was received with a framing error.
+ */
+sw_result_t sw_tformat_device_framing_error(sw_tformat_device_t *device,
+                                            uint64_t end_ns,
+                                            sw_tformat_answer_t *answer);
+
+/**
+ * Prepares a master: bits per second (2500000 or 5000000) and the widths of the encoder's single-turn data, 1..24 bits, and
+ * multi-turn data, 0..24 bits.
+ */
+sw_result_t sw_tformat_init(sw_tformat_t *m,
+                            uint32_t bits_per_second,
+                            uint8_t abs_bits,
+                            uint8_t abm_bits);
+
+/**
+ * Other widths, or turns of another kind (`flags`: sw_tformat_turns_t). The position that was heard last is forgotten.
+ */
+sw_result_t sw_tformat_set_resolution(sw_tformat_t *m,
+                                      uint8_t abs_bits,
+                                      uint8_t abm_bits,
+                                      uint8_t flags);
+
+/**
+ * The times of the line as they are.
+ */
+sw_result_t sw_tformat_get_line(const sw_tformat_t *m, sw_tformat_line_t *line);
+
+/**
+ * Other times of the line, from the next request on. `echo` is 0 or 1.
+ */
+sw_result_t sw_tformat_set_line(sw_tformat_t *m, const sw_tformat_line_t *line);
+
+/**
+ * Alarms (sw_tformat_almc_t, added) that sw_tformat_angle() and sw_tformat_position() tolerate beside their own, from now on.
+ */
+sw_result_t sw_tformat_tolerate(sw_tformat_t *m,
+                                uint8_t almc);
+
+/**
+ * Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
+ * and `to_send` is filled.
+ */
+sw_result_t sw_tformat_read(sw_tformat_t *m,
+                            uint8_t id,
+                            uint64_t start_ns,
+                            sw_tformat_transmission_t *to_send);
+
+/**
+ * Begins one exchange of any kind. IDs 6, 7, 8 and C change the encoder: the procedures do it with the repetitions, waits and
+ * checks that belong to it.
+ */
+sw_result_t sw_tformat_start(sw_tformat_t *m,
+                             const sw_tformat_request_t *asked,
+                             uint64_t start_ns,
+                             sw_tformat_transmission_t *to_send);
+
+/**
+ * Bytes were received one after the other; the last one ended at `end_ns`, or was handed over within the latency of the line after
+ * that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
+ */
+sw_result_t sw_tformat_hear(sw_tformat_t *m,
+                            const uint8_t *bytes,
+                            size_t len,
+                            uint64_t end_ns);
+
+/**
+ * The UART reports a framing error for the byte that ended at `end_ns`.
+ */
+sw_result_t sw_tformat_framing_error(sw_tformat_t *m, uint64_t end_ns);
+
+/**
+ * It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+ */
+sw_result_t sw_tformat_poll(sw_tformat_t *m, uint64_t now_ns);
+
+/**
+ * While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
+ * SW_NO_TIME for a state that was not started.
+ */
+uint64_t sw_tformat_until_ns(const sw_tformat_t *m);
+
+/**
+ * The response of the exchange, once it has ended with SW_OK: raw fields. For control use sw_tformat_angle() and
+ * sw_tformat_position().
+ */
+sw_result_t sw_tformat_response(const sw_tformat_t *m,
+                                sw_tformat_response_t *response);
+
+/**
+ * The angle of the shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.**
+ *
+ * It is judged now: no older than `max_age_ns` since it was sampled, from a sound response to this master's request, of the right
+ * encoder, without alarms that concern the single turn (tolerated are OF, BA, BE, ME and OS, and what sw_tformat_tolerate() names).
+ * `angle` is left alone if the result is false.
+ */
+bool sw_tformat_angle(const sw_tformat_t *m,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      uint32_t *angle);
+
+/**
+ * The position with its turns, judged now: false if it must not be used. Tolerated are OF and BA, and what sw_tformat_tolerate()
+ * names. Turns come with ID 3. `position` is left alone if the result is false.
+ */
+bool sw_tformat_position(const sw_tformat_t *m,
+                         uint64_t now_ns,
+                         uint64_t max_age_ns,
+                         sw_position_t *position);
+
+/**
+ * Why sw_tformat_angle() is false: sw_tformat_doubt_t, or a refusal.
+ */
+sw_result_t sw_tformat_doubt(const sw_tformat_t *m, uint64_t now_ns, uint64_t max_age_ns);
+
+/**
+ * ID 7: clears all latched errors, ten requests. Position and turns stay. Then sw_tformat_next().
+ */
+sw_result_t sw_tformat_clear_errors(sw_tformat_procedure_t *p, uint64_t now_ns);
+
+/**
+ * ID 8: makes this position the zero of the turn, and reads what became of it. **Shifts the commutation angle of the motor.** The
+ * shaft stands still; `tolerance` is how far from zero, in counts, it may seem to be afterwards.
+ */
+sw_result_t sw_tformat_zero_single_turn_and_shift_commutation_angle(sw_tformat_procedure_t *p,
+                                                                    uint8_t abs_bits,
+                                                                    uint32_t tolerance,
+                                                                    uint64_t now_ns);
+
+/**
+ * ID C: clears turns and errors, and reads what became of it. **The machine loses its multi-turn reference.** `tolerance` is how
+ * many turns it may seem to be off zero afterwards.
+ */
+sw_result_t sw_tformat_clear_turns_and_lose_multi_turn_reference(sw_tformat_procedure_t *p,
+                                                                 uint8_t abs_bits,
+                                                                 uint8_t abm_bits,
+                                                                 uint32_t tolerance,
+                                                                 uint64_t now_ns);
+
+/**
+ * Reads the EEPROM byte at `address`, 0..126, of `page`, 0..7.
+ */
+sw_result_t sw_tformat_eeprom_read(sw_tformat_procedure_t *p, uint8_t page, uint8_t address, uint64_t now_ns);
+
+/**
+ * Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: know what is at the address.
+ */
+sw_result_t sw_tformat_eeprom_write(sw_tformat_procedure_t *p,
+                                    uint8_t page,
+                                    uint8_t address,
+                                    uint8_t edf,
+                                    uint64_t now_ns);
+
+/**
+ * Finds the encoder after power-on: 1.5 s later at 5 Mbit/s, then at 2.5 Mbit/s. The master's line is that of the encoder when it
+ * ends with SW_OK; the value is its ENID.
+ */
+sw_result_t sw_tformat_detect(sw_tformat_procedure_t *p,
+                              uint64_t power_on_ns);
+
+/**
+ * What a procedure wants next: SW_SEND with `to_send` filled (the exchange has begun in the master: hear and poll it until it ends,
+ * then call this again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
+ *
+ * The first call begins. After the end the line and the encoder are free at sw_tformat_value()'s `ready_ns`.
+ */
+sw_result_t sw_tformat_next(sw_tformat_procedure_t *p,
+                            sw_tformat_t *m,
+                            uint64_t now_ns,
+                            sw_tformat_transmission_t *to_send);
+
+/**
+ * What a procedure that has ended with SW_OK was made for: the EEPROM byte, ENID, ABM or ABS. `ready_ns` (may be NULL) is the time from
+ * which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+ */
+sw_result_t sw_tformat_value(const sw_tformat_procedure_t *p,
+                             uint32_t *value,
+                             uint64_t *ready_ns);
+
+/**
+ * The request in 10-bit SPI words, sent most significant bit first, one a field, at most 4. The idle word 0x3ff follows.
+ */
+sw_result_t sw_tformat_build_spi10(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from 10-bit SPI words, without the idle words received during the request.
+ */
+sw_result_t sw_tformat_parse_spi10(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
+
+/**
+ * What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
+ */
+sw_result_t sw_tformat_build_spi16(const sw_tformat_request_t *asked,
+                                   uint16_t *words,
+                                   size_t size,
+                                   size_t *count);
+
+/**
+ * The response from the 16-bit SPI words received over a whole transaction.
+ */
+sw_result_t sw_tformat_parse_spi16(const sw_tformat_request_t *asked,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   sw_tformat_response_t *response);
+
+/**
+ * The response to ID 0 from UART bytes.
+ */
+sw_result_t sw_tformat_parse_single_turn(const uint8_t *bytes, size_t len, sw_tformat_single_turn_t *data);
+
+/**
+ * The response to ID 1 from UART bytes.
+ */
+sw_result_t sw_tformat_parse_multi_turn(const uint8_t *bytes, size_t len, sw_tformat_multi_turn_t *data);
+
+/**
+ * The response to ID 2 from UART bytes.
+ */
+sw_result_t sw_tformat_parse_encoder_id(const uint8_t *bytes, size_t len, sw_tformat_encoder_id_t *data);
+
+/**
+ * The response to ID 3 from UART bytes.
+ */
+sw_result_t sw_tformat_parse_all(const uint8_t *bytes, size_t len, sw_tformat_all_t *data);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* SERVOWIRE_H */

@@ -1,0 +1,27 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![allow(non_camel_case_types, reason = "names as C writes them")]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+pub mod aformat;
+mod border;
+mod clock;
+pub mod motion;
+pub mod nrz;
+mod result;
+pub mod rtex;
+#[cfg(test)]
+mod tests;
+pub mod tformat;
+
+pub use clock::{SW_NO_TIME, sw_clock_ns, sw_clock_start, sw_clock_t};
+pub use result::{sw_code_t, sw_result_t, sw_text};
+
+/// Never called: no function of this library can panic, and the tests of the library look for it.
+#[cfg(all(feature = "panic-handler", not(feature = "std"), not(test)))]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {}
+}

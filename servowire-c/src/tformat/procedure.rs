@@ -1,0 +1,218 @@
+//! What takes several exchanges.
+
+use core::mem::MaybeUninit;
+
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, MultiTurnZero, Progress, Reset, SingleTurnZero, Step};
+use tformat::{Address, Error, Page, Resolution, Response};
+
+use super::codec::error;
+use super::master::{sw_tformat_t, sw_tformat_transmission_t};
+use crate::border::{OK, Refused, border, in_range, state, there};
+use crate::clock::time;
+use crate::result::{sw_code_t, sw_result_t};
+
+/// A procedure of several exchanges: it says what to send, and decides what to repeat. Its content is private.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct sw_tformat_procedure_t {
+    pub(crate) _private: [MaybeUninit<u64>; 20],
+}
+state!(sw_tformat_procedure_t, Procedure, b"SWtp");
+
+#[derive(Clone, Copy)]
+pub(crate) enum Kind {
+    Reset(Reset),
+    SingleTurnZero(SingleTurnZero),
+    MultiTurnZero(MultiTurnZero),
+    Eeprom(EepromAccess),
+    Detection(Detection),
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Procedure {
+    kind: Kind,
+    next: Step<u32>,
+    /// The exchange of `next` has begun.
+    asked: bool,
+}
+
+/// The value of a procedure as a number: what C asks for.
+fn plain<T>(step: Step<T>, number: impl FnOnce(T) -> u32) -> Step<u32> {
+    step.and_then(|value, ready_ns| Step::Done { value: number(value), ready_ns })
+}
+
+impl Kind {
+    fn start(&mut self, now_ns: u64) -> Step<u32> {
+        match self {
+            Self::Reset(it) => plain(it.start(now_ns), |value| value.abs.get()),
+            Self::SingleTurnZero(it) => plain(it.start(now_ns), |value| value.abs.get()),
+            Self::MultiTurnZero(it) => plain(it.start(now_ns), |value| value.abm.get()),
+            Self::Eeprom(it) => plain(it.start(now_ns), u32::from),
+            Self::Detection(it) => plain(it.start(now_ns), |value| value.enid.into()),
+        }
+    }
+
+    fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u32> {
+        match self {
+            Self::Reset(it) => plain(it.receive(outcome, ready_ns), |value| value.abs.get()),
+            Self::SingleTurnZero(it) => plain(it.receive(outcome, ready_ns), |value| value.abs.get()),
+            Self::MultiTurnZero(it) => plain(it.receive(outcome, ready_ns), |value| value.abm.get()),
+            Self::Eeprom(it) => plain(it.receive(outcome, ready_ns), u32::from),
+            Self::Detection(it) => plain(it.receive(outcome, ready_ns), |value| value.enid.into()),
+        }
+    }
+}
+
+fn begin(p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>, mut kind: Kind, now_ns: u64) -> Result<i32, Refused> {
+    let next = kind.start(time(now_ns)?);
+    sw_tformat_procedure_t::start(p, Procedure { kind, next, asked: false })?;
+    OK
+}
+
+/// ID 7: clears all latched errors, ten requests. Position and turns stay. Then sw_tformat_next().
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_clear_errors(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    now_ns: u64,
+) -> sw_result_t {
+    border(|| begin(p, Kind::Reset(Reset::clear_errors()), now_ns))
+}
+
+/// ID 8: makes this position the zero of the turn, and reads what became of it. **Shifts the commutation angle of the motor.** The
+/// shaft stands still; `tolerance` is how far from zero, in counts, it may seem to be afterwards.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_zero_single_turn_and_shift_commutation_angle(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    abs_bits: u8,
+    tolerance: u32,
+    now_ns: u64,
+) -> sw_result_t {
+    border(|| {
+        let resolution = in_range(Resolution::new(abs_bits, 0).ok())?;
+        begin(p, Kind::SingleTurnZero(SingleTurnZero::set_and_shift_commutation_angle(resolution, tolerance)), now_ns)
+    })
+}
+
+/// ID C: clears turns and errors, and reads what became of it. **The machine loses its multi-turn reference.** `tolerance` is how
+/// many turns it may seem to be off zero afterwards.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_clear_turns_and_lose_multi_turn_reference(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    abs_bits: u8,
+    abm_bits: u8,
+    tolerance: u32,
+    now_ns: u64,
+) -> sw_result_t {
+    border(|| {
+        let resolution = in_range(Resolution::new(abs_bits, abm_bits).ok())?;
+        begin(p, Kind::MultiTurnZero(MultiTurnZero::set_and_lose_multi_turn_reference(resolution, tolerance)), now_ns)
+    })
+}
+
+/// Reads the EEPROM byte at `address`, 0..126, of `page`, 0..7.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_eeprom_read(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    page: u8,
+    address: u8,
+    now_ns: u64,
+) -> sw_result_t {
+    border(|| {
+        let (page, address) = cell(page, address)?;
+        begin(p, Kind::Eeprom(EepromAccess::read(page, address, EEPROM_POLLING)), now_ns)
+    })
+}
+
+/// Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: know what is at the address.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_eeprom_write(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    page: u8,
+    address: u8,
+    edf: u8,
+    now_ns: u64,
+) -> sw_result_t {
+    border(|| {
+        let (page, address) = cell(page, address)?;
+        begin(p, Kind::Eeprom(EepromAccess::write(page, address, edf, EEPROM_POLLING)), now_ns)
+    })
+}
+
+fn cell(page: u8, address: u8) -> Result<(Page, Address), Refused> {
+    let address = in_range(Address::new(address).filter(|address| *address != Address::PAGE_REGISTER))?;
+    Ok((in_range(Page::new(page))?, address))
+}
+
+/// Finds the encoder after power-on: 1.5 s later at 5 Mbit/s, then at 2.5 Mbit/s. The master's line is that of the encoder when it
+/// ends with SW_OK; the value is its ENID.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_detect(
+    p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
+    power_on_ns: u64,
+) -> sw_result_t {
+    border(|| begin(p, Kind::Detection(Detection::new()), power_on_ns))
+}
+
+/// What a procedure wants next: SW_SEND with `to_send` filled (the exchange has begun in the master: hear and poll it until it ends,
+/// then call this again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
+///
+/// The first call begins. After the end the line and the encoder are free at sw_tformat_value()'s `ready_ns`.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_next(
+    p: Option<&mut sw_tformat_procedure_t>,
+    m: Option<&mut sw_tformat_t>,
+    now_ns: u64,
+    to_send: Option<&mut MaybeUninit<sw_tformat_transmission_t>>,
+) -> sw_result_t {
+    border(|| {
+        let (p, m) = (sw_tformat_procedure_t::get(p)?, sw_tformat_t::get(m)?);
+        let (now_ns, to_send) = (time(now_ns)?, there(to_send)?);
+        if p.asked {
+            let ended = m.transaction.map(|transaction| transaction.progress());
+            let (outcome, ready_ns) = match ended {
+                Some(Progress::Pending { .. }) => return Ok(sw_code_t::SW_PENDING as sw_result_t),
+                Some(Progress::Done { value, ready_ns }) => (Ok(value.response), ready_ns),
+                Some(Progress::Failed { error, ready_ns }) => (Err(error), ready_ns),
+                None => return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
+            };
+            p.next = p.kind.receive(outcome, ready_ns);
+            p.asked = false;
+        }
+        match p.next {
+            Step::Send { request, not_before_ns } => {
+                if let Kind::Detection(detection) = &p.kind {
+                    m.line = detection.line();
+                }
+                p.asked = true;
+                m.begin(request, not_before_ns.max(now_ns), to_send)
+            }
+            Step::Done { .. } => OK,
+            Step::Failed { error: refusal, .. } => Err(error(refusal)),
+        }
+    })
+}
+
+/// What a procedure that has ended with SW_OK was made for: the EEPROM byte, ENID, ABM or ABS. `ready_ns` (may be NULL) is the time from
+/// which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_tformat_value(
+    p: Option<&sw_tformat_procedure_t>,
+    value: Option<&mut MaybeUninit<u32>>,
+    ready_ns: Option<&mut MaybeUninit<u64>>,
+) -> sw_result_t {
+    border(|| {
+        let (p, value) = (sw_tformat_procedure_t::look(p)?, there(value)?);
+        let (result, end_ns) = match p.next {
+            Step::Send { .. } => return Ok(sw_code_t::SW_PENDING as sw_result_t),
+            Step::Done { value: it, ready_ns } => {
+                value.write(it);
+                (OK, ready_ns)
+            }
+            Step::Failed { error: refusal, ready_ns } => (Err(error(refusal)), ready_ns),
+        };
+        if let Some(ready_ns) = ready_ns {
+            ready_ns.write(end_ns);
+        }
+        result
+    })
+}

@@ -1,0 +1,343 @@
+/* What C may do wrong, and what it may do at all: NULL, short buffers, a state that was not started, one of another kind,
+ * a copy; and one exchange from the request to the angle. */
+#include "servowire.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CHECK(truth) \
+    do { \
+        if (!(truth)) { \
+            fprintf(stderr, "%s:%d: not so: %s\n", __FILE__, __LINE__, #truth); \
+            exit(1); \
+        } \
+    } while (0)
+
+/* ID 3: turn 0, 3915817 counts of 23 bits, no alarms. */
+static const uint8_t answer[11] = {0x1a, 0x00, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0x00, 0xdf};
+
+static sw_tformat_t zeroed;
+
+static void pointers(void)
+{
+    sw_tformat_all_t all;
+    sw_tformat_response_t response;
+    sw_tformat_request_t request = {SW_TFORMAT_READ_EEPROM, 5, 0};
+    uint8_t bytes[4];
+    size_t len = 99;
+
+    CHECK(sw_tformat_parse_all(NULL, 11, &all) == SW_E_NULL);
+    CHECK(sw_tformat_parse_all(answer, 11, NULL) == SW_E_NULL);
+    CHECK(sw_tformat_parse_all(answer, 0, &all) == SW_E_TFORMAT_TRUNCATED);
+    CHECK(sw_tformat_parse_all(answer, SIZE_MAX, &all) == SW_E_ARGUMENT);
+    CHECK(sw_tformat_parse(NULL, answer, 11, &response) == SW_E_NULL);
+    CHECK(sw_tformat_build(&request, bytes, 2, &len) == SW_E_SHORT_BUFFER && len == 99);
+    CHECK(sw_tformat_build(&request, bytes, 4, NULL) == SW_E_NULL);
+    CHECK(sw_tformat_build(&request, NULL, 4, &len) == SW_E_NULL);
+    CHECK(sw_tformat_build(&request, bytes, 3, &len) == SW_OK && len == 3 && bytes[2] == (0xea ^ 5));
+    request.id = 4;
+    CHECK(sw_tformat_build(&request, bytes, 4, &len) == SW_E_ARGUMENT);
+}
+
+static void states(void)
+{
+    sw_tformat_t m;
+    sw_tformat_t other;
+    sw_tformat_procedure_t p;
+    sw_tformat_transmission_t tx;
+    sw_tformat_line_t line;
+    uint32_t angle = 7;
+
+    memset(&m, 0xff, sizeof m);
+    CHECK(sw_tformat_hear(&zeroed, answer, 11, 1) == SW_E_STATE);
+    CHECK(sw_tformat_hear(&m, answer, 11, 1) == SW_E_STATE);
+    CHECK(sw_tformat_hear(NULL, answer, 11, 1) == SW_E_NULL);
+    CHECK(sw_tformat_read(&zeroed, SW_TFORMAT_READ_ALL, 0, &tx) == SW_E_STATE);
+    CHECK(!sw_tformat_angle(&zeroed, 0, 1000, &angle) && !sw_tformat_angle(NULL, 0, 1000, &angle) && angle == 7);
+    CHECK(sw_tformat_until_ns(&zeroed) == SW_NO_TIME);
+    CHECK(sw_tformat_init(&m, 3000000, 23, 16) == SW_E_ARGUMENT && sw_tformat_poll(&m, 0) == SW_E_STATE);
+    CHECK(sw_tformat_init(&m, 2500000, 25, 16) == SW_E_ARGUMENT);
+    CHECK(sw_tformat_init(NULL, 2500000, 23, 16) == SW_E_NULL);
+
+    /* A state of another kind is none. */
+    CHECK(sw_tformat_clear_errors(&p, 0) == SW_OK);
+    memcpy(&m, &p, sizeof p);
+    CHECK(sw_tformat_poll(&m, 0) == SW_E_STATE);
+
+    CHECK(sw_tformat_init(&m, 2500000, 23, 16) == SW_OK);
+    CHECK(sw_tformat_poll(&m, 0) == SW_E_NO_VALUE);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_SET_SINGLE_TURN_ZERO, 0, &tx) == SW_E_ARGUMENT);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, SW_NO_TIME, &tx) == SW_E_CLOCK);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 0, NULL) == SW_E_NULL);
+    CHECK(sw_tformat_get_line(&m, &line) == SW_OK && line.bits_per_second == 2500000 && line.turn_around_ns == 1600);
+    line.response_timeout_ns = 1000;
+    CHECK(sw_tformat_set_line(&m, &line) == SW_OK);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 0, &tx) == SW_E_TFORMAT_LINE);
+    line.response_timeout_ns = 10000;
+    line.echo = 2;
+    CHECK(sw_tformat_set_line(&m, &line) == SW_E_ARGUMENT);
+
+    /* A copy is a state of its own. */
+    CHECK(sw_tformat_init(&m, 2500000, 23, 16) == SW_OK);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 0, &tx) == SW_SEND);
+    other = m;
+    CHECK(sw_tformat_hear(&other, answer, 11, 51000) == SW_OK);
+    CHECK(sw_tformat_poll(&m, 1000) == SW_PENDING);
+    CHECK(sw_tformat_angle(&other, 60000, 100000, &angle) && !sw_tformat_angle(&m, 60000, 100000, &angle));
+}
+
+/* TIDM-1011: ID 3 is 0x1a; a field takes 4 us, the answer begins 3 us after the request. */
+static void exchange(void)
+{
+    sw_tformat_t m;
+    sw_tformat_transmission_t tx;
+    sw_tformat_response_t response;
+    sw_position_t position;
+    uint32_t angle = 0;
+    uint8_t damaged[11];
+
+    CHECK(sw_tformat_init(&m, 2500000, 23, 16) == SW_OK);
+    CHECK(sw_tformat_doubt(&m, 0, 1000) == SW_TFORMAT_DOUBT_NEVER);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1000000, &tx) == SW_SEND);
+    CHECK(tx.len == 1 && tx.bytes[0] == 0x1a && tx.start_ns == 1000000 && tx.end_ns == 1004000);
+    CHECK(tx.driver_on_ns == 999000 && tx.driver_off_ns == 1005600);
+    CHECK(sw_tformat_hear(&m, answer, 4, 1023000) == SW_PENDING);
+    CHECK(sw_tformat_response(&m, &response) == SW_E_NO_VALUE);
+    CHECK(sw_tformat_hear(&m, answer + 4, 7, 1051000) == SW_OK);
+    CHECK(sw_tformat_response(&m, &response) == SW_OK && response.id == 3 && response.abs == 3915817);
+    CHECK(response.enid == 0x17 && response.almc == 0 && response.abm == 0);
+    CHECK(sw_tformat_until_ns(&m) == 1051000);
+
+    /* Sampled at 1004480: 62.5 us later it is good, and not a nanosecond longer. */
+    CHECK(sw_tformat_angle(&m, 1066980, 62500, &angle) && angle == 3915817u << 9);
+    CHECK(sw_tformat_position(&m, 1066980, 62500, &position));
+    CHECK(position.single_turn == 3915817 && position.turns == 0 && position.counts == 3915817);
+    CHECK(position.sampled_ns == 1004480);
+    angle = 5;
+    CHECK(!sw_tformat_angle(&m, 1066981, 62500, &angle) && angle == 5);
+    CHECK(sw_tformat_doubt(&m, 1066981, 62500) == SW_TFORMAT_DOUBT_OLD);
+    CHECK(!sw_tformat_angle(&m, SW_NO_TIME, UINT64_MAX, &angle) && angle == 5);
+
+    /* A damaged answer is refused, and the position grows old. */
+    memcpy(damaged, answer, sizeof damaged);
+    damaged[3] ^= 1;
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1100000, &tx) == SW_SEND);
+    CHECK(sw_tformat_hear(&m, damaged, 11, 1151000) == SW_E_TFORMAT_CRC);
+    CHECK(strcmp(sw_text(SW_E_TFORMAT_CRC), "crc") == 0 && strcmp(sw_text(-9999), "unknown") == 0);
+    CHECK(!sw_tformat_angle(&m, 1155000, 62500, &angle));
+
+    /* Nobody answers: 10 us, a field and the time to hand it over, then it is over. */
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1200000, &tx) == SW_SEND);
+    CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m) - 1) == SW_PENDING);
+    CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m)) == SW_E_TFORMAT_NO_RESPONSE);
+}
+
+/* Master and modelled encoder: ID 7 ten times, an EEPROM byte written and read back. */
+static uint64_t now;
+
+static sw_result_t run(sw_tformat_procedure_t *p, sw_tformat_device_t *encoder, uint32_t *value)
+{
+    sw_tformat_t m;
+    sw_tformat_transmission_t tx;
+    sw_tformat_answer_t reply;
+    sw_result_t r;
+    unsigned sent = 0;
+
+    CHECK(sw_tformat_init(&m, 2500000, 17, 16) == SW_OK);
+    while ((r = sw_tformat_next(p, &m, now, &tx)) == SW_SEND) {
+        CHECK(++sent < 100);
+        CHECK(sw_tformat_next(p, &m, now, &tx) == SW_PENDING);
+        CHECK(sw_tformat_device_hear(encoder, tx.bytes, tx.len, tx.end_ns, &reply) == SW_SEND);
+        CHECK(sw_tformat_hear(&m, reply.bytes, reply.len, reply.end_ns) == SW_OK);
+        now = sw_tformat_until_ns(&m);
+    }
+    CHECK(sw_tformat_value(p, value, &now) == r);
+    return r;
+}
+
+static void procedures(void)
+{
+    sw_tformat_procedure_t p;
+    sw_tformat_device_t encoder;
+    uint32_t value = 0;
+
+    CHECK(sw_tformat_device_start(&encoder, 0x11, 2500000) == SW_OK);
+    CHECK(sw_tformat_device_set_position(&encoder, 1000, 3) == SW_OK);
+    CHECK(sw_tformat_eeprom_write(&p, 2, 127, 1, now) == SW_E_ARGUMENT);
+    CHECK(sw_tformat_eeprom_write(&p, 2, 17, 0x5a, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 0x5a && sw_tformat_device_page(&encoder) == 2);
+    CHECK(sw_tformat_eeprom_read(&p, 2, 17, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 0x5a);
+    CHECK(sw_tformat_clear_errors(&p, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 1000);
+    CHECK(sw_tformat_zero_single_turn_and_shift_commutation_angle(&p, 17, 4, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 0);
+    CHECK(sw_tformat_clear_turns_and_lose_multi_turn_reference(&p, 17, 16, 0, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 0);
+    CHECK(sw_tformat_device_start(&encoder, 0x11, 5000000) == SW_OK);
+    CHECK(sw_tformat_detect(&p, now) == SW_OK);
+    CHECK(run(&p, &encoder, &value) == SW_OK && value == 0x11);
+}
+
+/* Two encoders of 17 and 16 bits answer command 4 at 4 Mbit/s: EA 0 with published words that show an error, EA 1 without one. */
+static void bus(void)
+{
+    static const uint16_t words[8] = {0x2085, 0xf64a, 0x8009, 0x80a1, 0x3080, 0x599f, 0xdd68, 0x009a};
+    static const sw_aformat_encoder_t encoder = {17, 16, 0};
+    static const sw_aformat_request_t asked = {0, 4, 0, 0, 0, 0};
+    static sw_aformat_t zeroed_bus;
+    static sw_aformat_bus_t light;
+    sw_aformat_t m;
+    sw_aformat_transmission_t tx;
+    sw_aformat_response_t response;
+    sw_position_t position;
+    uint16_t contents[8];
+    uint8_t framed[4] = {1, 1, 1, 1};
+    uint32_t angle = 1;
+    int k, bit;
+
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 4, SW_MSB_FIRST, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 3, SW_MSB_FIRST, &response) == SW_E_AFORMAT_TRUNCATED);
+    CHECK(sw_aformat_parse(&asked, &encoder, words, 4, 2, &response) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_parse(&asked, NULL, words, 4, SW_MSB_FIRST, &response) == SW_E_NULL);
+    CHECK(sw_aformat_bus_push(&light, words, 4, SW_MSB_FIRST, &response) == SW_E_STATE && sw_aformat_bus_missing(&light) == 0xff);
+    CHECK(sw_aformat_bus_start(&light, &asked, &encoder, 0) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_bus_start(&light, &asked, &encoder, 6) == SW_OK && sw_aformat_bus_missing(&light) == 6);
+    CHECK(sw_aformat_bus_push(&light, words + 4, 4, SW_MSB_FIRST, &response) == SW_OK && response.ea == 1);
+    CHECK(sw_aformat_bus_missing(&light) == 4);
+    CHECK(sw_aformat_bus_push(&light, words + 4, 4, SW_MSB_FIRST, &response) == SW_E_AFORMAT_TWO_RESPONSES);
+    CHECK(sw_aformat_bus_push(&light, words, 4, SW_MSB_FIRST, &response) == SW_E_AFORMAT_ADDRESS_MISMATCH);
+    for (k = 0; k < 8; k++) {
+        for (contents[k] = 0, bit = 0; bit < 16; bit++) {
+            contents[k] = (uint16_t)(contents[k] | (words[k] >> bit & 1) << (15 - bit));
+        }
+    }
+    CHECK(sw_aformat_poll(&zeroed_bus, 0) == SW_E_STATE && sw_aformat_missing(&zeroed_bus) == 0xff);
+    CHECK(sw_aformat_init(&m, 5000000, &encoder) == SW_E_ARGUMENT && sw_aformat_init(&m, 4000000, NULL) == SW_E_NULL);
+    CHECK(sw_aformat_init(&m, 4000000, &encoder) == SW_OK);
+    CHECK(sw_aformat_read(&m, 12, 3, 0, &tx) == SW_E_ARGUMENT && sw_aformat_read(&m, 0, 3, 0, &tx) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_read(&m, 4, 0, 0, &tx) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_read(&m, 4, 3, 0, &tx) == SW_SEND && tx.len == 1 && tx.end_ns == 4500);
+    CHECK(sw_aformat_hear(&m, contents, framed, 49, 25500) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_hear(&m, contents, framed, 4, 25500) == SW_PENDING && sw_aformat_missing(&m) == 2);
+    CHECK(sw_aformat_response(&m, 0, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));
+    CHECK(response.es == (SW_AFORMAT_ES_BATT | SW_AFORMAT_ES_ERROR) && !sw_aformat_angle(&m, 0, 60000, 60000, &angle));
+    CHECK(sw_aformat_response(&m, 1, &response) == SW_E_NO_VALUE && sw_aformat_response(&m, 8, &response) == SW_E_ARGUMENT);
+    CHECK(sw_aformat_hear(&m, contents + 4, NULL, 4, 49000) == SW_OK && sw_aformat_missing(&m) == 0);
+    CHECK(sw_aformat_angle(&m, 1, 100000, 95500, &angle) && angle == 129434u << 15);
+    CHECK(!sw_aformat_angle(&m, 1, 100001, 95500, &angle) && !sw_aformat_angle(&m, 8, 100000, 95500, &angle));
+    CHECK(sw_aformat_position(&m, 1, 100000, 95500, &position) && position.turns == 2909 && position.sampled_ns == 4500);
+    CHECK(sw_aformat_read(&m, 4, 2, 1000000, &tx) == SW_SEND);
+    framed[3] = 0;
+    CHECK(sw_aformat_hear(&m, contents + 4, framed, 4, 1025500) == SW_PENDING && sw_aformat_missing(&m) == 2);
+    CHECK(!sw_aformat_angle(&m, 1, 1100000, 95500, &angle));
+    CHECK(sw_aformat_poll(&m, sw_aformat_until_ns(&m)) == SW_OK && sw_aformat_missing(&m) == 2);
+}
+
+/* One axis: MAC-ID 11, CP; the drive answers with position 100. */
+static void axis(void)
+{
+    static const uint8_t rsp[16] = {0x8b, 0x20, 0x40, 0x00, 100};
+    static sw_rtex_axis_t zeroed_axis;
+    sw_rtex_axis_t a;
+    sw_rtex_config_t config = {500000, 0, 4, 9, 5, 1, 1, 3, 2, 11, SW_RTEX_CP};
+    sw_rtex_state_of_t state;
+    sw_rtex_feedback_t feedback;
+    sw_rtex_response_t response;
+    uint8_t block[16];
+
+    CHECK(sw_rtex_parse_response(rsp, 15, &response) == SW_E_RTEX_TRUNCATED);
+    CHECK(sw_rtex_parse_response(NULL, 16, &response) == SW_E_NULL);
+    CHECK(sw_rtex_axis_hear(&zeroed_axis, rsp, 16, 0) == SW_E_STATE && sw_rtex_axis_stop(&zeroed_axis, 0) == SW_E_STATE);
+    CHECK(!sw_rtex_feedback(&zeroed_axis, 0, 1, &feedback));
+    config.echo = 0;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_E_ARGUMENT);
+    config.echo = 3;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_OK && sw_rtex_axis_start(&a, NULL) == SW_E_NULL);
+    CHECK(!sw_rtex_feedback(&a, 0, UINT64_MAX, &feedback));
+    CHECK(sw_rtex_axis_switch_on(&a) == SW_E_RTEX_NOT_NOW && strcmp(sw_text(SW_E_RTEX_NOT_NOW), "not_now") == 0);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, SW_NO_TIME) == SW_E_CLOCK);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, 1000000) == SW_OK);
+    /* A period that cannot be written is not begun: the counter of the next block is 1. */
+    CHECK(sw_rtex_axis_transmit(&a, block, 15) == SW_E_SHORT_BUFFER);
+    CHECK(sw_rtex_axis_transmit(&a, block, 16) == SW_OK && block[0] == 0x2b && block[1] == 0x20 && block[4] == 100);
+    CHECK(sw_rtex_axis_state(&a, &state) == SW_OK && state.code == SW_RTEX_OFF && state.reason == SW_RTEX_NO_REASON);
+    CHECK(sw_rtex_feedback(&a, 1500000, 500000, &feedback) && feedback.position == 100 && feedback.sampled_ns == 1000000);
+    CHECK(!sw_rtex_feedback(&a, 1500001, 500000, &feedback));
+    CHECK(sw_rtex_axis_set_position(&a, 200) == SW_E_RTEX_NOT_NOW && sw_rtex_axis_setpoint(&a) == 100);
+}
+
+/* 3000 steps and back, made by a timer of 1 MHz. */
+static void motion(void)
+{
+    static sw_motion_queue_t queue;
+    static sw_motion_axis_t a;
+    static sw_motion_timer_t timer;
+    sw_motion_limits_t limits = {4000000, 20000, 200000};
+    sw_motion_fired_t fired = {0, 0, 0};
+    int64_t made = 0, commanded = 99;
+    uint64_t ticks = 0, shortest = UINT64_MAX, last = 0;
+    int way;
+
+    CHECK(sw_motion_poll(&a) == SW_E_STATE && sw_motion_fire(&timer, &fired) == SW_E_STATE && !sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_start(&a, &timer, NULL, 1000000, &limits) == SW_E_NULL);
+    CHECK(sw_motion_start(&a, &timer, &queue, 999, &limits) == SW_E_ARGUMENT);
+    limits.speed = 500001;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_E_MOTION_SPEED_ABOVE_CLOCK);
+    limits.speed = 20000;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_OK && sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_commanded(&a, NULL) == SW_E_NULL && sw_motion_run(&a, 2, 100) == SW_E_ARGUMENT);
+    for (way = 0; way < 2; way++) {
+        sw_result_t work;
+        unsigned calls = 0;
+        CHECK(sw_motion_move_to(&a, way == 0 ? 3000 : -500) == SW_OK);
+        while ((work = sw_motion_poll(&a)) != SW_MOTION_REST) {
+            CHECK(work > 0 && ++calls < 1000000);
+            if (work == SW_MOTION_MORE) {
+                continue;
+            }
+            ticks += fired.wait;
+            CHECK(sw_motion_fire(&timer, &fired) == SW_OK);
+            if (fired.step) {
+                made += fired.reverse ? -1 : 1;
+                if (made > 1 && last > 0 && ticks - last < shortest) {
+                    shortest = ticks - last;
+                }
+                last = ticks;
+            }
+        }
+        CHECK(sw_motion_commanded(&a, &commanded) == SW_OK && commanded == made && made == (way == 0 ? 3000 : -500));
+        fired.wait = 0;
+    }
+    /* 20000 steps a second are 50 us. */
+    CHECK(shortest >= 49 && shortest <= 51);
+    CHECK(sw_motion_run(&a, 1, 10000) == SW_OK && sw_motion_halt(&a) == SW_OK);
+    while (sw_motion_poll(&a) != SW_MOTION_REST) {
+        CHECK(sw_motion_fire(&timer, &fired) == SW_OK && !fired.step);
+    }
+}
+
+static void clock_of_32_bits(void)
+{
+    sw_clock_t clock;
+
+    CHECK(sw_clock_start(&clock, 32768, 0) == SW_E_ARGUMENT);
+    CHECK(sw_clock_start(&clock, 170000000, UINT32_MAX - 295u) == SW_OK);
+    CHECK(sw_clock_ns(&clock, UINT32_MAX - 125u) == 1000 && sw_clock_ns(&clock, 44) == 2000);
+    CHECK(sw_clock_ns(&clock, 27) == SW_NO_TIME && sw_clock_ns(&clock, 197) == 3000);
+}
+
+int main(void)
+{
+    pointers();
+    states();
+    exchange();
+    procedures();
+    bus();
+    axis();
+    motion();
+    clock_of_32_bits();
+    puts("border: good");
+    return 0;
+}

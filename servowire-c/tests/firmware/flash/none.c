@@ -1,0 +1,3 @@
+/* The empty program. */
+int main(void);
+int main(void) { return 0; }
