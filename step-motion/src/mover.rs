@@ -1,6 +1,6 @@
 //! An axis that can be told something else at any time.
 
-use crate::cutter::{Cutter, Demand, Stretch};
+use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::phases::{Frame, P, Phases, steps};
@@ -62,7 +62,6 @@ pub struct Mover {
     bounds: Bounds,
     phases: Phases,
     stepper: Stepper,
-    cutter: Cutter,
     /// Its steps are cut into stretches, not taken one by one.
     cuts: bool,
     direction: Direction,
@@ -103,7 +102,6 @@ impl Mover {
             bounds: checked(clock, limits)?,
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
-            cutter: Cutter::new(),
             cuts: false,
             direction: Direction::Forward,
             origin: 0,
@@ -310,7 +308,7 @@ impl Mover {
         if self.due.is_none() {
             return Cut::Rest;
         }
-        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.cutter);
+        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.stepper.cutter);
         let Some(stretch) = cutter.next(curve, frame, demand) else {
             self.due = None;
             self.go_on();
@@ -324,7 +322,7 @@ impl Mover {
         let (endless, all) = (frame.endless, steps(frame.last(curve)));
         let (direction, count) = (self.direction, i64::from(stretch.count));
         self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
-        self.cutter = cutter;
+        self.stepper.cutter = cutter;
         let last = tick(stretch.last()).max(self.free);
         self.free = last.saturating_add(1);
         (self.turn, self.dir) = (None, Some(direction));
@@ -398,7 +396,7 @@ impl Mover {
     fn rest(&mut self, moment: u64) {
         self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
-        (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
+        self.stepper = Stepper::new();
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
@@ -441,7 +439,7 @@ impl Mover {
     /// Begins with the plan that there is.
     fn adopt(&mut self) {
         self.origin = self.commanded;
-        (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
+        self.stepper = Stepper::new();
         let Phases { curve, frame } = &self.phases;
         let begin = frame.begin.div_ceil(self.clock.moment(1));
         let due = if self.cuts {

@@ -12,7 +12,7 @@ use crate::real::Real;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
-    cutter: Cutter,
+    pub(super) cutter: Cutter,
     /// Steps left of the segment, the time of the last one that was made, and the differences from there on.
     left: u32,
     time: i128,
