@@ -15,6 +15,12 @@
 #define SW_NO_TIME UINT64_MAX
 
 /**
+ * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
+ * frame.
+ */
+#define SW_SORTE_DATA_AT 2
+
+/**
  * Refusals of A-format, in the order of their numbers.
  */
 enum sw_aformat_error_t
@@ -738,6 +744,117 @@ enum sw_rtex_status_t
 };
 #ifndef __cplusplus
 typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of SORTE frames, in the order of their numbers.
+ */
+enum sw_sorte_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The frame is too short.
+     */
+    SW_E_SORTE_TRUNCATED = -1281,
+    /**
+     * The frame check sequence is wrong.
+     */
+    SW_E_SORTE_BAD_FCS = -1282,
+    /**
+     * The type is not the one that is due.
+     */
+    SW_E_SORTE_UNEXPECTED_TYPE = -1285,
+    /**
+     * The frame is too long.
+     */
+    SW_E_SORTE_TOO_LONG = -1286,
+    /**
+     * The CRC-8 is wrong.
+     */
+    SW_E_SORTE_BAD_CRC8 = -1287,
+    /**
+     * Another source than the one that is due.
+     */
+    SW_E_SORTE_WRONG_SOURCE = -1288,
+    /**
+     * The buffer is too small.
+     */
+    SW_E_SORTE_BUFFER_TOO_SMALL = -1294,
+    /**
+     * A PTO word that is reserved.
+     */
+    SW_E_SORTE_RESERVED_PTO_VALUE = -1295,
+};
+#ifndef __cplusplus
+typedef int32_t sw_sorte_error_t;
+#endif // __cplusplus
+
+/**
+ * What a PTO word says.
+ */
+enum sw_sorte_pto_kind_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * No pulse in this cycle.
+     */
+    SW_SORTE_NO_PULSE = 0,
+    /**
+     * A pulse.
+     */
+    SW_SORTE_PULSE = 1,
+    /**
+     * The driver is switched off.
+     */
+    SW_SORTE_DRIVER_OFF = 2,
+    /**
+     * A reserved value.
+     */
+    SW_SORTE_RESERVED = 3,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_sorte_pto_kind_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of step-profile, in the order of their numbers.
+ */
+enum sw_step_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * No steps an entry.
+     */
+    SW_E_STEP_ZERO_SEGMENT_LENGTH = -1793,
+    /**
+     * Too many steps an entry.
+     */
+    SW_E_STEP_SEGMENT_TOO_LONG = -1794,
+    /**
+     * Two steps could fall into one cycle.
+     */
+    SW_E_STEP_STEP_RATE_TOO_HIGH = -1795,
+    /**
+     * The first step takes longer than 32 bits count.
+     */
+    SW_E_STEP_STEP_TIME_OVERFLOW = -1796,
+    /**
+     * The sync time does not lie in a cycle.
+     */
+    SW_E_STEP_SYNC_TIME_OUT_OF_RANGE = -1797,
+    /**
+     * The frequency is too low.
+     */
+    SW_E_STEP_FREQUENCY_TOO_LOW = -1800,
+};
+#ifndef __cplusplus
+typedef int32_t sw_step_error_t;
 #endif // __cplusplus
 
 /**
@@ -1485,6 +1602,66 @@ typedef struct {
 } sw_rtex_command_t;
 
 /**
+ * A frame from the master: its output lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Time stamp of its transmission, ns.
+     */
+    uint16_t time_stamp;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+} sw_sorte_master_frame_t;
+
+/**
+ * A frame from a device: its payload lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Who sends it.
+     */
+    uint8_t address;
+    /**
+     * STATUS: LAST and ERROR.
+     */
+    uint8_t status;
+} sw_sorte_device_frame_t;
+
+/**
+ * A PTO word.
+ */
+typedef struct {
+    /**
+     * Start of the pulse in the cycle, ns; 0 without one. Of a reserved word: its time, which must not be used.
+     */
+    uint16_t start_ns;
+    /**
+     * sw_sorte_pto_kind_t.
+     */
+    uint8_t kind;
+    /**
+     * DIR, 0 or 1; 0 where the driver is off.
+     */
+    uint8_t direction;
+} sw_sorte_pto_t;
+
+/**
+ * When a step comes.
+ */
+typedef struct {
+    /**
+     * Cycles of 4 us to wait.
+     */
+    uint32_t cnt;
+    /**
+     * Time in that cycle, ns.
+     */
+    uint32_t sync;
+} sw_step_time_t;
+
+/**
  * What a master sends.
  */
 typedef struct {
@@ -2081,6 +2258,89 @@ sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_comm
  * The block of a command, 16 bytes. Reserved bits are sent as 0.
  */
 sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The frame of a master with this many bytes of output, from its source address to its time stamp, without preamble.
+ */
+sw_result_t sw_sorte_parse_master_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t output_len,
+                                        sw_sorte_master_frame_t *frame);
+
+/**
+ * The frame of the IO exchange with this output: 5 bytes more.
+ */
+sw_result_t sw_sorte_build_master_frame(const uint8_t *output,
+                                        size_t output_len,
+                                        uint16_t time_stamp,
+                                        uint8_t *bytes,
+                                        size_t size,
+                                        size_t *len);
+
+/**
+ * The frame of a device with this many bytes of payload, from its source address to its CRC.
+ */
+sw_result_t sw_sorte_parse_device_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t payload_len,
+                                        sw_sorte_device_frame_t *frame);
+
+/**
+ * The frame of a device with the three bytes of payload of the published application: 6 bytes.
+ */
+sw_result_t sw_sorte_build_device_frame(const sw_sorte_device_frame_t *frame,
+                                        const uint8_t *payload,
+                                        uint8_t *bytes,
+                                        size_t size);
+
+/**
+ * The word for a pulse that starts `sync_ns` into the cycle, 0..3990; 0 and 1 are sent as 1 ns.
+ */
+sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *word);
+
+/**
+ * What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
+ */
+sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
+
+/**
+ * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.
+ */
+uint32_t sw_step_ramp(uint8_t i);
+
+/**
+ * The speed constant for a step frequency in Hz.
+ */
+sw_result_t sw_step_speed(uint32_t hz, uint32_t *speed);
+
+/**
+ * The time of a step in ns: an entry of the ramp at a speed; modulo 2^32.
+ */
+uint32_t sw_step_time_ns(uint32_t entry, uint32_t speed);
+
+/**
+ * The next step, `t_step` ns after one that came `prev` ns into its cycle.
+ */
+sw_result_t sw_step_next(uint32_t t_step, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * The same as the PRU computes it, its errors included, for an entry of the ramp at a speed.
+ */
+sw_result_t sw_step_next_as_pru(uint32_t entry, uint32_t speed, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * Whether a move with the published ramp is possible: `k` steps an entry, the first step `init_sync` ns into its cycle. `pru_is_exact`
+ * (may be NULL) tells whether the PRU computes it without error.
+ */
+sw_result_t sw_step_check(uint32_t speed,
+                          uint32_t k,
+                          uint32_t init_sync,
+                          bool *pru_is_exact);
+
+/**
+ * How long a move of `steps` with the published ramp takes, ns.
+ */
+sw_result_t sw_step_duration_ns(uint32_t speed, uint32_t k, uint32_t init_sync, uint32_t steps, uint64_t *ns);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.

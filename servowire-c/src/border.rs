@@ -55,6 +55,22 @@ pub(crate) unsafe fn room<'a, T>(start: *mut T, size: usize) -> Result<&'a mut [
     Ok(unsafe { core::slice::from_raw_parts_mut(start.cast(), size) })
 }
 
+/// The first `want` bytes of a caller's buffer of `size`, cleared: for what writes into bytes that are there.
+///
+/// # Safety
+/// As for [`room`].
+#[inline(always)]
+pub(crate) unsafe fn cleared<'a>(start: *mut u8, size: usize, want: usize) -> Result<&'a mut [u8], Refused> {
+    // SAFETY: the caller vouches for it.
+    let room = unsafe { room::<u8>(start, size)? };
+    let room = room.get_mut(..want).ok_or(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t)?;
+    for byte in room.iter_mut() {
+        byte.write(0);
+    }
+    // SAFETY: every byte has just been written.
+    Ok(unsafe { core::slice::from_raw_parts_mut(room.as_mut_ptr().cast(), room.len()) })
+}
+
 #[inline(always)]
 fn check<T>(start: *const T, len: usize) -> Result<(), Refused> {
     if start.is_null() {

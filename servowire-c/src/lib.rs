@@ -12,6 +12,8 @@ pub mod motion;
 pub mod nrz;
 mod result;
 pub mod rtex;
+pub mod sorte;
+pub mod step;
 #[cfg(test)]
 mod tests;
 pub mod tformat;

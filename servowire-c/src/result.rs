@@ -41,7 +41,9 @@ pub(crate) enum Protocol {
     Tformat = 1,
     Aformat = 2,
     Rtex = 4,
+    Sorte = 5,
     Motion = 6,
+    Step = 7,
 }
 
 /// The result for a class of a protocol.
@@ -126,7 +128,9 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
         1 => names!(tformat::ErrorClass),
         2 => names!(nikon_aformat::ErrorClass),
         4 => names!(rtex_block::ErrorClass),
+        5 => names!(sorte_proto::ErrorClass),
         6 => names!(step_motion::ErrorClass),
+        7 => names!(step_profile::ErrorClass),
         _ => return None,
     };
     if number == 0 { None } else { nth(names, number) }
@@ -155,6 +159,14 @@ mod tests {
         }
         for class in step_motion::ErrorClass::ALL {
             let code = refused(Protocol::Motion, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in sorte_proto::ErrorClass::ALL {
+            let code = refused(Protocol::Sorte, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in step_profile::ErrorClass::ALL {
+            let code = refused(Protocol::Step, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
         for class in nikon_aformat::ErrorClass::ALL {

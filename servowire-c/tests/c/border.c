@@ -318,6 +318,35 @@ static void motion(void)
     }
 }
 
+static void sorte_and_steps(void)
+{
+    static const uint8_t output[4] = {1, 2, 3, 4};
+    sw_sorte_master_frame_t frame;
+    sw_sorte_device_frame_t from = {1, 0};
+    sw_sorte_pto_t pto;
+    sw_step_time_t time;
+    uint8_t bytes[9];
+    uint16_t word = 7;
+    uint32_t speed = 7;
+    size_t len = 7;
+
+    CHECK(sw_sorte_build_master_frame(output, 4, 500, bytes, 8, &len) == SW_E_SHORT_BUFFER && len == 7);
+    CHECK(sw_sorte_build_master_frame(output, SIZE_MAX, 500, bytes, 9, &len) == SW_E_ARGUMENT);
+    CHECK(sw_sorte_build_master_frame(NULL, 4, 500, bytes, 9, &len) == SW_E_NULL);
+    CHECK(sw_sorte_build_master_frame(output, 4, 500, bytes, 9, &len) == SW_OK && len == 9);
+    CHECK(sw_sorte_parse_master_frame(bytes, 9, 4, &frame) == SW_OK && frame.time_stamp == 500);
+    CHECK(memcmp(bytes + SW_SORTE_DATA_AT, output, 4) == 0);
+    CHECK(sw_sorte_parse_master_frame(bytes, 9, SIZE_MAX, &frame) < 0 && sw_sorte_parse_master_frame(bytes, 0, 4, &frame) < 0);
+    CHECK(sw_sorte_build_device_frame(&from, output, bytes, 5) == SW_E_SHORT_BUFFER);
+    CHECK(sw_sorte_parse_device_frame(bytes, 9, 3, NULL) == SW_E_NULL);
+    CHECK(sw_sorte_pto_of_step(4000, 0, &word) == SW_E_ARGUMENT && sw_sorte_pto_of_step(5, 2, &word) == SW_E_ARGUMENT && word == 7);
+    CHECK(sw_sorte_parse_pto(3991, &pto) == SW_E_SORTE_RESERVED_PTO_VALUE && pto.kind == SW_SORTE_RESERVED);
+    CHECK(strcmp(sw_text(SW_E_SORTE_RESERVED_PTO_VALUE), "reserved_pto_value") == 0);
+    CHECK(sw_step_speed(0, &speed) < 0 && speed == 7 && sw_step_ramp(32) == 0 && sw_step_ramp(31) == 1000);
+    CHECK(sw_step_next(1661380, 0, &time) == SW_OK && time.cnt == 415 && time.sync == 1380);
+    CHECK(sw_step_next(1661380, 0, NULL) == SW_E_NULL && sw_step_check(262144, 0, 0, NULL) == SW_E_STEP_ZERO_SEGMENT_LENGTH);
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -337,6 +366,7 @@ int main(void)
     bus();
     axis();
     motion();
+    sorte_and_steps();
     clock_of_32_bits();
     puts("border: good");
     return 0;
