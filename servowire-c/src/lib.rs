@@ -5,10 +5,15 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod aformat;
 mod border;
 mod clock;
+pub mod motion;
 pub mod nrz;
 mod result;
+pub mod rtex;
+pub mod sorte;
+pub mod step;
 #[cfg(test)]
 mod tests;
 pub mod tformat;

@@ -36,10 +36,14 @@ pub use recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
 
 /// Opens a capture, finding its format from its beginning, else from its name.
-pub fn open(input: Input, hints: Hints) -> Result<Capture, Fault> {
+pub fn open(input: Input, mut hints: Hints) -> Result<Capture, Fault> {
     let mut input = if hints.format.is_none_or(Format::is_text) { input.unpacked()? } else { input };
     if hints.sample_rate.is_none() && hints.record_size.is_none() {
         input = input.in_utf8()?;
+    }
+    let rate = sigrok_text::announced(&mut input)?;
+    if hints.format.is_none() && known(input.peek()?).is_none() {
+        hints.sample_rate = hints.sample_rate.or(rate);
     }
     let format = match hints.format {
         Some(format) => format,

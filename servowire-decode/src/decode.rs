@@ -30,6 +30,9 @@ pub fn decode(
                     out.flush()?;
                 }
                 out.tick();
+                if out.is_done() {
+                    break;
+                }
             }
             Ok(())
         }

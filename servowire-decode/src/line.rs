@@ -58,6 +58,9 @@ pub(crate) fn decode(
         if line.input().is_some_and(Input::is_due) {
             decoder.pause(line.reached(), out)?;
         }
+        if out.is_done() {
+            break Ok(());
+        }
         let more = read(line, &mut decoder, &mut changes, out)?;
         if let Some(hole) = line.hole() {
             decoder.hole(hole, out)?;

@@ -44,7 +44,7 @@ pub(crate) fn decode(
     for burst in bursts {
         join(reader.as_mut(), burst, &mut whole, out)?;
     }
-    while end == Ok(true) {
+    while end == Ok(true) && !out.is_done() {
         if log.pauses() {
             out.flush()?;
         }

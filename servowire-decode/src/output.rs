@@ -21,14 +21,18 @@ use crate::time::Time;
 
 /// All outputs of one file together.
 pub struct Output<'a> {
-    printer: &'a mut dyn Printer,
-    vcd: Option<&'a mut vcd::VcdOut>,
-    beside: Option<&'a mut dyn Printer>,
+    /// All get all events, the first one first.
+    printers: Vec<&'a mut dyn Printer>,
     filter: Option<&'a mut filter::Filter>,
     /// Called after every block that was read.
     progress: Option<&'a dyn Fn()>,
     /// Takes what the user should know but did not ask for.
     notes: Option<&'a dyn Fn(&Note)>,
+    /// Says whether the user has enough.
+    enough: Option<&'a dyn Fn() -> bool>,
+    /// The first refused frame is the last one.
+    until_error: bool,
+    done: bool,
     /// Frames so far.
     pub tally: Tally,
     /// Those of them that were asked for.
@@ -42,12 +46,13 @@ impl<'a> Output<'a> {
     /// `printer` gets all events of the file called `file`.
     pub fn new(file: &str, printer: &'a mut dyn Printer) -> Self {
         Self {
-            printer,
-            vcd: None,
-            beside: None,
+            printers: vec![printer],
             filter: None,
             progress: None,
             notes: None,
+            enough: None,
+            until_error: false,
+            done: false,
             tally: Tally::default(),
             chosen: Tally::default(),
             refused: BTreeMap::new(),
@@ -55,16 +60,23 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// Writes events and changes beside each other.
+    /// A further printer gets the events too, if there is one.
     #[must_use]
-    pub fn with_vcd(self, vcd: Option<&'a mut vcd::VcdOut>) -> Self {
-        Self { vcd, ..self }
+    pub fn with_beside(mut self, printer: Option<&'a mut dyn Printer>) -> Self {
+        self.printers.extend(printer);
+        self
     }
 
-    /// A second printer gets the events too.
+    /// Nothing is shown and read any more as soon as `enough` says so.
     #[must_use]
-    pub fn with_beside(self, beside: Option<&'a mut dyn Printer>) -> Self {
-        Self { beside, ..self }
+    pub fn with_enough(self, enough: &'a dyn Fn() -> bool) -> Self {
+        Self { enough: Some(enough), ..self }
+    }
+
+    /// The first refused frame that is shown is the last one.
+    #[must_use]
+    pub fn until_error(self, until_error: bool) -> Self {
+        Self { until_error, ..self }
     }
 
     /// Called after every block that was read.
@@ -87,23 +99,25 @@ impl<'a> Output<'a> {
 
     /// Whether the changes of the line have a taker.
     pub fn wants_changes(&self) -> bool {
-        self.vcd.is_some()
+        self.printers.iter().any(|printer| printer.wants_changes())
     }
 
     /// The file begins.
     pub fn begin(&mut self) -> io::Result<()> {
-        self.printer.begin(&self.origin)
+        let Self { printers, origin, .. } = self;
+        printers.iter_mut().try_for_each(|printer| printer.begin(origin))
     }
 
     /// The file is at its end.
     pub fn end(&mut self) -> io::Result<()> {
-        self.printer.end(&self.origin)?;
-        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.finish())
+        let Self { printers, origin, .. } = self;
+        printers.iter_mut().try_for_each(|printer| printer.end(origin))
     }
 
     /// The channels of the capture. The lines found so far are decoded.
     pub fn channels(&mut self, channels: &[String]) -> io::Result<()> {
-        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels, &self.origin.lanes))
+        let Self { printers, origin, .. } = self;
+        printers.iter_mut().try_for_each(|printer| printer.channels(origin, channels))
     }
 
     /// A further line is decoded; it has the next number, from 0.
@@ -118,7 +132,7 @@ impl<'a> Output<'a> {
 
     /// A change of any channel.
     pub fn change(&mut self, change: &Change) -> io::Result<()> {
-        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.change(change))
+        self.printers.iter_mut().try_for_each(|printer| printer.change(change))
     }
 
     /// A block was read.
@@ -145,12 +159,17 @@ impl<'a> Output<'a> {
 
     /// Whether nothing that was asked for can come any more once a recording was read up to `time`.
     pub fn is_over(&self, time: Time) -> bool {
-        self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
+        self.is_done() || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
+    }
+
+    /// Whether the user has enough: what still comes is dropped.
+    pub fn is_done(&self) -> bool {
+        self.done || self.enough.is_some_and(|enough| enough())
     }
 
     /// Nothing comes for a while: what is complete is shown.
     pub fn flush(&mut self) -> io::Result<()> {
-        self.printer.flush()
+        self.printers.iter_mut().try_for_each(|printer| printer.flush())
     }
 
     /// Something the user should know.
@@ -163,6 +182,9 @@ impl<'a> Output<'a> {
 
 impl Sink for Output<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
+        if self.is_done() {
+            return Ok(());
+        }
         self.tally.event(event)?;
         let mut errors = false;
         if let Some(filter) = &mut self.filter {
@@ -182,12 +204,8 @@ impl Sink for Output<'_> {
                 cause.clone_from(&refusal.cause);
             }
         }
-        if let Some(vcd) = &mut self.vcd {
-            vcd.event(self.origin.speaks, event);
-        }
-        if let Some(beside) = &mut self.beside {
-            beside.event(&self.origin, event)?;
-        }
-        self.printer.event(&self.origin, event)
+        self.done = self.until_error && !event.verdict.is_ok();
+        let Self { printers, origin, .. } = self;
+        printers.iter_mut().try_for_each(|printer| printer.event(origin, event))
     }
 }

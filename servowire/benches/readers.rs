@@ -309,7 +309,7 @@ impl Printer for Nowhere {
 fn write(edges: &Edges, path: &Path) -> String {
     let mut vcd = VcdOut::new(BufWriter::new(File::create(path).unwrap()));
     let mut nowhere = Nowhere;
-    let mut out = Output::new("memory", &mut nowhere).with_vcd(Some(&mut vcd));
+    let mut out = Output::new("memory", &mut nowhere).with_beside(Some(&mut vcd));
     out.channels(&["line".to_owned()]).unwrap();
     for (time, level) in edges {
         out.change(&Change { time: Time::from_ps((*time).into()), channel: 0, level: *level }).unwrap();

@@ -26,7 +26,9 @@ use servowire_decode::sink::Tally;
 pub(crate) use arguments::Decode;
 
 use crate::files::{self, Piped};
+use crate::interrupt;
 use crate::picture::Picture;
+use crate::terminal;
 
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
@@ -34,7 +36,7 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
-    let described = arguments.describes_a_file();
+    let described = arguments.reading.describes_a_file();
     let piped = match if files == 0 { files::piped(described.is_some()) } else { Piped::Nothing } {
         Piped::Content(input) => Some(input),
         Piped::Silence => {
@@ -66,6 +68,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
             return ExitCode::from(2);
         }
     }
+    interrupt::note();
     let stdout = io::stdout();
     let colour = AutoStream::choice(&stdout) != ColorChoice::Never;
     let out = BufWriter::with_capacity(1 << 16, stdout.lock());
@@ -76,7 +79,11 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     } else if arguments.csv {
         Box::new(Csv::new(out))
     } else {
-        Box::new(Text::new(out, files != 1 && piped.is_none(), colour))
+        let text = Text::new(out, files != 1 && piped.is_none(), colour);
+        Box::new(match terminal::columns() {
+            Some(columns) => text.with_columns(columns),
+            None => text,
+        })
     };
     match all(arguments, piped, printer.as_mut()) {
         Ok(true) => ExitCode::SUCCESS,
@@ -94,11 +101,12 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
 fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<bool> {
     let mut good = true;
     if let Some(input) = piped {
-        return one(arguments, Ok(input), arguments.hints(), &Bar { bar: None }, printer);
+        return one(arguments, Ok(input), arguments.reading.hints(), &Bar { bar: None }, printer);
     }
-    for path in &arguments.files {
+    for path in arguments.files.iter().take_while(|_| !interrupt::asked()) {
         let bar = Bar::new(path);
-        good &= one(arguments, files::open(path, arguments.file.follow), arguments.hints(), &bar, printer)?;
+        good &=
+            one(arguments, files::open(path, arguments.reading.file.follow), arguments.reading.hints(), &bar, printer)?;
         bar.finish();
     }
     if arguments.files.is_empty() {
@@ -112,7 +120,7 @@ fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> i
 
 /// The captures that come with the program, of the protocol that is meant.
 fn bundled(arguments: &Decode) -> &'static [(&'static str, &'static [u8])] {
-    arguments.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures)
+    arguments.reading.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures)
 }
 
 /// Decodes one file; whether it was good.
@@ -137,7 +145,10 @@ fn one(
     let mut vcd = match &arguments.vcd {
         None => None,
         Some(path) => match File::create(path) {
-            Ok(file) => Some(VcdOut::new(BufWriter::new(file))),
+            Ok(file) => Some(match (VcdOut::new(BufWriter::new(file)), arguments.cut) {
+                (vcd, Some((from, to))) => vcd.within(from, to),
+                (vcd, None) => vcd,
+            }),
             Err(e) => {
                 let file = path.display().to_string();
                 return Ok(complain(&Fault::new(&file, At::File, format!("cannot be created: {e}")), bar));
@@ -146,13 +157,15 @@ fn one(
     };
     let progress = || bar.set(meter.get());
     let notes = |note: &Note| bar.say(&note.to_string());
-    let beside = picture.as_mut().map(|picture| picture as &mut dyn Printer);
-    let mut out = Output::new(name, printer).with_progress(&progress).with_notes(&notes);
-    out = out.with_vcd(vcd.as_mut()).with_beside(beside).with_filter(&mut filter);
+    let mut out = Output::new(name, printer).with_progress(&progress).with_notes(&notes).with_filter(&mut filter);
+    out = out.with_beside(vcd.as_mut().map(|vcd| vcd as &mut dyn Printer));
+    out = out.with_beside(picture.as_mut().map(|picture| picture as &mut dyn Printer));
+    out = out.with_enough(&interrupt::asked).until_error(arguments.until.is_some());
     out.begin()?;
-    let end = servowire_decode::decode(name, capture, arguments.protocol.0, &arguments.settings(), &mut out);
+    let end =
+        servowire_decode::decode(name, capture, arguments.reading.protocol.0, &arguments.reading.settings(), &mut out);
     out.end()?;
-    let (tally, chosen, refusals) = (out.tally, out.chosen, out.refusals());
+    let (tally, chosen, refusals, done) = (out.tally, out.chosen, out.refusals(), out.is_done());
     if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {
         if let Err(e) = picture.draw().and_then(|svg| Ok(fs::write(path, svg)?)) {
             let what = format!("cannot be drawn: {e}");
@@ -168,6 +181,8 @@ fn one(
             format!("none of its {} frames passes the filter", tally.ok + tally.refused)
         }
         Ok(()) => return Ok(refusals.is_none()),
+        // Where the user had enough, what he read was cut there by himself.
+        Err(Stop::Fault(_)) if done => return Ok(refusals.is_none()),
         Err(Stop::Fault(fault)) => return Ok(complain(&fault, bar)),
         Err(Stop::Output(error)) => return Err(error),
     };
@@ -176,7 +191,7 @@ fn one(
 
 /// Why what is asked cannot be had of a capture of its kind.
 fn cannot(arguments: &Decode, capture: &Capture, has_times: bool) -> Option<&'static str> {
-    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.rtex.period.is_none();
+    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.reading.rtex.period.is_none();
     let levels = matches!(capture, Capture::Edges(_) | Capture::Samples(_));
     let cannot = [
         (arguments.vcd.is_some() && !levels, "there are no levels in it for a VCD"),

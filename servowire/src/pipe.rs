@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use servowire_decode::capture::Live;
 
+use crate::interrupt;
+
 /// Bytes read at once.
 const CHUNK: usize = 1 << 16;
 /// Chunks that wait to be taken.
@@ -105,10 +107,9 @@ impl Live for Pipe {
 impl Read for Pipe {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.is_empty() {
-            match self.chunks.recv() {
-                Ok(chunk) => self.take(chunk),
-                Err(_) => self.ended = true,
-            }
+            // Somebody who wants it to end is heard also while nothing comes.
+            while !interrupt::asked() && !self.gives_within(LOOK) {}
+            self.ended |= interrupt::asked();
         }
         if let Some(fault) = self.fault.take() {
             self.ended = true;

@@ -22,6 +22,8 @@ use encoder::Encoder;
 use link::Link;
 use record::Recorded;
 
+use crate::units::tformat_rate;
+
 /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
 ///
 /// Exit code 0: it was done; 1: the encoder did not answer as it should, or the port failed; 2: wrong use.
@@ -31,7 +33,7 @@ pub struct Arguments {
     #[arg(long)]
     port: String,
     /// Bits a second, 2.5M or 5M.
-    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
     /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.
     #[arg(long, value_name = "MS", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
@@ -154,14 +156,6 @@ fn encoder_id(text: &str) -> Result<u8, String> {
         None => text.parse(),
     };
     parsed.map_err(|_| format!("\"{text}\" is not a byte, as 0x17 or 23"))
-}
-
-fn rate(text: &str) -> Result<BitRate, String> {
-    match text.trim_end_matches("Hz") {
-        "2.5M" | "2500000" => Ok(BitRate::Mbit2_5),
-        "5M" | "5000000" => Ok(BitRate::Mbit5),
-        _ => Err(format!("\"{text}\" is neither 2.5M nor 5M, the rates of T-Format")),
-    }
 }
 
 impl Arguments {

@@ -3,6 +3,12 @@
 use std::fmt;
 use std::io::{self, Write};
 
+/// Columns of the terminal that the standard output is; none where it is a file or a pipe.
+pub(crate) fn columns() -> Option<usize> {
+    let (width, _) = terminal_size::terminal_size_of(io::stdout())?;
+    Some(width.0.into())
+}
+
 /// Writes to the standard output at once; somebody who does not read on is no fault.
 pub(crate) fn say(text: fmt::Arguments) -> io::Result<()> {
     let mut out = io::stdout().lock();

@@ -1,6 +1,7 @@
-//! Frequencies on the command line.
+//! Frequencies and times on the command line.
 
-use servowire_decode::time;
+use servowire_decode::time::{self, Time};
+use tformat::BitRate;
 
 /// Frequencies as people write them: `24000000`, `24M`, `2.5MHz`, `100 kHz`.
 pub(crate) fn frequency(text: &str) -> Result<u64, String> {
@@ -16,6 +17,26 @@ pub(crate) fn bit_rate(text: &str) -> Result<u32, String> {
         rate @ 1..=1_000_000_000 => Ok(rate as u32),
         rate => Err(format!("{rate} bits a second are more than 10^9")),
     }
+}
+
+/// A time of the capture.
+pub(crate) fn moment(text: &str) -> Result<Time, String> {
+    time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, as 20us, 1.5ms or 2s"))
+}
+
+/// One of the bit rates that a protocol has, in the same form; `6.67M` is near enough to 6,666,667.
+pub(crate) fn one_of<T>(text: &str, rates: impl Iterator<Item = (T, u32)> + Clone) -> Result<T, String> {
+    let said = frequency(text).unwrap_or(0);
+    let near = |(_, rate): &(T, u32)| said.abs_diff(u64::from(*rate)) * 200 < u64::from(*rate);
+    rates.clone().find(near).map(|(rate, _)| rate).ok_or_else(|| {
+        let name = |(_, rate): (T, u32)| format!("{}M", (f64::from(rate) / 1e4).round() / 100.0);
+        format!("\"{text}\" is not one of the rates {}", rates.map(name).collect::<Vec<_>>().join(", "))
+    })
+}
+
+/// A rate of T-Format.
+pub(crate) fn tformat_rate(text: &str) -> Result<BitRate, String> {
+    one_of(text, [BitRate::Mbit2_5, BitRate::Mbit5].into_iter().map(|rate| (rate, rate.bits_per_second())))
 }
 
 #[cfg(test)]
@@ -35,6 +56,17 @@ mod tests {
         }
         for text in ["", "M", "fast", "-1", "0", "1e13", "inf", "NaN"] {
             assert!(frequency(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn rates_of_a_protocol() {
+        let rate = |text| one_of(text, [('a', 2_500_000), ('b', 6_666_667)].into_iter());
+        for (text, want) in [("2.5M", 'a'), ("2500000", 'a'), ("2.5 MHz", 'a'), ("6.67M", 'b'), ("6.666667M", 'b')] {
+            assert_eq!(rate(text), Ok(want), "{text}");
+        }
+        for text in ["2.5", "5M", "6.6M", "fast"] {
+            assert_eq!(rate(text), Err(format!("\"{text}\" is not one of the rates 2.5M, 6.67M")));
         }
     }
 }

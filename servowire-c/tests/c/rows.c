@@ -80,7 +80,7 @@ void say_bits(const uint8_t *bytes, size_t bits)
 
 static command_t *find(const char *name)
 {
-    static const entry_t *const tables[] = {tformat_commands};
+    static const entry_t *const tables[] = {tformat_commands, aformat_commands, rtex_commands, sorte_commands};
     size_t k;
     for (k = 0; k < sizeof tables / sizeof *tables; k++) {
         const entry_t *entry;
@@ -118,7 +118,9 @@ static int run(char *line)
     while (held > 0) {
         free(blocks[--held]);
     }
-    if (strcmp(answer, expected) == 0) {
+    /* Behind three dots the row says nothing. */
+    word = strstr(expected, "...");
+    if (word != NULL ? strncmp(answer, expected, (size_t)(word - expected)) == 0 : strcmp(answer, expected) == 0) {
         return 1;
     }
     fprintf(stderr, "%s: %s\n  expected: %s\n  real:     %s\n", name, arguments[0], expected, answer);

@@ -165,7 +165,10 @@ impl Input {
 
     /// The beginning of the file without taking it: 4 KiB, or all there are.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
-        while self.head.len() < HEAD && self.head_taken == 0 && (self.head.is_empty() || !self.waits()) {
+        // What was taken of the beginning is no longer it.
+        self.head.drain(..self.head_taken);
+        self.head_taken = 0;
+        while self.head.len() < HEAD && (self.head.is_empty() || !self.waits()) {
             let name = &self.name;
             let more = self.reader.fill_buf();
             let more = more.map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))?;
@@ -176,7 +179,7 @@ impl Input {
                 break;
             }
         }
-        Ok(self.head.get(self.head_taken..).unwrap_or_default())
+        Ok(&self.head)
     }
 
     /// Whether nothing more than the head is there for a moment.

@@ -10,6 +10,20 @@ const LONGEST: usize = 1 << 20;
 /// More channels has no device.
 const CHANNELS: usize = 1024;
 
+/// Takes the lines that `sigrok-cli` writes in front of every form of output when it reads a file itself (`-i` or `-I`), such
+/// as `META samplerate: 20000000`; the rate in them. Samples of `-O binary` follow them too.
+pub(super) fn announced(input: &mut Input) -> Result<Option<u64>, Fault> {
+    let mut rate = None;
+    while input.peek()?.starts_with(b"META ") {
+        let mut line = Vec::new();
+        input.line(&mut line, At::Line(1), LONGEST, || format!("a line of more than {LONGEST} characters"))?;
+        let line = String::from_utf8_lossy(&line);
+        let hertz = line.trim_end().strip_prefix("META samplerate: ").and_then(|hertz| hertz.parse().ok());
+        rate = hertz.filter(|hertz| (1..=1_000_000_000_000).contains(hertz)).or(rate);
+    }
+    Ok(rate)
+}
+
 /// A text of samples after its two lines of heading.
 pub struct SigrokText {
     input: Input,

@@ -2,6 +2,7 @@
 
 use std::io;
 
+use crate::capture::Change;
 use crate::codec::Codec;
 use crate::event::Event;
 
@@ -40,6 +41,21 @@ impl Origin {
 pub trait Printer {
     /// A file begins.
     fn begin(&mut self, _origin: &Origin) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// The channels of the capture; the lines that `origin` names so far are decoded.
+    fn channels(&mut self, _origin: &Origin, _channels: &[String]) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Whether it takes the changes of the channels: they cost time.
+    fn wants_changes(&self) -> bool {
+        false
+    }
+
+    /// A change of any channel. The events made of it come later.
+    fn change(&mut self, _change: &Change) -> io::Result<()> {
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! One line a transaction, of a hundred columns at most; what is longer goes on below.
+//! One line a transaction, as wide as the terminal, else of a hundred columns; what is longer goes on below.
 //!
 //! ```text
 //!      10.000 us  <>  ID 3  SF EA1  ABS 3915817  ABM 0  ALMC OF BE BA  0.466802 turns  +3.00 us  ok
@@ -12,8 +12,9 @@ use std::io::{self, Write};
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 
-/// Columns of a line.
+/// Columns of a line where there is no terminal, and the fewest of one.
 const COLUMNS: usize = 100;
+const FEWEST: usize = 40;
 /// Wider values are left to stand out of their column.
 const WIDEST: usize = 24;
 /// What hardly ever changes is said when it does.
@@ -43,12 +44,19 @@ impl<W: Write> Text<W> {
     pub fn new(out: W, headings: bool, colour: bool) -> Self {
         Self {
             out,
-            line: Columns { text: String::new(), pieces: Vec::new(), colour },
+            line: Columns { text: String::new(), pieces: Vec::new(), colour, most: COLUMNS },
             held: BTreeMap::new(),
             headings,
             widths: HashMap::new(),
             steady: HashMap::new(),
         }
+    }
+
+    /// Breaks lines at the width of a terminal.
+    #[must_use]
+    pub fn with_columns(mut self, columns: usize) -> Self {
+        self.line.most = columns.max(FEWEST);
+        self
     }
 
     fn print(
@@ -115,6 +123,8 @@ struct Columns {
     /// Where they begin.
     pieces: Vec<usize>,
     colour: bool,
+    /// Columns of a line.
+    most: usize,
 }
 
 impl Columns {
@@ -135,7 +145,7 @@ impl Columns {
     }
 
     fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        if !self.colour && self.text.len() <= COLUMNS {
+        if !self.colour && self.text.len() <= self.most {
             out.write_all(self.text.as_bytes())?;
             return out.write_all(b"\n");
         }
@@ -146,7 +156,7 @@ impl Columns {
         for (from, to) in self.pieces.iter().zip(ends) {
             let piece = self.text.get(*from..to).unwrap_or_default().trim_end();
             let width = to - from;
-            if !first && at + 2 + piece.chars().count() > COLUMNS && indent + piece.len() <= COLUMNS {
+            if !first && at + 2 + piece.chars().count() > self.most && indent + piece.len() <= self.most {
                 write!(out, "\n{:indent$}", "")?;
                 at = indent;
             } else if !first {
@@ -157,7 +167,7 @@ impl Columns {
             at = self.words(out, piece, at, indent)?;
             // Padding keeps the columns.
             let padding = width.saturating_sub(2 + piece.len());
-            if to < self.text.len() && at + padding < COLUMNS {
+            if to < self.text.len() && at + padding < self.most {
                 write!(out, "{:padding$}", "")?;
                 at += padding;
             }
@@ -169,7 +179,7 @@ impl Columns {
     fn words(&self, out: &mut impl Write, piece: &str, mut at: usize, indent: usize) -> io::Result<usize> {
         for (k, word) in piece.split(' ').enumerate() {
             let width = word.chars().count();
-            if k > 0 && at + 1 + width > COLUMNS {
+            if k > 0 && at + 1 + width > self.most {
                 write!(out, "\n{:indent$}", "")?;
                 at = indent;
             } else if k > 0 {

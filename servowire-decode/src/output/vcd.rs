@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
 
-use super::printer::Lane;
+use super::printer::{Origin, Printer};
 use crate::capture::Change;
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 use crate::time::Time;
@@ -31,6 +31,9 @@ pub struct VcdOut {
     /// Time of the capture that is 0 in the file.
     origin: Option<Time>,
     written: Option<u64>,
+    window: Option<(Time, Time)>,
+    /// The levels of the channels before the window.
+    before: BTreeMap<u16, bool>,
 }
 
 #[derive(Clone)]
@@ -53,30 +56,15 @@ impl VcdOut {
             sequence: 0,
             origin: None,
             written: None,
+            window: None,
+            before: BTreeMap::new(),
         }
     }
 
-    /// Writes the header. A line that is found later has no place in it.
-    pub(super) fn channels(&mut self, channels: &[String], lanes: &[Lane]) -> io::Result<()> {
-        let writer = &mut self.writer;
-        writer.version("servowire")?;
-        writer.timescale(1, TimescaleUnit::NS)?;
-        writer.add_module("capture")?;
-        for name in channels {
-            let code = writer.add_wire(1, &word(name))?;
-            self.channels.push([format!("0{code}\n"), format!("1{code}\n")]);
-        }
-        writer.upscope()?;
-        for lane in lanes {
-            writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
-            let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
-            let (frame, verdict) = (string("frame")?, string("verdict")?);
-            let names = lane.protocol.fields;
-            let fields = names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
-            writer.upscope()?;
-            self.strings.push(Strings { frame, verdict, names, fields });
-        }
-        writer.enddefinitions()
+    /// Writes only what lies between two times of the capture, which are those of the file too.
+    #[must_use]
+    pub fn within(self, from: Time, to: Time) -> Self {
+        Self { window: Some((from, to)), ..self }
     }
 
     fn wait(&mut self, time: Time, code: IdCode, text: String) {
@@ -84,41 +72,18 @@ impl VcdOut {
         self.sequence += 1;
     }
 
-    /// A level of the capture.
-    pub(super) fn change(&mut self, change: &Change) -> io::Result<()> {
-        if self.origin.is_none() {
-            self.origin = Some(change.time.min(Time::ZERO));
-            let strings = self.strings.clone();
-            for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
-                self.wait(change.time, code, NOTHING.to_owned());
-            }
+    /// The first that is written: the levels that the channels have then, and that nothing is said yet.
+    fn open(&mut self, time: Time) {
+        if self.origin.is_some() {
+            return;
         }
-        self.levels.push_back(*change);
-        self.flush_before(change.time - WINDOW)
-    }
-
-    /// A decoded frame of a line.
-    pub(super) fn event(&mut self, speaks: usize, event: &Event) {
-        let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(speaks)) else { return };
-        let side = match event.direction {
-            Some(Direction::Request) => "request ",
-            Some(Direction::Answer) => "answer ",
-            None => "",
-        };
-        let verdict = match &event.verdict {
-            Verdict::Ok => "ok".to_owned(),
-            Verdict::Refused(refusal) => format!("{}: {}", refusal.class, refusal.reason),
-        };
-        let mut shown = vec![(strings.frame, format!("{side}{}", event.kind)), (strings.verdict, verdict)];
-        for (name, code) in strings.names.iter().zip(&strings.fields) {
-            if let Some(field) = event.fields.iter().find(|field| field.name == *name) {
-                shown.push((*code, text(field)));
-            }
+        self.origin = Some(time.min(Time::ZERO));
+        let strings = self.strings.clone();
+        for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
+            self.wait(time, code, NOTHING.to_owned());
         }
-        for (code, text) in shown {
-            self.wait(start, code, word(&text));
-            self.wait(end, code, NOTHING.to_owned());
-        }
+        let levels = std::mem::take(&mut self.before);
+        self.levels.extend(levels.into_iter().map(|(channel, level)| Change { time, channel, level }));
     }
 
     fn flush_before(&mut self, time: Time) -> io::Result<()> {
@@ -159,9 +124,82 @@ impl VcdOut {
         }
         Ok(())
     }
+}
+
+impl Printer for VcdOut {
+    /// Writes the header. A line that is found later has no place in it.
+    fn channels(&mut self, origin: &Origin, channels: &[String]) -> io::Result<()> {
+        let writer = &mut self.writer;
+        writer.version("servowire")?;
+        writer.timescale(1, TimescaleUnit::NS)?;
+        writer.add_module("capture")?;
+        for name in channels {
+            let code = writer.add_wire(1, &word(name))?;
+            self.channels.push([format!("0{code}\n"), format!("1{code}\n")]);
+        }
+        writer.upscope()?;
+        for lane in &origin.lanes {
+            writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
+            let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
+            let (frame, verdict) = (string("frame")?, string("verdict")?);
+            let names = lane.protocol.fields;
+            let fields = names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
+            writer.upscope()?;
+            self.strings.push(Strings { frame, verdict, names, fields });
+        }
+        writer.enddefinitions()
+    }
+
+    fn wants_changes(&self) -> bool {
+        true
+    }
+
+    fn change(&mut self, change: &Change) -> io::Result<()> {
+        match self.window {
+            Some((from, _)) if change.time < from => {
+                self.before.insert(change.channel, change.level);
+                return Ok(());
+            }
+            Some((_, to)) if change.time >= to => return Ok(()),
+            Some((from, _)) => self.open(from),
+            None => self.open(change.time),
+        }
+        self.levels.push_back(*change);
+        self.flush_before(change.time - WINDOW)
+    }
+
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(origin.speaks)) else {
+            return Ok(());
+        };
+        let (from, to) = self.window.unwrap_or((start, end));
+        let side = match event.direction {
+            Some(Direction::Request) => "request ",
+            Some(Direction::Answer) => "answer ",
+            None => "",
+        };
+        let verdict = match &event.verdict {
+            Verdict::Ok => "ok".to_owned(),
+            Verdict::Refused(refusal) => format!("{}: {}", refusal.class, refusal.reason),
+        };
+        let mut shown = vec![(strings.frame, format!("{side}{}", event.kind)), (strings.verdict, verdict)];
+        for (name, code) in strings.names.iter().zip(&strings.fields) {
+            if let Some(field) = event.fields.iter().find(|field| field.name == *name) {
+                shown.push((*code, text(field)));
+            }
+        }
+        for (code, text) in shown {
+            self.wait(start.max(from), code, word(&text));
+            self.wait(end.min(to), code, NOTHING.to_owned());
+        }
+        Ok(())
+    }
 
     /// Writes what is left.
-    pub(super) fn finish(&mut self) -> io::Result<()> {
+    fn end(&mut self, _: &Origin) -> io::Result<()> {
+        if let Some((from, _)) = self.window {
+            self.open(from);
+        }
         self.flush_before(Time::MAX)?;
         self.writer.flush()
     }

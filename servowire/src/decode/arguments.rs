@@ -1,63 +1,13 @@
 //! What `servowire decode` is told.
 
-use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
-use std::sync::LazyLock;
 
-use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use rtex_block::position::Gear;
-use servowire_decode::capture::{Format, Hints};
-use servowire_decode::codec::Codec;
 use servowire_decode::output::filter::Filter;
-use servowire_decode::protocols::CODECS;
-use servowire_decode::settings::{Options, Rtex, Settings, Widths};
-use servowire_decode::time::{self, Time};
+use servowire_decode::time::Time;
 
-use crate::units::{bit_rate, frequency};
-
-/// A protocol by its name, or whatever the capture holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Meant(pub(super) Option<&'static dyn Codec>);
-
-impl ValueEnum for Meant {
-    fn value_variants<'a>() -> &'a [Self] {
-        static ALL: LazyLock<Vec<Meant>> =
-            LazyLock::new(|| [None].into_iter().chain(CODECS.iter().copied().map(Some)).map(Meant).collect());
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, about) = self.0.map_or(("auto", "Whatever the capture holds"), |codec| (codec.name, codec.about));
-        Some(PossibleValue::new(name).help(about))
-    }
-}
-
-/// A file format by its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Named(Format);
-
-impl ValueEnum for Named {
-    fn value_variants<'a>() -> &'a [Self] {
-        static ALL: LazyLock<[Named; Format::ALL.len()]> =
-            LazyLock::new(|| Format::ALL.map(|(format, ..)| Named(format)));
-        ALL.as_slice()
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (_, names, about) = Format::ALL.into_iter().find(|(format, ..)| *format == self.0)?;
-        let (name, aliases) = names.split_first()?;
-        Some(PossibleValue::new(*name).aliases(aliases.iter().copied()).help(about))
-    }
-}
-
-/// Comes back from a call that panics, and prints nothing of it.
-fn guarded(call: &mut dyn FnMut()) {
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| ()));
-    let _ = panic::catch_unwind(AssertUnwindSafe(call));
-    panic::set_hook(hook);
-}
+use crate::reading::Reading;
+use crate::units::moment;
 
 /// Decode captures of a line.
 ///
@@ -70,9 +20,6 @@ pub(crate) struct Decode {
     /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
     /// comes through a pipe, else the captures that come with the program.
     pub(super) files: Vec<PathBuf>,
-    /// What is spoken on the line; otherwise every protocol is tried on every channel, and each line found is decoded.
-    #[arg(short, long, value_enum, default_value_t = Meant(None))]
-    pub(super) protocol: Meant,
     /// JSON Lines, an object a frame; times in picoseconds.
     #[arg(long)]
     pub(super) json: bool,
@@ -86,26 +33,23 @@ pub(crate) struct Decode {
     #[arg(long, value_name = "COUNTS", requires = "stats")]
     pub(super) jump: Option<u64>,
     /// Write the capture as VCD, with the decoded fields beside it as strings.
-    #[arg(long, value_name = "OUT")]
+    #[arg(short = 'o', long, value_name = "OUT")]
     pub(super) vcd: Option<PathBuf>,
+    /// Write only this piece of it, as 1ms..2ms, and show only its frames.
+    #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, requires = "vcd", conflicts_with_all = ["from", "to"])]
+    pub(super) cut: Option<(Time, Time)>,
+    /// Stop at the first refused frame or missing answer.
+    #[arg(long, value_name = "EVENT", value_enum)]
+    pub(super) until: Option<Until>,
     /// Draw position and errors over time, and how long answers took.
     #[arg(long, value_name = "OUT")]
     pub(super) svg: Option<PathBuf>,
+    /// What is read, and how.
+    #[command(flatten)]
+    pub(super) reading: Reading,
     /// Which frames are shown.
     #[command(flatten)]
     pub(super) filter: FilterArgs,
-    /// How the file is to be read.
-    #[command(flatten)]
-    pub(super) file: FileArgs,
-    /// How the line is to be taken.
-    #[command(flatten)]
-    pub(super) line: LineArgs,
-    /// What the frames of encoders do not tell.
-    #[command(flatten)]
-    pub(super) tformat: TformatArgs,
-    /// What RTEX blocks do not tell.
-    #[command(flatten)]
-    pub(super) rtex: RtexArgs,
 }
 
 /// Which frames are shown and counted.
@@ -129,180 +73,25 @@ pub(crate) struct FilterArgs {
     pub(super) errors: bool,
 }
 
-/// How the file is to be read.
-#[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "File")]
-pub(crate) struct FileArgs {
-    /// File format, where the content does not tell it.
-    #[arg(long, value_enum)]
-    pub(super) format: Option<Named>,
-    /// Samples a second of a raw file, as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
-    #[arg(long, value_name = "HZ", value_parser = frequency)]
-    pub(super) rate: Option<u64>,
-    /// Bytes a sample of a raw file, otherwise 1.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
-    pub(super) unit_size: Option<u8>,
-    /// The files are logs of bytes as hex digits, a burst a line.
-    #[arg(long, conflicts_with_all = ["format", "rate"])]
-    pub(super) bytes: bool,
-    /// The files are binary records of this many bytes, a burst each.
-    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
-    pub(super) record_size: Option<u16>,
-    /// The file still grows: what comes to it is decoded too, until the program is stopped.
-    #[arg(long)]
-    pub(super) follow: bool,
-    /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
-    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
-    pub(super) threshold: Option<f64>,
-}
-
-/// How the line is to be taken.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Line")]
-pub(crate) struct LineArgs {
-    /// Channel by name or number; otherwise the one that decodes best.
-    #[arg(long, value_name = "NAME")]
-    pub(super) channel: Option<String>,
-    /// Channel of the requests, where the answers are on another one.
-    #[arg(long, value_name = "NAME", requires = "rx", conflicts_with = "channel")]
-    pub(super) tx: Option<String>,
-    /// Channel of the answers.
-    #[arg(long, value_name = "NAME", requires = "tx", conflicts_with = "channel")]
-    pub(super) rx: Option<String>,
-    /// Bits a second, as 2500000 or 2.5M; otherwise found from the lengths of the runs.
-    #[arg(long, value_name = "HZ", value_parser = bit_rate)]
-    pub(super) bit_rate: Option<u32>,
-    /// Whether the line idles high (normal) or low; otherwise the one that decodes best.
-    #[arg(long, value_enum)]
-    pub(super) polarity: Option<Polarity>,
-}
-
-/// Which way up a line is.
+/// What ends a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Polarity {
-    /// Idles high.
-    Normal,
-    /// Idles low: A and B swapped.
-    Inverted,
+pub(crate) enum Until {
+    /// A frame is refused, or an answer is missing.
+    Error,
 }
 
-/// What the frames of encoders do not tell.
-#[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "Encoder (T-Format, A-format)")]
-pub(crate) struct TformatArgs {
-    /// Bits of a turn; otherwise from the encoder ID or type word seen on the line.
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=24))]
-    pub(super) single_turn_bits: Option<u8>,
-    /// Bits that count turns; otherwise from the encoder ID or type word, else 16.
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(0..=24))]
-    pub(super) multi_turn_bits: Option<u8>,
-}
-
-/// What RTEX blocks do not tell.
-#[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "RTEX")]
-pub(crate) struct RtexArgs {
-    /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
-    #[arg(long, value_name = "BYTES", value_parser = block_size)]
-    pub(super) block_size: Option<u8>,
-    /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
-    #[arg(long, value_name = "TIME", value_parser = period)]
-    pub(super) period: Option<u32>,
-    /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
-    #[arg(long, value_name = "N/D", value_parser = gear, requires = "period")]
-    pub(super) gear: Option<Gear>,
-    /// Only the blocks of this drive.
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=31))]
-    pub(super) mac_id: Option<u8>,
-}
-
-/// A time of the capture.
-fn moment(text: &str) -> Result<Time, String> {
-    time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, as 20us, 1.5ms or 2s"))
-}
-
-/// A period in ns.
-fn period(text: &str) -> Result<u32, String> {
-    match time::duration(text).map(|time| (time.ps() + 500) / 1000) {
-        Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
-        _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
-    }
-}
-
-fn gear(text: &str) -> Result<Gear, String> {
-    let read = text.split_once('/').and_then(|(n, d)| Gear::new(n.trim().parse().ok()?, d.trim().parse().ok()?));
-    read.ok_or_else(|| format!("\"{text}\" is not a gear of two whole numbers above 0, as 8/1"))
-}
-
-fn block_size(text: &str) -> Result<u8, String> {
-    match text {
-        "16" => Ok(16),
-        "32" => Ok(32),
-        _ => Err(format!("\"{text}\" is neither 16 nor 32")),
-    }
+/// Two times with two dots between them.
+fn stretch(text: &str) -> Result<(Time, Time), String> {
+    let (from, to) = text.split_once("..").ok_or_else(|| format!("\"{text}\" is not two times, as 1ms..2ms"))?;
+    let (from, to) = (moment(from)?, moment(to)?);
+    if from < to { Ok((from, to)) } else { Err(format!("nothing lies in \"{text}\"")) }
 }
 
 impl Decode {
-    /// An option that says something of a file.
-    pub(super) fn describes_a_file(&self) -> Option<&'static str> {
-        let said = [
-            (self.file.format.is_some(), "--format"),
-            (self.file.rate.is_some(), "--rate"),
-            (self.file.bytes, "--bytes"),
-            (self.file.record_size.is_some(), "--record-size"),
-            (self.file.threshold.is_some(), "--threshold"),
-            (self.file.follow, "--follow"),
-            (self.line.channel.is_some(), "--channel"),
-            (self.line.tx.is_some(), "--tx"),
-            (self.file.unit_size.is_some(), "--unit-size"),
-            (self.line.bit_rate.is_some(), "--bit-rate"),
-            (self.line.polarity.is_some(), "--polarity"),
-            (self.rtex.block_size.is_some(), "--block-size"),
-            (self.rtex.period.is_some(), "--period"),
-            (self.rtex.mac_id.is_some(), "--mac-id"),
-        ];
-        said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
-    }
-
     /// Which frames are asked for.
     pub(super) fn filter(&self) -> Filter {
         let FilterArgs { id, address, from, to, errors } = &self.filter;
-        Filter::new(id.clone(), address.map(i64::from), (*from, *to), *errors)
-    }
-
-    /// What was said about the files.
-    pub(super) fn hints(&self) -> Hints {
-        let format = if self.file.bytes { Some(Format::Hex) } else { self.file.format.map(|Named(format)| format) };
-        Hints {
-            format,
-            sample_rate: self.file.rate,
-            unit_size: usize::from(self.file.unit_size.unwrap_or(1)),
-            record_size: self.file.record_size.map(usize::from),
-            threshold: self.file.threshold,
-            grows: self.file.follow,
-            guard: Some(guarded),
-        }
-    }
-
-    /// What was said about line and protocol.
-    pub(super) fn settings(&self) -> Settings {
-        Settings {
-            line: Options {
-                channel: self.line.channel.clone(),
-                pair: self.line.tx.clone().zip(self.line.rx.clone()),
-                bit_rate: self.line.bit_rate,
-                inverted: self.line.polarity.map(|polarity| polarity == Polarity::Inverted),
-            },
-            widths: Widths {
-                single_turn_bits: self.tformat.single_turn_bits,
-                multi_turn_bits: self.tformat.multi_turn_bits,
-            },
-            rtex: Rtex {
-                block_size: self.rtex.block_size.map(usize::from),
-                mac_id: self.rtex.mac_id,
-                period_ns: self.rtex.period,
-                gear: self.rtex.gear.unwrap_or(Gear::UNITY),
-            },
-        }
+        let times = self.cut.map_or((*from, *to), |(from, to)| (Some(from), Some(to)));
+        Filter::new(id.clone(), address.map(i64::from), times, *errors)
     }
 }

@@ -4,7 +4,7 @@ pub(super) mod memory;
 
 use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
@@ -108,6 +108,8 @@ pub(super) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Pri
     let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
     let (mut gone, mut out) = (None, io::stdout());
+    // Over the line before, to the end of the line; in a file or pipe a line each.
+    let (from, to) = if out.is_terminal() { ("\r", "\x1b[K") } else { ("", "\n") };
     while watch.count.is_none_or(|count| good + bad < count) {
         let reading = match encoder.read() {
             Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
@@ -136,8 +138,7 @@ pub(super) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Pri
         }
         let errors = bad as f64 * 100.0 / (good + bad) as f64;
         let written = match (print, &reading) {
-            // Over the line before, to the end of the line.
-            (Print::Text, _) => write!(out, "\r{text}  {errors:.1} % errors\x1b[K"),
+            (Print::Text, _) => write!(out, "{from}{text}  {errors:.1} % errors{to}"),
             (Print::Json, Ok(all)) => writeln!(out, "{}", json!({ "time_s": time, "reading": object(all) })),
             (Print::Json, Err(fault)) => writeln!(out, "{}", json!({ "time_s": time, "fault": fault.to_string() })),
         };
@@ -147,7 +148,7 @@ pub(super) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Pri
         }
         thread::sleep(Duration::from_millis(watch.period));
     }
-    let said = format!("\n{good} good, {bad} refused or missing");
+    let said = format!("{}{good} good, {bad} refused or missing", if from.is_empty() { "" } else { "\n" });
     print.say(said, || json!({ "good": good, "bad": bad }))?;
     if let Some((mut csv, path)) = csv {
         csv.flush().map_err(Fault::file(path))?;

@@ -13,12 +13,13 @@ use nikon_aformat::{
 };
 
 use super::{Bar, Plan};
+use crate::units::one_of;
 
 /// Nikon A-format encoders, one or several on a bus.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Bit rate in Mbit/s: 2.5, 4, 6.67, 8 or 16.
-    #[arg(long, value_name = "RATE", default_value = "4", value_parser = rate)]
+    /// Bits a second, 2.5M, 4M, 6.67M, 8M or 16M.
+    #[arg(long, value_name = "HZ", default_value = "4M", value_parser = rate)]
     rate: BitRate,
     /// What is asked for, by name (ABS24_LOW) or code: ABS40 by default, ABS40_MT of several encoders.
     #[arg(long, value_name = "COMMAND", value_parser = command)]
@@ -49,15 +50,7 @@ const ENCODERS: [&str; 8] =
     ["encoder 0", "encoder 1", "encoder 2", "encoder 3", "encoder 4", "encoder 5", "encoder 6", "encoder 7"];
 
 fn rate(text: &str) -> Result<BitRate, String> {
-    let known = [
-        ("2.5", BitRate::Mbit2_5),
-        ("4", BitRate::Mbit4),
-        ("6.67", BitRate::Mbit6_67),
-        ("8", BitRate::Mbit8),
-        ("16", BitRate::Mbit16),
-    ];
-    let found = known.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, rate)| rate).ok_or_else(|| "2.5, 4, 6.67, 8 or 16".to_owned())
+    one_of(text, BitRate::ALL.into_iter().map(|rate| (rate, rate.bits_per_second())))
 }
 
 fn command(text: &str) -> Result<Command, String> {
@@ -230,9 +223,9 @@ mod tests {
 
     #[test]
     fn wrong_use_is_refused() {
-        assert!(rate("3").is_err() && command("31").is_err() && command("ABS").is_err());
+        assert!(rate("4").is_err() && command("31").is_err() && command("ABS").is_err());
         assert_eq!(
-            (rate("6.67"), command("status_mt"), command("12")),
+            (rate("6.67M"), command("status_mt"), command("12")),
             (Ok(BitRate::Mbit6_67), Ok(Command::StatusMt), Ok(Command::ZeroPreset))
         );
         let one = Arguments { command: Some(Command::Abs40), ..arguments(BitRate::Mbit4, &[0, 1]) };

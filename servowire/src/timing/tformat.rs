@@ -5,12 +5,13 @@ use tformat::master::{Line, Progress, Transaction};
 use tformat::{Adf, BitRate, DataId, Request};
 
 use super::{Bar, Plan};
+use crate::units::tformat_rate;
 
 /// One Tamagawa T-Format encoder.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Bit rate in Mbit/s.
-    #[arg(long, value_name = "RATE", default_value = "2.5", value_parser = rate)]
+    /// Bits a second, 2.5M or 5M.
+    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
     /// What is asked for, one hex digit: 0 position, 1 turns, 2 encoder ID, 3 all, 6 and D EEPROM, 7, 8 and C reset.
     #[arg(long, value_name = "ID", default_value = "3", value_parser = data_id)]
@@ -24,14 +25,6 @@ pub(super) struct Arguments {
     /// From the end of the response to its hand-over to the program, in ns.
     #[arg(long, value_name = "NS", default_value_t = 0)]
     latency: u32,
-}
-
-fn rate(text: &str) -> Result<BitRate, String> {
-    match text {
-        "2.5" => Ok(BitRate::Mbit2_5),
-        "5" => Ok(BitRate::Mbit5),
-        _ => Err("2.5 or 5".to_owned()),
-    }
 }
 
 fn data_id(text: &str) -> Result<DataId, String> {
@@ -101,7 +94,7 @@ mod tests {
 
     #[test]
     fn wrong_use_is_refused() {
-        assert!(rate("3").is_err() && data_id("4").is_err() && data_id("g").is_err());
-        assert_eq!((rate("5"), data_id("C")), (Ok(BitRate::Mbit5), Ok(DataId::ResetTurnsAndErrors)));
+        assert!(data_id("4").is_err() && data_id("g").is_err());
+        assert_eq!(data_id("C"), Ok(DataId::ResetTurnsAndErrors));
     }
 }

@@ -256,3 +256,22 @@ fn a_table_without_times() {
     all_good(&bench.decode("a.csv", &text, &["--json", "--format", "csv", "--rate", "20M"]));
     bench.decode("a.csv", &text, &[]).fails_with("is said with --format csv --rate");
 }
+
+/// What `sigrok-cli -I` writes in front of its outputs: text, VCD, and samples, whose rate nobody has to say then.
+#[test]
+fn a_line_of_sigrok_before_the_capture() {
+    let bench = Bench::new();
+    let (wave, meta) = (good_traffic(2.5e6), "META samplerate: 20000000\n");
+    let mut text = format!("{meta}libsigrok 0.5.2\nAcquisition with 1/1 channels at 20 MHz\n");
+    for chunk in wave.samples(20e6).chunks(64) {
+        let bits: String = chunk.iter().map(|level| if *level { '1' } else { '0' }).collect();
+        writeln!(text, "D0:{bits}").unwrap();
+    }
+    all_good(&bench.decode("a.bits", &text, &["--json"]));
+    all_good(&bench.decode("a.vcd", format!("{meta}{}", wave.vcd()), &["--json"]));
+    let samples = [meta.as_bytes(), &wave.raw(20e6, 0)].concat();
+    all_good(&bench.decode("a.bin", &samples, &["--json"]));
+    all_good(&bench.decode("b.bin", &samples, &["--json", "--rate", "20M"]));
+    // The line alone is no capture.
+    bench.decode("c.bin", meta, &[]).fails_with("the file is empty");
+}

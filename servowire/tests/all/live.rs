@@ -182,3 +182,47 @@ fn options_without_a_file() {
         assert!(run.err.contains("describes a capture: name its file"), "{}", run.err);
     }
 }
+
+/// Ctrl-C ends what follows a file; its figures are printed, and what is complete so far.
+#[cfg(unix)]
+#[test]
+fn figures_of_what_is_followed() {
+    let bench = Bench::new();
+    for (options, want) in
+        [(&["--stats"][..], "  frames        10 requests, 10 answers, 0 others"), (&["--csv"], "file,channel,")]
+    {
+        let path = bench.file("grows.vcd", exchanges(40, 10).vcd());
+        let mut live = Live::start(&[&["decode", "--follow", path.to_str().unwrap()], options].concat());
+        std::thread::sleep(Duration::from_millis(1500));
+        let asked = Command::new("kill").args(["-INT", &live.child.id().to_string()]).status().unwrap();
+        assert!(asked.success());
+        assert_eq!(live.child.wait().unwrap().code(), Some(0), "{options:?}");
+        let lines = live.end();
+        assert!(lines.iter().any(|line| line.starts_with(want)), "{options:?}: {lines:?}");
+    }
+}
+
+/// The first error is the last thing that is shown, also of what goes on.
+#[test]
+fn until_the_first_error() {
+    let mut wave = exchanges(40, 6);
+    let mut bad = id3(46, 0, 0);
+    bad[5] ^= 1;
+    wave.exchange(&[0x1a], &bad);
+    for k in 47..60 {
+        wave.exchange(&[0x1a], &id3(k, 0, 0));
+    }
+    let bench = Bench::new();
+    let path = bench.file("grows.vcd", wave.vcd());
+    let live = Live::start(&["decode", "--json", "--until", "error", "--follow", path.to_str().unwrap()]);
+    let lines = live.end();
+    assert_eq!(lines.len(), 14, "{lines:?}");
+    assert!(lines[13].contains("\"verdict\":\"crc\""), "{}", lines[13]);
+    let run = common::decode(&path, &["--stats", "--until", "error"]);
+    assert_eq!(run.code, 1);
+    assert!(run.out.contains("  verdicts      13 ok, 1 refused"), "{}", run.out);
+    // A log of bytes too.
+    let log = "1A\n1A 20 29 C0 3B 17 00 00 00 C8 36\n1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n";
+    let run = bench.decode("log.txt", log, &["--json", "--until", "error"]);
+    assert_eq!((run.code, run.out.lines().count()), (1, 2), "{}", run.out);
+}

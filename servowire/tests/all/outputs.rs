@@ -220,3 +220,32 @@ fn no_progress_bar_without_a_terminal() {
     run.is_good();
     assert_eq!(run.err.lines().count(), 1, "{}", run.err);
 }
+
+/// A piece of a capture by itself: the levels as they were, at their times, and it can be decoded again.
+#[test]
+fn a_piece_is_cut_out() {
+    let bench = Bench::new();
+    let (wave, out) = (good_traffic(2.5e6), bench.path("piece.vcd"));
+    let to = out.to_str().unwrap();
+    // The second to the fourth transaction; the line is high before.
+    let run = bench.decode("a.vcd", wave.vcd(), &["--json", "--cut", "90us..360us", "-o", to]);
+    run.is_good();
+    assert_eq!(run.json().len(), 6, "{}", run.out);
+    let again = common::decode(&out, &["--json", "--channel", "line"]);
+    again.is_good();
+    let times = |run: &common::Run| -> Vec<(i64, i64)> {
+        let time = |event: &serde_json::Value, key: &str| event[key].as_i64().unwrap();
+        run.json().iter().map(|event| (time(event, "start_ps"), time(event, "end_ps"))).collect()
+    };
+    assert_eq!(times(&again), times(&run));
+    let text = std::fs::read_to_string(&out).unwrap();
+    let stamps: Vec<u64> = text.lines().filter_map(|line| line.strip_prefix('#')?.parse().ok()).collect();
+    assert_eq!((stamps[0], stamps.iter().all(|at| (90_000..360_000).contains(at))), (90_000, true));
+    // Where nothing moves, the levels alone.
+    bench.decode("a.vcd", wave.vcd(), &["--json", "--cut", "1us..2us", "-o", to]);
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.contains("#1000\n") && text.lines().filter(|line| line.starts_with('1')).count() == 1, "{text}");
+    for wrong in ["2ms..1ms", "1ms", "1..2"] {
+        assert_eq!(bench.decode("a.vcd", wave.vcd(), &["--cut", wrong, "-o", to]).code, 2, "{wrong}");
+    }
+}

@@ -119,6 +119,8 @@ fn the_program_reads_what_its_own_encoder_says() {
     let csv = folder.path().join("out.csv");
     let output = bench.talk(&["watch", "--count", "3", "--period", "1", "--csv", csv.to_str().unwrap()]);
     assert!(text(&output).ends_with("3 good, 0 refused or missing\n"), "{}", text(&output));
+    // In a pipe a line each, and no escape code.
+    assert!(text(&output).lines().count() == 4 && !text(&output).contains(['\x1b', '\r']), "{}", text(&output));
     assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 4);
     bench.end();
 }

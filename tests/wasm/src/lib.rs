@@ -62,13 +62,13 @@ pub fn outputs(name: &str, bytes: &[u8]) -> String {
 }
 
 /// Decodes once; notes and fault.
-fn one(name: &str, bytes: &[u8], printer: &mut dyn Printer, vcd: Option<&mut VcdOut>) -> String {
+fn one(name: &str, bytes: &[u8], printer: &mut dyn Printer, vcd: Option<&mut dyn Printer>) -> String {
     let said = RefCell::new(String::new());
     let notes = |note: &Note| {
         let _ = writeln!(said.borrow_mut(), "{note}");
     };
     let end = capture::open(Input::seeking(name, io::Cursor::new(bytes.to_vec())), Hints::default()).map(|capture| {
-        let mut out = Output::new(name, printer).with_notes(&notes).with_vcd(vcd);
+        let mut out = Output::new(name, printer).with_notes(&notes).with_beside(vcd.map(|vcd| vcd as &mut dyn Printer));
         let end = servowire_decode::decode(name, capture, None, &Settings::default(), &mut out);
         (out.end().is_ok(), end.map_err(|stop| stop.to_string()), out.refusals())
     });

@@ -186,7 +186,7 @@ pub(super) fn numbers(inside: &str) -> Option<Vec<u8>> {
         return None;
     }
     let cells = inside.split(',').map(str::trim).filter(|cell| !cell.is_empty());
-    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse().ok() } else { None }).collect()
+    cells.map(|cell| if cell.bytes().all(|b| b.is_ascii_digit()) { cell.parse::<u8>().ok() } else { None }).collect()
 }
 
 /// A string of Python or C with its escapes: `b'\x02Hello'`.

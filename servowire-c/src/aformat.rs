@@ -1,0 +1,18 @@
+//! Nikon A-format.
+
+mod bus;
+mod codec;
+mod names;
+mod words;
+
+pub use bus::{
+    sw_aformat_angle, sw_aformat_hear, sw_aformat_init, sw_aformat_missing, sw_aformat_poll, sw_aformat_position,
+    sw_aformat_read, sw_aformat_response, sw_aformat_set_hand_over, sw_aformat_t, sw_aformat_transmission_t,
+    sw_aformat_until_ns,
+};
+pub use codec::{
+    sw_aformat_build, sw_aformat_encoder_t, sw_aformat_layout, sw_aformat_parse, sw_aformat_parse_as,
+    sw_aformat_parse_line, sw_aformat_request_t, sw_aformat_response_t,
+};
+pub use names::{sw_aformat_error_t, sw_aformat_es_t, sw_aformat_layout_t, sw_aformat_option_t};
+pub use words::{sw_aformat_bus_missing, sw_aformat_bus_push, sw_aformat_bus_start, sw_aformat_bus_t};

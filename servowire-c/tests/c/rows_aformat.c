@@ -1,0 +1,97 @@
+/* A-format. */
+#include "rows.h"
+
+static void say_response(sw_result_t r, const sw_aformat_response_t *it)
+{
+    say("%s", sw_text(r));
+    if (r == SW_OK) {
+        say(" layout %u command %u ea %u es %u abs %llu velocity %d data %u alm %u acceleration %d temperature %u pm_alm %u address %u bank %u",
+            it->layout, it->command, it->ea, it->es, (unsigned long long)it->abs, it->velocity, it->data, it->alm, it->acceleration,
+            it->temperature, it->pm_alm, it->address, it->bank);
+    }
+}
+
+/* COMMAND LAYOUT EA BITS */
+static void line(char **a, int n)
+{
+    sw_aformat_response_t it;
+    block_t bits = packed(a[3]);
+    sw_result_t r;
+    (void)n;
+    r = sw_aformat_parse_line((uint8_t)number(a[0]), (uint8_t)number(a[1]), (uint8_t)number(a[2]), bits.at,
+                              strcmp(a[3], "-") == 0 ? 0 : strlen(a[3]), SW_LSB_FIRST, &it);
+    say_response(r, &it);
+}
+
+static uint16_t *words_of(char **a, int n)
+{
+    /* Of exactly their length. */
+    uint16_t *words = malloc(n > 0 ? (size_t)n * sizeof *words : 1);
+    int k;
+    if (words == NULL) {
+        exit(2);
+    }
+    for (k = 0; k < n; k++) {
+        words[k] = (uint16_t)strtoul(a[k], NULL, 16);
+    }
+    return words;
+}
+
+/* COMMAND LAYOUT EA WORDS... */
+static void words(char **a, int n)
+{
+    sw_aformat_response_t it;
+    uint16_t *heard = words_of(a + 3, n - 3);
+    sw_result_t r = sw_aformat_parse_as((uint8_t)number(a[0]), (uint8_t)number(a[1]), (uint8_t)number(a[2]), heard, (size_t)(n - 3),
+                                        SW_MSB_FIRST, &it);
+    free(heard);
+    say_response(r, &it);
+}
+
+static sw_aformat_request_t asked_of(char **a)
+{
+    sw_aformat_request_t asked;
+    asked.command = (uint8_t)number(a[0]);
+    asked.ea = (uint8_t)number(a[1]);
+    asked.fc = (uint8_t)number(a[2]);
+    asked.address = (uint8_t)number(a[3]);
+    asked.bank = (uint8_t)number(a[4]);
+    asked.data = (uint32_t)number(a[5]);
+    return asked;
+}
+
+/* COMMAND EA FC ADDRESS BANK DATA OPTIONS WORDS...: with all that a request tells. */
+static void asked(char **a, int n)
+{
+    sw_aformat_request_t request = asked_of(a);
+    sw_aformat_encoder_t encoder = {20, 16, 0};
+    sw_aformat_response_t it;
+    uint16_t *heard = words_of(a + 7, n - 7);
+    sw_result_t r;
+    encoder.options = (uint8_t)number(a[6]);
+    r = sw_aformat_parse(&request, &encoder, heard, (size_t)(n - 7), SW_MSB_FIRST, &it);
+    free(heard);
+    say("%s", sw_text(r));
+}
+
+/* COMMAND EA FC ADDRESS BANK DATA OPTIONS: the frames, and with what an encoder answers. */
+static void build(char **a, int n)
+{
+    sw_aformat_request_t request = asked_of(a);
+    sw_aformat_encoder_t encoder = {20, 16, 0};
+    uint16_t frames[5];
+    uint8_t layout = 99, size = 0;
+    size_t count = 0, k;
+    (void)n;
+    encoder.options = (uint8_t)number(a[6]);
+    say("%s", sw_text(sw_aformat_build(&request, SW_MSB_FIRST, frames, 5, &count)));
+    for (k = 0; k < count; k++) {
+        say(" %04x", frames[k]);
+    }
+    say(" %s", sw_text(sw_aformat_layout(&request, &encoder, &layout, &size)));
+    say(" %u %u", layout, size);
+}
+
+const entry_t aformat_commands[] = {
+    {"aformat_line", line}, {"aformat_words", words}, {"aformat_asked", asked}, {"aformat_build", build}, {NULL, NULL},
+};
