@@ -108,9 +108,15 @@ flash() {
 
 # The example and its encoder in an emulated Cortex-M4; then once more with another Rust library beside this one.
 emulated() {
+    local example
+    for example in examples/*.c; do
+        arm-none-eabi-gcc "${m4[@]}" -std=c99 -Os -Wstrict-prototypes "${strict[@]}" -c "$example" -o "$out/example.o"
+    done
     local sources=(examples/tformat_uart.c tests/firmware/run_tformat.c)
     image tformat "${sources[@]}"
     run_image tformat
+    image cost tests/firmware/cost.c
+    run_image cost -icount shift=0
     rustc --edition 2024 --crate-type staticlib --target thumbv7em-none-eabihf -C panic=abort -O -o "$out/libother.a" tests/firmware/other.rs
     arm-none-eabi-gcc "${m4[@]}" "${firmware[@]}" "${sources[@]}" -Wl,-u,other_divide "$out/libother.a" \
         "$out/lib/thumbv7em-none-eabihf/libservowire_c.a" -lc_nano -lgcc -o "$out/two.elf"
@@ -119,7 +125,7 @@ emulated() {
 
 run_image() {
     timeout 60 qemu-system-arm -machine mps2-an386 -display none -serial none -monitor none -semihosting-config enable=on,target=native \
-        -kernel "$out/$1.elf" || fail "$1 ended with $?"
+        "${@:2}" -kernel "$out/$1.elf" || fail "$1 ended with $?"
 }
 
 # The release archive, and programs that find it by CMake and by pkg-config.

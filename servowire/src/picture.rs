@@ -102,7 +102,7 @@ impl Printer for Picture {
 }
 
 /// A line, and an address on it where the frames tell it.
-type Speaker = (usize, Option<u16>);
+type Speaker = (usize, Option<u32>);
 
 /// Gathers what is drawn.
 #[derive(Debug, Clone)]
@@ -146,7 +146,7 @@ impl Picture {
         }
     }
 
-    fn position(&mut self, origin: &Origin, address: Option<u16>, time: Time, position: Position) {
+    fn position(&mut self, origin: &Origin, address: Option<u32>, time: Time, position: Position) {
         let turns = position.turns();
         let curve = self.curves.entry(((origin.speaks, address), position.span)).or_insert_with(|| Curve {
             name: match (origin.lane(), address) {

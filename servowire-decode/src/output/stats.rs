@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json, json};
 
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
@@ -32,8 +32,9 @@ struct Figures {
     kinds: BTreeMap<String, u64>,
     refused: BTreeMap<&'static str, u64>,
     delay: Spread,
-    /// By address, where the frames tell it.
-    axes: BTreeMap<Option<u16>, Axis>,
+    /// Of all frames together, and by address where that is known.
+    line: Axis,
+    axes: BTreeMap<u32, Axis>,
     happened: Vec<Happening>,
     /// Of all lists together: what there was no room for.
     unlisted: u64,
@@ -43,7 +44,7 @@ struct Figures {
 #[derive(Debug, Clone)]
 struct Happening {
     place: Place,
-    address: Option<u16>,
+    address: Option<u32>,
     what: String,
 }
 
@@ -148,7 +149,20 @@ impl Figures {
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
-        self.axes.entry(event.address).or_default().add(event, limit);
+        self.line.add(event, limit);
+        // What is refused may be of anybody.
+        if let Some(address) = event.address.filter(|_| event.verdict.is_ok()) {
+            self.axes.entry(address).or_default().add(event, limit);
+        }
+    }
+
+    /// The figures of the only one there is; none of several, each of which has its own.
+    fn alone(&self) -> Option<&Axis> {
+        match self.axes.len() {
+            0 => Some(&self.line),
+            1 => self.axes.values().next(),
+            _ => None,
+        }
     }
 
     /// What belongs in the list of events.
@@ -246,15 +260,18 @@ impl Axis {
         Ok(())
     }
 
-    fn json(&self, limit: Option<u64>) -> Json {
+    /// Into an object; the cycle is that of `line`.
+    fn json(&self, limit: Option<u64>, line: &Self, object: &mut Map<String, Json>) {
         let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
-        json!({
-            "cycle": if self.counted { Json::Null } else { self.cycle.json() },
-            "largest_move": self.position.map(|_| self.largest),
-            "least_position": self.range.map(|range| range.0), "most_position": self.range.map(|range| range.1),
-            "jumps": limit.filter(|_| self.missing().is_none()).map(|_| self.jumps),
-            "jumps_listed": self.listed.iter().map(jump).collect::<Vec<_>>(),
-        })
+        let entries = [
+            ("cycle", if line.counted { Json::Null } else { line.cycle.json() }),
+            ("largest_move", json!(self.position.map(|_| self.largest))),
+            ("least_position", json!(self.range.map(|range| range.0))),
+            ("most_position", json!(self.range.map(|range| range.1))),
+            ("jumps", json!(limit.filter(|_| self.missing().is_none()).map(|_| self.jumps))),
+            ("jumps_listed", self.listed.iter().map(jump).collect()),
+        ];
+        object.extend(entries.map(|(key, value)| (key.to_owned(), value)));
     }
 }
 
@@ -277,22 +294,19 @@ impl<W: Write> Stats<W> {
         for (class, count) in &f.refused {
             writeln!(self.out, "    {class:<17} {count}")?;
         }
-        let addressed = f.axes.len() > 1 || f.axes.keys().any(Option::is_some);
-        if !addressed {
-            let cycle = f.axes.values().next().map_or_else(|| Spread::default().text(), Axis::cycle_text);
-            writeln!(self.out, "  cycle         {cycle}")?;
+        let alone = f.alone();
+        if alone.is_some() {
+            writeln!(self.out, "  cycle         {}", f.line.cycle_text())?;
         }
         writeln!(self.out, "  answer delay  {}", f.delay.text())?;
-        for (address, axis) in &f.axes {
-            match address {
-                Some(address) => {
-                    writeln!(self.out, "  axis {address}")?;
-                    writeln!(self.out, "    cycle         {}", axis.cycle_text())?;
-                    axis.print_range(&mut self.out)?;
-                    axis.print(&mut self.out, self.limit, "    ")?;
-                }
-                None if !addressed => axis.print(&mut self.out, self.limit, "  ")?,
-                None => {}
+        if let Some(axis) = alone {
+            axis.print(&mut self.out, self.limit, "  ")?;
+        } else {
+            for (address, axis) in &f.axes {
+                writeln!(self.out, "  axis {address}")?;
+                writeln!(self.out, "    cycle         {}", axis.cycle_text())?;
+                axis.print_range(&mut self.out)?;
+                axis.print(&mut self.out, self.limit, "    ")?;
             }
         }
         self.print_events()
@@ -322,35 +336,32 @@ impl<W: Write> Stats<W> {
 
     fn print_json(&mut self, file: &str) -> io::Result<()> {
         let f = &self.figures;
-        let mut object = json!({
-            "file": file, "requests": f.requests, "answers": f.answers, "others": f.others,
-            "ok": f.ok, "refused": f.refused, "kinds": f.kinds, "answer_delay": f.delay.json(),
-        });
-        let axis = |axis: &Axis| axis.json(self.limit);
-        let mut entry = |key: &str, value: Json| {
-            if let Some(object) = object.as_object_mut() {
-                object.insert(key.to_owned(), value);
-            }
-        };
-        // Of a line with one encoder that needs no address, its figures are those of the line.
-        let addressed = f.axes.iter().filter_map(|(address, figures)| Some(((*address)?, figures)));
-        let axes: Vec<Json> = addressed
-            .map(|(address, figures)| {
-                let mut object = axis(figures);
-                object.as_object_mut().map(|object| object.insert("address".to_owned(), address.into()));
-                object
-            })
-            .collect();
-        let alone = if axes.is_empty() { f.axes.values().next() } else { None };
-        if let Json::Object(figures) = alone.map_or_else(|| axis(&Axis::default()), axis) {
-            figures.into_iter().for_each(|(key, value)| entry(&key, value));
+        let mut object = Map::new();
+        for (key, value) in [
+            ("file", json!(file)),
+            ("requests", json!(f.requests)),
+            ("answers", json!(f.answers)),
+            ("others", json!(f.others)),
+            ("ok", json!(f.ok)),
+            ("refused", json!(f.refused)),
+            ("kinds", json!(f.kinds)),
+            ("answer_delay", f.delay.json()),
+        ] {
+            object.insert(key.to_owned(), value);
         }
-        if !axes.is_empty() {
-            entry("axes", axes.into());
+        if let Some(alone) = f.alone() {
+            alone.json(self.limit, &f.line, &mut object);
+        } else {
+            let of = |(address, axis): (&u32, &Axis)| {
+                let mut object = Map::from_iter([("address".to_owned(), json!(address))]);
+                axis.json(self.limit, axis, &mut object);
+                Json::Object(object)
+            };
+            object.insert("axes".to_owned(), f.axes.iter().map(of).collect());
         }
         if !f.happened.is_empty() {
-            entry("events", f.happened.iter().map(Happening::json).collect());
-            entry("events_unlisted", f.unlisted.into());
+            object.insert("events".to_owned(), f.happened.iter().map(Happening::json).collect());
+            object.insert("events_unlisted".to_owned(), f.unlisted.into());
         }
         serde_json::to_writer(&mut self.out, &object)?;
         self.out.write_all(b"\n")

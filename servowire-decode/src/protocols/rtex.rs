@@ -195,7 +195,7 @@ fn position(report: &Report) -> Option<Position> {
     let field = report.fields().find(|field| field.name == "Response_Data1")?;
     match field.value {
         inspect::Value::Number(counts) if is_block(report) => {
-            Some(Position { counts, span: Some(1 << 32), per_turn: None })
+            Some(Position { name: field.name, counts, span: Some(1 << 32), per_turn: None })
         }
         _ => None,
     }
