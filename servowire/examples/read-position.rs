@@ -9,8 +9,9 @@
 //! the instant of sampling is that before the request, the earliest that is possible, and the age that the policy allows is a whole call. That is
 //! good for looking at an axis that stands or turns slowly, and not for control: at 3,000 1/min a shaft makes 0.8 turns in 16 ms.
 
-use std::error::Error;
-use std::time::{Duration, Instant};
+use core::error::Error;
+use core::time::Duration;
+use std::time::Instant;
 
 use servowire::talk::encoder::Encoder;
 use servowire::talk::port;
@@ -29,12 +30,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let began = Instant::now();
     let now_ns = || u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
     for _ in 0..10 {
-        let asked_ns = now_ns();
+        let (asked, asked_ns) = (Instant::now(), now_ns());
         let evidence = Evidence::of(Response::ReadAll(encoder.read()?), resolution, asked_ns);
-        let answered_ns = now_ns();
-        let took_us = (answered_ns - asked_ns) / 1_000;
-        match evidence.at(answered_ns, policy) {
-            Ok(sample) => println!("{sample}, the call took {took_us} us"),
+        match evidence.at(now_ns(), policy) {
+            Ok(sample) => println!("{sample}, the call took {} us", asked.elapsed().as_micros()),
             Err(doubt) => println!("no position: {doubt}"),
         }
     }
