@@ -190,7 +190,7 @@ impl Decoder {
             let (first, last) = flags.or_else(known)?;
             Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
         });
-        Some(Event { position, ..event })
+        Some(Event { position, address: Some(header.mac_id.get().into()), ..event })
     }
 
     /// The actual position, where only one drive is looked at: the figures are made for one axis.
@@ -199,7 +199,7 @@ impl Decoder {
         let field = report.fields().find(|field| field.name == "Response_Data1")?;
         match field.value {
             inspect::Value::Number(counts) if is_block(report) => {
-                Some(Position { counts, span: Some(1 << 32), per_turn: None })
+                Some(Position { name: field.name, counts, span: Some(1 << 32), per_turn: None })
             }
             _ => None,
         }

@@ -190,7 +190,10 @@ fn is_a(kind: &str, value: &Value) -> bool {
         }),
         "position" => {
             let position = value.as_object().unwrap();
-            position["counts"].is_i64() && position.get("turns").is_none_or(Value::is_number) && position.len() <= 2
+            position["name"].is_string()
+                && position["counts"].is_i64()
+                && position.get("turns").is_none_or(Value::is_number)
+                && position.len() <= 3
         }
         other => panic!("the README has no type {other:?}"),
     }

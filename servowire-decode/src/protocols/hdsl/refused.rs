@@ -25,6 +25,6 @@ pub(super) fn event(
     Event::new(place, Some(direction), kind, fields, verdict)
 }
 
-pub(super) fn position(counts: u64) -> Position {
-    Position { counts: i64::try_from(counts).unwrap_or(i64::MAX), span: Some(1 << 40), per_turn: None }
+pub(super) fn position(name: &'static str, counts: u64) -> Position {
+    Position { name, counts: i64::try_from(counts).unwrap_or(i64::MAX), span: Some(1 << 40), per_turn: None }
 }

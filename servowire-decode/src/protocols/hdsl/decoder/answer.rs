@@ -53,7 +53,7 @@ impl Decoder {
             let raw = u64::from_le_bytes(sample.position().to_le_bytes()) & 0xff_ffff_ffff;
             event.fields.push(Field::hex("POS", raw, 10));
             event.fields.push(Field::measured("VEL", sample.velocity(), "/frame"));
-            event.position = Some(position(raw));
+            event.position = Some(position("POS", raw));
         }
         if event.verdict.is_ok() && !answer.switch_ok() {
             event.fields.push(Field::text("note", SWITCH));
@@ -169,7 +169,7 @@ impl Decoder {
         let second = safe2.vpos();
         let error = safe.err().or(second.err());
         let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
-        event.position = safe.ok().map(position);
+        event.position = safe.ok().map(|counts| position("VPOS", counts));
         self.said.push(event);
         let failed = [is_damage(safe.err()), is_damage(second.err())];
         self.failed = Some(failed);
