@@ -108,6 +108,10 @@ flash() {
 
 # The example and its encoder in an emulated Cortex-M4; then once more with another Rust library beside this one.
 emulated() {
+    local example
+    for example in examples/*.c; do
+        arm-none-eabi-gcc "${m4[@]}" -std=c99 -Os -Wstrict-prototypes "${strict[@]}" -c "$example" -o "$out/example.o"
+    done
     local sources=(examples/tformat_uart.c tests/firmware/run_tformat.c)
     image tformat "${sources[@]}"
     run_image tformat

@@ -15,6 +15,12 @@
 #define SW_NO_TIME UINT64_MAX
 
 /**
+ * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
+ * frame.
+ */
+#define SW_SORTE_DATA_AT 2
+
+/**
  * Refusals of A-format, in the order of their numbers.
  */
 enum sw_aformat_error_t
@@ -322,6 +328,533 @@ enum sw_code_t
 };
 #ifndef __cplusplus
 typedef int32_t sw_code_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of motion, in the order of their numbers.
+ */
+enum sw_motion_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The axis is still moving.
+     */
+    SW_E_MOTION_MOVING = -1537,
+    /**
+     * Two steps could fall into one tick of the clock.
+     */
+    SW_E_MOTION_SPEED_ABOVE_CLOCK = -1538,
+    /**
+     * More steps than 31 bits count.
+     */
+    SW_E_MOTION_TOO_MANY_STEPS = -1539,
+    /**
+     * No room.
+     */
+    SW_E_MOTION_QUEUE_FULL = -1540,
+    /**
+     * A target outside the soft limits.
+     */
+    SW_E_MOTION_SOFT_LIMIT = -1543,
+    /**
+     * Too few steps for the change of speed.
+     */
+    SW_E_MOTION_TOO_SHORT = -1544,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_error_t;
+#endif // __cplusplus
+
+/**
+ * What the background has left to do.
+ */
+enum sw_motion_work_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * At rest where it is to be.
+     */
+    SW_MOTION_REST = 0,
+    /**
+     * Poll again.
+     */
+    SW_MOTION_MORE = 1,
+    /**
+     * Fire the interrupt now: it stands, and there is something for it.
+     */
+    SW_MOTION_START = 2,
+    /**
+     * Nothing before the interrupt has gone on.
+     */
+    SW_MOTION_LATER = 3,
+    /**
+     * The stop needs more slots than the queue has: the axis comes to rest.
+     */
+    SW_MOTION_TOO_FEW_SLOTS = 4,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_work_t;
+#endif // __cplusplus
+
+/**
+ * Where an axis stands.
+ */
+enum sw_rtex_axis_code_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Its drive has not answered yet.
+     */
+    SW_RTEX_STARTING = 0,
+    /**
+     * Servo off.
+     */
+    SW_RTEX_OFF = 1,
+    /**
+     * Servo_On is sent, Servo_Active has not come yet.
+     */
+    SW_RTEX_SWITCHING_ON = 2,
+    /**
+     * Servo on.
+     */
+    SW_RTEX_ON = 3,
+    /**
+     * Slows down; there is a reason.
+     */
+    SW_RTEX_STOPPING = 4,
+    /**
+     * Stands with the servo on; there is a reason.
+     */
+    SW_RTEX_HELD = 5,
+    /**
+     * Servo_On is 0, Servo_Active has not gone yet.
+     */
+    SW_RTEX_SWITCHING_OFF = 6,
+    /**
+     * Servo off for a reason.
+     */
+    SW_RTEX_STOPPED = 7,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_axis_code_t;
+#endif // __cplusplus
+
+/**
+ * Control bits of a command, bytes 2 and 3.
+ */
+enum sw_rtex_control_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Homing_Ctrl.
+     */
+    SW_RTEX_HOMING_CTRL = (1 << 2),
+    /**
+     * TL_SW: first or second torque limit.
+     */
+    SW_RTEX_TL_SW = (1 << 3),
+    /**
+     * Gain_SW: first or second gain.
+     */
+    SW_RTEX_GAIN_SW = (1 << 4),
+    /**
+     * Servo_On. An axis sets it by itself.
+     */
+    SW_RTEX_SERVO_ON = (1 << 7),
+    /**
+     * EX-OUT1.
+     */
+    SW_RTEX_EX_OUT1 = (1 << 8),
+    /**
+     * EX-OUT2.
+     */
+    SW_RTEX_EX_OUT2 = (1 << 9),
+    /**
+     * SL_SW.
+     */
+    SW_RTEX_SL_SW = (1 << 11),
+    /**
+     * Pause.
+     */
+    SW_RTEX_PAUSE = (1 << 13),
+    /**
+     * Smooth_Stop.
+     */
+    SW_RTEX_SMOOTH_STOP = (1 << 14),
+    /**
+     * Hard_Stop.
+     */
+    SW_RTEX_HARD_STOP = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_control_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of RTEX, in the order of their numbers; the last two are of axes.
+ */
+enum sw_rtex_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The block is too short.
+     */
+    SW_E_RTEX_TRUNCATED = -1025,
+    /**
+     * The block is too long.
+     */
+    SW_E_RTEX_TOO_LONG = -1026,
+    /**
+     * A command where a response is due, or the other way round.
+     */
+    SW_E_RTEX_DIRECTION = -1027,
+    /**
+     * Another MAC-ID.
+     */
+    SW_E_RTEX_MAC_ID = -1028,
+    /**
+     * There is no such cyclic code.
+     */
+    SW_E_RTEX_CYCLIC_CODE = -1029,
+    /**
+     * There is no such non-cyclic code.
+     */
+    SW_E_RTEX_NON_CYCLIC_CODE = -1030,
+    /**
+     * Sub_Chk is wrong.
+     */
+    SW_E_RTEX_SUB_CHK = -1031,
+    /**
+     * There is no such sub-command.
+     */
+    SW_E_RTEX_SUB_COMMAND_CODE = -1032,
+    /**
+     * The two codes do not go together.
+     */
+    SW_E_RTEX_CODE_PAIR = -1033,
+    /**
+     * A reserved bit is set.
+     */
+    SW_E_RTEX_RESERVED = -1034,
+    /**
+     * The axis is in another state or mode, or its drive is not ready.
+     */
+    SW_E_RTEX_NOT_NOW = -1264,
+    /**
+     * The step or the rate is beyond the limits of the axis; nothing has changed.
+     */
+    SW_E_RTEX_TOO_FAR = -1265,
+};
+#ifndef __cplusplus
+typedef int32_t sw_rtex_error_t;
+#endif // __cplusplus
+
+/**
+ * Cyclic codes, which are the control modes.
+ */
+enum sw_rtex_mode_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Nothing.
+     */
+    SW_RTEX_NOP = 0,
+    /**
+     * Profile position.
+     */
+    SW_RTEX_PP = 1,
+    /**
+     * Cyclic position.
+     */
+    SW_RTEX_CP = 2,
+    /**
+     * Cyclic velocity.
+     */
+    SW_RTEX_CV = 3,
+    /**
+     * Cyclic torque.
+     */
+    SW_RTEX_CT = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_mode_t;
+#endif // __cplusplus
+
+/**
+ * Why an axis stops.
+ */
+enum sw_rtex_reason_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * It does not.
+     */
+    SW_RTEX_NO_REASON = 0,
+    /**
+     * No new echo.
+     */
+    SW_RTEX_ECHO_TIMEOUT = 1,
+    /**
+     * Another drive answers; the detail is its MAC-ID.
+     */
+    SW_RTEX_WRONG_MAC_ID = 2,
+    /**
+     * Blocks were refused; the detail is the number of the class.
+     */
+    SW_RTEX_REFUSED = 3,
+    /**
+     * No block.
+     */
+    SW_RTEX_RECEIVE_TIMEOUT = 4,
+    /**
+     * The drive reports an alarm.
+     */
+    SW_RTEX_ALARM = 5,
+    /**
+     * Servo_Ready went to 0.
+     */
+    SW_RTEX_NOT_READY = 6,
+    /**
+     * Servo_Active went to 0.
+     */
+    SW_RTEX_NOT_ACTIVE = 7,
+    /**
+     * Servo_Ready did not come.
+     */
+    SW_RTEX_READY_TIMEOUT = 8,
+    /**
+     * Servo_Active did not come.
+     */
+    SW_RTEX_ACTIVE_TIMEOUT = 9,
+    /**
+     * Servo_Active did not go.
+     */
+    SW_RTEX_INACTIVE_TIMEOUT = 10,
+    /**
+     * The drive does not accept the command; the detail is its error code.
+     */
+    SW_RTEX_COMMAND_ERROR = 11,
+    /**
+     * Another axis has failed; the detail is its place.
+     */
+    SW_RTEX_OTHER_AXIS = 12,
+    /**
+     * It was asked to.
+     */
+    SW_RTEX_REQUESTED = 13,
+    /**
+     * Homing did not end in time.
+     */
+    SW_RTEX_HOMING_TIMEOUT = 14,
+    /**
+     * Another reason, of a later release.
+     */
+    SW_RTEX_OTHER_REASON = 255,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_reason_t;
+#endif // __cplusplus
+
+/**
+ * Status flags of a response, bytes 2 and 3.
+ */
+enum sw_rtex_status_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * In_Position.
+     */
+    SW_RTEX_IN_POSITION = (1 << 0),
+    /**
+     * In_Progress.
+     */
+    SW_RTEX_IN_PROGRESS = (1 << 1),
+    /**
+     * Homing_Complete.
+     */
+    SW_RTEX_HOMING_COMPLETE = (1 << 2),
+    /**
+     * Torque_Limited.
+     */
+    SW_RTEX_TORQUE_LIMITED = (1 << 3),
+    /**
+     * Warning.
+     */
+    SW_RTEX_WARNING = (1 << 4),
+    /**
+     * Alarm.
+     */
+    SW_RTEX_ALARM_FLAG = (1 << 5),
+    /**
+     * Servo_Ready.
+     */
+    SW_RTEX_SERVO_READY = (1 << 6),
+    /**
+     * Servo_Active: the motor is energised.
+     */
+    SW_RTEX_SERVO_ACTIVE = (1 << 7),
+    /**
+     * NOT.
+     */
+    SW_RTEX_NOT = (1 << 8),
+    /**
+     * POT.
+     */
+    SW_RTEX_POT = (1 << 9),
+    /**
+     * HOME.
+     */
+    SW_RTEX_HOME = (1 << 10),
+    /**
+     * SI-MON1.
+     */
+    SW_RTEX_SI_MON1 = (1 << 11),
+    /**
+     * SI-MON2.
+     */
+    SW_RTEX_SI_MON2 = (1 << 12),
+    /**
+     * SI-MON3.
+     */
+    SW_RTEX_SI_MON3 = (1 << 13),
+    /**
+     * SI-MON4.
+     */
+    SW_RTEX_SI_MON4 = (1 << 14),
+    /**
+     * SI-MON5.
+     */
+    SW_RTEX_SI_MON5 = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of SORTE frames, in the order of their numbers.
+ */
+enum sw_sorte_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The frame is too short.
+     */
+    SW_E_SORTE_TRUNCATED = -1281,
+    /**
+     * The frame check sequence is wrong.
+     */
+    SW_E_SORTE_BAD_FCS = -1282,
+    /**
+     * The type is not the one that is due.
+     */
+    SW_E_SORTE_UNEXPECTED_TYPE = -1285,
+    /**
+     * The frame is too long.
+     */
+    SW_E_SORTE_TOO_LONG = -1286,
+    /**
+     * The CRC-8 is wrong.
+     */
+    SW_E_SORTE_BAD_CRC8 = -1287,
+    /**
+     * Another source than the one that is due.
+     */
+    SW_E_SORTE_WRONG_SOURCE = -1288,
+    /**
+     * The buffer is too small.
+     */
+    SW_E_SORTE_BUFFER_TOO_SMALL = -1294,
+    /**
+     * A PTO word that is reserved.
+     */
+    SW_E_SORTE_RESERVED_PTO_VALUE = -1295,
+};
+#ifndef __cplusplus
+typedef int32_t sw_sorte_error_t;
+#endif // __cplusplus
+
+/**
+ * What a PTO word says.
+ */
+enum sw_sorte_pto_kind_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * No pulse in this cycle.
+     */
+    SW_SORTE_NO_PULSE = 0,
+    /**
+     * A pulse.
+     */
+    SW_SORTE_PULSE = 1,
+    /**
+     * The driver is switched off.
+     */
+    SW_SORTE_DRIVER_OFF = 2,
+    /**
+     * A reserved value.
+     */
+    SW_SORTE_RESERVED = 3,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_sorte_pto_kind_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of step-profile, in the order of their numbers.
+ */
+enum sw_step_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * No steps an entry.
+     */
+    SW_E_STEP_ZERO_SEGMENT_LENGTH = -1793,
+    /**
+     * Too many steps an entry.
+     */
+    SW_E_STEP_SEGMENT_TOO_LONG = -1794,
+    /**
+     * Two steps could fall into one cycle.
+     */
+    SW_E_STEP_STEP_RATE_TOO_HIGH = -1795,
+    /**
+     * The first step takes longer than 32 bits count.
+     */
+    SW_E_STEP_STEP_TIME_OVERFLOW = -1796,
+    /**
+     * The sync time does not lie in a cycle.
+     */
+    SW_E_STEP_SYNC_TIME_OUT_OF_RANGE = -1797,
+    /**
+     * The frequency is too low.
+     */
+    SW_E_STEP_FREQUENCY_TOO_LOW = -1800,
+};
+#ifndef __cplusplus
+typedef int32_t sw_step_error_t;
 #endif // __cplusplus
 
 /**
@@ -817,6 +1350,63 @@ typedef struct {
 } sw_clock_t;
 
 /**
+ * The end of the background. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[460];
+} sw_motion_axis_t;
+
+/**
+ * The end of the interrupt. It belongs to its queue: it is not copied.
+ */
+typedef struct {
+    uint64_t _private[9];
+} sw_motion_timer_t;
+
+/**
+ * What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+ */
+typedef struct {
+    uint64_t _private[656];
+} sw_motion_queue_t;
+
+/**
+ * How fast an axis may go.
+ */
+typedef struct {
+    /**
+     * Steps/s³; 0 for a trapezoid.
+     */
+    uint64_t jerk;
+    /**
+     * Steps/s.
+     */
+    uint32_t speed;
+    /**
+     * Steps/s².
+     */
+    uint32_t acceleration;
+} sw_motion_limits_t;
+
+/**
+ * What the interrupt does.
+ */
+typedef struct {
+    /**
+     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+     */
+    uint32_t wait;
+    /**
+     * 1: make a step now. DIR has been right for the time that the driver needs.
+     */
+    uint8_t step;
+    /**
+     * The level of DIR from now on, 1 for reverse. It never changes together with a step.
+     */
+    uint8_t reverse;
+} sw_motion_fired_t;
+
+/**
  * A receiver of start-stop fields from an oversampled line. Its content is private.
  */
 typedef struct {
@@ -844,6 +1434,232 @@ typedef struct {
      */
     uint8_t delimiter;
 } sw_nrz_field_t;
+
+/**
+ * One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be copied. One context at a
+ * time.
+ */
+typedef struct {
+    uint64_t _private[60];
+} sw_rtex_axis_t;
+
+/**
+ * What an axis is set up with. Limits are counted in update periods.
+ */
+typedef struct {
+    /**
+     * Update period, ns.
+     */
+    uint32_t update_ns;
+    /**
+     * Update periods of invalid data at the start; 0 if somebody else has sent them.
+     */
+    uint32_t invalid;
+    /**
+     * Waits for Servo_Active, for an answer, for a stop.
+     */
+    uint32_t wait;
+    /**
+     * Wait for Servo_Ready; 0 waits for ever.
+     */
+    uint32_t ready;
+    /**
+     * Wait for Servo_Active to go; 0 is `wait`.
+     */
+    uint32_t inactive;
+    /**
+     * Electronic gear of the drive, numerator.
+     */
+    uint32_t gear_numerator;
+    /**
+     * Electronic gear of the drive, denominator.
+     */
+    uint32_t gear_denominator;
+    /**
+     * Responses without a new echo after which the axis stops, 1 or more.
+     */
+    uint16_t echo;
+    /**
+     * Responses with CMD_Error after which it stops, 1 or more.
+     */
+    uint16_t command_errors;
+    /**
+     * MAC-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * sw_rtex_mode_t.
+     */
+    uint8_t mode;
+} sw_rtex_config_t;
+
+/**
+ * Where an axis stands.
+ */
+typedef struct {
+    /**
+     * MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, where the reason has one.
+     */
+    uint16_t detail;
+    /**
+     * sw_rtex_axis_code_t.
+     */
+    uint8_t code;
+    /**
+     * sw_rtex_reason_t.
+     */
+    uint8_t reason;
+} sw_rtex_state_of_t;
+
+/**
+ * Feedback that may be used.
+ */
+typedef struct {
+    /**
+     * When the block was heard.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Actual position in command units.
+     */
+    int32_t position;
+} sw_rtex_feedback_t;
+
+/**
+ * What a drive sends: as received, not yet a position.
+ */
+typedef struct {
+    /**
+     * Response_Data1.
+     */
+    int32_t response_data1;
+    /**
+     * Status flags: sw_rtex_status_t; byte 2 is the low one.
+     */
+    uint16_t status;
+    /**
+     * Bytes 8 to 15, as the non-cyclic response lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Actual_MAC-ID.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter_Echo.
+     */
+    uint8_t update_counter_echo;
+    /**
+     * CMD_Error, 0 or 1.
+     */
+    uint8_t cmd_error;
+    /**
+     * Cyclic code, 0..15.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code, 0..7.
+     */
+    uint8_t noncyclic;
+} sw_rtex_response_t;
+
+/**
+ * What a controller sends.
+ */
+typedef struct {
+    /**
+     * Command_Data1.
+     */
+    int32_t command_data1;
+    /**
+     * Control bits: sw_rtex_control_t; byte 2 is the low one.
+     */
+    uint16_t control;
+    /**
+     * Bytes 8 to 15, as the non-cyclic command lays them out.
+     */
+    uint8_t data[8];
+    /**
+     * Mac-ID, 0..31.
+     */
+    uint8_t mac_id;
+    /**
+     * Update_Counter, 0..3.
+     */
+    uint8_t update_counter;
+    /**
+     * TMG_CNT, 0 or 1.
+     */
+    uint8_t tmg_cnt;
+    /**
+     * Cyclic code: sw_rtex_mode_t, 0 for NOP.
+     */
+    uint8_t cyclic;
+    /**
+     * Non-cyclic code.
+     */
+    uint8_t noncyclic;
+} sw_rtex_command_t;
+
+/**
+ * A frame from the master: its output lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Time stamp of its transmission, ns.
+     */
+    uint16_t time_stamp;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+} sw_sorte_master_frame_t;
+
+/**
+ * A frame from a device: its payload lies behind SW_SORTE_DATA_AT.
+ */
+typedef struct {
+    /**
+     * Who sends it.
+     */
+    uint8_t address;
+    /**
+     * STATUS: LAST and ERROR.
+     */
+    uint8_t status;
+} sw_sorte_device_frame_t;
+
+/**
+ * A PTO word.
+ */
+typedef struct {
+    /**
+     * Start of the pulse in the cycle, ns; 0 without one. Of a reserved word: its time, which must not be used.
+     */
+    uint16_t start_ns;
+    /**
+     * sw_sorte_pto_kind_t.
+     */
+    uint8_t kind;
+    /**
+     * DIR, 0 or 1; 0 where the driver is off.
+     */
+    uint8_t direction;
+} sw_sorte_pto_t;
+
+/**
+ * When a step comes.
+ */
+typedef struct {
+    /**
+     * Cycles of 4 us to wait.
+     */
+    uint32_t cnt;
+    /**
+     * Time in that cycle, ns.
+     */
+    uint32_t sync;
+} sw_step_time_t;
 
 /**
  * What a master sends.
@@ -1274,6 +2090,67 @@ uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
 
 /**
+ * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
+ * second. While it is called neither end is in use.
+ */
+sw_result_t sw_motion_start(sw_motion_axis_t *axis,
+                            sw_motion_timer_t *timer,
+                            sw_motion_queue_t *queue,
+                            uint32_t clock_hz,
+                            const sw_motion_limits_t *limit);
+
+/**
+ * The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+ */
+sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
+                           sw_motion_fired_t *fired);
+
+/**
+ * A slice of planning, in the background: sw_motion_work_t, or a refusal.
+ */
+sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
+
+/**
+ * To a position in steps.
+ */
+sw_result_t sw_motion_move_to(sw_motion_axis_t *axis, int64_t target);
+
+/**
+ * On and on at this speed, steps/s; `reverse` is 0 or 1.
+ */
+sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t speed);
+
+/**
+ * To rest within the limits; the target is forgotten.
+ */
+sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
+
+/**
+ * No step any more, at once.
+ */
+sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
+
+/**
+ * To rest within the limits; sw_motion_resume() goes on.
+ */
+sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
+
+/**
+ * Goes on after sw_motion_hold().
+ */
+sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
+
+/**
+ * Where the axis is commanded to be, in steps.
+ */
+sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
+
+/**
+ * Whether the axis stands; false for a state that was not started.
+ */
+bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
+
+/**
  * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
  */
 sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
@@ -1291,6 +2168,179 @@ sw_result_t sw_nrz_run(sw_nrz_t *receiver,
  * Never NULL, valid for ever.
  */
 const char *sw_text(sw_result_t result);
+
+/**
+ * Prepares an axis whose drive has not answered yet.
+ */
+sw_result_t sw_rtex_axis_start(sw_rtex_axis_t *axis, const sw_rtex_config_t *config);
+
+/**
+ * Takes what an update period brought: the block of this axis, or NULL if there was none, heard until `end_ns`. A block of another
+ * length is a refused one.
+ */
+sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis,
+                              const uint8_t *bytes,
+                              size_t len,
+                              uint64_t end_ns);
+
+/**
+ * The block of the next update period, 16 bytes, which counts as sent.
+ */
+sw_result_t sw_rtex_axis_transmit(sw_rtex_axis_t *axis, uint8_t *bytes, size_t size);
+
+/**
+ * Switches the servo on: SW_E_RTEX_NOT_NOW if the axis is not off, no new position has come, or the drive is not ready.
+ */
+sw_result_t sw_rtex_axis_switch_on(sw_rtex_axis_t *axis);
+
+/**
+ * Switches the servo off.
+ */
+sw_result_t sw_rtex_axis_switch_off(sw_rtex_axis_t *axis);
+
+/**
+ * Stops by category 0 (servo off at once), 1 (slow down, then off) or 2 (slow down and hold), as far as the limits of the axis allow.
+ */
+sw_result_t sw_rtex_axis_stop(sw_rtex_axis_t *axis,
+                              uint8_t category);
+
+/**
+ * Leaves the stop: the axis may be switched on again when its drive allows.
+ */
+sw_result_t sw_rtex_axis_clear(sw_rtex_axis_t *axis);
+
+/**
+ * The target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the drive's gear and the limits
+ * allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the set-point stays then.
+ */
+sw_result_t sw_rtex_axis_set_position(sw_rtex_axis_t *axis,
+                                      int32_t position);
+
+/**
+ * The speed of CV or the torque of CT, in the units of the drive.
+ */
+sw_result_t sw_rtex_axis_set_rate(sw_rtex_axis_t *axis, int32_t rate);
+
+/**
+ * Control bits beside Servo_On and the stops (sw_rtex_control_t, added), from the next block on.
+ */
+sw_result_t sw_rtex_axis_set_control(sw_rtex_axis_t *axis, uint16_t control);
+
+/**
+ * The set-point: in CP the target in command units; 0 for a state that was not started.
+ */
+int32_t sw_rtex_axis_setpoint(const sw_rtex_axis_t *axis);
+
+/**
+ * Where the axis stands, and why.
+ */
+sw_result_t sw_rtex_axis_state(const sw_rtex_axis_t *axis, sw_rtex_state_of_t *state);
+
+/**
+ * The actual position, judged now: **false if it must not be used**: never heard, older than `max_age_ns`, an alarm of the drive.
+ */
+bool sw_rtex_feedback(const sw_rtex_axis_t *axis,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      sw_rtex_feedback_t *feedback);
+
+/**
+ * The response in a block of 16 bytes.
+ */
+sw_result_t sw_rtex_parse_response(const uint8_t *bytes, size_t len, sw_rtex_response_t *response);
+
+/**
+ * The command in a block of 16 bytes, as a drive receives it.
+ */
+sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_command_t *command);
+
+/**
+ * The block of a command, 16 bytes. Reserved bits are sent as 0.
+ */
+sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The frame of a master with this many bytes of output, from its source address to its time stamp, without preamble.
+ */
+sw_result_t sw_sorte_parse_master_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t output_len,
+                                        sw_sorte_master_frame_t *frame);
+
+/**
+ * The frame of the IO exchange with this output: 5 bytes more.
+ */
+sw_result_t sw_sorte_build_master_frame(const uint8_t *output,
+                                        size_t output_len,
+                                        uint16_t time_stamp,
+                                        uint8_t *bytes,
+                                        size_t size,
+                                        size_t *len);
+
+/**
+ * The frame of a device with this many bytes of payload, from its source address to its CRC.
+ */
+sw_result_t sw_sorte_parse_device_frame(const uint8_t *bytes,
+                                        size_t len,
+                                        size_t payload_len,
+                                        sw_sorte_device_frame_t *frame);
+
+/**
+ * The frame of a device with the three bytes of payload of the published application: 6 bytes.
+ */
+sw_result_t sw_sorte_build_device_frame(const sw_sorte_device_frame_t *frame,
+                                        const uint8_t *payload,
+                                        uint8_t *bytes,
+                                        size_t size);
+
+/**
+ * The word for a pulse that starts `sync_ns` into the cycle, 0..3990; 0 and 1 are sent as 1 ns.
+ */
+sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *word);
+
+/**
+ * What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
+ */
+sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
+
+/**
+ * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.
+ */
+uint32_t sw_step_ramp(uint8_t i);
+
+/**
+ * The speed constant for a step frequency in Hz.
+ */
+sw_result_t sw_step_speed(uint32_t hz, uint32_t *speed);
+
+/**
+ * The time of a step in ns: an entry of the ramp at a speed; modulo 2^32.
+ */
+uint32_t sw_step_time_ns(uint32_t entry, uint32_t speed);
+
+/**
+ * The next step, `t_step` ns after one that came `prev` ns into its cycle.
+ */
+sw_result_t sw_step_next(uint32_t t_step, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * The same as the PRU computes it, its errors included, for an entry of the ramp at a speed.
+ */
+sw_result_t sw_step_next_as_pru(uint32_t entry, uint32_t speed, uint32_t prev, sw_step_time_t *time);
+
+/**
+ * Whether a move with the published ramp is possible: `k` steps an entry, the first step `init_sync` ns into its cycle. `pru_is_exact`
+ * (may be NULL) tells whether the PRU computes it without error.
+ */
+sw_result_t sw_step_check(uint32_t speed,
+                          uint32_t k,
+                          uint32_t init_sync,
+                          bool *pru_is_exact);
+
+/**
+ * How long a move of `steps` with the published ramp takes, ns.
+ */
+sw_result_t sw_step_duration_ns(uint32_t speed, uint32_t k, uint32_t init_sync, uint32_t steps, uint64_t *ns);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.

@@ -55,6 +55,22 @@ pub(crate) unsafe fn room<'a, T>(start: *mut T, size: usize) -> Result<&'a mut [
     Ok(unsafe { core::slice::from_raw_parts_mut(start.cast(), size) })
 }
 
+/// The first `want` bytes of a caller's buffer of `size`, cleared: for what writes into bytes that are there.
+///
+/// # Safety
+/// As for [`room`].
+#[inline(always)]
+pub(crate) unsafe fn cleared<'a>(start: *mut u8, size: usize, want: usize) -> Result<&'a mut [u8], Refused> {
+    // SAFETY: the caller vouches for it.
+    let room = unsafe { room::<u8>(start, size)? };
+    let room = room.get_mut(..want).ok_or(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t)?;
+    for byte in room.iter_mut() {
+        byte.write(0);
+    }
+    // SAFETY: every byte has just been written.
+    Ok(unsafe { core::slice::from_raw_parts_mut(room.as_mut_ptr().cast(), room.len()) })
+}
+
 #[inline(always)]
 fn check<T>(start: *const T, len: usize) -> Result<(), Refused> {
     if start.is_null() {
@@ -83,16 +99,34 @@ pub(crate) struct Started<T> {
     pub(crate) state: T,
 }
 
+/// Where in the memory of a C type its state stands: at the begin, unless the state wants more than 8 bytes of alignment, which only
+/// hosts ask for.
+#[inline(always)]
+pub(crate) fn place<C, T>(memory: *mut C) -> *mut Started<T> {
+    let begin = memory.cast::<u8>();
+    let ahead =
+        if align_of::<Started<T>>() <= align_of::<C>() { 0 } else { begin.align_offset(align_of::<Started<T>>()) };
+    begin.wrapping_add(ahead).cast()
+}
+
 /// Gives a C type of fixed size, `[u64; K]`, the state that lives in it.
 ///
-/// A layout of Rust may change with the compiler, so the size is compared by `<=` with a tenth as margin.
+/// A layout of Rust may change with the compiler, so the size is compared by `<=` with a tenth as margin. A state that is `pinned` is
+/// never copied, so it may stand at any place of its memory.
 macro_rules! state {
     ($c:ty, $rust:ty, $mark:literal) => {
         const _: () = {
             use $crate::border::Started;
+            assert!(align_of::<Started<$rust>>() <= align_of::<$c>(), "a copy would be aligned in another way");
+        };
+        $crate::border::state!(pinned $c, $rust, $mark);
+    };
+    (pinned $c:ty, $rust:ty, $mark:literal) => {
+        const _: () = {
+            use $crate::border::Started;
             let size = size_of::<Started<$rust>>();
-            assert!(size.saturating_add(size / 10) <= size_of::<$c>(), "the C type is too small");
-            assert!(align_of::<Started<$rust>>() <= align_of::<$c>(), "the C type is not aligned");
+            let all = size.saturating_add(size / 10).saturating_add(align_of::<Started<$rust>>().saturating_sub(align_of::<$c>()));
+            assert!(all <= size_of::<$c>(), "the C type is too small");
             assert!(!core::mem::needs_drop::<$rust>(), "C forgets a state without a word");
         };
 
@@ -105,7 +139,7 @@ macro_rules! state {
                 this: Option<&mut core::mem::MaybeUninit<Self>>,
                 state: $rust,
             ) -> Result<(), $crate::border::Refused> {
-                let place = $crate::border::there(this)?.as_mut_ptr().cast::<$crate::border::Started<$rust>>();
+                let place = $crate::border::place::<_, $rust>($crate::border::there(this)?.as_mut_ptr());
                 // SAFETY: the memory is the caller's, large enough and aligned, as asserted above.
                 unsafe { place.write($crate::border::Started { mark: Self::MARK, state }) };
                 Ok(())
@@ -114,7 +148,7 @@ macro_rules! state {
             /// The state, if it was started.
             #[inline(always)]
             pub(crate) fn get(this: Option<&mut Self>) -> Result<&mut $rust, $crate::border::Refused> {
-                let place = core::ptr::from_mut($crate::border::there(this)?).cast::<$crate::border::Started<$rust>>();
+                let place = $crate::border::place::<_, $rust>(core::ptr::from_mut($crate::border::there(this)?));
                 // SAFETY: large enough and aligned, as asserted above. The mark is a plain number.
                 let mark = unsafe { core::ptr::addr_of!((*place).mark).read() };
                 if mark != Self::MARK {
@@ -128,7 +162,8 @@ macro_rules! state {
             #[inline(always)]
             #[allow(dead_code, reason = "not every state is only looked at")]
             pub(crate) fn look(this: Option<&Self>) -> Result<&$rust, $crate::border::Refused> {
-                let place = core::ptr::from_ref($crate::border::there(this)?).cast::<$crate::border::Started<$rust>>();
+                let memory = core::ptr::from_ref($crate::border::there(this)?).cast_mut();
+                let place = $crate::border::place::<_, $rust>(memory).cast_const();
                 // SAFETY: as in `get`.
                 let mark = unsafe { core::ptr::addr_of!((*place).mark).read() };
                 if mark != Self::MARK {

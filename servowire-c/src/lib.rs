@@ -8,8 +8,12 @@ extern crate std;
 pub mod aformat;
 mod border;
 mod clock;
+pub mod motion;
 pub mod nrz;
 mod result;
+pub mod rtex;
+pub mod sorte;
+pub mod step;
 #[cfg(test)]
 mod tests;
 pub mod tformat;

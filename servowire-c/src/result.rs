@@ -2,6 +2,8 @@
 
 use core::ffi::{CStr, c_char};
 
+use crate::rtex::sw_rtex_error_t;
+
 /// What a call came to: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the `sw_..._error_t` of the
 /// protocols; `sw_text()` has a text for each.
 ///
@@ -38,6 +40,10 @@ pub enum sw_code_t {
 pub(crate) enum Protocol {
     Tformat = 1,
     Aformat = 2,
+    Rtex = 4,
+    Sorte = 5,
+    Motion = 6,
+    Step = 7,
 }
 
 /// The result for a class of a protocol.
@@ -46,16 +52,18 @@ pub(crate) const fn refused(protocol: Protocol, number: u8) -> sw_result_t {
     ((protocol as i32) << 8 | number as i32).wrapping_neg()
 }
 
-const COMMON: [(sw_code_t, &CStr); 9] = [
-    (sw_code_t::SW_OK, c"ok"),
-    (sw_code_t::SW_PENDING, c"pending"),
-    (sw_code_t::SW_SEND, c"send"),
-    (sw_code_t::SW_E_NULL, c"null_pointer"),
-    (sw_code_t::SW_E_ARGUMENT, c"argument"),
-    (sw_code_t::SW_E_STATE, c"not_started"),
-    (sw_code_t::SW_E_SHORT_BUFFER, c"short_buffer"),
-    (sw_code_t::SW_E_CLOCK, c"clock"),
-    (sw_code_t::SW_E_NO_VALUE, c"no_value"),
+const COMMON: [(sw_result_t, &CStr); 11] = [
+    (sw_code_t::SW_OK as sw_result_t, c"ok"),
+    (sw_code_t::SW_PENDING as sw_result_t, c"pending"),
+    (sw_code_t::SW_SEND as sw_result_t, c"send"),
+    (sw_code_t::SW_E_NULL as sw_result_t, c"null_pointer"),
+    (sw_code_t::SW_E_ARGUMENT as sw_result_t, c"argument"),
+    (sw_code_t::SW_E_STATE as sw_result_t, c"not_started"),
+    (sw_code_t::SW_E_SHORT_BUFFER as sw_result_t, c"short_buffer"),
+    (sw_code_t::SW_E_CLOCK as sw_result_t, c"clock"),
+    (sw_code_t::SW_E_NO_VALUE as sw_result_t, c"no_value"),
+    (sw_rtex_error_t::SW_E_RTEX_NOT_NOW as sw_result_t, c"not_now"),
+    (sw_rtex_error_t::SW_E_RTEX_TOO_FAR as sw_result_t, c"too_far"),
 ];
 
 /// The names of a crate's classes, each with a NUL behind it, in the order of their numbers from 1; a number that is not given
@@ -112,13 +120,17 @@ fn nth(names: &'static [u8], number: u8) -> Option<&'static CStr> {
 }
 
 fn text(code: sw_result_t) -> Option<&'static CStr> {
-    if let Some((_, text)) = COMMON.iter().find(|(common, _)| *common as sw_result_t == code) {
+    if let Some((_, text)) = COMMON.iter().find(|(common, _)| *common == code) {
         return Some(text);
     }
     let [number, protocol, 0, 0] = code.checked_neg()?.to_le_bytes() else { return None };
     let names: &'static [u8] = match protocol {
         1 => names!(tformat::ErrorClass),
         2 => names!(nikon_aformat::ErrorClass),
+        4 => names!(rtex_block::ErrorClass),
+        5 => names!(sorte_proto::ErrorClass),
+        6 => names!(step_motion::ErrorClass),
+        7 => names!(step_profile::ErrorClass),
         _ => return None,
     };
     if number == 0 { None } else { nth(names, number) }
@@ -139,6 +151,22 @@ mod tests {
     fn every_class_has_its_text_and_nothing_else_has() {
         for class in tformat::ErrorClass::ALL {
             let code = refused(Protocol::Tformat, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in rtex_block::ErrorClass::ALL {
+            let code = refused(Protocol::Rtex, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in step_motion::ErrorClass::ALL {
+            let code = refused(Protocol::Motion, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in sorte_proto::ErrorClass::ALL {
+            let code = refused(Protocol::Sorte, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in step_profile::ErrorClass::ALL {
+            let code = refused(Protocol::Step, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
         for class in nikon_aformat::ErrorClass::ALL {

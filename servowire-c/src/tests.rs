@@ -127,3 +127,35 @@ fn an_exchange_in_pieces_and_in_a_copy() {
         assert_eq!(sw_tformat_angle(Some(&m), 1_066_980, 62_500, Some(&mut angle)), cut == ANSWER.len());
     }
 }
+
+#[test]
+fn both_ends_of_a_motion() {
+    use crate::motion::*;
+    let place = std::boxed::Box::into_raw(std::boxed::Box::new(MaybeUninit::<sw_motion_queue_t>::zeroed()));
+    let (mut axis, mut timer) = (MaybeUninit::zeroed(), MaybeUninit::zeroed());
+    let limits = sw_motion_limits_t { jerk: 0, speed: 1_000, acceleration: 100_000 };
+    // SAFETY: the place stays until the end of the test.
+    let queue = unsafe { &mut *place };
+    assert_eq!(sw_motion_start(Some(&mut axis), Some(&mut timer), Some(queue), 1_000_000, Some(&limits)), 0);
+    // SAFETY: they were started.
+    let (axis, timer) = unsafe { (axis.assume_init_mut(), timer.assume_init_mut()) };
+    assert_eq!(sw_motion_move_to(Some(axis), 3), 0);
+    let (mut fired, mut steps) = (MaybeUninit::uninit(), 0);
+    for _ in 0..10_000 {
+        match sw_motion_poll(Some(axis)) {
+            0 => break,
+            1 => {}
+            _ => {
+                assert_eq!(sw_motion_fire(Some(timer), Some(&mut fired)), 0);
+                // SAFETY: SW_OK says that it is written.
+                steps += i64::from(unsafe { fired.assume_init() }.step);
+            }
+        }
+    }
+    let mut commanded = MaybeUninit::uninit();
+    assert_eq!(sw_motion_commanded(Some(axis), Some(&mut commanded)), 0);
+    // SAFETY: SW_OK says that it is written.
+    assert_eq!((steps, unsafe { commanded.assume_init() }), (3, 3));
+    // SAFETY: nobody uses it any more.
+    drop(unsafe { std::boxed::Box::from_raw(place) });
+}

@@ -28,6 +28,12 @@ pub enum ClockError {
         /// By how much, ns.
         by_ns: u64,
     },
+    /// More time has passed since the last reading than can have passed.
+    #[error("the clock jumped ahead by {by_ns} ns")]
+    Ahead {
+        /// From the last reading to this one, ns.
+        by_ns: u64,
+    },
     /// It gives the same reading again and again.
     #[error("the clock stands still")]
     Stopped,

@@ -15,8 +15,8 @@ pub(crate) const MAX_LOOKS: u32 = 200_000;
 /// Its tick has to be 1 us or shorter, better a fraction of that: an encoder answers 3 us after its request. A [`CounterClock`] is
 /// one, made of a cycle counter or a timer, and so is every closure that gives nanoseconds.
 ///
-/// The drivers look twice: a clock that goes back, or gives the same reading 200,000 times, ends the call with
-/// [`Error::Clock`](crate::Error::Clock).
+/// The drivers look twice: a clock that goes back, is ahead by more than a second within a call, or gives the same reading 200,000 times,
+/// ends the call with [`Error::Clock`](crate::Error::Clock).
 pub trait Clock {
     /// Nanoseconds from any origin; never backwards.
     ///

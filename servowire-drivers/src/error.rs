@@ -36,7 +36,7 @@ pub enum Error<IO, PIN, P, D> {
     /// Somebody talks without a pause; nothing was sent.
     #[error("the line does not become quiet")]
     NeverQuiet,
-    /// The clock stands, or was set back; whether a request that had begun had its effect is not known.
+    /// The clock stands, was set back or has jumped; whether a request that had begun had its effect is not known.
     #[error("{0}")]
     Clock(#[from] ClockError),
     /// No answer, or one that was refused; of an RTEX master the reason why its communication does not run.

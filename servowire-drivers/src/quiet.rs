@@ -5,10 +5,13 @@ use servowire_core::{ClockCheck, ClockError};
 use crate::Clock;
 use crate::clock::MAX_LOOKS;
 
+/// So long no processor is elsewhere within a call: a clock that says so has jumped.
+const MAX_AWAY_NS: u64 = 1_000_000_000;
+
 /// How long a driver waits for a line that does not become quiet.
 const PATIENCE_NS: u64 = 2_000_000;
 
-/// How often a clock may be set back while a request leaves.
+/// How often a clock may be set back or jump while a request leaves.
 #[cfg(feature = "tformat")]
 const CLOCK_FAULTS: u32 = 3;
 
@@ -22,6 +25,8 @@ pub(crate) struct Line {
     leaving_ns: Option<u64>,
     /// How long the line has to be silent after something unasked came.
     silence_ns: u64,
+    /// The clock was set back or has jumped since the last request began.
+    shifted: bool,
 }
 
 /// What to do before a request.
@@ -48,7 +53,8 @@ pub(crate) struct Settling {
 
 impl Line {
     pub(crate) const fn new(silence_ns: u32) -> Self {
-        Self { check: ClockCheck::new(MAX_LOOKS), ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64 }
+        let check = ClockCheck::new(MAX_LOOKS);
+        Self { check, ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64, shifted: false }
     }
 
     /// The bits have another length from now on.
@@ -57,25 +63,50 @@ impl Line {
         self.silence_ns = silence_ns as u64;
     }
 
-    /// A look at the clock: every one goes through here, so that no wait is for ever.
+    /// A look at the clock, not long after the last one: every look goes through here or the next two, so that no wait is for ever.
     #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
+        self.look(clock, |check, now_ns| check.check_within(now_ns, MAX_AWAY_NS))
+    }
+
+    /// The same after a wait until `until_ns`.
+    #[cfg(feature = "async")]
+    pub(crate) fn after_ns(&mut self, clock: &mut impl Clock, until_ns: u64) -> Result<u64, ClockError> {
+        let wait_ns = until_ns.saturating_sub(self.check.last_ns()).min(u64::MAX >> 2);
+        self.look(clock, |check, now_ns| check.check_within(now_ns, wait_ns.saturating_add(MAX_AWAY_NS)))
+    }
+
+    /// The first look of a call: nobody knows how long ago the last one was.
+    pub(crate) fn first_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
+        self.look(clock, ClockCheck::check)
+    }
+
+    #[inline(always)]
+    fn look(
+        &mut self,
+        clock: &mut impl Clock,
+        check: impl FnOnce(&mut ClockCheck, u64) -> Result<u64, ClockError>,
+    ) -> Result<u64, ClockError> {
         let now_ns = match clock.now_ns() {
             Ok(now_ns) => now_ns,
             Err(error) => return Err(self.lost(error, self.check.last_ns())),
         };
-        match self.check.check(now_ns) {
-            Ok(now_ns) => Ok(now_ns),
-            Err(error @ ClockError::Backwards { by_ns }) => Err(self.lost(error, now_ns.saturating_add(by_ns))),
-            Err(error) => Err(error),
-        }
+        check(&mut self.check, now_ns).map_err(|error| {
+            let last_ns = match error {
+                ClockError::Backwards { by_ns } => now_ns.saturating_add(by_ns),
+                ClockError::Ahead { by_ns } => now_ns.saturating_sub(by_ns),
+                _ => now_ns,
+            };
+            self.lost(error, last_ns)
+        })
     }
 
-    /// The clock is wrong. If it was set back, what the line was to be left alone for is waited for from the next look on.
+    /// The clock is wrong. If it was set back or has jumped, what the line was to be left alone for is waited for from the next look on.
     #[cold]
     #[inline(never)]
     fn lost(&mut self, error: ClockError, last_ns: u64) -> ClockError {
-        if matches!(error, ClockError::Backwards { .. }) {
+        if matches!(error, ClockError::Backwards { .. } | ClockError::Ahead { .. }) {
+            self.shifted = true;
             let left_ns = self.ready_ns.saturating_sub(last_ns);
             self.leaving_ns = Some(self.leaving_ns.unwrap_or(0).max(left_ns));
             self.ready_ns = 0;
@@ -95,15 +126,15 @@ impl Line {
         self.check.last_ns()
     }
 
-    /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock is set back, nothing of that has
-    /// passed for certain; one that stands has been looked at for longer.
+    /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock was set back or has jumped since the
+    /// request began, nothing of that has passed for certain; one that stands has been looked at for longer.
     #[cfg(feature = "tformat")]
-    pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, mut ns: u64, longest_ns: u64) {
+    pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) {
         for _ in 0..CLOCK_FAULTS {
-            let from_ns = self.now_ns(clock).unwrap_or(self.last_ns());
-            ns = ns.min(from_ns.saturating_add(longest_ns));
-            match self.wait_until(clock, ns) {
-                Err(ClockError::Backwards { .. }) => ns = u64::MAX,
+            let latest_ns = self.now_ns(clock).unwrap_or(self.last_ns()).saturating_add(longest_ns);
+            let until_ns = if self.shifted { latest_ns } else { ns.min(latest_ns) };
+            match self.wait_until(clock, until_ns) {
+                Err(ClockError::Backwards { .. } | ClockError::Ahead { .. }) => {}
                 _ => return,
             }
         }
@@ -113,6 +144,7 @@ impl Line {
     /// future leaves it so until the next call, because nobody has read the clock.
     pub(crate) const fn begin(&mut self, longest_ns: u64) {
         self.leaving_ns = Some(longest_ns);
+        self.shifted = false;
     }
 
     /// The request was handed over by `now_ns`. However long that took, the worst is assumed until the end is known.
@@ -270,6 +302,30 @@ mod tests {
         assert_eq!(line.now_ns(&mut || 0), Err(ClockError::Backwards { by_ns: 500 }));
         assert_eq!(line.settle(100).next(false, 90_099), Settle::Until(90_100));
         assert_eq!(line.settle(90_100).next(false, 90_100), Settle::Quiet);
+    }
+
+    /// Five seconds of a clock that jumps are no time that has passed; between two calls, or after a wait until then, they may have.
+    #[test]
+    fn a_clock_that_jumps_is_named_and_frees_no_line() {
+        let mut line = Line::new(8_000);
+        line.begin(90_000);
+        assert_eq!(line.first_ns(&mut || 7_000_000_000), Ok(7_000_000_000));
+        line.sent(7_000_000_000);
+        assert_eq!(line.now_ns(&mut || 7_000_030_000), Ok(7_000_030_000));
+        let jumped = Err(ClockError::Ahead { by_ns: 5_000_000_000 });
+        assert_eq!(line.now_ns(&mut || 12_000_030_000), jumped);
+        assert_eq!(line.settle(12_000_030_000).next(false, 12_000_089_999), Settle::Until(12_000_090_000));
+        assert_eq!(line.first_ns(&mut || 17_000_030_000), Ok(17_000_030_000));
+    }
+
+    #[cfg(feature = "async")]
+    #[test]
+    fn a_wait_is_no_jump() {
+        let mut line = Line::new(8_000);
+        assert_eq!(line.after_ns(&mut || 17_000_030_000, 16_000_030_000), Ok(17_000_030_000));
+        let jumped = Err(ClockError::Ahead { by_ns: 5_000_000_001 });
+        assert_eq!(line.after_ns(&mut || 22_000_030_001, 21_000_030_000), jumped);
+        assert_eq!(line.after_ns(&mut || 22_000_030_000, u64::MAX), Err(ClockError::Backwards { by_ns: 1 }));
     }
 
     /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.

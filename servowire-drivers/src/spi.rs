@@ -16,6 +16,8 @@
 //! * The clock must run through a transfer without gaps. The RP2040's SPI pauses between words with CPHA = 0; take CPHA = 1.
 //! * The window has to hold the wait for the answer and the longest answer: at 2.5 Mbit/s, 8 samples a bit, T-Format needs
 //!   10 us and 110 bits, 135 bytes; [`Sampling::bytes`] counts them.
+//! * Futures need an SPI that can do both, block and wait, as those of embassy can: a request goes out without giving the time back, 4 to
+//!   16 us of T-Format and up to 45 us of A-format at 2.5 Mbit/s, so that none is cut off by a future that is dropped.
 //! * While nothing is expected the line is heard only in looks of one field or frame. So a driver takes that much longer a call.
 
 #[cfg(feature = "nikon")]
@@ -275,32 +277,25 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
     }
 }
 
+/// A request is sent as the blocking ones do it, in 4 to 20 us: a transfer that is dropped is cut off, and ID 0 without its end is ID 8. Only
+/// the window gives the time back.
 #[cfg(feature = "async")]
-impl<S: AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
-    /// Sends `bits`. The line driver is off afterwards, and when the future is dropped.
-    async fn send_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
-        let len = self.prepare(bits)?;
-        let guard = self.direction.transmit().map_err(SpiError::Pin)?;
-        self.bus.write(self.tx.get(..len).unwrap_or_default()).await.map_err(SpiError::Spi)?;
-        self.bus.flush().await.map_err(SpiError::Spi)?;
-        guard.receive().map_err(SpiError::Pin)
-    }
-
+impl<S: SpiBus + AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
     /// Samples `len` bytes.
     async fn sample_asynch(&mut self, len: usize) -> Result<(), Fault<S, D>> {
         self.direction.off().map_err(SpiError::Pin)?;
         self.idle(len);
         let len = len.min(self.rx.len());
         let window = self.rx.get_mut(..len).unwrap_or_default();
-        self.bus.transfer_in_place(window).await.map_err(SpiError::Spi)?;
-        self.bus.flush().await.map_err(SpiError::Spi)?;
+        AsyncSpiBus::transfer_in_place(&mut self.bus, window).await.map_err(SpiError::Spi)?;
+        AsyncSpiBus::flush(&mut self.bus).await.map_err(SpiError::Spi)?;
         self.sampled(len);
         Ok(())
     }
 
     /// Sends, and samples the window.
     async fn ask_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
-        self.send_asynch(bits).await?;
+        self.send(bits)?;
         self.sample_asynch(usize::MAX).await
     }
 

@@ -164,7 +164,7 @@ impl Sheet {
     }
 }
 
-/// A text of no more pixels than there is room for.
+/// A text cut to the pixels that there is room for.
 pub(crate) fn shortened(text: &str, size: u32, room: i32) -> String {
     let printable = || text.chars().map(|c| if c.is_control() { ' ' } else { c });
     if width_of(text, size) <= room {

@@ -281,7 +281,7 @@ impl Clock {
         };
         let from = if late { " from the first frame on" } else { "" };
         let mut clock = Self { origin, unit, label: format!("time in {name}{from}"), range: 0.0..1.0 };
-        clock.range = clock.show(first.ps())..clock.show(last.ps()).max(clock.show(first.ps()) + 1e-6);
+        clock.range = clock.show(first.ps())..clock.show(last.ps()).max(clock.show(first.ps()) + 1e-3);
         clock
     }
 

@@ -35,7 +35,7 @@ pub enum Work {
 /// [`halt`](Self::halt), after which there is no step. Each step is made within 3/4 of a tick, or 25 ns where that is more, of its exact
 /// time. Behind all that is out lies a stop: if [`poll`](Self::poll) is not called
 /// in time the axis comes to rest, and goes on from there when it is. Its intervals are exact
-/// to a hundredth.
+/// to some hundredths.
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -61,19 +61,15 @@ pub enum Work {
 pub struct Axis<'q, const N: usize> {
     queue: &'q Queue<N>,
     mover: Mover,
-    clock: Clock,
     /// How far off a step may be, in moments.
     off: Real,
     /// Ticks of motion in a block.
     reach: u32,
-    /// The end of what has been cut, in 2^-32 ticks, as the interrupt's sum has it; and DIR there, if that is known.
-    end: i128,
-    dir: Option<Direction>,
+    writer: Writer,
     /// Steps cut so far, as the interrupt counts them.
     made: u32,
-    /// The block that is filled, its slots that are, and those of them that are no stop; where its time ends.
+    /// The block that is filled, and where its time ends.
     block: usize,
-    len: usize,
     until: i128,
     /// The stop from the end of the block, while it is cut.
     stop: Option<Tail>,
@@ -100,20 +96,31 @@ struct Out {
     dir: Option<Direction>,
 }
 
+/// A stop while it is cut.
 #[derive(Debug)]
 struct Tail {
     mover: Mover,
+    /// It is still the motion that is to be stopped.
+    moves: bool,
     demand: Demand,
+    writer: Writer,
+}
+
+/// Where segments are put.
+#[derive(Debug, Clone, Copy)]
+struct Writer {
+    /// The end of what has been cut, in 2^-32 ticks, as the interrupt's sum has it; and DIR there, if that is known.
     end: i128,
     dir: Option<Direction>,
+    /// Slots of the block that are filled.
     len: usize,
 }
 
 /// A tick in times.
 const TICK: i128 = 1 << 32;
-/// How exact a stop is that is to be run only if the background starves: its intervals by parts of 128, or of 8 where slots are few.
-const COARSE: i32 = -7;
-const COARSEST: i32 = -3;
+/// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few.
+const COARSE: u32 = 4;
+const COARSEST: u32 = 2;
 /// The longest wait in an event, in ticks.
 const LONGEST: u32 = 1 << 30;
 
@@ -133,14 +140,11 @@ impl<'q, const N: usize> Axis<'q, N> {
         let axis = Self {
             queue,
             mover,
-            clock,
             off,
             reach,
-            end: 0,
-            dir: None,
+            writer: Writer { end: 0, dir: None, len: 0 },
             made: 0,
             block: 0,
-            len: 0,
             until: 0,
             stop: None,
             last: 0,
@@ -180,7 +184,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Whether the interrupt stands and nothing is to come (or held).
     pub fn is_at_rest(&self) -> bool {
         let (current, _) = self.current();
-        self.halt.is_none() && self.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())
+        self.halt.is_none() && self.writer.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())
     }
 
     /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
@@ -241,7 +245,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         }
         self.queue.halt.store(self.ticket, Ordering::Release);
         self.halt = Some(self.ticket);
-        (self.stop, self.len) = (None, 0);
+        (self.stop, self.writer.len) = (None, 0);
     }
 
     /// As [`Mover::set_commanded`].
@@ -331,7 +335,7 @@ impl<'q, const N: usize> Axis<'q, N> {
 
     /// The tick at which a request acts.
     fn now(&self) -> u64 {
-        tick(self.end)
+        tick(self.writer.end)
     }
 
     fn ready(&self) -> Result<(), Error> {
@@ -347,7 +351,8 @@ impl<'q, const N: usize> Axis<'q, N> {
         let was_moving = position != self.mover.commanded() || !self.mover.is_at_rest(self.now());
         self.mover.halt_at(position, self.now(), was_moving);
         self.made = self.queue.made.load(Ordering::Acquire);
-        (self.end, self.dir, self.last, self.busy) = (i128::from(self.now()) << 32, None, 0, [false; 2]);
+        (self.last, self.busy) = (0, [false; 2]);
+        self.writer = Writer { end: i128::from(self.now()) << 32, dir: None, len: 0 };
         self.queue.halt.store(0, Ordering::Release);
         (self.halt, self.lost) = (None, false);
         Work::More
@@ -356,10 +361,10 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// From the end of the stop of a block.
     fn recover(&mut self, block: usize, slot: usize) {
         let Some(Out { position, end, dir, .. }) = self.out.get(block).copied() else { return };
-        (self.end, self.dir, self.last) = (end, dir, slot);
+        (self.writer, self.last) = (Writer { end, dir, len: 0 }, slot);
         self.made = self.queue.made.load(Ordering::Acquire);
         self.mover.rest_at(position, tick(end));
-        (self.block, self.len, self.stop, self.lost) = (1_usize.wrapping_sub(block), 0, None, false);
+        (self.block, self.stop, self.lost) = (1_usize.wrapping_sub(block), None, false);
         self.set_busy(self.block, false);
         // It stands at a slot that counts as one before the stop from now on.
         if let Some(out) = self.out.get_mut(block) {
@@ -370,121 +375,119 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// A segment of the block.
     fn cut(&mut self, slot: usize) -> Work {
         let over = self.mover.over();
-        if self.len == 0 {
-            self.until = self.end.saturating_add(i128::from(self.reach) << 32);
+        if self.writer.len == 0 {
+            self.until = self.writer.end.saturating_add(i128::from(self.reach) << 32);
         }
         let (until, now) = (tick(self.until), self.now());
-        let full = self.len.saturating_add(4) > Queue::<N>::BLOCK / 3;
-        if full || self.len > 0 && now >= until {
-            return self.close();
+        let full = self.writer.len.saturating_add(4) > Queue::<N>::BLOCK / 3;
+        if full || self.writer.len > 0 && now >= until {
+            return self.close(COARSE);
         }
-        let time = Real::new(self.clock.moment(until.saturating_sub(now)));
+        let time = until.saturating_sub(now).saturating_mul(1 << 32);
         match self.mover.cut(&Demand { off: self.off, coarse: None, time }, until) {
             Cut::Steps(stretch, direction) => {
                 let steps = u32::from(stretch.count);
                 self.made = self.made.wrapping_add(if direction.dir() { steps.wrapping_neg() } else { steps });
-                self.put_steps(&stretch, direction);
+                self.writer.put_steps((self.queue, self.block), &stretch, direction);
                 Work::More
             }
             Cut::Later => {
                 // A step that comes right after the wait has its tick, too.
-                self.put_wait(self.until.saturating_sub(2 * TICK));
-                self.close()
+                self.writer.put_wait((self.queue, self.block), self.until.saturating_sub(2 * TICK));
+                self.until = self.writer.end;
+                Work::More
             }
             Cut::Rest if over > now => {
-                self.put_wait(i128::from(over.saturating_add(1)) << 32);
-                self.close()
+                self.writer.put_wait((self.queue, self.block), i128::from(over.saturating_add(1)) << 32);
+                Work::More
             }
-            Cut::Rest if self.len > 0 => self.close(),
+            Cut::Rest if self.writer.len > 0 => self.close(COARSE),
             Cut::Rest => self.waiting(slot),
         }
     }
 
     /// The block is as long as it is to be: what comes behind it.
-    fn close(&mut self) -> Work {
-        self.close_with(COARSE)
-    }
-
-    fn close_with(&mut self, coarse: i32) -> Work {
+    fn close(&mut self, coarse: u32) -> Work {
         if let Some(out) = self.out.get_mut(self.block) {
-            out.len = self.len;
+            out.len = self.writer.len;
         }
-        let mut mover = self.mover.clone();
-        mover.stop(self.now());
-        let demand = Demand { off: self.off, coarse: Some(coarse), time: Real::HUGE };
-        self.stop = Some(Tail { mover, demand, end: self.end, dir: self.dir, len: self.len });
+        let demand = Demand { off: self.off, coarse: Some(coarse), time: u64::MAX };
+        self.stop = Some(Tail { mover: self.mover.clone(), moves: true, demand, writer: self.writer });
         Work::More
     }
 
     /// A segment of the stop behind the block.
     fn cut_stop(&mut self) -> Work {
-        let Some(mut tail) = self.stop.take() else { return Work::More };
-        let cut = tail.mover.cut(&tail.demand, u64::MAX);
-        let (end, dir, len) = (self.end, self.dir, self.len);
-        (self.end, self.dir, self.len) = (tail.end, tail.dir, tail.len);
-        let more = match cut {
+        let Some(tail) = &mut self.stop else { return Work::More };
+        if core::mem::take(&mut tail.moves) {
+            tail.mover.stop(tick(tail.writer.end));
+            return Work::More;
+        }
+        let to = (self.queue, self.block);
+        let more = match tail.mover.cut(&tail.demand, u64::MAX) {
             Cut::Steps(stretch, direction) => {
-                self.put_steps(&stretch, direction);
+                tail.writer.put_steps(to, &stretch, direction);
                 true
             }
             Cut::Later | Cut::Rest => {
-                self.put_wait(i128::from(tail.mover.over()) << 32);
+                tail.writer.put_wait(to, i128::from(tail.mover.over()) << 32);
                 false
             }
         };
-        (tail.end, tail.dir, tail.len) = (self.end, self.dir, self.len);
-        (self.end, self.dir, self.len) = (end, dir, len);
-        if tail.len > Queue::<N>::BLOCK {
+        if tail.writer.len > Queue::<N>::BLOCK {
             // Once more with fewer segments.
             match tail.demand.coarse {
-                Some(coarse) if coarse < COARSEST => return self.close_with(coarse.saturating_add(2)),
+                Some(coarse) if coarse > COARSEST => return self.close(coarse.saturating_sub(1)),
                 _ => return self.give_up(),
             }
-        } else if more {
-            self.stop = Some(tail);
-        } else {
-            self.publish(&tail);
+        }
+        if !more {
+            self.publish();
         }
         Work::More
     }
 
     /// The block cannot be run: what was cut of it is forgotten, and the axis comes to rest where the interrupt does.
     fn give_up(&mut self) -> Work {
-        (self.len, self.lost) = (0, true);
+        (self.writer.len, self.lost, self.stop) = (0, true, None);
         self.mover.stop(self.now());
         Work::TooFewSlots
     }
 
-    fn publish(&mut self, tail: &Tail) {
+    fn publish(&mut self) {
+        let Some(Tail { mover, writer, .. }) = &self.stop else { return };
+        let len = self.writer.len;
         if let Some(out) = self.out.get_mut(self.block) {
-            *out = Out { len: self.len, position: tail.mover.commanded(), end: tail.end, dir: tail.dir };
+            *out = Out { len, position: mover.commanded(), end: writer.end, dir: writer.dir };
         }
         self.queue.link(self.last, Queue::<N>::slot(self.block, 0));
-        self.last = Queue::<N>::slot(self.block, self.len.saturating_sub(1));
+        self.last = Queue::<N>::slot(self.block, len.saturating_sub(1));
         self.set_busy(self.block, true);
-        (self.block, self.len) = (1_usize.wrapping_sub(self.block), 0);
+        (self.block, self.writer.len, self.stop) = (1_usize.wrapping_sub(self.block), 0, None);
     }
+}
 
+impl Writer {
     /// Steps behind what there is; before them DIR, where it changes, and a wait that an event cannot hold.
-    fn put_steps(&mut self, stretch: &Stretch, direction: Direction) {
+    fn put_steps<const N: usize>(&mut self, to: (&Queue<N>, usize), stretch: &Stretch, direction: Direction) {
         let first = stretch.first.saturating_add(TICK / 2).max(self.end.saturating_add(TICK));
         if self.dir != Some(direction) {
             self.dir = Some(direction);
             let half = (first.saturating_sub(self.end) / 2).max(TICK);
-            self.put_wait(self.end.saturating_add(half));
+            self.put_wait(to, self.end.saturating_add(half));
         }
         let first = first.max(self.end.saturating_add(TICK));
         if first.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
-            self.put_wait(first.saturating_sub(TICK));
+            self.put_wait(to, first.saturating_sub(TICK));
         }
         let kind = Kind { step: true, reverse: direction.dir() };
         let late = first.saturating_sub(stretch.first);
-        self.put(stretch.count, kind, first, stretch.differences);
+        self.put(to, (stretch.count, kind), first, stretch.differences);
         self.end = stretch.last().saturating_add(late);
     }
 
     /// Nothing until a time.
-    fn put_wait(&mut self, until: i128) {
+    fn put_wait<const N: usize>(&mut self, to: (&Queue<N>, usize), until: i128) {
         let kind = Kind { step: false, reverse: self.dir.is_some_and(Direction::dir) };
         let mut left = until.saturating_sub(self.end);
         let longest = i128::from(LONGEST) << 32;
@@ -492,18 +495,24 @@ impl<'q, const N: usize> Axis<'q, N> {
             let times = left.checked_div(longest).unwrap_or(0).min(0xffff);
             let count = u16::try_from(times).unwrap_or(u16::MAX);
             let end = self.end.saturating_add(longest);
-            self.put(count, kind, end, [i64::from(LONGEST) << 32, 0, 0]);
+            self.put(to, (count, kind), end, [i64::from(LONGEST) << 32, 0, 0]);
             self.end = self.end.saturating_add(longest.wrapping_mul(times));
             left = until.saturating_sub(self.end);
         }
         if left >= TICK {
-            self.put(1, kind, until, [0; 3]);
+            self.put(to, (1, kind), until, [0; 3]);
             self.end = until;
         }
     }
 
     /// Events, the first one at a time, and the differences from there on. Where they begin anew is one step before them.
-    fn put(&mut self, count: u16, kind: Kind, first: i128, [interval, add, bend]: [i64; 3]) {
+    fn put<const N: usize>(
+        &mut self,
+        (queue, block): (&Queue<N>, usize),
+        (count, kind): (u16, Kind),
+        first: i128,
+        [interval, add, bend]: [i64; 3],
+    ) {
         let first = i64::try_from(first.saturating_sub(self.end)).unwrap_or(0);
         let add = add.wrapping_sub(bend);
         let interval = interval.wrapping_sub(add);
@@ -511,8 +520,8 @@ impl<'q, const N: usize> Axis<'q, N> {
         let place = self.len;
         self.len = place.saturating_add(1);
         if place < Queue::<N>::BLOCK {
-            let slot = |at| Queue::<N>::slot(self.block, at);
-            self.queue.put(slot(place), &segment, place.checked_sub(1).map(slot));
+            let slot = |at| Queue::<N>::slot(block, at);
+            queue.put(slot(place), &segment, place.checked_sub(1).map(slot));
         }
     }
 }

@@ -1,18 +1,25 @@
 //! From curves to segments: stretches of steps whose times are a cubic of their number, near enough.
 //!
-//! With r = 1 / v, w = a r² and y = j r³ at a place of a piece of constant jerk, the time at which the position is u steps further is
+//! A segment joins two steps, and has the time and the pace of both. With r = 1 / v, w = a r² and y = j r³ at its begin, the time
+//! at which the position is u steps further is
 //!
 //! ```text
-//!  t(u) = t + r (u - w/2 u² + (3w² - y)/6 u³ - (15w³ - 10wy)/24 u⁴ + (105w⁴ - 105w²y + 10y²)/120 u⁵ - ...)
+//!  t(u) = r (u - w/2 u² + (3w² - y)/6 u³ - (15w³ - 10wy)/24 u⁴ + (105w⁴ - 105w²y + 10y²)/120 u⁵ - ...)
 //! ```
 //!
-//! A segment takes the first three terms, at a place near its middle. The next two, doubled for all that follow, say how far off
-//! it may be at its ends, and so how many steps it may have. Where that is less than two, near rest, a step's time is searched
-//! by Newton's method, and the step is a segment of its own.
+//! The next two terms say how many steps the segment may have. The first three say about when its last step is made, the position there says
+//! exactly when. What they miss by there is 24 / 384, a sixteenth, of what the segment is off in its middle, if the fourth derivative is the
+//! same everywhere. A sixth is taken.
+//!
+//! Within a piece all is in parts of it: times in parts of its time, positions in parts of its way, in words of 64 bits. With t from 0 to 1
+//! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2.
+//!
+//! A step that is a segment of its own, near rest and at the begin of a piece, is searched by Newton's method. Each piece is seen from
+//! the end at which it is slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
 
-use crate::curve::{Bend, Curve, Piece};
+use crate::curve::{Bend, Curve};
 use crate::phases::{Frame, P};
-use crate::real::{Real, THIRD};
+use crate::real::{Inverse, Real, THIRD, high};
 
 /// Steps of an axis on a curve as segments, one after the other.
 #[derive(Debug, Clone, Copy)]
@@ -20,12 +27,38 @@ use crate::real::{Real, THIRD};
 pub(crate) struct Cutter {
     /// Steps made, counted from the origin of the positions.
     count: u32,
-    /// The piece under way.
-    piece: u8,
-    /// The time of the curve at the last step; 0 at first.
-    time: Real,
-    /// How many steps the next segment may well have.
-    hint: u32,
+    /// The piece after the one under way, and the steps made where that ends.
+    next: u8,
+    until: u32,
+    piece: Part,
+    /// Time from the slower end of the piece to the last step, and the speed then; none before the first one of the piece.
+    last: Option<(u64, Inverse)>,
+}
+
+/// A piece from its slower end. Times are in 2^-64 of its time, ways and speeds in 2^-62 of its way and of that in its time.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Part {
+    /// The speed, half the acceleration and a sixth of the jerk at the slower end, which is the end of the piece.
+    speed: u64,
+    half: u64,
+    sixth: u64,
+    /// The jerk adds to the acceleration.
+    grows: bool,
+    back: bool,
+    /// Constant speed: there are no parts of it.
+    even: bool,
+    /// When and where the slower end is: in 2^-32 ticks of the clock, and 2^-64 steps from where the positions are 0.
+    begin: i128,
+    origin: i128,
+    /// What the piece takes, and what a step takes at its mean speed, in 2^-32 ticks.
+    lasts: Real,
+    pace: Real,
+    /// Its way, with the power of 2 of its unit, and a step of it.
+    way: (Inverse, i32),
+    step: u64,
+    /// How far off a step may be.
+    off: u64,
 }
 
 /// How a segment is to be.
@@ -33,10 +66,10 @@ pub(crate) struct Cutter {
 pub(crate) struct Demand {
     /// How far off a step may be, in moments.
     pub(crate) off: Real,
-    /// For a stop that nobody is to need: it may be off by an interval times 2 to this, too.
-    pub(crate) coarse: Option<i32>,
-    /// Time that its steps may take, in moments; one step may take longer.
-    pub(crate) time: Real,
+    /// For a stop that nobody is to need: it may be off by an interval times 2 to minus this, too.
+    pub(crate) coarse: Option<u32>,
+    /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
+    pub(crate) time: u64,
 }
 
 /// A stretch of steps. Times are in 2^-32 ticks, of the clock for the first step, differences after it.
@@ -49,12 +82,10 @@ pub(crate) struct Stretch {
     pub(crate) differences: [i64; 3],
 }
 
-const QUARTER: Real = Real::fixed(1, 2);
-
-/// Fraction bits of a tick, and of the number of a step.
-const TICK: i32 = 32;
-const STEP: u32 = 24;
-const STEP_BITS: i32 = 24;
+/// Fraction bits of a position here.
+const P2: i32 = 2 * P;
+/// Intervals within a segment are below 2^28 ticks, so that three of them are no overflow.
+const LONGEST: u64 = 1 << 60;
 
 impl Stretch {
     /// When its last step is made, each interval added as the interrupt does.
@@ -73,7 +104,7 @@ impl Stretch {
 
 impl Cutter {
     pub(crate) const fn new() -> Self {
-        Self { count: 0, piece: 0, time: Real::ZERO, hint: 2 }
+        Self { count: 0, next: 0, until: 0, piece: Part::NONE, last: None }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -83,239 +114,383 @@ impl Cutter {
 
     /// The next steps; `None` after the last one.
     pub(crate) fn next(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Option<Stretch> {
-        let (piece, end, until) = loop {
-            let (piece, end, until) = frame.piece(curve, self.piece)?;
+        while self.count >= self.until {
+            let (piece, end, until) = frame.piece(curve, self.next)?;
+            self.next = self.next.saturating_add(1);
             if until > self.count {
-                break (piece, end, until);
-            }
-            self.piece = self.piece.saturating_add(1);
-        };
-        let from = self.time.max(piece.time).max(curve.skipped.0);
-        let on = On { piece, frame, curve, end };
-        let left = until.saturating_sub(self.count);
-        let (count, stretch, last) =
-            self.many(&on, from, left, demand).unwrap_or_else(|| on.single(self.count, from, demand));
-        (self.count, self.time) = (self.count.saturating_add(count.into()), last);
-        Some(stretch)
-    }
-
-    /// Two steps or more from a place near their middle.
-    fn many(&mut self, on: &On<'_>, from: Real, left: u32, demand: &Demand) -> Option<(u16, Stretch, Real)> {
-        let here = on.state(from);
-        let even = here.a.is_zero() && here.j.is_zero();
-        let mut count = if even { left } else { left.min(self.hint) };
-        let pace = Real::ONE / here.v;
-        let room = (demand.time / pace).to_fixed(0).min(match demand.coarse {
-            _ if even => 0xffff,
-            None => 1024,
-            Some(_) => 2048,
-        });
-        count = count.min(u32::try_from(room).unwrap_or(u32::MAX));
-        while count >= 2 {
-            let middle = (from + pace * Real::fixed(count.into(), 1)).min(on.end).max(from);
-            let state = on.state(middle);
-            let series = Series::new(&state, on.behind(self.count, &state));
-            let most = demand.coarse.map_or(demand.off, |by| demand.off.max(series.r.scaled(by)));
-            match series.off(count) {
-                Ok(off) if off <= most => {
-                    if !even {
-                        // Twice as many steps are 16 times as far off.
-                        let room = most.exponent().saturating_sub(off.exponent()).clamp(0, 16);
-                        let quarter = if room > 1 { count >> 2 } else { 0 };
-                        self.hint = (count << (room >> 2)).saturating_add(quarter);
-                    }
-                    let count = u16::try_from(count).ok()?;
-                    let (stretch, last) = series.cut(on, middle, count)?;
-                    return Some((count, stretch, last));
-                }
-                Ok(off) => {
-                    let much = off.exponent().saturating_sub(most.exponent()).clamp(4, 64);
-                    count = count.checked_shr(much.unsigned_abs() >> 2).unwrap_or(0);
-                }
-                Err(doublings) => count = count.checked_shr(doublings).unwrap_or(0),
+                self.piece = Part::new(curve, frame, (piece, end), demand.off);
+                (self.until, self.last) = (until, None);
             }
         }
-        self.hint = 2;
+        let left = self.until.saturating_sub(self.count);
+        if self.piece.even {
+            let stretch = self.piece.cruise(self.count, left, demand.time);
+            self.count = self.count.saturating_add(stretch.count.into());
+            return Some(stretch);
+        }
+        if let Some((stretch, last)) = self.last.and_then(|last| self.piece.many(self.count, left, last, demand)) {
+            (self.last, self.count) = (Some(last), self.count.saturating_add(stretch.count.into()));
+            return Some(stretch);
+        }
+        let coarse = demand.coarse.zip(self.last).map_or(0, |(by, (_, v))| v.of(self.piece.step) >> by);
+        let (time, speed) = self.piece.search(self.count, self.last, self.piece.off.max(coarse) >> 4);
+        (self.last, self.count) = (Some((time, speed)), self.count.saturating_add(1));
+        Some(Stretch { count: 1, first: self.piece.tick(time), differences: [0; 3] })
+    }
+
+    /// When a step of the piece under way is made, as exactly as there are digits.
+    pub(crate) fn exact(&self, count: u32) -> i128 {
+        if self.piece.even {
+            return self.piece.cruise(count, 1, 0).first;
+        }
+        let (time, _) = self.piece.search(count, None, 0);
+        self.piece.tick(time)
+    }
+}
+
+/// A position, the speed and half the acceleration there.
+struct Place {
+    p: u64,
+    v: u64,
+    half: u64,
+}
+
+impl Part {
+    const NONE: Self = Self {
+        speed: 0,
+        half: 0,
+        sixth: 0,
+        grows: false,
+        back: false,
+        even: true,
+        begin: 0,
+        origin: 0,
+        lasts: Real::ZERO,
+        pace: Real::ZERO,
+        way: (Inverse::ONE, 0),
+        step: 0,
+        off: 0,
+    };
+
+    /// Of a piece with its end, or of what is left of it where the curve was joined.
+    fn new(curve: &Curve, frame: &Frame, (piece, end): (&crate::curve::Piece, Real), off: Real) -> Self {
+        let begin = piece.time.max(curve.skipped.0);
+        let first = piece.after(begin - piece.time);
+        let even = piece.a.is_zero() && piece.j.is_zero();
+        let back = !piece.up && !even;
+        let time = end - begin;
+        let slow = if back { first.after(time) } else { first };
+        let scale = frame.scale;
+        let bits = 32_i32.saturating_sub(i32::try_from(frame.shift).unwrap_or(0));
+        let ticks = |time: Real| time.scaled(bits);
+        let since = frame.since(curve, slow.time).to_wide(bits);
+        let steps = |p: Real| (p * scale).to_wide(P2);
+        let own = Self {
+            even,
+            back,
+            grows: (piece.bend != Bend::Fading) != back,
+            begin: (i128::from(frame.begin) << bits.unsigned_abs()).saturating_add(since),
+            origin: (i128::from(frame.from) << P).saturating_add(steps(slow.p)).saturating_sub(steps(curve.skipped.1)),
+            ..Self::NONE
+        };
+        if even {
+            return Self { pace: ticks(Real::ONE / (piece.v * scale)), ..own };
+        }
+        let (v, a, j) =
+            (slow.v * time, slow.a * time.squared().half(), slow.j * (time.squared() * time) * (THIRD.half()));
+        let all = (v + a).along(j, own.grows);
+        let per = Real::ONE / all;
+        let part = |x: Real| (x * per).to_fixed(62);
+        let way = all * scale;
+        Self {
+            speed: part(v),
+            half: part(a),
+            sixth: part(j),
+            lasts: ticks(time),
+            pace: ticks(time) / way,
+            way: way.inverse(),
+            step: (Real::ONE / way).to_fixed(62),
+            off: (off / time).to_fixed(64),
+            ..own
+        }
+    }
+
+    /// 2^-64 steps from the slower end to where step `count` (from 0) is made; below 0 or beyond the other end if it was due when a
+    /// request came.
+    fn away(&self, count: u32) -> i128 {
+        let at = (i128::from(count) << P2).saturating_add(1 << (P2 - 1)).saturating_sub(self.origin);
+        if self.back { at.saturating_neg() } else { at }
+    }
+
+    /// The same as a part of the way.
+    fn target(&self, count: u32) -> u64 {
+        let (way, unit) = self.way;
+        let away = self.away(count).max(0);
+        let down = unit.saturating_add(P2);
+        let away = if down < 0 { away << down.unsigned_abs().min(63) } else { away >> down.unsigned_abs().min(127) };
+        way.of(u64::try_from(away).unwrap_or(u64::MAX)) >> 2
+    }
+
+    /// A time on the clock, in 2^-32 ticks.
+    fn tick(&self, time: u64) -> i128 {
+        let since = self.lasts.times(time, -64);
+        if self.back { self.begin.saturating_sub(since) } else { self.begin.saturating_add(since) }
+    }
+
+    /// Up to `left` steps at constant speed.
+    fn cruise(&self, count: u32, left: u32, time: u64) -> Stretch {
+        let interval = self.pace.to_fixed(0);
+        let away = self.away(count);
+        let (far, wide) = (away.max(0).unsigned_abs(), 64_u32.saturating_sub(away.max(0).leading_zeros()));
+        let far = u64::try_from(far >> wide).unwrap_or(u64::MAX);
+        let first = self.begin.saturating_add(self.pace.times(far, P2.saturating_neg().saturating_add_unsigned(wide)));
+        let room =
+            if away < 0 || interval >= LONGEST { 0 } else { time.checked_div(interval).unwrap_or(0).min(0xffff) };
+        let count = u64::from(left).min(room.max(1));
+        let interval = i64::try_from(interval).unwrap_or(0);
+        Stretch { count: u16::try_from(count).unwrap_or(1), first, differences: [interval, 0, 0] }
+    }
+
+    fn at(&self, time: u64) -> Place {
+        let bent = high(self.sixth, time);
+        let bow = high(along(self.half, bent, self.grows), time);
+        let thrice = bent.wrapping_mul(3);
+        Place {
+            p: high(self.speed.wrapping_add(bow), time),
+            v: self.speed.wrapping_add(high(along(self.half << 1, thrice, self.grows), time)),
+            half: along(self.half, thrice, self.grows),
+        }
+    }
+
+    /// Two steps or more from the last one on: what the last of them leaves, too.
+    fn many(
+        &self,
+        count: u32,
+        left: u32,
+        (time, v): (u64, Inverse),
+        demand: &Demand,
+    ) -> Option<(Stretch, (u64, Inverse))> {
+        let pace = self.pace.over(v);
+        if pace >= LONGEST {
+            return None;
+        }
+        let room = if demand.time == u64::MAX { demand.time } else { demand.time.checked_div(pace).unwrap_or(0) };
+        let step = v.of(self.step);
+        // How far the first three terms may miss.
+        let most = demand.coarse.map_or(self.off, |by| self.off.max(step >> by)).saturating_mul(6);
+        // Of one step: w / 2 and y / 6.
+        let half = self.at(time).half;
+        let (w, y) = (v.of(high(half, step)), v.of(high(high(self.sixth, step), step)));
+        let long = if demand.coarse.is_some() { 2048 } else { 512 };
+        let mut n = few(step, w, y, most).min(left).min(long).min(u32::try_from(room).unwrap_or(u32::MAX));
+        while n >= 2 {
+            let x = step.saturating_mul(n.into());
+            let (w, y) = (w.saturating_mul(n.into()), y.saturating_mul(u64::from(n).wrapping_mul(n.into())));
+            // Half of the way to rest, or as far again as from there, by the greater speed at either end: beyond it the derivative is too far from the same everywhere.
+            if w.saturating_add(y.saturating_mul(3)) > u64::MAX >> if self.back { 3 } else { 2 } {
+                n = n.saturating_sub((n >> 2).max(1));
+                continue;
+            }
+            let about = along(x, high(x, w), self.back).wrapping_add(high(x, high(w, w)) << 1);
+            let about = along(about, high(x, y), !self.grows);
+            let there = along(time, about, !self.back);
+            let Place { p, v, half } = self.at(there);
+            let way = self.target(count.saturating_add(n).saturating_sub(1));
+            let miss = Inverse::new(v).of(p.abs_diff(way));
+            if miss <= most {
+                let there = along(there, miss, p < way);
+                let v_there = Inverse::new(along(v, high(half, miss) << 1, p < way));
+                let mean = self.lasts.times(time.abs_diff(there), -64);
+                let stretch =
+                    self.join(n, time, [pace, u64::try_from(mean).unwrap_or(u64::MAX), self.pace.over(v_there)])?;
+                return Some((stretch, (there, v_there)));
+            }
+            n = n.saturating_sub((n >> 2).max(1));
+        }
         None
     }
-}
 
-/// A piece of a curve on an axis.
-struct On<'c> {
-    piece: &'c Piece,
-    frame: &'c Frame,
-    curve: &'c Curve,
-    end: Real,
-}
-
-impl On<'_> {
-    /// The state at a time of the curve, in steps of the axis.
-    fn state(&self, time: Real) -> Piece {
-        let piece = self.piece.after(time - self.piece.time);
-        let scale = self.frame.scale;
-        Piece { v: piece.v * scale, a: piece.a * scale, j: piece.j * scale, ..piece }
+    /// The segment between two steps from the paces at both, and the time between.
+    fn join(&self, count: u32, time: u64, [first, all, last]: [u64; 3]) -> Option<Stretch> {
+        if first.max(last) >= LONGEST || all == u64::MAX {
+            return None;
+        }
+        let per = part(count);
+        let [first, mean, last] = [first, high(all, per), last].map(|pace| i64::try_from(pace).unwrap_or(0));
+        let n = i64::from(count);
+        // first u + b u² + c u³; what rounding takes from c is given to b, so that the end is met.
+        let bow = first.wrapping_add(last).wrapping_sub(mean << 1);
+        let c6 = times(times(bow.wrapping_mul(6), per), per);
+        let sixth = |x: i64| times(x, SIXTH);
+        let slant = mean.wrapping_sub(first).wrapping_sub(sixth(c6.wrapping_mul(n).wrapping_mul(n)));
+        let (b2, c) = (times(slant << 1, per), sixth(c6));
+        let start = first.wrapping_add(b2 >> 1).wrapping_add(c);
+        Some(Stretch {
+            count: u16::try_from(count).ok()?,
+            first: self.tick(time).saturating_add(start.into()),
+            differences: [start.wrapping_add(b2).wrapping_add(c6), b2.wrapping_add(c6 << 1), c6],
+        })
     }
 
-    /// The steps from a state to the place at which step `count` (from 0) is made: ahead, and behind.
-    fn behind(&self, count: u32, state: &Piece) -> (Real, Real) {
-        let (want, over) = self.target(count);
-        let made = self.frame.made(self.curve, state.p) + over;
-        (want - made, made - want)
-    }
-
-    /// How far step `count` is from where the curve begins: ahead, and behind, for it may have been due when a request came.
-    fn target(&self, count: u32) -> (Real, Real) {
-        let at = (i64::from(count) << P).saturating_add(1 << 31);
-        let away = at.saturating_sub(self.frame.from);
-        let size = Real::fixed(away.unsigned_abs(), P);
-        if away < 0 { (Real::ZERO, size) } else { (size, Real::ZERO) }
-    }
-
-    /// A time of the curve on the clock, in 2^-32 ticks.
-    fn tick(&self, time: Real) -> i128 {
-        let bits = TICK.saturating_sub(i32::try_from(self.frame.shift).unwrap_or(0));
-        let since = self.frame.since(self.curve, time).to_wide(bits);
-        (i128::from(self.frame.begin) << bits.unsigned_abs()).saturating_add(since)
-    }
-
-    /// The next step alone, from a time that is not after it.
-    fn single(&self, count: u32, from: Real, demand: &Demand) -> (u16, Stretch, Real) {
-        let time = self.search(count, from, demand);
-        (1, Stretch { count: 1, first: self.tick(time), differences: [0; 3] }, time)
-    }
-
-    /// The time of a step: Newton's method between the times that are known to be too early and late enough; if it takes long,
-    /// halving.
-    fn search(&self, count: u32, from: Real, demand: &Demand) -> Real {
-        let here = self.state(from);
-        let (way, _) = self.behind(count, &here);
-        let (mut low, mut high) = (from, self.end.max(from));
-        let mut time = (from + guess(way, &here)).min(high);
-        let enough = demand.off.scaled(-4);
-        for round in 0..48_u8 {
-            let state = self.state(time);
-            let (ahead, past) = self.behind(count, &state);
-            if ahead.is_zero() {
-                high = time;
-            } else {
-                low = time;
+    /// The time from the slower end to a step, and the speed then, by Newton's method.
+    fn search(&self, count: u32, last: Option<(u64, Inverse)>, near: u64) -> (u64, Inverse) {
+        let way = self.target(count);
+        let mut time = last.map_or(0, |(last, v)| {
+            // By the speed, and the change of it.
+            let step = v.of(self.step);
+            let w = v.of(high(self.at(last).half, step));
+            along(last, along(step, high(step, w), self.back), !self.back)
+        });
+        if time == 0 || time == u64::MAX {
+            time = self.guess(way);
+        }
+        for _ in 0..32 {
+            let Place { p, v, half } = self.at(time);
+            let by = Inverse::new(v).of(p.abs_diff(way));
+            let next = along(time, by, p < way);
+            if by <= near.max(2) || next == time {
+                return (next, Inverse::new(along(v, high(half, by) << 1, p < way)));
             }
-            let by = ahead.max(past) / state.v;
-            let near = demand.coarse.map_or(enough, |by| enough.max((time - from).scaled(by)));
-            if by < near || (high - low) < near {
-                break;
-            }
-            let next = time.along(by, past.is_zero());
-            time = if round % 8 < 7 && next > low && next < high { next } else { (low + high).half() };
+            time = next;
+        }
+        (time, Inverse::new(self.at(time).v))
+    }
+
+    /// At least the time for a way.
+    fn guess(&self, way: u64) -> u64 {
+        // While the acceleration fades to 0 it makes two thirds at least of what it would make.
+        let more = if self.grows { way } else { way.saturating_add(way >> 1) };
+        let square = Inverse::new(self.half).of(more).isqrt().saturating_add(1).saturating_mul(1 << 32);
+        let mut time = Inverse::new(self.speed).of(way).min(square);
+        if self.grows {
+            // The third of a power of 2 above a cube.
+            let zeros = Inverse::new(self.sixth).of(way).leading_zeros();
+            let third = u64::MAX >> zeros.div_euclid(3);
+            let third = match zeros.rem_euclid(3) {
+                0 => third,
+                1 => high(third, 0xcb5 << 52),
+                _ => high(third, 0xa15 << 52),
+            };
+            time = time.min(third);
         }
         time
     }
 }
 
-/// About the time for a way, at least as much as it takes without the greatest of the three; the power of 2 above a root.
-fn guess(way: Real, here: &Piece) -> Real {
-    let mut time = way / here.v;
-    if here.up || here.bend == Bend::Growing {
-        let root = |x: Real, n: i32| {
-            let exponent = x.exponent().saturating_add(1);
-            Real::ONE.scaled(exponent.div_euclid(n).saturating_add(i32::from(exponent.rem_euclid(n) > 0)))
-        };
-        if here.up && !here.a.is_zero() {
-            time = time.min((way.scaled(1) / here.a).sqrt());
-        }
-        if here.up && here.bend == Bend::Growing && !here.j.is_zero() {
-            let cube = way * Real::new(6) / here.j;
-            time = time.min(root(cube, 3));
-        }
-    }
-    time
+/// 2^64 / 6.
+const SIXTH: u64 = u64::MAX / 6 + 1;
+
+/// A number times a part.
+fn times(x: i64, part: u64) -> i64 {
+    let size = i64::try_from(high(x.unsigned_abs(), part)).unwrap_or(0);
+    if x < 0 { size.wrapping_neg() } else { size }
 }
 
-/// The terms of the time at a place, and the place of a segment's first step from there.
-struct Series {
-    r: Real,
-    w: Real,
-    y: Real,
-    /// The speed grows, and the acceleration with the sign of its effect on the time: 3w² - y or 3w² + y.
-    up: bool,
-    faster: bool,
-    /// The first step: ahead, or behind.
-    first: (Real, Real),
+/// 2^64 / n of up to 16 bits, in divisions that a 32-bit core has.
+fn part(n: u32) -> u64 {
+    let digit = |left: u32| (left.checked_div(n).unwrap_or(0), left.checked_rem(n).unwrap_or(0) << 16 | 0xffff);
+    let (first, left) = digit(u32::MAX);
+    let (second, left) = digit(left);
+    let (third, _) = digit(left);
+    u64::from(first) << 32 | u64::from(second) << 16 | u64::from(third)
 }
 
-impl Series {
-    fn new(state: &Piece, first: (Real, Real)) -> Self {
-        let r = Real::ONE / state.v;
-        let squared = r.squared();
-        let faster = state.up == (state.bend != Bend::Fading);
-        Self { r, w: state.a * squared, y: state.j * squared * r, up: state.up, faster, first }
+/// A sum that ends at the greatest number, or a difference that ends at 0.
+fn along(x: u64, by: u64, up: bool) -> u64 {
+    if up { x.saturating_add(by) } else { x.saturating_sub(by) }
+}
+
+/// About as many steps as the two terms left out allow to be off by `most`, from those of one step.
+fn few(step: u64, w: u64, y: u64, most: u64) -> u32 {
+    // Of 16 steps, lest they are too small.
+    let (x, w, y) = (step.saturating_mul(16), w.saturating_mul(16), y.saturating_mul(256));
+    let square = high(w, w);
+    let fourth = high(high(x, w), square.saturating_mul(5).saturating_add(y.saturating_mul(15) >> 1));
+    let both = square.saturating_mul(4).saturating_add(y.saturating_mul(3));
+    let fifth = high(x, high(both, both));
+    let root = |term: u64, degree: u32| {
+        // From 2^-60 of 16 steps on.
+        let octaves = term.leading_zeros().saturating_add(60).saturating_sub(most.leading_zeros());
+        let (whole, part) = (octaves.checked_div(degree).unwrap_or(0), octaves.checked_rem(degree).unwrap_or(0));
+        let steps = u64::from(degree.saturating_add(part)) << whole.min(40);
+        let down = 60_u32.checked_div(degree).unwrap_or(0).saturating_sub(4);
+        u32::try_from((steps >> down).checked_div(degree.into()).unwrap_or(0)).unwrap_or(u32::MAX)
+    };
+    root(fourth, 4).min(root(fifth, 5))
+}
+
+#[cfg(test)]
+#[expect(clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "numbers for random cases, and compared with 1")]
+mod tests {
+    use super::*;
+    use crate::limits::{Clock, Limits};
+    use crate::planner::{Goal, Motion, plan};
+    use proptest::prelude::*;
+
+    /// How far the steps of the segments are off at most, in parts of what they may be, and how many steps a segment has.
+    fn worst(curve: &Curve, frame: &Frame, off: Real) -> (f64, f64) {
+        let (mut cutter, mut worst, mut segments) = (Cutter::new(), 0.0, 0.0);
+        let most = off.scaled(48).to_wide(32 - i32::try_from(frame.shift).unwrap()) as f64 / 2_f64.powi(48);
+        while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX }) {
+            let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
+            for k in 0..u32::from(stretch.count) {
+                let exact = cutter.exact(cutter.count() - u32::from(stretch.count) + k);
+                worst = f64::max(worst, (time - exact).unsigned_abs() as f64 / most);
+                (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
+            }
+            segments += 1.0;
+        }
+        (worst, f64::from(cutter.count()) / segments)
     }
 
-    /// How far off the steps are at most, in moments; or how often their number is to be halved for the series to end soon enough.
-    fn off(&self, count: u32) -> Result<Real, u32> {
-        let Self { r, w, y, first: (ahead, behind), .. } = *self;
-        if w.is_zero() && y.is_zero() {
-            return Ok(Real::ZERO);
-        }
-        let length = Real::new(count.saturating_sub(1).into());
-        let h = if ahead.is_zero() { behind.max(length - behind) } else { ahead + length };
-        let (wh, yh) = (w * h, y * h.squared());
-        let most = wh.exponent().max(yh.exponent().saturating_add(1) >> 1).saturating_add(3);
-        if wh > QUARTER || yh > QUARTER {
-            return Err(most.max(1).unsigned_abs());
-        }
-        let square = wh.squared();
-        let fourth = (square * wh * Real::new(15) + wh * yh * Real::new(10)) / Real::new(12);
-        let fifth = (square.squared() * Real::new(105) + square * yh * Real::new(105) + yh.squared() * Real::new(10))
-            / Real::new(60);
-        Ok(r * h * (fourth + fifth))
+    fn spread(low: f64, high: f64) -> impl Strategy<Value = f64> {
+        (low.ln()..high.ln()).prop_map(f64::exp)
     }
 
-    /// The segment, and the time of the curve at its last step.
-    fn cut(&self, on: &On<'_>, middle: Real, count: u16) -> Option<(Stretch, Real)> {
-        let Self { r, w, y, up, faster, first: (ahead, behind) } = *self;
-        let bits = TICK.saturating_sub(i32::try_from(on.frame.shift).unwrap_or(0));
-        let signed = |x: Real, plus: bool, bits: i32| {
-            let size = x.to_wide(bits.saturating_add(1)).saturating_add(1) >> 1;
-            if plus { size } else { size.saturating_neg() }
+    proptest! {
+        #[test]
+        #[cfg_attr(miri, ignore = "too long for an interpreter")]
+        fn a_segment_is_as_exact_as_is_asked(
+            v in spread(1.0, 1e6), a in spread(1.0, 1e9), j in prop_oneof![Just(0.0), spread(1.0, 1e12)],
+            n in prop_oneof![1..300_u32, 1..20_000_u32], ends in prop_oneof![Just([0.0; 2]), [0.0..1.0, 0.0..1.0]],
+            off in spread(1e-3, 1e3),
+        ) {
+            let clock = Clock::new(168_000_000).unwrap();
+            let limits = Limits::new(v as u32, a as u32).unwrap();
+            let limits = if j == 0.0 { limits } else { limits.with_jerk(j as u64).unwrap() };
+            let bounds = limits.bounds(clock);
+            let [entry, exit] = ends.map(|part| bounds.v * Real::new((part * 1e6) as u64) / Real::new(1_000_000));
+            let Ok(curve) = plan(Motion::steady(entry), Goal::At(Real::new(n.into()), exit), &bounds) else {
+                return Ok(());
+            };
+            let frame = Frame { to: Some(i64::from(n) << 32), ..Frame::rest(clock.shift(), 0, 0) };
+            let off = Real::fixed((off * 65536.0) as u64, 16);
+            let (worst, _) = worst(&curve, &frame, off);
+            prop_assert!(worst <= 1.0, "{worst} of {off:?}");
+        }
+    }
+
+    /// 64 steps, ramps of 250 and of 2500: how many steps a segment has, at a third of a tick of 1 us and at 20 ns.
+    #[test]
+    fn steps_of_a_segment() {
+        let cut = |steps: u32, speed, jerk, off| {
+            let bounds = Limits::new(speed, 100_000).unwrap().with_jerk(jerk).unwrap().bounds(Clock::MICROSECONDS);
+            let curve =
+                plan(Motion::steady(Real::ZERO), Goal::At(Real::new(steps.into()), Real::ZERO), &bounds).unwrap();
+            let frame = Frame { to: Some(i64::from(steps) << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
+            worst(&curve, &frame, Real::new(Clock::MICROSECONDS.moment(1)) * off).1
         };
-        let (square, third) = ((w.squared() * Real::new(3)), y);
-        let (c3, plus) = match faster {
-            true if square < third => (third - square, false),
-            true => (square - third, true),
-            false => (square + third, true),
-        };
-        // Of 2^-32 ticks, the second with 24 bits more, the third with 8.
-        let c1 = r.to_wide(bits);
-        let c2 = signed((r * w).half(), !up, bits.saturating_add(24));
-        let c3 = signed(r * c3 * THIRD.half(), plus, bits.saturating_add(24));
-        let place = |x: Real, plus| signed(x, plus, STEP_BITS);
-        let u = if ahead.is_zero() { place(behind, false) } else { place(ahead, true) };
-        // No sum or product comes near 2^127, as the third term is less than the second, and that less than the first.
-        let down = |x: i128, by: u32| x >> by;
-        // c1 u + c2 u² + c3 u³
-        let at = |u: i128| {
-            let inner = c2.wrapping_add(down(c3.wrapping_mul(u), STEP));
-            let inner = c1.wrapping_add(down(down(inner, 12).wrapping_mul(u), STEP.wrapping_add(12)));
-            down(inner.wrapping_mul(u), STEP)
-        };
-        let one = 1_i128 << STEP;
-        let double = u.wrapping_mul(2).wrapping_add(one);
-        let cubic = u.wrapping_mul(u.wrapping_add(one)).wrapping_mul(3);
-        let cubic = down(cubic, STEP).wrapping_add(one);
-        let narrow = |x: i128| i64::try_from(x).ok();
-        let interval = c1.wrapping_add(down(
-            down(c2, 12).wrapping_mul(double).wrapping_add(down(c3, 12).wrapping_mul(cubic)),
-            STEP.wrapping_add(12),
-        ));
-        let add = down(c2, 23)
-            .wrapping_add(down(down(c3, 8).wrapping_mul(u.wrapping_add(one)).wrapping_mul(6), STEP.wrapping_add(16)));
-        let bend = down(c3.wrapping_mul(6), 24);
-        let differences = [narrow(interval)?, narrow(add)?, narrow(bend)?];
-        let last = u.wrapping_add(i128::from(count.saturating_sub(1)) << STEP);
-        // Where the segment ends, for the next one to look from: the fraction of a tick does not matter.
-        let size = u64::try_from(at(last).unsigned_abs()).ok()?;
-        let time = middle.along(Real::fixed(size, bits), last >= 0).max(on.piece.time);
-        Some((Stretch { count, first: on.tick(middle).saturating_add(at(u)), differences }, time))
+        let third = Real::ONE / Real::new(3);
+        let fine = Real::fixed(20, 0) / Real::new(1000);
+        for (steps, speed, jerk, wants) in [
+            (64, 20_000, 5_000_000, [1.9, 1.2]),
+            (500, 20_000, 5_000_000, [7.9, 4.0]),
+            (5000, 50_000, 1_000_000, [30.0, 15.0]),
+        ] {
+            for (off, want) in [third, fine].into_iter().zip(wants) {
+                let got = cut(steps, speed, jerk, off);
+                assert!(got >= want, "{got} steps a segment of {steps}, {want} are wanted");
+            }
+        }
     }
 }

@@ -1,13 +1,13 @@
 //! An axis that can be told something else at any time.
 
-use crate::cutter::{Cutter, Demand, Stretch};
+use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::phases::{Frame, P, Phases, steps};
 use crate::plan::{Setpoint, checked};
-use crate::planner::{Goal, Motion, plan};
+use crate::planner::{Goal, Motion, plan_into};
 use crate::real::Real;
-use crate::stepper::Stepper;
+use crate::stepper::{Stepper, tick};
 use servowire_core::Direction;
 
 /// A step: when, and which way.
@@ -62,7 +62,6 @@ pub struct Mover {
     bounds: Bounds,
     phases: Phases,
     stepper: Stepper,
-    cutter: Cutter,
     /// Its steps are cut into stretches, not taken one by one.
     cuts: bool,
     direction: Direction,
@@ -103,7 +102,6 @@ impl Mover {
             bounds: checked(clock, limits)?,
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
-            cutter: Cutter::new(),
             cuts: false,
             direction: Direction::Forward,
             origin: 0,
@@ -310,7 +308,7 @@ impl Mover {
         if self.due.is_none() {
             return Cut::Rest;
         }
-        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.cutter);
+        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.stepper.cutter);
         let Some(stretch) = cutter.next(curve, frame, demand) else {
             self.due = None;
             self.go_on();
@@ -324,7 +322,7 @@ impl Mover {
         let (endless, all) = (frame.endless, steps(frame.last(curve)));
         let (direction, count) = (self.direction, i64::from(stretch.count));
         self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
-        self.cutter = cutter;
+        self.stepper.cutter = cutter;
         let last = tick(stretch.last()).max(self.free);
         self.free = last.saturating_add(1);
         (self.turn, self.dir) = (None, Some(direction));
@@ -398,7 +396,7 @@ impl Mover {
     fn rest(&mut self, moment: u64) {
         self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
-        (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
+        self.stepper = Stepper::new();
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
@@ -427,76 +425,65 @@ impl Mover {
     /// From the state at a moment to the aim.
     fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
         let moment = moment.max(self.phases.frame.begin);
-        let next = if self.is_moving(moment) { self.onward(moment, bounds) } else { self.anew(moment, bounds) };
-        self.adopt(next);
+        if self.is_moving(moment) {
+            self.onward(moment, bounds);
+        } else {
+            self.anew(moment, bounds);
+        }
         if self.due.is_none() && self.has_work() {
             // No step on the way to rest: what follows begins there.
-            let next = self.anew(self.phases.end(), bounds);
-            self.adopt(next);
+            self.anew(self.phases.end(), bounds);
         }
     }
 
-    fn adopt(&mut self, next: Option<Phases>) {
-        (self.due, self.turn) = (None, None);
-        if let Some(phases) = next {
-            self.origin = self.commanded;
-            (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
-            let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
-            let Phases { curve, frame } = &phases;
-            let due = if self.cuts {
-                // Not after the next step is enough.
-                (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
-            } else {
-                self.stepper.next(curve, frame)
-            };
-            self.due = due.map(|due| due.max(self.free).max(begin));
-            if self.dir != Some(self.direction) {
-                self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
-                self.dir = None;
-            }
-            self.phases = phases;
+    /// Begins with the plan that there is.
+    fn adopt(&mut self) {
+        self.origin = self.commanded;
+        self.stepper = Stepper::new();
+        let Phases { curve, frame } = &self.phases;
+        let begin = frame.begin.div_ceil(self.clock.moment(1));
+        let due = if self.cuts {
+            // Not after the next step is enough.
+            (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
+        } else {
+            self.stepper.next(curve, frame)
+        };
+        self.due = due.map(|due| due.max(self.free).max(begin));
+        self.turn = None;
+        if self.dir != Some(self.direction) {
+            self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
+            self.dir = None;
         }
     }
 
-    /// The plan of an axis in motion. Its positions count from the steps made.
-    fn onward(&mut self, moment: u64, bounds: &Bounds) -> Option<Phases> {
-        let state = self.phases.at(moment);
-        let made = self.commanded.abs_diff(self.origin);
-        let p = state.p.wrapping_sub(i64::try_from(made).unwrap_or(0) << 32);
+    /// Plans on from the motion that there is. Positions count from the steps made.
+    fn onward(&mut self, moment: u64, bounds: &Bounds) {
+        let (state, last) = (self.phases.at(moment), self.phases.last());
+        let made = i64::try_from(self.commanded.abs_diff(self.origin)).unwrap_or(0) << 32;
+        let p = state.p.wrapping_sub(made);
         let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
         let bounds = &bounds.holding(state.v, state.a);
-        let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
-        let curve = self.goal(self.direction, bounds).and_then(|(goal, bounds)| match goal {
-            Want::At(target) => {
-                let left = ahead(self.commanded, target, self.direction)?;
-                let to = i64::from(left) << 32;
-                frame.to = Some(to);
-                let distance = Real::fixed(u64::try_from(to.checked_sub(p)?).ok()?, P);
-                plan(start, Goal::At(distance, Real::ZERO), &bounds).ok()
+        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
+        let again = self.braking;
+        self.braking = !self.plan(self.direction, start, frame, bounds);
+        if self.braking {
+            self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
+            let Phases { curve, frame } = &mut self.phases;
+            // A stop has always room.
+            let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
+            if again {
+                // Rounding makes no step more of a stop within higher limits.
+                frame.to = Some(frame.last(curve).min(last.saturating_sub(made)));
             }
-            Want::Speed(v) => {
-                frame.endless = true;
-                plan(start, Goal::Speed(v), &bounds).ok()
-            }
-        });
-        let again = core::mem::replace(&mut self.braking, curve.is_none());
-        if let Some(curve) = curve {
-            return Some(Phases { curve, frame });
         }
-        (frame.to, frame.endless) = (None, false);
-        let curve = plan(start, Goal::Speed(Real::ZERO), bounds).ok()?;
-        if again {
-            // Rounding makes no step more of a stop within higher limits.
-            let made = i64::try_from(made).unwrap_or(0) << 32;
-            frame.to = Some(frame.last(&curve).min(self.phases.last().saturating_sub(made)));
-        }
-        Some(Phases { curve, frame })
+        self.adopt();
     }
 
-    /// The plan of an axis at rest.
-    fn anew(&mut self, moment: u64, bounds: &Bounds) -> Option<Phases> {
+    /// Plans from rest.
+    fn anew(&mut self, moment: u64, bounds: &Bounds) {
         let end = self.phases.end();
         self.rest(end);
+        (self.due, self.turn) = (None, None);
         let mut begin = moment.max(end);
         if let Some(last) = self.free.checked_sub(1) {
             // The axis has come to rest up to half a step behind that step, and begins at it.
@@ -505,7 +492,7 @@ impl Mover {
         }
         self.braking = false;
         if !self.has_work() {
-            return None;
+            return;
         }
         self.idle = begin.div_ceil(self.clock.moment(1));
         let direction = match self.aim {
@@ -517,20 +504,33 @@ impl Mover {
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
         }
         self.direction = direction;
-        let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
-        let start = Motion::steady(Real::ZERO);
-        let curve = self.goal(direction, bounds).and_then(|(goal, bounds)| match goal {
+        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
+        if self.plan(direction, Motion::steady(Real::ZERO), frame, bounds) {
+            self.adopt();
+        } else {
+            self.rest(end);
+        }
+    }
+
+    /// Puts a plan to the aim in the place of the one that there is; false if that is a stop, or cannot be reached any more.
+    fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
+        let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
+        self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
+        let Phases { curve, frame } = &mut self.phases;
+        let goal = match want {
             Want::At(target) => {
-                let left = ahead(self.commanded, target, direction)?;
-                frame.to = Some(i64::from(left) << 32);
-                plan(start, Goal::At(Real::new(left.into()), Real::ZERO), &bounds).ok()
+                let Some(left) = ahead(self.commanded, target, direction) else { return false };
+                let to = i64::from(left) << 32;
+                frame.to = Some(to);
+                let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
+                Goal::At(Real::fixed(way, P), Real::ZERO)
             }
             Want::Speed(v) => {
                 frame.endless = true;
-                plan(start, Goal::Speed(v), &bounds).ok()
+                Goal::Speed(v)
             }
-        });
-        curve.map(|curve| Phases { curve, frame })
+        };
+        plan_into(curve, start, goal, &bounds).is_ok()
     }
 
     /// What to do in this direction; `None` if that is a stop.
@@ -563,11 +563,6 @@ pub(super) enum Cut {
     Later,
     /// There is no step to come.
     Rest,
-}
-
-/// The tick into which a time in 2^-32 ticks falls.
-pub(super) fn tick(time: i128) -> u64 {
-    u64::try_from(time.saturating_add(1 << 31) >> 32).unwrap_or(0)
 }
 
 /// Where a plan leads.

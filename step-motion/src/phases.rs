@@ -56,11 +56,6 @@ impl Frame {
         (Real::new(moment.saturating_sub(self.begin)) + curve.skipped.0) - self.offset
     }
 
-    /// Steps from `from` to a place of the curve.
-    pub(super) fn made(&self, curve: &Curve, p: Real) -> Real {
-        (p - curve.skipped.1) * self.scale
-    }
-
     fn position(&self, curve: &Curve, p: Real) -> i64 {
         let behind = curve.skipped.1;
         let (back, size) = if p < behind { (true, behind - p) } else { (false, p - behind) };
@@ -93,23 +88,6 @@ impl Frame {
             ),
             None => (piece, curve.time, if self.endless { u32::MAX } else { last() }),
         })
-    }
-
-    /// The first middle of a tick that is not before a time of the curve: the tick, and the moments until then. A step
-    /// falls into the tick at whose middle it is made.
-    pub(super) fn sample(&self, curve: &Curve, time: Real) -> (u64, Real) {
-        let (tick, past) = self.middle(self.since(curve, time));
-        if past.is_zero() { (tick.saturating_sub(1), past) } else { (tick, Real::new(1 << self.shift) - past) }
-    }
-
-    /// The tick nearest to a time since `begin`, and the moments since it began to be that.
-    pub(super) fn middle(&self, since: Real) -> (u64, Real) {
-        let shift = self.shift;
-        let tick = 1_u64 << shift;
-        let part = (self.begin & tick.wrapping_sub(1)).wrapping_add(tick >> 1);
-        let time = since + Real::new(part);
-        let whole = time.to_fixed(0) >> shift;
-        ((self.begin >> shift).saturating_add(whole), time - Real::new(whole << shift))
     }
 
     /// The state at a moment; at rest after the end.

@@ -127,11 +127,6 @@ impl Iterator for Pulses<'_> {
         let left = usize::try_from(left).ok();
         (left.unwrap_or(usize::MAX), left)
     }
-
-    #[inline]
-    fn fold<B, F: FnMut(B, u64) -> B>(self, init: B, take: F) -> B {
-        self.stepper.fold(&self.plan.phases.curve, &self.plan.phases.frame, init, take)
-    }
 }
 
 impl FusedIterator for Pulses<'_> {}

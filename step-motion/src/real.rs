@@ -92,6 +92,39 @@ impl Real {
         }
     }
 
+    /// Times `x` and 2^`bits`, up to 2^126.
+    #[expect(clippy::cast_possible_wrap, reason = "the top bit is shifted out or known to be 0")]
+    pub(super) const fn times(self, x: u64, bits: i32) -> i128 {
+        let (high, low) = product(self.m(), x);
+        let wide = (high as u128) << 64 | low as u128;
+        let shift = self.e().saturating_add(bits);
+        let by = shift.unsigned_abs();
+        if shift < 0 {
+            (if by < 128 { wide >> by } else { 0 }) as i128
+        } else if by < wide.leading_zeros() {
+            (wide << by) as i128
+        } else {
+            i128::MAX >> 1
+        }
+    }
+
+    /// Over a number in units of 2^-62, truncated; the largest number if it does not fit.
+    pub(super) const fn over(self, by: Inverse) -> u64 {
+        let quotient = high(self.m(), by.per);
+        let shift = self.e().saturating_add_unsigned(by.zeros).saturating_sub(1);
+        match (shift, shift.unsigned_abs()) {
+            (..=-64, _) => 0,
+            (..=0, by) => quotient >> by,
+            (_, by) if by <= quotient.leading_zeros() && by < 64 => quotient << by,
+            _ => u64::MAX,
+        }
+    }
+
+    /// To divide by it: its digits, and the power of 2 of their unit.
+    pub(super) const fn inverse(self) -> (Inverse, i32) {
+        (Inverse::new(self.m()), self.e())
+    }
+
     /// The exponent of the top bit: the number is from 2^this to less than twice that.
     pub(super) const fn exponent(self) -> i32 {
         self.e().wrapping_add(63)
@@ -120,16 +153,6 @@ impl Real {
 
     pub(super) fn max(self, other: Self) -> Self {
         if other > self { other } else { self }
-    }
-
-    /// The whole number below.
-    pub(super) const fn floor(self) -> Self {
-        if self.e() >= 0 { self } else { Self::new(self.to_fixed(0)) }
-    }
-
-    /// What is above the whole number below.
-    pub(super) fn fraction(self) -> Self {
-        self - self.floor()
     }
 
     /// The root of the upper 32 bits, and two of Heron's steps, s + (m - s²) / 2s, with a reciprocal of s that is refined
@@ -241,6 +264,42 @@ impl Div for Real {
     }
 }
 
+/// A number of 64 bits to divide by.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Inverse {
+    /// 2^127 over it, with its leading `zeros` shifted out.
+    per: u64,
+    zeros: u32,
+}
+
+impl Inverse {
+    pub(super) const ONE: Self = Self { per: u64::MAX, zeros: 63 };
+
+    pub(super) const fn new(x: u64) -> Self {
+        let zeros = x.leading_zeros();
+        if zeros == 64 { Self { per: u64::MAX, zeros } } else { Self { per: reciprocal(x << zeros), zeros } }
+    }
+
+    /// `x` over it in units of 2^-64; the largest number from 1 on.
+    pub(super) const fn of(self, x: u64) -> u64 {
+        let quotient = high(x, self.per);
+        if quotient == 0 {
+            0
+        } else if quotient.leading_zeros() > self.zeros {
+            quotient << self.zeros << 1
+        } else {
+            u64::MAX
+        }
+    }
+}
+
+/// The upper half of a product.
+#[inline]
+pub(super) const fn high(a: u64, b: u64) -> u64 {
+    product(a, b).0
+}
+
 /// Both halves of a product of 128 bits, on a 32-bit core in multiplications that it has.
 #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
 #[inline]
@@ -329,7 +388,6 @@ mod tests {
             prop_assert_eq!(Real::fixed(n, bits).to_fixed(bits), n);
             prop_assert_eq!(Real::new(n).to_fixed(0), n);
             prop_assert_eq!(Real::fixed(n, 7).to_fixed(0), n >> 7);
-            prop_assert_eq!(Real::fixed(n, 7).fraction(), Real::fixed(n & 127, 7));
         }
     }
 

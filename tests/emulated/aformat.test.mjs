@@ -7,7 +7,8 @@ import { US, check, service } from './pair.mjs';
 function value(units) {
   const [information, low, middle, high] = units.map((unit) => unit.value);
   assert.equal(information & 7, 4, 'sync code of an answer');
-  return `abs ${low + middle * 2 ** 16 + (high & 0xff) * 2 ** 32} `;
+  const position = low + middle * 2 ** 16 + (high & 0xff) * 2 ** 32;
+  return `turn ${Math.floor(position / 2 ** 20)}, ${position % 2 ** 20} counts at `;
 }
 
 // The sync code of a command frame is 010; address and command are 0, and so is their CRC-3.

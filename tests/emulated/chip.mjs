@@ -17,6 +17,9 @@ const STACK_TOP = 0x20040000;
 const PT_LOAD = 1;
 const DMA_CHAN_ABORT = 0x444;
 const EXEC_STALLED = 0x80000000;
+/** SMx_SHIFTCTRL, from SMx_CLKDIV on, and its bits for joined FIFOs. */
+const SHIFTCTRL = 0x08;
+const JOINED = 0xc0000000;
 /** Of a character on the console: 10 bits at 1,000,000 baud. */
 const CHARACTER_NS = 10_000;
 
@@ -27,7 +30,17 @@ class Scheduled {
     this.clocks = 0; // 1/256 clocks until the next cycle
     this.pause = 0; // cycles of delay that are left
     this.inCycle = false;
-    const { checkWait, restart } = machine;
+    const { checkWait, restart, writeUint32 } = machine;
+    // Joining the FIFOs, or taking them apart again, empties them.
+    machine.writeUint32 = (offset, value) => {
+      if (offset === SHIFTCTRL && (value ^ machine.shiftCtrl) & JOINED) {
+        while (!machine.txFIFO.empty) machine.txFIFO.pull();
+        while (!machine.rxFIFO.empty) machine.rxFIFO.pull();
+        machine.updateDMATx();
+        machine.updateDMARx();
+      }
+      writeUint32.call(machine, offset, value);
+    };
     // FIFO writes, IRQ flags and pins end a wait only when the machine's own cycle comes, or at once for an
     // instruction that the processor has put in.
     machine.checkWait = () => {

@@ -8,10 +8,11 @@ function value(units) {
   const bytes = units.map((unit) => unit.value);
   assert.equal(bytes.reduce((sum, byte) => sum ^ byte, 0), 0, 'x^8 + 1');
   const [abs, abm] = [2, 6].map((at) => bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16));
-  return `abs ${abs} abm ${abm} enid ${bytes[5].toString(16)} `;
+  assert.equal(bytes[5], 0x17, 'an encoder with 23 bits');
+  return `turn ${abm}, ${abs} counts at `;
 }
 
-const PAIR = { bits: 8, turn: 3 * US, late: 12 * US, request: [0x1a], length: 11, value };
+const PAIR = { bits: 8, turn: 3 * US, late: 16 * US, request: [0x1a], length: 11, value };
 test('T-Format at 2.5 Mbit/s', () => check('tformat-master', { ...PAIR, clocks: 48 }));
 test('T-Format at 5 Mbit/s', () => check('tformat-master-5m', { ...PAIR, clocks: 24 }));
 

@@ -9,6 +9,8 @@ import { HZ, IMAGES } from './pair.mjs';
 const [DI, DE, RO] = [2, 3, 4];
 // Number of bits - 1, a wait, the bits: an odd pattern of 60 bits, then one of 27 bits with a wait.
 const WORDS = [59, 0, 0x6a5c3d96, 0x080f3a90 | (1 << 27), 26, 33, 0x06b7_51a1 | (1 << 26)];
+/** The flag that starts what the transmitter holds. */
+const START = 1;
 const START_CLOCKS = 12_000;
 // And so long without a request of its own.
 const QUIET_CLOCKS = 1_000;
@@ -39,6 +41,7 @@ const [waves, words, heard] = [[], [...WORDS], []];
 chip.machines[0].clocks = chip.machines[1].clocks = 0;
 for (let cycle = 0; cycle < 2500; cycle++) {
   while (words.length > 0 && !tx.txFIFO.full) tx.writeFIFO(words.shift());
+  pio.irq |= START;
   for (let k = 0; k < divider; k++) chip.clock();
   const [di, de] = [(pio.pinValues >> DI) & 1, (pio.pinValues >> DE) & 1];
   const level = de ? di : 1;

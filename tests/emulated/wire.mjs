@@ -21,27 +21,32 @@ export class Wire {
     this.deaf = false; // the encoder hears nothing, so it is silent
     this.disturb = null; // (clocks since the request began, level) => level
     this.onRequest = () => {};
+    // Mistakes of the wiring: what becomes of the master's DE, of the level that the encoder drives and hears, and of the
+    // master's receiver while it drives.
+    this.mistakes = { enable: (on) => on, crossed: false, echo: false };
   }
 
   clock() {
     const { master, encoder, t } = this;
     master.clock();
     encoder.clock();
-    const masterOn = master.output(DE);
+    const masterOn = this.mistakes.enable(master.output(DE));
     this.past[t % PAST] = (encoder.output(DE) ? 2 : 0) | (encoder.output(DI) ? 1 : 0);
     // Only what was wanted since the request began comes late.
     const wanted = t - this.delay < this.began ? 1 : this.past[(t + PAST - this.delay) % PAST];
     const encoderOn = wanted > 1;
+    const { crossed, echo } = this.mistakes;
     if (masterOn && encoderOn) this.clashes++;
-    let level = masterOn ? master.output(DI) : encoderOn ? (wanted & 1) === 1 : true;
+    let level = masterOn ? master.output(DI) : encoderOn ? ((wanted & 1) === 1) !== crossed : true;
     this.driver(0, masterOn);
     this.driver(1, encoderOn);
     if (this.disturb) level = this.disturb(t - this.began, level);
     if (level !== this.level) this.edges.push([t, level]);
     this.level = level;
     // A receiver that is off gives 1, by the pull-up at its output.
-    master.input(RO, masterOn || level);
-    encoder.input(RO, encoderOn || this.deaf || level);
+    master.input(RO, (masterOn && !echo) || level);
+    // Nobody drives: 1, whichever way round the wires are.
+    encoder.input(RO, encoderOn || this.deaf || (masterOn ? level !== crossed : level));
     this.t++;
   }
 

@@ -235,6 +235,118 @@ static void bus(void)
     CHECK(sw_aformat_poll(&m, sw_aformat_until_ns(&m)) == SW_OK && sw_aformat_missing(&m) == 2);
 }
 
+/* One axis: MAC-ID 11, CP; the drive answers with position 100. */
+static void axis(void)
+{
+    static const uint8_t rsp[16] = {0x8b, 0x20, 0x40, 0x00, 100};
+    static sw_rtex_axis_t zeroed_axis;
+    sw_rtex_axis_t a;
+    sw_rtex_config_t config = {500000, 0, 4, 9, 5, 1, 1, 3, 2, 11, SW_RTEX_CP};
+    sw_rtex_state_of_t state;
+    sw_rtex_feedback_t feedback;
+    sw_rtex_response_t response;
+    uint8_t block[16];
+
+    CHECK(sw_rtex_parse_response(rsp, 15, &response) == SW_E_RTEX_TRUNCATED);
+    CHECK(sw_rtex_parse_response(NULL, 16, &response) == SW_E_NULL);
+    CHECK(sw_rtex_axis_hear(&zeroed_axis, rsp, 16, 0) == SW_E_STATE && sw_rtex_axis_stop(&zeroed_axis, 0) == SW_E_STATE);
+    CHECK(!sw_rtex_feedback(&zeroed_axis, 0, 1, &feedback));
+    config.echo = 0;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_E_ARGUMENT);
+    config.echo = 3;
+    CHECK(sw_rtex_axis_start(&a, &config) == SW_OK && sw_rtex_axis_start(&a, NULL) == SW_E_NULL);
+    CHECK(!sw_rtex_feedback(&a, 0, UINT64_MAX, &feedback));
+    CHECK(sw_rtex_axis_switch_on(&a) == SW_E_RTEX_NOT_NOW && strcmp(sw_text(SW_E_RTEX_NOT_NOW), "not_now") == 0);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, SW_NO_TIME) == SW_E_CLOCK);
+    CHECK(sw_rtex_axis_hear(&a, rsp, 16, 1000000) == SW_OK);
+    /* A period that cannot be written is not begun: the counter of the next block is 1. */
+    CHECK(sw_rtex_axis_transmit(&a, block, 15) == SW_E_SHORT_BUFFER);
+    CHECK(sw_rtex_axis_transmit(&a, block, 16) == SW_OK && block[0] == 0x2b && block[1] == 0x20 && block[4] == 100);
+    CHECK(sw_rtex_axis_state(&a, &state) == SW_OK && state.code == SW_RTEX_OFF && state.reason == SW_RTEX_NO_REASON);
+    CHECK(sw_rtex_feedback(&a, 1500000, 500000, &feedback) && feedback.position == 100 && feedback.sampled_ns == 1000000);
+    CHECK(!sw_rtex_feedback(&a, 1500001, 500000, &feedback));
+    CHECK(sw_rtex_axis_set_position(&a, 200) == SW_E_RTEX_NOT_NOW && sw_rtex_axis_setpoint(&a) == 100);
+}
+
+/* 3000 steps and back, made by a timer of 1 MHz. */
+static void motion(void)
+{
+    static sw_motion_queue_t queue;
+    static sw_motion_axis_t a;
+    static sw_motion_timer_t timer;
+    sw_motion_limits_t limits = {4000000, 20000, 200000};
+    sw_motion_fired_t fired = {0, 0, 0};
+    int64_t made = 0, commanded = 99;
+    uint64_t ticks = 0, shortest = UINT64_MAX, last = 0;
+    int way;
+
+    CHECK(sw_motion_poll(&a) == SW_E_STATE && sw_motion_fire(&timer, &fired) == SW_E_STATE && !sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_start(&a, &timer, NULL, 1000000, &limits) == SW_E_NULL);
+    CHECK(sw_motion_start(&a, &timer, &queue, 999, &limits) == SW_E_ARGUMENT);
+    limits.speed = 500001;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_E_MOTION_SPEED_ABOVE_CLOCK);
+    limits.speed = 20000;
+    CHECK(sw_motion_start(&a, &timer, &queue, 1000000, &limits) == SW_OK && sw_motion_is_at_rest(&a));
+    CHECK(sw_motion_commanded(&a, NULL) == SW_E_NULL && sw_motion_run(&a, 2, 100) == SW_E_ARGUMENT);
+    for (way = 0; way < 2; way++) {
+        sw_result_t work;
+        unsigned calls = 0;
+        CHECK(sw_motion_move_to(&a, way == 0 ? 3000 : -500) == SW_OK);
+        while ((work = sw_motion_poll(&a)) != SW_MOTION_REST) {
+            CHECK(work > 0 && ++calls < 1000000);
+            if (work == SW_MOTION_MORE) {
+                continue;
+            }
+            ticks += fired.wait;
+            CHECK(sw_motion_fire(&timer, &fired) == SW_OK);
+            if (fired.step) {
+                made += fired.reverse ? -1 : 1;
+                if (made > 1 && last > 0 && ticks - last < shortest) {
+                    shortest = ticks - last;
+                }
+                last = ticks;
+            }
+        }
+        CHECK(sw_motion_commanded(&a, &commanded) == SW_OK && commanded == made && made == (way == 0 ? 3000 : -500));
+        fired.wait = 0;
+    }
+    /* 20000 steps a second are 50 us. */
+    CHECK(shortest >= 49 && shortest <= 51);
+    CHECK(sw_motion_run(&a, 1, 10000) == SW_OK && sw_motion_halt(&a) == SW_OK);
+    while (sw_motion_poll(&a) != SW_MOTION_REST) {
+        CHECK(sw_motion_fire(&timer, &fired) == SW_OK && !fired.step);
+    }
+}
+
+static void sorte_and_steps(void)
+{
+    static const uint8_t output[4] = {1, 2, 3, 4};
+    sw_sorte_master_frame_t frame;
+    sw_sorte_device_frame_t from = {1, 0};
+    sw_sorte_pto_t pto;
+    sw_step_time_t time;
+    uint8_t bytes[9];
+    uint16_t word = 7;
+    uint32_t speed = 7;
+    size_t len = 7;
+
+    CHECK(sw_sorte_build_master_frame(output, 4, 500, bytes, 8, &len) == SW_E_SHORT_BUFFER && len == 7);
+    CHECK(sw_sorte_build_master_frame(output, SIZE_MAX, 500, bytes, 9, &len) == SW_E_ARGUMENT);
+    CHECK(sw_sorte_build_master_frame(NULL, 4, 500, bytes, 9, &len) == SW_E_NULL);
+    CHECK(sw_sorte_build_master_frame(output, 4, 500, bytes, 9, &len) == SW_OK && len == 9);
+    CHECK(sw_sorte_parse_master_frame(bytes, 9, 4, &frame) == SW_OK && frame.time_stamp == 500);
+    CHECK(memcmp(bytes + SW_SORTE_DATA_AT, output, 4) == 0);
+    CHECK(sw_sorte_parse_master_frame(bytes, 9, SIZE_MAX, &frame) < 0 && sw_sorte_parse_master_frame(bytes, 0, 4, &frame) < 0);
+    CHECK(sw_sorte_build_device_frame(&from, output, bytes, 5) == SW_E_SHORT_BUFFER);
+    CHECK(sw_sorte_parse_device_frame(bytes, 9, 3, NULL) == SW_E_NULL);
+    CHECK(sw_sorte_pto_of_step(4000, 0, &word) == SW_E_ARGUMENT && sw_sorte_pto_of_step(5, 2, &word) == SW_E_ARGUMENT && word == 7);
+    CHECK(sw_sorte_parse_pto(3991, &pto) == SW_E_SORTE_RESERVED_PTO_VALUE && pto.kind == SW_SORTE_RESERVED);
+    CHECK(strcmp(sw_text(SW_E_SORTE_RESERVED_PTO_VALUE), "reserved_pto_value") == 0);
+    CHECK(sw_step_speed(0, &speed) < 0 && speed == 7 && sw_step_ramp(32) == 0 && sw_step_ramp(31) == 1000);
+    CHECK(sw_step_next(1661380, 0, &time) == SW_OK && time.cnt == 415 && time.sync == 1380);
+    CHECK(sw_step_next(1661380, 0, NULL) == SW_E_NULL && sw_step_check(262144, 0, 0, NULL) == SW_E_STEP_ZERO_SEGMENT_LENGTH);
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -252,6 +364,9 @@ int main(void)
     exchange();
     procedures();
     bus();
+    axis();
+    motion();
+    sorte_and_steps();
     clock_of_32_bits();
     puts("border: good");
     return 0;

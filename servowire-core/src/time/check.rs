@@ -56,6 +56,31 @@ impl ClockCheck {
         }
     }
 
+    /// The reading, if it is sound and at most `most_ns` after the last one; `most_ns` is 2^63 at the most.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check), and [`ClockError::Ahead`] if more has passed, once: the next one is compared with this one.
+    #[inline]
+    pub const fn check_within(&mut self, now_ns: u64, most_ns: u64) -> Result<u64, ClockError> {
+        // What is not after the last one is far above.
+        if now_ns.wrapping_sub(self.last_ns).wrapping_sub(1) < most_ns {
+            self.last_ns = now_ns;
+            return Ok(now_ns);
+        }
+        self.without(now_ns)
+    }
+
+    /// A reading that is not after the last one or too long after it.
+    #[cold]
+    #[inline(never)]
+    const fn without(&mut self, now_ns: u64) -> Result<u64, ClockError> {
+        let last_ns = self.last_ns;
+        match self.check(now_ns) {
+            Ok(now_ns) if now_ns > last_ns => Err(ClockError::Ahead { by_ns: now_ns.wrapping_sub(last_ns) }),
+            checked => checked,
+        }
+    }
+
     /// What is wrong with a reading that is not after the last one.
     #[cold]
     #[inline(never)]

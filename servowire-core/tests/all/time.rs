@@ -263,3 +263,25 @@ proptest! {
         }
     }
 }
+
+/// A second at the most from look to look: what is more has jumped, once, and all else is as without a limit.
+#[test]
+fn a_clock_that_jumps_is_seen_where_looks_follow_each_other() {
+    const MOST_NS: u64 = 1_000_000_000;
+    let mut check = ClockCheck::new(1);
+    let jumped = |by_ns| Err(ClockError::Ahead { by_ns });
+    for (now_ns, want) in [
+        (MOST_NS, Ok(MOST_NS)),
+        (2 * MOST_NS + 1, jumped(MOST_NS + 1)),
+        (2 * MOST_NS + 2, Ok(2 * MOST_NS + 2)),
+        (5, Err(ClockError::Backwards { by_ns: 2 * MOST_NS - 3 })),
+        (6, Ok(6)),
+        (6, Ok(6)),
+        (6, Err(ClockError::Stopped)),
+        (u64::MAX / 2, jumped(u64::MAX / 2 - 6)),
+        (0, Err(ClockError::Backwards { by_ns: u64::MAX / 2 })),
+    ] {
+        assert_eq!(check.check_within(now_ns, MOST_NS), want, "{now_ns}");
+        assert_eq!(check.last_ns(), now_ns);
+    }
+}

@@ -142,7 +142,8 @@ impl Candidates {
             if !may_run_at(edges, bit) && self.speeches.len() > 1 {
                 continue;
             }
-            let idle = idle_level(edges, bit as i64);
+            // A line with a clock never rests.
+            let idle = if speech.protocol.clocked { None } else { idle_level(edges, bit as i64) };
             for inverted in [false, true] {
                 if self.inverted.is_some_and(|given| given != inverted) {
                     continue;
@@ -321,8 +322,14 @@ fn may_run_at(edges: &Edges, bit: f64) -> bool {
     5 * short <= 4 * all && 12 * fitting >= all
 }
 
-/// The level of what is longer than any field's run, by time.
+/// The level of what is longer than any field's run, by time. What was before the first edge may have been before the power was
+/// on: it counts only where nothing else does.
 pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
+    let later = edges.get(1..).unwrap_or_default();
+    level_of_rest(later, bit).or_else(|| level_of_rest(edges, bit))
+}
+
+fn level_of_rest(edges: &Edges, bit: i64) -> Option<bool> {
     let (mut high, mut low) = (0_i64, 0_i64);
     for pair in edges.windows(2) {
         let [(from, level), (to, _)] = pair else { continue };

@@ -101,6 +101,7 @@ macro_rules! driver {
                 operation: Operation,
                 asked: Addresses,
             ) -> Result<BusTransaction, Failure<F>> {
+                let _ = self.state.first_ns(&mut self.clock)?;
                 $wait!(sleep(&mut self.state, &mut self.clock, cycle.next_ns()))?;
                 let _ = cycle.is_due(self.state.now_ns(&mut self.clock)?);
                 $wait!(self.read_bus(operation, asked))
@@ -132,8 +133,13 @@ macro_rules! driver {
             where
                 P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
             {
-                let now_ns = self.state.now_ns(&mut self.clock)?;
+                let now_ns = self.state.first_ns(&mut self.clock)?;
                 let exchange = $($asynch)? |request, not_before_ns| {
+                    // What is never sent has no effect that could be unknown.
+                    let refused = Transaction::start(request, self.resolution, self.line, now_ns).progress();
+                    if let Progress::Failed { error, .. } = refused {
+                        return Err(Error::Protocol(error));
+                    }
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
                     let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
@@ -200,7 +206,7 @@ macro_rules! driver {
 
             /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
             $($asynch)? fn settle(&mut self) -> Result<(), Failure<F>> {
-                let mut until_ns = self.state.now_ns(&mut self.clock)?;
+                let mut until_ns = self.state.first_ns(&mut self.clock)?;
                 let mut settling = self.state.settle(until_ns);
                 loop {
                     let (port, state, clock) = (&mut self.port, &mut self.state, &mut self.clock);

@@ -18,7 +18,8 @@ use crate::{Clock, Direction};
 /// most five frames: with 8 samples a bit and no gaps `tx` needs 93 bytes. The window is all of `rx`: the wait for the answer and
 /// 54 or 72 bits, for each encoder that answers.
 ///
-/// The async futures of the SPI have to stop the transfer when they are dropped.
+/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is one: a request is sent by its
+/// [`SpiBus`], so that none is cut off.
 #[derive(Debug)]
 pub struct SpiFrames<'b, S, D, C> {
     sampler: Sampler<'b, S, D>,
@@ -72,11 +73,11 @@ impl<S: SpiBus, D: Direction, C: Clock> blocking::FramePort for SpiFrames<'_, S,
 }
 
 #[cfg(feature = "async")]
-impl<S: AsyncSpiBus, D: Direction, C: Clock> asynch::FramePort for SpiFrames<'_, S, D, C> {
+impl<S: SpiBus + AsyncSpiBus, D: Direction, C: Clock> asynch::FramePort for SpiFrames<'_, S, D, C> {
     type Error = Fault<S, D>;
 
     async fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error> {
-        self.sampler.send_asynch(line_bits(units(frames), gap_bits)).await?;
+        self.sampler.send(line_bits(units(frames), gap_bits))?;
         self.began_ns = self.clock.now_ns()?;
         self.sampler.sample_asynch(usize::MAX).await
     }

@@ -14,7 +14,8 @@ use crate::Direction;
 /// A write sends its bytes in one transfer and then samples the window, so it lasts as long as the whole exchange; what was heard is
 /// read afterwards. Requests have at most four bytes: with 8 samples a bit `tx` needs 42 bytes. The window is all of `rx`.
 ///
-/// The async futures of the SPI have to stop the transfer when they are dropped.
+/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is one: a request is sent by its
+/// [`SpiBus`], so that none is cut off: ID 0 without its end is ID 8.
 #[derive(Debug)]
 pub struct SpiUart<'b, S, D> {
     sampler: Sampler<'b, S, D>,
@@ -112,7 +113,7 @@ where
 }
 
 #[cfg(feature = "async")]
-impl<S: AsyncSpiBus, D: Direction> embedded_io_async::Write for SpiUart<'_, S, D>
+impl<S: SpiBus + AsyncSpiBus, D: Direction> embedded_io_async::Write for SpiUart<'_, S, D>
 where
     D::Error: core::fmt::Debug,
 {
@@ -128,7 +129,7 @@ where
 }
 
 #[cfg(feature = "async")]
-impl<S: AsyncSpiBus, D: Direction> embedded_io_async::Read for SpiUart<'_, S, D>
+impl<S: SpiBus + AsyncSpiBus, D: Direction> embedded_io_async::Read for SpiUart<'_, S, D>
 where
     D::Error: core::fmt::Debug,
 {

@@ -26,5 +26,5 @@ async fn read<U: Read>(
 }
 
 async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
+    race::sleep(timer, |timer| line.after_ns(timer, until_ns), until_ns).await
 }

@@ -158,10 +158,11 @@ macro_rules! driver {
                 procedure: &mut P,
                 mut tune: impl FnMut(&mut Self, P::Request) -> Result<Request, Failure<U, D>>,
             ) -> Result<P::Value, Failure<U, D>> {
-                let now_ns = self.state.now_ns(&mut self.clock)?;
+                let now_ns = self.state.first_ns(&mut self.clock)?;
                 let exchange = $($asynch)? |request, not_before_ns| {
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
                     let request = tune(self, request)?;
+                    self.check()?;
                     let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
                 };
@@ -170,11 +171,17 @@ macro_rules! driver {
                 ended.outcome.map_err(Error::Protocol)
             }
 
+            /// Nothing is sent on a line whose settings leave no time for an answer.
+            fn check(&self) -> Result<(), Failure<U, D>> {
+                if self.line.leaves_time() { Ok(()) } else { Err(Error::Protocol(tformat::Error::Line)) }
+            }
+
             /// One request and its answer.
             ///
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+                self.check()?;
                 self.direction.off().map_err(Error::Pin)?;
                 $wait!(self.settle())?;
                 let start_ns = $wait!(self.send(request))?;
@@ -209,7 +216,7 @@ macro_rules! driver {
 
             /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
             $($asynch)? fn settle(&mut self) -> Result<(), Failure<U, D>> {
-                let mut until_ns = self.state.now_ns(&mut self.clock)?;
+                let mut until_ns = self.state.first_ns(&mut self.clock)?;
                 let mut settling = self.state.settle(until_ns);
                 loop {
                     let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);

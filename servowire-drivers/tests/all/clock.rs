@@ -1,4 +1,4 @@
-//! No call waits for ever on a clock that stands, was set back, or wraps after 32 bits: all calls of the blocking drivers, the clock
+//! No call waits for ever on a clock that stands, was set back, jumps, or wraps after 32 bits: all calls of the blocking drivers, the clock
 //! failing at any of their looks, with nobody at the line.
 
 use std::cell::Cell;
@@ -33,6 +33,8 @@ enum Wrong {
     Reset,
     /// It has 32 bits, which are over at that look.
     Wraps,
+    /// It is five seconds ahead at once.
+    Jumps,
 }
 
 /// A clock that goes on with every look, until something is wrong.
@@ -57,7 +59,8 @@ impl Bad {
             Wrong::Stands => begin_ns + past_ns(look.min(self.at)),
             Wrong::Reset if look >= self.at => past_ns(look - self.at),
             Wrong::Wraps => (begin_ns + past_ns(look)) & 0xffff_ffff,
-            Wrong::Nothing | Wrong::Reset => begin_ns + past_ns(look),
+            Wrong::Jumps if look >= self.at => begin_ns + past_ns(look) + 5_000_000_000,
+            Wrong::Nothing | Wrong::Reset | Wrong::Jumps => begin_ns + past_ns(look),
         }
     }
 }
@@ -68,13 +71,21 @@ fn holds<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
     name: &str,
     calls: impl Fn(&Bad) -> [Option<Error<IO, PIN, P, D>>; 3],
 ) {
+    holds_against(&[Wrong::Stands, Wrong::Reset, Wrong::Wraps, Wrong::Jumps], name, calls);
+}
+
+fn holds_against<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
+    wrongs: &[Wrong],
+    name: &str,
+    calls: impl Fn(&Bad) -> [Option<Error<IO, PIN, P, D>>; 3],
+) {
     let good = Bad::new(Wrong::Nothing, 0);
     for error in calls(&good) {
         assert!(!matches!(error, Some(Error::Clock(_))), "{name}: {error:?}");
     }
     let looks = good.looks.get() * 2 / 3;
-    for wrong in [Wrong::Stands, Wrong::Reset, Wrong::Wraps] {
-        let mut at = 1;
+    for wrong in wrongs.iter().copied() {
+        let (mut at, mut seen) = (1, [0, 0]);
         while at < looks {
             let errors = calls(&Bad::new(wrong, at)).map(|error| match error {
                 Some(Error::Clock(error)) => Some(error),
@@ -83,6 +94,12 @@ fn holds<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
             let told = if wrong == Wrong::Stands {
                 // And it goes on standing.
                 errors[2] == Some(ClockError::Stopped)
+            } else if wrong == Wrong::Jumps {
+                let mut told = errors.iter().flatten();
+                let told = (told.next(), told.next());
+                // Between two calls five seconds may have passed.
+                seen[usize::from(told.0.is_some())] += 1;
+                matches!(told, (None | Some(ClockError::Ahead { by_ns: 5_000_000_000.. }), None))
             } else {
                 let mut told = errors.iter().flatten();
                 matches!((told.next(), told.next()), (Some(ClockError::Backwards { .. }), None))
@@ -90,6 +107,7 @@ fn holds<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
             assert!(told, "{name}, {wrong:?} from look {at} of {looks} on: {errors:?}");
             at += 1 + at / 9;
         }
+        assert!(wrong != Wrong::Jumps || seen[0] * 3 < seen[1], "{name}: {seen:?}");
     }
 }
 
@@ -308,7 +326,8 @@ fn host() -> Master<1> {
 
 #[test]
 fn rtex() {
-    holds("start", |clock| {
+    // What a phase of an RTEX master lasts nobody can tell from a jump.
+    holds_against(&[Wrong::Stands, Wrong::Reset, Wrong::Wraps], "start", |clock| {
         let writes = Cell::new(0);
         let mut driver = Driver::new(Stuck(&writes), || clock.look(), host(), &RECEIVED);
         std::array::from_fn(|_| driver.start(1_000_000).err())
@@ -358,21 +377,29 @@ impl Direction for Timed<'_> {
 
 /// A request without its end may be another one: ID 0 is ID 8 then. One byte lasts 4 us, and the clock is looked at every 100 ns.
 #[test]
-fn no_request_is_cut_off_when_the_clock_is_set_back() {
+fn no_request_is_cut_off_when_the_clock_is_set_back_or_jumps() {
     let line = tformat::master::Line::new(tformat::BitRate::Mbit2_5);
-    for at in 0..200 {
+    for (at, jumps) in (0..200).flat_map(|at| [(at, false), (at, true)]) {
         let (looks, shortest) = (Cell::new(0), Cell::new(u32::MAX));
         let clock = || {
             looks.set(looks.get() + 1);
             let look = looks.get();
-            100 * u64::from(if look >= at { look - at } else { look + 1_000_000 })
+            match (look >= at, jumps) {
+                (true, false) => 100 * u64::from(look - at),
+                (true, true) => 100 * u64::from(look) + 5_000_000_000,
+                (false, _) => 100 * u64::from(look + 1_000_000),
+            }
         };
         let pin = Timed { looks: &looks, on: 0, shortest: &shortest };
         let mut encoder = Encoder::new(Silence, pin, clock, line).unwrap();
         let error = encoder.transact(tformat::Request::ReadSingleTurn).unwrap_err();
         // With the lead of 1 us and a tick, unless nothing had been sent yet.
         let before = matches!(error, Error::Clock(_)) && shortest.get() <= 13;
-        assert!(before || shortest.get() >= 40, "set back at look {at}: the pin was on for {} looks", shortest.get());
+        assert!(
+            before || shortest.get() >= 40,
+            "shifted at look {at}, ahead: {jumps}: the pin was on for {} looks",
+            shortest.get()
+        );
     }
 }
 
@@ -390,4 +417,76 @@ fn a_counter_of_a_processor_is_a_clock() {
     assert_eq!((clock.read_within_ns(), systick.read_within_ns()), (13_421_772_793, 52_428_793));
     cycles.set(0);
     assert_eq!(clock.now_ns(), Err(ClockError::Backwards { by_ns: 50_010_000 }));
+}
+
+/// What is never sent has no effect that could be unknown: nothing leaves on a line that gives an answer no time, or a request that no
+/// encoder of this version knows, and a procedure says just that.
+#[test]
+fn what_is_refused_is_not_sent() {
+    use nikon_aformat::Version;
+    use nikon_aformat::master::Write as NikonWrite;
+
+    let now_ns = Cell::new(0);
+    let clock = || {
+        now_ns.set(now_ns.get() + STEP_NS);
+        now_ns.get()
+    };
+    // An answer cannot begin after 3 us and before 1.
+    let line = tformat::master::Line::new(tformat::BitRate::Mbit2_5);
+    let line = line.with_turn_around_ns(3_000).with_response_timeout_ns(1_000);
+    let mut encoder = Encoder::new(Untouched, Automatic, clock, line).unwrap();
+    let refused = Error::Protocol(tformat::Error::Line);
+    assert_eq!(encoder.transact(tformat::Request::SetSingleTurnZero).unwrap_err(), refused);
+    let mut zero = tformat::master::Reset::set_single_turn_zero_and_shift_commutation_angle();
+    assert_eq!(encoder.run(&mut zero).unwrap_err(), refused);
+
+    let line = nikon_aformat::master::Line::new(nikon_aformat::BitRate::Mbit2_5);
+    let resolution = nikon_aformat::Resolution::default().with_version(Version::V2_1);
+    let ea = EncoderAddress::ZERO;
+    let mut master = Encoders::new(Untouched, clock, resolution, line);
+    let write = NikonWrite::eeprom_of_bank(ea, 1, 2, 3);
+    let refused = master.transact(write.request()).unwrap_err();
+    assert!(matches!(refused, Error::Protocol(_)), "{refused:?}");
+    assert_eq!(master.run(&mut { write }).unwrap_err(), refused);
+}
+
+/// A UART and a port that must not be told to send.
+struct Untouched;
+
+impl ErrorType for Untouched {
+    type Error = Infallible;
+}
+
+impl Write for Untouched {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        panic!("{bytes:02x?} are sent");
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl ReadReady for Untouched {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(false)
+    }
+}
+
+impl Read for Untouched {
+    fn read(&mut self, _: &mut [u8]) -> Result<usize, Infallible> {
+        Ok(0)
+    }
+}
+
+impl FramePort for Untouched {
+    type Error = Infallible;
+
+    fn send(&mut self, frames: &[RequestFrame], _: u32) -> Result<(), Infallible> {
+        panic!("{frames:?} are sent");
+    }
+
+    fn take(&mut self) -> Result<Option<Frame>, Infallible> {
+        Ok(None)
+    }
 }

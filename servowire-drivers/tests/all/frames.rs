@@ -24,6 +24,7 @@ use servowire_world::{
 use crate::hostile::{Calls, rates};
 #[cfg(feature = "async")]
 use crate::polls::pause;
+use crate::second::nikon::Encoder;
 
 /// 2.5 Mbit/s: a frame is 7.2 us.
 pub const RATE: BitRate = BitRate::Mbit2_5;
@@ -35,6 +36,11 @@ const ANSWER_NS: u64 = 4 * FRAME_NS;
 pub struct Bench {
     pub world: World,
     pub encoders: Vec<Device<1>>,
+    /// Encoders of the tests' own, in their place.
+    pub seconds: Vec<Encoder>,
+    /// The contents of the last request, and what each encoder has heard since, with its framing.
+    asked: Vec<u16>,
+    heard: Vec<(u8, u16, bool)>,
     pub fifo: VecDeque<Frame>,
     /// Whether frames carry the time of their end.
     stamped: bool,
@@ -63,6 +69,9 @@ impl Bench {
         Rc::new(RefCell::new(Self {
             world: World::new(Wire { devices: encoders, ..WIRE }, scenario),
             encoders: (0..encoders).map(encoder).collect(),
+            seconds: Vec::new(),
+            asked: Vec::new(),
+            heard: Vec::new(),
             fifo: VecDeque::new(),
             stamped,
             shaft: 0,
@@ -151,25 +160,70 @@ impl Bench {
                     if device == 0 {
                         self.shaft += 1;
                     }
-                    let Some(encoder) = self.encoders.get_mut(usize::from(device)) else { continue };
-                    encoder.set_position(self.shaft, 3 + u32::from(device));
-                    if !framed {
-                        encoder.framing_error(unit.end_ns);
-                    } else if let Some(answer) = encoder.hear(&[Some(content as u16)], unit.end_ns) {
-                        self.asked_at = self.shaft;
-                        let contents = answer.frames.contents().iter().map(|content| u64::from(*content));
-                        let message = Message::frames(16, contents).tagged(self.shaft.into());
-                        self.world.answer(device, unit.origin.transmission, &message, answer.start_ns);
-                    }
+                    self.heard.push((device, content as u16, framed));
+                    let Some((contents, start_ns)) = self.answer(device, content as u16, framed, unit.end_ns) else {
+                        continue;
+                    };
+                    self.asked_at = self.shaft;
+                    let message = Message::frames(16, contents).tagged(self.shaft.into());
+                    self.world.answer(device, unit.origin.transmission, &message, start_ns);
                 }
             }
         }
+    }
+
+    /// What an encoder says to a frame, and when.
+    fn answer(&mut self, device: u8, content: u16, framed: bool, end_ns: u64) -> Option<(Vec<u64>, u64)> {
+        if let Some(second) = self.seconds.get_mut(usize::from(device)) {
+            second.single = self.shaft;
+            let answer = second.hear(content, framed, end_ns)?;
+            return Some((answer.frames.into_iter().map(u64::from).collect(), answer.start_ns));
+        }
+        let encoder = self.encoders.get_mut(usize::from(device))?;
+        encoder.set_position(self.shaft, 3 + u32::from(device));
+        if !framed {
+            encoder.framing_error(end_ns);
+            return None;
+        }
+        let answer = encoder.hear(&[Some(content)], end_ns)?;
+        Some((answer.frames.contents().iter().map(|content| u64::from(*content)).collect(), answer.start_ns))
+    }
+
+    /// The encoders lose their supply for a moment.
+    pub fn restart(&mut self) {
+        self.seconds.iter_mut().for_each(Encoder::restart);
+    }
+
+    /// Another master asks.
+    pub fn intrude(&mut self, content: u16, at_ns: u64) {
+        self.world.intrude(&Message::frames(16, [u64::from(content)]), at_ns);
+    }
+
+    /// Whether what all encoders have heard first since the last request was asked is that request.
+    pub fn is_heard(&self) -> bool {
+        (0..self.seconds.len() as u8).all(|device| {
+            let heard = self.heard.iter().filter(|(by, ..)| *by == device).take(self.asked.len());
+            heard.map(|(_, content, framed)| (*content, *framed)).eq(self.asked.iter().map(|content| (*content, true)))
+        })
+    }
+
+    /// Whether request and answer of the last call came through whole and in time, so that it may not fail.
+    pub fn came_whole(&self) -> bool {
+        let Some(request) = self.request else { return false };
+        let truth = self.world.truth();
+        let Some(sent) = truth.transmission(request) else { return false };
+        let gapless = |t: &Transmission| t.end_ns - t.start_ns == FRAME_NS * t.units as u64;
+        let in_time = |t: &Transmission| t.start_ns == t.asked_ns && gapless(t) && t.start_ns <= sent.sent_ns + 15_000;
+        let left = sent.start_ns == sent.asked_ns && sent.end_ns == sent.sent_ns;
+        let undisturbed = left && self.is_heard() && !self.was_preempted() && truth.undisturbed(request);
+        undisturbed && truth.intact_answers(request).any(in_time)
     }
 
     pub fn send(&mut self, frames: &[u16], gap_bits: u32) {
         let contents = frames.iter().map(|content| u64::from(*content));
         let message = Message::frames(16, contents).with_gap_bits(gap_bits as usize);
         let now_ns = self.world.now_ns();
+        (self.asked, self.heard) = (frames.to_vec(), Vec::new());
         self.request = Some(self.world.send(&message, now_ns));
     }
 }

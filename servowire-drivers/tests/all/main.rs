@@ -37,6 +37,8 @@ mod contract;
 mod direction;
 #[cfg(feature = "tformat")]
 mod hard;
+#[cfg(feature = "nikon")]
+mod hard_nikon;
 #[cfg(all(feature = "nikon", feature = "async"))]
 mod nikon_asynch;
 #[cfg(feature = "nikon")]
@@ -45,6 +47,8 @@ mod nikon_blocking;
 mod rtex;
 #[cfg(all(feature = "tformat", feature = "nikon"))]
 mod spi;
+#[cfg(all(feature = "tformat", feature = "async"))]
+mod spi_dropped;
 #[cfg(all(feature = "tformat", feature = "async"))]
 mod tformat_asynch;
 #[cfg(feature = "tformat")]

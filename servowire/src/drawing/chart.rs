@@ -92,19 +92,20 @@ impl Panel for Chart {
         let digits = decimals(&up, labels.max(1));
         let widest = [up.start, up.end].map(|y| width_of(&label(y, digits), SMALL)).into_iter().max().unwrap_or(0);
         let beside = widest.max(40) + 12;
-        let pixels = (width - LEFT - RIGHT - beside, height - TITLE - TOP - BELOW);
+        // Half of the last label stands beyond the end of its axis.
+        let right = RIGHT.max(widest_of(&self.x, 8) / 2 + 6);
+        let pixels = (width - LEFT - right - beside, height - TITLE - TOP - BELOW);
         let (x, y) = self.ranges(pixels);
         let (_, body) = area.split_vertically(TITLE);
         let mut builder = ChartBuilder::on(&body);
         builder
             .margin_left(LEFT)
-            .margin_right(RIGHT)
+            .margin_right(right)
             .margin_top(TOP)
             .x_label_area_size(BELOW)
             .y_label_area_size(beside);
         let along = decimals(&x, 8);
-        let each = [x.start, x.end].map(|x| width_of(&fixed(x, along), SMALL)).into_iter().max().unwrap_or(1);
-        let across = (pixels.0 / (each + 24).max(1)).clamp(2, 11) as usize;
+        let across = (pixels.0 / (widest_of(&x, 8) + 24)).clamp(2, 11) as usize;
         // The two kinds of axes are of different types, so the few calls are there twice.
         macro_rules! fill {
             ($chart:expr) => {{
@@ -146,7 +147,13 @@ pub(super) fn decimals(range: &Range<f64>, labels: i32) -> usize {
     (-step.max(1e-9).log10()).ceil().clamp(0.0, 9.0) as usize
 }
 
-/// A number with so many digits behind the point, and no sign of nothing.
+/// Pixels of the widest label of a range.
+pub(super) fn widest_of(range: &Range<f64>, labels: i32) -> i32 {
+    let digits = decimals(range, labels);
+    [range.start, range.end].map(|value| width_of(&fixed(value, digits), SMALL)).into_iter().max().unwrap_or(0)
+}
+
+/// A number with this many digits behind the point, and no sign of nothing.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }

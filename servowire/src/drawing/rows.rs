@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::chart::{decimals, fixed};
+use super::chart::{decimals, fixed, widest_of};
 use super::{ALARM, Area, Drawn, GRID, INK, Panel, SHADE, SMALL, ink, shortened, width_of};
 
 const TITLE: i32 = 24;
@@ -52,14 +52,15 @@ impl Panel for Rows {
             self.each.iter().map(|row| width_of(of(row), SMALL)).max().unwrap_or(0).min(most)
         };
         let (names, notes) = (widest(|row| &row.name, WIDEST.0), widest(|row| &row.note, WIDEST.1));
-        let (left, right) = (names + 20, notes + 34);
+        // Half of the first and of the last label stands beyond the ends of the axis.
+        let each = widest_of(&self.x, 8);
+        let (left, right) = ((names + 20).max(each / 2 + 6), (notes + 34).max(each / 2 + 6));
         let (_, body) = area.split_vertically(TITLE);
         let mut builder = ChartBuilder::on(&body);
         builder.margin_right(right).margin_top(6).x_label_area_size(BELOW).y_label_area_size(left);
         let count = self.each.len().max(1);
         let mut chart = builder.build_cartesian_2d(self.x.clone(), 0.0..count as f64)?;
         let digits = decimals(&self.x, 8);
-        let each = [self.x.start, self.x.end].map(|x| width_of(&fixed(x, digits), SMALL)).into_iter().max();
         chart
             .configure_mesh()
             .axis_style(INK)
@@ -67,7 +68,7 @@ impl Panel for Rows {
             .max_light_lines(0)
             .disable_y_mesh()
             .y_labels(0)
-            .x_labels(((width - left - right) / (each.unwrap_or(1) + 24)).clamp(2, 11) as usize)
+            .x_labels(((width - left - right) / (each + 24)).clamp(2, 11) as usize)
             .x_label_formatter(&|x| fixed(*x, digits))
             .label_style(ink(SMALL))
             .axis_desc_style(ink(SMALL))

@@ -41,7 +41,7 @@ mod tests {
         let svg = svg(&plan).unwrap();
         nothing_is_covered(&svg);
         // An empty bar is not drawn.
-        assert_eq!(svg.matches("fill=\"#CDDCF0\"").count(), 2);
+        assert_eq!(svg.matches("fill=\"#CDDCF0\" stroke").count(), 2);
         let place = |what: &str| texts(&svg).into_iter().find(|(words, _)| words == what).unwrap().1;
         let (controller, encoder, note) = (place("controller"), place("encoder"), place("what encoder does"));
         assert!(controller[3] < encoder[1] && (encoder[1] - note[1]).abs() < 1e-9 && encoder[2] < note[0]);

@@ -52,10 +52,10 @@ fn a_frame_bit_by_bit() {
     assert!(run.out.contains("REFUSED crc in CRC"), "{}", run.out);
     let check = run.out.lines().find(|line| line.contains('^')).unwrap();
     assert_eq!(check.matches('^').count(), 10, "{}", run.out);
-    assert!(std::fs::read_to_string(&svg).unwrap().contains("fill=\"#B00020\""));
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("opacity=\"0.25\" fill=\"#B00020\""));
     // Between two frames the nearest one is shown; before the first one too.
     assert!(
-        explain("70us").out.contains("no frame is on the line at 70.000 us; the nearest one:\nanswer ID 3, 27.000 us")
+        explain("80us").out.contains("no frame is on the line at 80.000 us; the nearest one:\nanswer ID 3, 27.000 us")
     );
     assert_eq!(explain("soon").code, 2);
     bench.decode("a.txt", "1A\n", &["--bytes"]);

@@ -137,10 +137,16 @@ fn the_type_word_gives_the_resolution() {
     let (wave, _) = traffic(BitRate::Mbit4, 4e6);
     let run = decode(&Bench::new(), &wave, &[]);
     let events = run.json();
-    let position = events.iter().find(|event| event["kind"] == "ABS40" && event["direction"] == "answer").unwrap();
-    let turns = position["position"]["turns"].as_f64().unwrap();
-    let want = 17.0 + f64::from(300_000 + 0x5_1234) / f64::from(1 << 20);
-    assert!((turns - want).abs() < 1e-9, "{position}");
+    let turns = |kind: &str, ea: u32| {
+        let said = |event: &&serde_json::Value| {
+            event["kind"] == kind && event["direction"] == "answer" && event["address"] == ea
+        };
+        events.iter().find(said).unwrap()["position"]["turns"].as_f64()
+    };
+    let want = 17.0 + f64::from(100_000 + 0x5_1234) / f64::from(1 << 20);
+    assert!((turns("ABS40_MT", 1).unwrap() - want).abs() < 1e-9);
+    // Nobody has asked encoder 3 for its type.
+    assert_eq!(turns("ABS40", 3), None);
 }
 
 #[test]

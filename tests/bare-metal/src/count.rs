@@ -43,14 +43,17 @@ pub(crate) fn tenths_on<S, I, O>(state: &mut S, kernel: fn(&mut S, &'static I) -
     each(with, without, rounds * inputs.len())
 }
 
-/// Tenths of an instruction of the dearest of many calls, to a tick, whatever comes with it between two looks at the clock.
+/// Tenths of an instruction of the dearest of many calls, to a tick: what `round` hands to the clock that it is given.
 #[cfg(feature = "step-motion")]
-pub(crate) fn most_tenths(calls: usize, mut call: impl FnMut() -> bool) -> u32 {
+pub(crate) fn most_tenths<T>(rounds: usize, mut round: impl FnMut(&mut dyn FnMut(&mut dyn FnMut() -> T) -> T)) -> u32 {
     let mut most = 0;
-    for _ in 0..calls {
-        let begin = SYST::get_current();
-        black_box(call());
-        most = most.max(begin.wrapping_sub(SYST::get_current()) & RELOAD);
+    for _ in 0..rounds {
+        round(&mut |call| {
+            let begin = SYST::get_current();
+            let value = black_box(call());
+            most = most.max(begin.wrapping_sub(SYST::get_current()) & RELOAD);
+            value
+        });
     }
     most * INSTRUCTIONS_PER_TICK as u32 * 10
 }

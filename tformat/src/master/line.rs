@@ -62,7 +62,7 @@ impl Line {
 
     /// Whether a response can come at all: it has to begin after the turn-around and before the time-out, and its fields last
     /// as long as fields do.
-    pub(super) const fn leaves_time(&self) -> bool {
+    pub const fn leaves_time(self) -> bool {
         self.turn_around_ns <= self.response_timeout_ns && self.field_timeout_ns >= self.rate.fields_ns(1)
     }
 

@@ -1,29 +1,31 @@
 //! A-format over the port: a master that prints positions, and an encoder.
 
-use core::convert::Infallible;
-use core::fmt::{self, Write as _};
+use core::fmt::{self, Display, Write as _};
 
 use nikon_aformat::device::Device;
-use nikon_aformat::master::{
-    EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction, VerifiedWrite, Write,
-};
+use nikon_aformat::master::{GuardedReset, Line, Reset, VerifiedWrite, Write};
 use nikon_aformat::{
-    BitRate, EncoderAddress, Error, FRAME_BITS, Operation, Request, Resolution, Response, UserAddress,
+    BitRate, EncoderAddress, EvidenceCell, FRAME_BITS, Operation, Policy, Request, Resolution, UserAddress,
 };
-use servowire_core::{Ended, Procedure};
+use servowire_boards::Report;
+use servowire_drivers::Clock as _;
+use servowire_drivers::nikon::blocking::Driver;
 
 use crate::board::{Board, Console};
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
-use crate::port::{Prepared, RingReceiver, Transmitter, Unit};
-use crate::programs::Rate;
+use crate::frames::{self, Frames};
+use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
+use crate::programs::{self, Rate};
 
 /// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
 const PAUSE_NS: u64 = 20_000;
-/// By how much the end time of a block may be late: how long this processor may take over a frame.
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
+/// A position that is printed is no older than this.
+const MAX_AGE_NS: u64 = 200_000;
+/// By how much the end time of a block may be late.
 const LATENCY_NS: u32 = 2_000;
-/// Frames of the longest response, and some noise.
-const MOST_FRAMES: usize = 8;
 /// Longest wait for the response: encoders answer after some microseconds, the one below after 30 if it has made no answer ahead.
 const RESPONSE_TIMEOUT_NS: u32 = 60_000;
 
@@ -38,214 +40,156 @@ const fn rate_of(rate: BitRate) -> Option<Rate> {
     }
 }
 
-/// The line to an encoder.
-struct Master {
-    clock: Clock,
-    transmitter: Transmitter,
-    receiver: RingReceiver,
-    line: Line,
-    /// From when on the line is free.
-    free_ns: u64,
-}
+type Encoders<'a> = Driver<Frames<'a>, &'a Clock>;
 
-impl Master {
-    /// One request and its answer, when the line is free. How long they took.
-    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Exchange, Error>, u64) {
-        let Self { clock, transmitter, receiver, line, free_ns } = self;
-        let frame_ns = u64::from(line.rate.bits_ns(FRAME_BITS));
-        receiver.settle(clock, *free_ns, 2 * frame_ns);
-        let began_ns = clock.now_ns();
-        let mut transaction = Transaction::start(request, Resolution::default(), *line, began_ns);
-        transmitter.send(message);
-        // The receiver is on again from the end of the request on, so nothing that comes is older.
-        let since_ns = transaction.transmission().end_ns;
-        let (mut frames, mut count, mut last_ns) = ([None; MOST_FRAMES], 0, 0);
-        let outcome = loop {
-            let unit = receiver.take();
-            let now_ns = clock.now_ns();
-            let progress = match unit {
-                Some(Unit { content, framed }) => {
-                    if let Some(place) = frames.get_mut(count) {
-                        *place = framed.then_some(content);
-                        count += 1;
-                    }
-                    last_ns = now_ns;
-                    transaction.progress()
-                }
-                // The line is quiet again: what has come is a block.
-                None if count > 0 && now_ns > last_ns + frame_ns + frame_ns / 2 => {
-                    let block = &frames[..count];
-                    count = 0;
-                    transaction.hear_since(block, since_ns, last_ns)
-                }
-                None => transaction.poll(now_ns),
-            };
-            let (end, ready_ns) = match progress {
-                Progress::Pending { .. } => continue,
-                Progress::Done { value, ready_ns } => (Ok(value), ready_ns),
-                Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
-            };
-            *free_ns = ready_ns;
-            break end;
-        };
-        (outcome, clock.now_ns() - began_ns)
-    }
-
-    /// A procedure of several exchanges.
-    fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Error>
-    where
-        P: Procedure<Request = Request, Response = Response, Error = Error>,
-    {
-        let now_ns = self.clock.now_ns();
-        let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, now_ns, |request, not_before_ns| {
-            while self.clock.now_ns() < not_before_ns {}
-            let (outcome, _) = self.exchange(request, &message(request, self.line));
-            let ready_ns = self.free_ns.max(self.clock.now_ns());
-            Ok::<_, Infallible>(Ended { outcome: outcome.map(|exchange| exchange.response), ready_ns })
-        });
-        self.free_ns = ready_ns;
-        outcome
-    }
-
-    /// Does what was typed, and says what came of it.
-    fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
-        let ea = EncoderAddress::ZERO;
-        match command {
-            Command::Read { address } => self.say_word(address, console),
-            Command::Write { address, data } => {
-                let Some(user) = UserAddress::new(address) else { return console.write_str("that is not for users\n") };
-                let mut write = VerifiedWrite::new(Write::eeprom(ea, user, data));
-                match self.run(&mut write) {
-                    Ok(()) => self.say_word(address, console),
-                    Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
-                }
+/// Does what was typed, and says what came of it.
+fn command(encoders: &mut Encoders<'_>, command: Command, console: &mut Console) -> fmt::Result {
+    let ea = EncoderAddress::ZERO;
+    match command {
+        Command::Read { address } => say_word(encoders, address, console),
+        Command::Write { address, data } => {
+            let Some(user) = UserAddress::new(address) else { return console.write_str("that is not for users\n") };
+            match encoders.run(&mut VerifiedWrite::new(Write::eeprom(ea, user, data))) {
+                Ok(()) => say_word(encoders, address, console),
+                Err(error) => say(console, "EEPROM", error),
             }
-            Command::LoseMultiTurnReference => {
-                let mut reset = GuardedReset::new(Reset::clear_multiturn(ea));
-                match self.run(&mut reset) {
-                    Ok(_) => console.write_str("turns: cleared\n"),
-                    Err(error) => writeln!(console, "turns: {error}"),
-                }
-            }
-            Command::Unknown => console.write_str("?\n"),
         }
-    }
-
-    fn say_word(&mut self, address: u8, console: &mut Console) -> fmt::Result {
-        let mut read = EepromRead::new(EncoderAddress::ZERO, address);
-        match self.run(&mut read) {
-            Ok(word) => writeln!(console, "EEPROM {address:02x}: {word:04x}"),
-            Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
-        }
+        Command::LoseMultiTurnReference => match encoders.run(&mut GuardedReset::new(Reset::clear_multiturn(ea))) {
+            Ok(_) => console.write_str("turns: cleared\n"),
+            Err(error) => say(console, "turns", error),
+        },
+        Command::Unknown => console.write_str("?\n"),
     }
 }
 
-/// The frames of a request, with the pauses between them.
-fn message(request: Request, line: Line) -> Prepared {
-    let gap_bits = line.rate.bits(line.frame_gap_ns);
-    let (mut bits, mut len) = (0, 0);
-    for frame in request.emit().as_slice() {
-        if len > 0 {
-            bits |= ((1 << gap_bits) - 1) << len;
-            len += gap_bits;
-        }
-        bits |= frame.line().bits() << len;
-        len += FRAME_BITS;
+fn say_word(encoders: &mut Encoders<'_>, address: u8, console: &mut Console) -> fmt::Result {
+    match encoders.read_eeprom(EncoderAddress::ZERO, address) {
+        Ok(word) => writeln!(console, "EEPROM {address:02x}: {word:04x}"),
+        Err(error) => say(console, "EEPROM", error),
     }
-    Prepared::new(bits, len, 0)
 }
 
-/// Reads the whole position of encoder 0 for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
+fn say(console: &mut Console, what: &str, error: impl Display) -> fmt::Result {
+    writeln!(console, "{what}: {error}")
+}
+
+/// Reads the position of encoder 0 for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
 ///
 /// # Panics
-/// At 16 Mbit/s.
-pub fn master(rate: BitRate) -> ! {
+/// At 16 Mbit/s, or if a clock does not start.
+pub fn master(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
-    let Board { mut console, clock, transmitter, receiver, channel } = Board::new(port, 16);
-    let receiver = RingReceiver::new(channel, receiver);
+    let mut board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
+    let (mut clock, console) = (&board.clock, &mut board.console);
+    let receiver = RingReceiver::new(board.channel, board.receiver);
+    let port = Frames::new(board.transmitter, receiver, clock, rate.bits_ns(FRAME_BITS));
     let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_hand_over_ns(LATENCY_NS);
-    let mut master = Master { clock, transmitter, receiver, line, free_ns: 0 };
+    let mut encoders = Driver::new(port, clock, Resolution::default(), line);
+    let mut cell = EvidenceCell::new();
+    let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
-    let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
-    let message = message(request, line);
-    let (mut good, mut bad) = (0_u32, 0_u32);
-    let _ = writeln!(console, "A-format master, {} bit/s", rate.bits_per_second());
+    let mut report = Report::new(PRINTED);
     loop {
-        let (outcome, took_ns) = master.exchange(request, &message);
-        match outcome {
-            Ok(exchange) => {
-                good += 1;
-                if good % 16 == 1 {
-                    let abs = exchange.response.abs().unwrap_or(0);
-                    let _ = writeln!(console, "abs {abs} in {took_ns} ns, {good} good, {bad} bad");
-                }
-            }
-            Err(error) => {
-                bad += 1;
-                let _ = writeln!(console, "fault: {error}, {good} good, {bad} bad");
-            }
+        board.watchdog.feed();
+        let read = encoders.read_evidence(EncoderAddress::ZERO).map(|evidence| writer.put(evidence));
+        let now_ns = clock.latest_ns();
+        let _ = match read {
+            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
+            Err(error) => report.fault(console, error),
+        };
+        if let Some(typed) = typed.take(console) {
+            let _ = command(&mut encoders, typed, console);
         }
-        if let Some(command) = typed.take(&console) {
-            let _ = master.command(command, &mut console);
+        let next_ns = clock.latest_ns() + PAUSE_NS;
+        while clock.now_ns().is_ok_and(|now_ns| now_ns < next_ns) {}
+    }
+}
+
+/// From the end of a request to the answer.
+const TURN_NS: u32 = 2_800;
+/// A frame that comes later than this is not of the request before.
+const FRAME_GAP_NS: u64 = 8_000;
+/// The next request comes so much later, or more.
+const LATER_NS: u64 = 50_000;
+
+/// An encoder, and the answer that it has ready.
+struct Ahead {
+    device: Device<1>,
+    position: u32,
+    transmitter: Transmitter,
+    receiver: Receiver,
+    wait_cycles: u32,
+    /// The command frame that starts what the transmitter holds.
+    expected: Option<u16>,
+}
+
+impl Ahead {
+    /// Holds what the encoder will answer to a command frame, which starts it; a copy of the encoder hears it. The shaft moves.
+    fn hold(&mut self, command_frame: u16, now_ns: u64) {
+        self.position += 1;
+        self.device.set_position(self.position, 7);
+        let mut copy = self.device;
+        let Some(reply) = copy.hear(&[Some(command_frame)], now_ns) else { return };
+        let contents = reply.frames.contents().iter().copied();
+        self.transmitter.hold(&frames::prepared(contents, 0, self.wait_cycles));
+        self.expected = Some(command_frame);
+        self.receiver.expect(Some(command_frame));
+    }
+
+    /// A frame came, or a damaged one: what is held is on its way if it is for this one, and gone if not. Whether it is on its way.
+    fn came(&mut self, frame: Option<u16>) -> bool {
+        let Some(expected) = self.expected.take() else { return false };
+        self.receiver.expect(None);
+        if frame == Some(expected) {
+            // The receiver has started it, or was told too late to expect it.
+            self.transmitter.start();
+            return true;
         }
-        master.free_ns += PAUSE_NS;
+        self.transmitter.discard();
+        false
     }
 }
 
 /// Encoder 0, whose shaft turns on by one with every answer.
 ///
-/// As with T-Format the answer to the read request that came last is made ahead, but not after another request. `wait_cycles` are on top of the way through
-/// the processor.
+/// As with T-Format the answer to the request that came last is made ahead, if it had one frame, and the receiver starts it. All others
+/// are answered when they are ready.
 ///
 /// # Panics
-/// At 16 Mbit/s.
-pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
+/// At 16 Mbit/s, or if a clock does not start.
+pub fn encoder(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
-    let Board { mut console, mut clock, mut transmitter, mut receiver, .. } = Board::new(port, 16);
-    let mut device = Device::<1>::new(EncoderAddress::ZERO, Resolution::default(), rate);
-    let mut position = 0x1_2345;
-    let mut ahead = Some(prepare(&mut device, Operation::Abs40, &mut position, wait_cycles));
-    let _ = writeln!(console, "A-format encoder, {} bit/s", rate.bits_per_second());
+    let Board { clock, transmitter, receiver, watchdog, .. } =
+        Board::new(image, rate.bits_per_second(), port, frames::BITS);
+    let device = Device::new(EncoderAddress::ZERO, Resolution::default(), rate);
+    let wait_cycles = programs::wait_cycles(port, TURN_NS);
+    let mut ahead = Ahead { device, position: 0x1_2345, transmitter, receiver, wait_cycles, expected: None };
+    let read = Request::new(EncoderAddress::ZERO, Operation::Abs40).emit();
+    let mut again = read.as_slice().first().map_or(0, |frame| frame.content());
+    let (mut first, mut last_ns) = (true, 0);
     loop {
-        let Some(unit) = receiver.take() else { continue };
-        // Data frames have another sync code, so the content of a command frame says all.
-        let prepared = ahead.as_ref().filter(|(command_frame, _)| unit.framed && unit.content == *command_frame);
-        let started = prepared.is_some();
-        if let Some((_, message)) = prepared {
-            transmitter.send(message);
-        }
-        let now_ns = clock.now_ns();
-        let reply = device.hear(&[unit.framed.then_some(unit.content)], now_ns);
-        if !unit.framed {
+        watchdog.feed();
+        let Some(Unit { content, framed }) = ahead.receiver.take() else {
+            let now_ns = clock.latest_ns();
+            if now_ns - last_ns >= FRAME_GAP_NS {
+                first = true;
+                if ahead.expected.is_none() {
+                    ahead.hold(again, now_ns + LATER_NS);
+                }
+            }
             continue;
+        };
+        let frame = framed.then_some(content);
+        let started = ahead.came(frame);
+        last_ns = clock.latest_ns();
+        let reply = ahead.device.hear(&[frame], last_ns);
+        if reply.is_some() && first {
+            again = content;
         }
-        let answered = reply.is_some();
+        first = false;
         if let Some(reply) = reply.filter(|_| !started) {
-            transmitter.send(&Prepared::new(reply.line.bits(), reply.line.len(), 0));
-        }
-        let operation = READS.into_iter().find(|operation| command_frame(*operation) == unit.content);
-        if let Some(operation) = operation {
-            ahead = Some(prepare(&mut device, operation, &mut position, wait_cycles));
-        } else if answered {
-            // It may have changed what an answer says, and repetitions are counted: nothing is made ahead now.
-            ahead = None;
+            let contents = reply.frames.contents().iter().copied();
+            ahead.transmitter.send(&frames::prepared(contents, 0, 0));
         }
     }
-}
-
-/// The requests that change nothing and are one frame long.
-const READS: [Operation; 4] = [Operation::Abs40, Operation::Abs24Low, Operation::Abs17, Operation::Status];
-
-fn command_frame(operation: Operation) -> u16 {
-    let request = Request::new(EncoderAddress::ZERO, operation);
-    request.emit().as_slice().first().map_or(0, |frame| frame.content())
-}
-
-/// The shaft moves, and the answer to `operation` is made.
-fn prepare(device: &mut Device<1>, operation: Operation, position: &mut u32, wait_cycles: u32) -> (u16, Prepared) {
-    *position += 1;
-    device.set_position(*position, 7);
-    let answer = device.answer(Request::new(EncoderAddress::ZERO, operation), 0);
-    let line = answer.map_or(nikon_aformat::Window::EMPTY, |answer| answer.emit().line());
-    (command_frame(operation), Prepared::new(line.bits(), line.len(), wait_cycles))
 }

@@ -1,25 +1,44 @@
 //! Clocks, pins and console of a board with a crystal of 12 MHz.
 
+use core::fmt::{self, Write};
+use core::panic::PanicInfo;
+
 use cortex_m::peripheral::Peripherals as Core;
 use rp2040_hal::clocks::{Clock as _, ClockSource, ClocksManager};
 use rp2040_hal::dma::{CH0, Channel, DMAExt};
-use rp2040_hal::fugit::RateExtU32;
+use rp2040_hal::fugit::{ExtU32, RateExtU32};
 use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
 use rp2040_hal::gpio::{FunctionPio0, FunctionUart, Pin, Pins, PullDown, PullUp};
-use rp2040_hal::pac::{Peripherals, UART0};
+use rp2040_hal::pac::{self, Peripherals, UART0};
 use rp2040_hal::pio::PIOExt;
 use rp2040_hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
 use rp2040_hal::uart::{DataBits, Enabled, StopBits, UartConfig, UartPeripheral};
 use rp2040_hal::xosc::setup_xosc_blocking;
 use rp2040_hal::{Sio, Watchdog};
+use servowire_boards::{FirstLine, Source};
 
-use crate::clock::Clock;
+use crate::clock::{self, Clock};
 use crate::port::{self, Receiver, Transmitter};
-use crate::programs::Rate;
+use crate::programs::{Rate, SYSTEM_HZ};
 
 /// The console: GPIO 0 sends, 1,000,000 baud, 8N1.
 pub type Console =
     UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
+
+/// The pins, of a Raspberry Pi Pico; no power stage is near.
+static PICO: servowire_boards::Board = const {
+    servowire_boards::Board {
+        name: "Raspberry Pi Pico",
+        crystal_hz: CRYSTAL_HZ,
+        pins: &[
+            servowire_boards::Pin { name: "GPIO 2", signal: "DI", at: "pin 4" },
+            servowire_boards::Pin { name: "GPIO 3", signal: "DE and /RE", at: "pin 5" },
+            servowire_boards::Pin { name: "GPIO 4", signal: "RO", at: "pin 6" },
+        ],
+        power_stage: &[],
+    }
+    .checked()
+};
 
 /// All that an image uses.
 pub struct Board {
@@ -33,21 +52,25 @@ pub struct Board {
     pub receiver: Receiver,
     /// For [`port::RingReceiver`].
     pub channel: Channel<CH0>,
+    /// Has to be fed, or the chip begins again.
+    pub watchdog: Watchdog,
 }
 
 const CRYSTAL_HZ: u32 = 12_000_000;
 const CONSOLE_BAUD: u32 = 1_000_000;
+/// Longer than anything here waits.
+const WATCHDOG_MS: u32 = 1_000;
 
 /// 12 MHz x 120 / 6 / 2 = 120 MHz.
 const PLL_120MHZ: PLLConfig =
     PLLConfig { vco_freq: rp2040_hal::fugit::HertzU32::MHz(1440), refdiv: 1, post_div1: 6, post_div2: 2 };
 
 impl Board {
-    /// Sets everything up for units of `bits` bits between start and stop bit at `rate`.
+    /// Sets everything up for units of `bits` bits between start and stop bit at `rate`, and says the first line.
     ///
     /// # Panics
     /// If called twice, or if a clock does not start.
-    pub fn new(rate: Rate, bits: u8) -> Self {
+    pub fn new(image: &'static str, bits_per_second: u32, rate: Rate, bits: u8) -> Self {
         let mut p = Peripherals::take().expect("called once");
         let core = Core::take().expect("called once");
         let mut watchdog = Watchdog::new(p.WATCHDOG);
@@ -59,7 +82,7 @@ impl Board {
         clocks.init_default(&crystal, &system.expect("PLL"), &usb.expect("PLL")).expect("clocks");
 
         let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
-        let console =
+        let mut console =
             UartPeripheral::new(p.UART0, (pins.gpio0.into_function(), pins.gpio1.into_function()), &mut p.RESETS)
                 .enable(
                     UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
@@ -70,10 +93,20 @@ impl Board {
         let _: Pin<_, FunctionPio0, _> = pins.gpio3.into_function();
         // The receiver is off while the driver is on: its output floats then.
         let _: Pin<_, FunctionPio0, PullUp> = pins.gpio4.into_function().into_pull_type();
-        let (mut pio, sm0, sm1, ..) = p.PIO0.split(&mut p.RESETS);
-        let (transmitter, receiver) = port::start(&mut pio, sm0, sm1, rate, bits);
+        let (block, sm0, sm1, ..) = p.PIO0.split(&mut p.RESETS);
+        let (transmitter, receiver) = port::start(block, sm0, sm1, rate, bits);
         let channel = p.DMA.split(&mut p.RESETS).ch0;
-        Self { console, clock: Clock::new(core.SYST), transmitter, receiver, channel }
+        let line = FirstLine {
+            image,
+            version: env!("CARGO_PKG_VERSION"),
+            board: &PICO,
+            core_hz: SYSTEM_HZ,
+            source: Source::Crystal,
+            bits_per_second,
+        };
+        let _ = writeln!(console, "{line}");
+        watchdog.start(WATCHDOG_MS.millis());
+        Self { console, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
     }
 }
 
@@ -81,3 +114,28 @@ impl Board {
 #[unsafe(link_section = ".boot2")]
 #[used]
 pub static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
+
+/// The console, for a panic: whoever had it is gone.
+struct LastWords;
+
+impl Write for LastWords {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        // SAFETY: interrupts are off, and nothing else runs again.
+        let uart = unsafe { &*pac::UART0::ptr() };
+        for byte in text.bytes() {
+            while uart.uartfr().read().txff().bit_is_set() {}
+            uart.uartdr().write(|w| unsafe { w.data().bits(byte) });
+        }
+        Ok(())
+    }
+}
+
+/// Says where; the watchdog begins again.
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    let _ = writeln!(LastWords, "\n{info}");
+    loop {
+        cortex_m::asm::nop();
+    }
+}

@@ -5,6 +5,8 @@ pub mod aformat;
 pub mod board;
 pub mod clock;
 pub mod commands;
+pub mod frames;
 pub mod port;
 pub mod programs;
 pub mod tformat;
+pub mod uart;

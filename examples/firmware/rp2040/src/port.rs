@@ -6,10 +6,9 @@ use cortex_m::singleton;
 use rp2040_hal::dma::{Channel, SingleChannel};
 use rp2040_hal::pac::{self, PIO0};
 use rp2040_hal::pio::{
-    PIO, PIOBuilder, PinDir, PinState, Rx, SM0, SM1, ShiftDirection, StateMachine, Stopped, Tx, UninitStateMachine,
+    PIO, PIOBuilder, PinDir, PinState, Running, Rx, SM0, SM1, ShiftDirection, StateMachine, Tx, UninitStateMachine,
 };
 
-use crate::clock::Clock;
 use crate::programs::{self, Rate};
 
 /// DI of the transceiver.
@@ -22,10 +21,13 @@ pub const RO: u8 = 4;
 /// Most words of one transmission: number of bits, delay, and 128 bits.
 const MOST_WORDS: usize = 6;
 
-/// The transmitter's FIFO.
+/// The transmitter.
 pub struct Transmitter {
     fifo: Tx<(PIO0, SM0)>,
-    cycles: u32,
+    machine: StateMachine<(PIO0, SM0), Running>,
+    block: PIO<PIO0>,
+    /// The instruction at which something is held.
+    holds_at: u32,
 }
 
 /// The words that make the transmitter send something: made ahead, they only have to be written.
@@ -36,36 +38,89 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// `len` line bits, at most 126, the first in bit 0. The driver is on for one idle bit before them, so that the line is
-    /// settled at the start bit. `wait_cycles`: cycles of the state machine before that.
-    pub fn new(line: u128, len: u32, wait_cycles: u32) -> Self {
-        let line = line << 1 | 1 | !0 << (len + 1);
-        let bits = len + 1;
+    /// Start-stop units of `bits` bits, with `gap_bits` idle bits between them; 126 line bits in all at the most. The driver is on for
+    /// one idle bit before them, so that the line is settled at the start bit. `wait_cycles`: cycles of the state machine from the flag
+    /// to that.
+    pub fn new(units: impl Iterator<Item = u16>, bits: u32, gap_bits: u32, wait_cycles: u32) -> Self {
+        let mut new = Self { words: [0, wait_cycles, 0, 0, 0, 0], len: 2 };
+        let mut count = 1;
+        new.put(0, 1);
+        for content in units {
+            if count > 1 {
+                new.put(count, (1 << gap_bits) - 1);
+                count += gap_bits;
+            }
+            new.put(count, u32::from(content) << 1 | 2 << bits);
+            count += bits + 2;
+        }
         // Not a multiple of 32, see the program: the last bit may well be idle.
-        let bits = if bits % 32 == 0 { bits + 1 } else { bits };
-        let [a, b, c, d] = [0, 32, 64, 96].map(|at| (line >> at) as u32);
-        Self { words: [bits - 1, wait_cycles, a, b, c, d], len: 2 + bits.div_ceil(32) as u8 }
+        if count % 32 == 0 {
+            new.put(count, 1);
+            count += 1;
+        }
+        new.words[0] = count - 1;
+        new.len += count.div_ceil(32) as u8;
+        new
+    }
+
+    /// Up to 31 bits at a place of the line.
+    #[inline]
+    fn put(&mut self, at: u32, line: u32) {
+        let (word, shift) = (2 + at as usize / 32, at % 32);
+        if let Some(place) = self.words.get_mut(word) {
+            *place |= line << shift;
+        }
+        if let Some(place) = self.words.get_mut(word + 1).filter(|_| shift > 0) {
+            *place |= line >> (32 - shift);
+        }
     }
 }
 
 impl Transmitter {
-    /// Cycles of the state machine a bit.
-    pub const fn cycles(&self) -> u32 {
-        self.cycles
-    }
-
-    /// Starts a transmission. What does not fit into the FIFO goes in while the first bits are sent.
+    /// Makes the transmitter hold a message until it is started, in place of what it holds. What does not fit into the FIFO goes in
+    /// while the end of the message before is sent.
     #[inline]
-    pub fn send(&mut self, prepared: &Prepared) {
+    pub fn hold(&mut self, prepared: &Prepared) {
+        self.discard();
         for word in prepared.words.iter().take(prepared.len.into()) {
             while !self.fifo.write(*word) {}
         }
+    }
+
+    /// Drops what is held.
+    #[inline]
+    pub fn discard(&mut self) {
+        if self.is_holding() {
+            self.machine.clear_fifos();
+            self.machine.restart();
+        }
+    }
+
+    /// Whether something is held, and was not started.
+    fn is_holding(&self) -> bool {
+        self.machine.instruction_address() == self.holds_at
+    }
+
+    /// Starts what is held, unless the receiver has done so.
+    #[inline]
+    pub fn start(&mut self) {
+        if self.is_holding() {
+            self.block.force_irq(1 << programs::START);
+        }
+    }
+
+    /// Sends a message.
+    #[inline]
+    pub fn send(&mut self, prepared: &Prepared) {
+        self.hold(prepared);
+        self.block.force_irq(1 << programs::START);
     }
 }
 
 /// Units of the receiver, taken from its FIFO one by one.
 pub struct Receiver {
     fifo: Rx<(PIO0, SM1)>,
+    expected: Tx<(PIO0, SM1)>,
     bits: u8,
 }
 
@@ -91,6 +146,16 @@ impl Receiver {
     pub fn take(&mut self) -> Option<Unit> {
         self.fifo.read().map(|word| Unit::of(word, self.bits))
     }
+
+    /// A unit with this content starts what the transmitter holds, from the unit on that comes next; with `None` none does.
+    #[inline]
+    pub fn expect(&mut self, content: Option<u16>) {
+        // Below its unit a word of the receiver is 0.
+        const NEVER: u32 = 1;
+        let unit = content.map_or(NEVER, |content| (1 << self.bits | u32::from(content)) << (31 - self.bits));
+        // The receiver takes all that was written with the next unit.
+        while !self.expected.write(unit) {}
+    }
 }
 
 /// How many units the ring holds.
@@ -107,8 +172,7 @@ pub struct RingReceiver {
     ring: *const u32,
     /// The next to take.
     at: usize,
-    bits: u8,
-    _fifo: Rx<(PIO0, SM1)>,
+    receiver: Receiver,
 }
 
 impl RingReceiver {
@@ -122,13 +186,13 @@ impl RingReceiver {
     {
         let ring = singleton!(: Ring = Ring([0; RING])).expect("one receiver");
         let ring = core::ptr::from_mut(ring).cast::<u32>();
-        let Receiver { fifo, bits } = receiver;
+        let fifo = &receiver.fifo;
         // SAFETY: the channel is owned, and so is the ring, which nobody reads but by volatile access below.
         let dma = unsafe { &*pac::DMA::ptr() };
         dma.ch(0).ch_read_addr().write(|w| unsafe { w.bits(fifo.fifo_address() as u32) });
         dma.ch(0).ch_write_addr().write(|w| unsafe { w.bits(ring as u32) });
         dma.ch(0).ch_al1_ctrl().write(|w| unsafe { w.bits(control(fifo.dreq_value())) });
-        let mut new = Self { ring, at: 0, bits, _fifo: fifo };
+        let mut new = Self { ring, at: 0, receiver };
         new.keep_running();
         new
     }
@@ -154,29 +218,9 @@ impl RingReceiver {
         // SAFETY: `at` is below RING, and the channel has written there.
         let word = unsafe { self.ring.add(self.at).read_volatile() };
         self.at = (self.at + 1) % RING;
-        Some(Unit::of(word, self.bits))
+        Some(Unit::of(word, self.receiver.bits))
     }
 }
-
-impl RingReceiver {
-    /// Waits until `from_ns`, and longer while somebody is still talking: until nothing has come for `quiet_ns`. Throws away
-    /// what comes. A line that never becomes quiet is given up after 1 ms.
-    pub fn settle(&mut self, clock: &mut Clock, from_ns: u64, quiet_ns: u64) {
-        let begin_ns = clock.now_ns();
-        let mut until_ns = from_ns;
-        loop {
-            let now_ns = clock.now_ns();
-            if self.take().is_some() {
-                until_ns = until_ns.max(now_ns + quiet_ns);
-            } else if now_ns >= until_ns || now_ns - begin_ns > GIVE_UP_NS {
-                return;
-            }
-        }
-    }
-}
-
-/// Longer than any response.
-const GIVE_UP_NS: u64 = 1_000_000;
 
 /// CHn_CTRL: enabled, words, the write address runs in a ring of 256 bytes, at the pace of the receiver; chained to itself,
 /// that is to none.
@@ -196,13 +240,14 @@ const fn control(dreq: u8) -> u32 {
 /// # Panics
 /// If the block's instruction memory is not empty.
 pub fn start(
-    pio: &mut PIO<PIO0>,
+    mut block: PIO<PIO0>,
     transmit: UninitStateMachine<(PIO0, SM0)>,
     receive: UninitStateMachine<(PIO0, SM1)>,
     rate: Rate,
     bits: u8,
 ) -> (Transmitter, Receiver) {
-    let program = pio.install(&programs::transmitter(rate)).expect("6 of 32 instructions");
+    let program = block.install(&programs::transmitter(rate)).expect("7 of 32 instructions");
+    let holds_at = u32::from(program.offset()) + programs::HOLDS_AT;
     let (mut machine, _, tx) = PIOBuilder::from_installed_program(program)
         .out_pins(DI, 1)
         .side_set_pin_base(DE)
@@ -213,20 +258,16 @@ pub fn start(
         .build(transmit);
     machine.set_pins([(DI, PinState::High), (DE, PinState::Low)]);
     machine.set_pindirs([(DI, PinDir::Output), (DE, PinDir::Output)]);
-    run(machine);
-    let program = pio.install(&programs::receiver(rate, bits)).expect("6 of 32 instructions");
-    let (mut machine, rx, _) = PIOBuilder::from_installed_program(program)
+    let transmitter = machine.start();
+    let program = block.install(&programs::receiver(rate, bits)).expect("12 of 32 instructions");
+    let (mut machine, rx, expected) = PIOBuilder::from_installed_program(program)
         .in_pin_base(RO)
         .in_shift_direction(ShiftDirection::Right)
-        .autopush(true)
-        .push_threshold(bits + 1)
         .clock_divisor_fixed_point(rate.divider, 0)
         .build(receive);
     machine.set_pindirs([(RO, PinDir::Input)]);
-    run(machine);
-    (Transmitter { fifo: tx, cycles: rate.cycles.into() }, Receiver { fifo: rx, bits })
-}
-
-fn run<S: rp2040_hal::pio::ValidStateMachine>(machine: StateMachine<S, Stopped>) {
     let _running = machine.start();
+    let mut receiver = Receiver { fifo: rx, expected, bits };
+    receiver.expect(None);
+    (Transmitter { fifo: tx, machine: transmitter, block, holds_at }, receiver)
 }

@@ -1,6 +1,9 @@
 //! The PIO programs. They are written for any number of cycles a bit, so that every rate has a whole divider at 120 MHz.
 
-use pio::{Assembler, InSource, JmpCondition, OutDestination, Program, SetDestination, SideSet};
+use pio::{
+    Assembler, InSource, IrqIndexMode, JmpCondition, MovDestination, MovOperation, MovSource, OutDestination, Program,
+    SetDestination, SideSet, WaitSource,
+};
 
 /// The system clock that makes all rates of [`Rate`] whole numbers of cycles.
 pub const SYSTEM_HZ: u32 = 120_000_000;
@@ -27,11 +30,16 @@ impl Rate {
     pub const MBIT8: Self = Self { cycles: 15, divider: 1 };
 }
 
-/// Sends bits, the first in bit 0 of a word, and switches the line driver on for exactly as long (side-set).
+/// Flag of the PIO block that starts the transmitter.
+pub const START: u8 = 0;
+
+/// Holds bits until the flag [`START`] is set, then sends them, the first in bit 0 of a word, and switches the line driver on for
+/// exactly as long (side-set).
 ///
 /// ```text
-/// begin:  out x, 32     side 0          number of bits - 1; the machine waits here, driver off
-///         out y, 32     side 0          how many cycles to wait first
+/// begin:  out x, 32     side 0          number of bits - 1
+///         out y, 32     side 0          how many cycles to wait behind the flag
+///         wait 1 irq 0  side 0          what is to be sent is held here, driver off
 /// delay:  jmp y-- delay side 0
 /// bit:    out pins, 1   side 1 [N - 2]
 ///         jmp x-- bit   side 1
@@ -46,6 +54,7 @@ pub fn transmitter(rate: Rate) -> Program<32> {
     a.bind(&mut begin);
     a.out_with_side_set(OutDestination::X, 32, 0);
     a.out_with_side_set(OutDestination::Y, 32, 0);
+    a.wait_with_side_set(1, WaitSource::IRQ, START, false, 0);
     a.bind(&mut delay);
     a.jmp_with_side_set(JmpCondition::YDecNonZero, &mut delay, 0);
     a.bind(&mut bit);
@@ -56,29 +65,54 @@ pub fn transmitter(rate: Rate) -> Program<32> {
     a.assemble_with_wrap(end, begin)
 }
 
-/// Receives start-stop units of `bits` bits; the word holds them and the stop bit in its highest bits, the stop bit on top.
+/// Where the transmitter of [`transmitter`] holds, counted from its begin.
+pub const HOLDS_AT: u32 = 2;
+
+/// Receives start-stop units of `bits` bits; the word holds them and the stop bit in its highest bits, the stop bit on top. A word
+/// that is the one in X sets the flag [`START`]: X is what the processor has written last.
 ///
 /// ```text
 /// begin:  wait 1 pin 0
 ///         wait 0 pin 0                  the start bit
-///         set x, bits - 1  [1.5 N - 3]  to the middle of the first bit
-/// bit:    in pins, 1       [N - 2]
-///         jmp x-- bit
-///         in pins, 1                    the stop bit: delivered, not judged
+///         set y, bits - 1  [1.5 N - 3]  to the middle of the first bit
+/// bit:    in pins, 1       [N - 4]
+///         pull noblock                  what is expected now; X if nothing new was written
+///         mov x, osr
+///         jmp y-- bit
+///         in pins, 1                    the stop bit: delivered, and part of what is expected
+///         mov y, isr
+///         jmp x!=y other
+///         irq set 0
+/// other:  push
 /// ```
 ///
-/// Automatic push, `bits` + 1 bits, shift right.
+/// Shift right.
 pub fn receiver(rate: Rate, bits: u8) -> Program<32> {
     let mut a = Assembler::<32>::new();
-    let (mut begin, mut bit, mut end) = (a.label(), a.label(), a.label());
+    let (mut begin, mut bit, mut other, mut end) = (a.label(), a.label(), a.label(), a.label());
     a.bind(&mut begin);
-    a.wait(1, pio::WaitSource::PIN, 0, false);
-    a.wait(0, pio::WaitSource::PIN, 0, false);
-    a.set_with_delay(SetDestination::X, bits - 1, rate.cycles * 3 / 2 - 3);
+    a.wait(1, WaitSource::PIN, 0, false);
+    a.wait(0, WaitSource::PIN, 0, false);
+    a.set_with_delay(SetDestination::Y, bits - 1, rate.cycles * 3 / 2 - 3);
     a.bind(&mut bit);
-    a.r#in_with_delay(InSource::PINS, 1, rate.cycles - 2);
-    a.jmp(JmpCondition::XDecNonZero, &mut bit);
+    a.r#in_with_delay(InSource::PINS, 1, rate.cycles - 4);
+    a.pull(false, false);
+    a.mov(MovDestination::X, MovOperation::None, MovSource::OSR);
+    a.jmp(JmpCondition::YDecNonZero, &mut bit);
     a.r#in(InSource::PINS, 1);
+    a.mov(MovDestination::Y, MovOperation::None, MovSource::ISR);
+    a.jmp(JmpCondition::XNotEqualY, &mut other);
+    a.irq(false, false, START, IrqIndexMode::DIRECT);
+    a.bind(&mut other);
+    a.push(false, true);
     a.bind(&mut end);
     a.assemble_with_wrap(end, begin)
+}
+
+/// Cycles for Y with which an answer begins `turn_ns` after the end of the unit that was expected: less the half of its stop bit, the
+/// bit for which the driver is on ahead, and the way from the pin to the flag and back to a pin.
+pub const fn wait_cycles(rate: Rate, turn_ns: u32) -> u32 {
+    const WAY: u32 = 6;
+    let cycles = turn_ns * (SYSTEM_HZ / 1_000_000) / 1_000 / rate.divider as u32;
+    cycles - rate.cycles as u32 / 2 - WAY
 }

@@ -1,21 +1,27 @@
 //! T-Format over the port: a master that prints positions, and an encoder.
 
-use core::convert::Infallible;
 use core::fmt::{self, Write};
 
-use servowire_core::{Ended, Procedure};
+use servowire_boards::Report;
+use servowire_drivers::tformat::blocking::{Driver, Failure};
+use servowire_drivers::{Automatic, Clock as _, Error};
 use tformat::device::Device;
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, Transaction};
-use tformat::{Abm, Abs, Address, BitRate, Error, Page, Request, Resolution, Response};
+use tformat::master::{Line, MultiTurnZero};
+use tformat::{Abm, Abs, Address, BitRate, DataId, EvidenceCell, Page, Policy, Request, Resolution};
 
 use crate::board::{Board, Console};
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
-use crate::port::{Prepared, RingReceiver, Transmitter, Unit};
-use crate::programs::Rate;
+use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
+use crate::programs::{self, Rate};
+use crate::uart::{self, Uart};
 
 /// From the end of one transaction to the beginning of the next.
 const PAUSE_NS: u64 = 20_000;
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
+/// A position that is printed is no older than this.
+const MAX_AGE_NS: u64 = 200_000;
 
 /// That of the encoder below.
 const RESOLUTION: Resolution = match Resolution::new(23, 16) {
@@ -30,189 +36,195 @@ const fn rate_of(rate: BitRate) -> Rate {
     }
 }
 
-/// The line to an encoder.
-struct Master {
-    clock: Clock,
-    transmitter: Transmitter,
-    receiver: RingReceiver,
-    line: Line,
-    /// From when on the line is free.
-    free_ns: u64,
-}
+type Encoder<'a> = Driver<Uart, Automatic, &'a Clock>;
 
-/// How long a procedure waits for an answer.
-const PATIENT_NS: u32 = 40_000;
-
-impl Master {
-    /// One request and its answer, when the line is free. How long they took.
-    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Response, Error>, u64) {
-        let Self { clock, transmitter, receiver, line, free_ns } = self;
-        receiver.settle(clock, *free_ns, u64::from(line.rate.fields_ns(2)));
-        let began_ns = clock.now_ns();
-        let mut transaction = Transaction::start(request, *line, began_ns);
-        transmitter.send(message);
-        let outcome = loop {
-            let progress = match receiver.take() {
-                Some(Unit { content, framed: true }) => transaction.hear(&[content as u8], clock.now_ns()),
-                Some(_) => transaction.framing_error(clock.now_ns()),
-                None => transaction.poll(clock.now_ns()),
-            };
-            let (end, ready_ns) = match progress {
-                Progress::Pending { .. } => continue,
-                Progress::Done { value, ready_ns } => (Ok(value.response), ready_ns),
-                Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
-            };
-            *free_ns = ready_ns;
-            break end;
-        };
-        (outcome, clock.now_ns() - began_ns)
-    }
-
-    /// A procedure of several exchanges.
-    fn run<P: Procedure<Request = Request, Response = Response, Error = Error>>(
-        &mut self,
-        mut procedure: P,
-    ) -> Result<P::Value, Error> {
-        // An encoder made of software, as that of this folder, takes more than 10 us for an answer that it has not made ahead.
-        let line = self.line;
-        self.line = line.with_response_timeout_ns(PATIENT_NS);
-        let now_ns = self.clock.now_ns();
-        let Ok(ended) = servowire_core::run(&mut procedure, now_ns, |request, not_before_ns| {
-            while self.clock.now_ns() < not_before_ns {}
-            let (outcome, _) = self.exchange(request, &message(request));
-            Ok::<_, Infallible>(Ended { outcome, ready_ns: self.free_ns.max(self.clock.now_ns()) })
-        });
-        self.free_ns = ended.ready_ns;
-        // Afterwards it has the answer to this one ready again.
-        let _ = self.exchange(Request::ReadAll, &message(Request::ReadAll));
-        self.line = line;
-        ended.outcome
-    }
-
-    /// Does what was typed, and says what came of it.
-    fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
-        let (address, access) = match command {
-            Command::Read { address } => {
-                (address, EepromAccess::read(Page::truncate(0), Address::truncate(address), EEPROM_POLLING))
-            }
-            Command::Write { address, data } => (
-                address,
-                EepromAccess::write(Page::truncate(0), Address::truncate(address), data as u8, EEPROM_POLLING),
-            ),
-            Command::LoseMultiTurnReference => {
-                return match self.run(MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1)) {
-                    Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
-                    Err(error) => writeln!(console, "turns: {error}"),
-                };
-            }
-            Command::Unknown => return console.write_str("?\n"),
-        };
-        match self.run(access) {
-            Ok(byte) => writeln!(console, "EEPROM {address:02x}: {byte:02x}"),
-            Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
+/// Does what was typed, and says what came of it.
+fn command(encoder: &mut Encoder<'_>, command: Command, console: &mut Console) -> fmt::Result {
+    let page = Page::truncate(0);
+    let (address, byte) = match command {
+        Command::Read { address } => (address, encoder.read_eeprom(page, Address::truncate(address))),
+        Command::Write { address, data } => {
+            (address, encoder.write_eeprom(page, Address::truncate(address), data as u8))
         }
+        Command::LoseMultiTurnReference => {
+            let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1);
+            return match encoder.run(&mut zero) {
+                Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
+                Err(error) => say(console, "turns", error),
+            };
+        }
+        Command::Unknown => return console.write_str("?\n"),
+    };
+    match byte {
+        Ok(byte) => writeln!(console, "EEPROM {address:02x}: {byte:02x}"),
+        Err(error) => say(console, "EEPROM", error),
     }
 }
 
-fn message(request: Request) -> Prepared {
-    let bits = request.emit().line();
-    Prepared::new(bits.bits(), bits.len(), 0)
+fn say(console: &mut Console, what: &str, error: Failure<Uart, Automatic>) -> fmt::Result {
+    writeln!(console, "{what}: {error}")
 }
 
-/// Reads all data of the encoder for ever; prints every sixteenth position, and every fault. Does what is typed meanwhile.
-pub fn master(rate: BitRate) -> ! {
-    let Board { mut console, clock, transmitter, receiver, channel } = Board::new(rate_of(rate), 8);
-    let receiver = RingReceiver::new(channel, receiver);
-    let mut master = Master { clock, transmitter, receiver, line: Line::new(rate), free_ns: 0 };
+/// Reads the position of the encoder for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
+///
+/// # Panics
+/// If a clock does not start.
+pub fn master(image: &'static str, rate: BitRate) -> ! {
+    let mut board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
+    let (mut clock, console) = (&board.clock, &mut board.console);
+    let uart = Uart::new(board.transmitter, RingReceiver::new(board.channel, board.receiver));
+    let mut encoder = Driver::new(uart, Automatic, clock, Line::new(rate)).expect("the PIO switches the driver");
+    let mut cell = EvidenceCell::new();
+    let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
-    let request = Request::ReadAll;
-    let message = message(request);
-    let (mut good, mut bad) = (0_u32, 0_u32);
-    let _ = writeln!(console, "T-Format master, {} bit/s", rate.bits_per_second());
+    let mut report = Report::new(PRINTED);
     loop {
-        let (outcome, took_ns) = master.exchange(request, &message);
-        match outcome {
-            Ok(Response::ReadAll(all)) => {
-                good += 1;
-                if good % 16 == 1 {
-                    let (abs, abm, enid) = (all.abs.get(), all.abm.get(), all.enid);
-                    let _ = writeln!(
-                        console,
-                        "abs {abs} abm {abm} enid {enid:02x} in {took_ns} ns, {good} good, {bad} bad"
-                    );
-                }
-            }
-            Ok(_) => {}
-            Err(error) => {
-                bad += 1;
-                let _ = writeln!(console, "fault: {error}, {good} good, {bad} bad");
-            }
+        board.watchdog.feed();
+        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
+        let now_ns = clock.latest_ns();
+        let _ = match read {
+            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
+            Err(Error::Io(fault)) => report.fault(console, fault),
+            Err(error) => report.fault(console, error),
+        };
+        if let Some(typed) = typed.take(console) {
+            let _ = command(&mut encoder, typed, console);
         }
-        if let Some(command) = typed.take(&console) {
-            let _ = master.command(command, &mut console);
-        }
-        master.free_ns += PAUSE_NS;
+        let next_ns = clock.latest_ns() + PAUSE_NS;
+        while clock.now_ns().is_ok_and(|now_ns| now_ns < next_ns) {}
     }
 }
 
 const ENCODER_ID: u8 = 0x17;
 /// Until they are reset.
 const TURNS: Abm = Abm::truncate(7);
+/// From the end of a request to the answer.
+const TURN_NS: u32 = 3_000;
+/// The same of an answer that is made while the end of its request comes, and hardly ready in time.
+const LEAST_TURN_NS: u32 = 2_000;
 /// A field that comes later than this is not of the request before.
 const FIELD_GAP_NS: u64 = 8_000;
 
+/// The next request comes so much later, or more.
+const LATER_NS: u64 = 50_000;
+
+/// An encoder, and the answer that it has ready.
+struct Ahead {
+    device: Device<1>,
+    transmitter: Transmitter,
+    receiver: Receiver,
+    /// The byte that starts what the transmitter holds.
+    expected: Option<u8>,
+}
+
+impl Ahead {
+    /// Holds what the encoder will answer to `request`, whose last byte starts it.
+    fn hold(&mut self, request: Request, now_ns: u64, wait_cycles: u32) {
+        let reply = match request {
+            // It changes nothing.
+            Request::ReadEeprom { .. } => self.device.answer(request, now_ns),
+            _ => { self.device }.answer(request, now_ns),
+        };
+        let asked = request.emit();
+        let Some((reply, last)) = reply.zip(asked.as_bytes().last()) else { return };
+        self.transmitter.hold(&uart::prepared(reply.emit().as_bytes(), wait_cycles));
+        self.expected = Some(*last);
+        self.receiver.expect(Some((*last).into()));
+    }
+
+    /// A byte came, or a damaged one: what is held is on its way if it is for this one, and gone if not. Whether it is on its way.
+    fn came(&mut self, byte: Option<u8>) -> bool {
+        let Some(expected) = self.expected.take() else { return false };
+        self.receiver.expect(None);
+        if byte == Some(expected) {
+            // The receiver has started it, or was told too late to expect it.
+            self.transmitter.start();
+            return true;
+        }
+        self.transmitter.discard();
+        false
+    }
+
+    /// A request is over, or damaged beyond that: answers it if that is not on its way yet.
+    fn ended(&mut self, bytes: &[u8], now_ns: u64, started: bool) -> Option<Request> {
+        let request = Request::parse(bytes).ok();
+        let reply = match request {
+            Some(request) => self.device.answer(request, now_ns).map(|response| response.emit()),
+            None => self.device.hear(bytes, now_ns).map(|reply| reply.frame),
+        };
+        if let Some(reply) = reply.filter(|_| !started) {
+            self.transmitter.send(&uart::prepared(reply.as_bytes(), 0));
+        }
+        request
+    }
+}
+
+/// Fields of a request with this control field.
+const fn fields(control_field: u8) -> usize {
+    const READ: u8 = DataId::ReadEeprom.control_field().get();
+    const WRITE: u8 = DataId::WriteEeprom.control_field().get();
+    match control_field {
+        READ => 3,
+        WRITE => 4,
+        _ => 1,
+    }
+}
+
 /// An encoder whose shaft turns on by one with every answer.
 ///
-/// The answer has to begin 3 us after the request, and this processor needs longer to make one. So the answer to a read
-/// request that came last is made ahead, while it is sent: when the request comes again, it only has to be started. All
-/// others are answered when they are ready, and so is the first read after one of them. `wait_cycles`: what the way through the processor leaves of the 3 us.
-pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
-    let Board { mut console, mut clock, mut transmitter, mut receiver, .. } = Board::new(rate_of(rate), 8);
-    let mut device = Device::<6>::new(ENCODER_ID, rate);
+/// The answer has to begin 3 us after the request, and this processor needs longer to make one. So the answer to the request that came
+/// last is made ahead and held by the transmitter, and the receiver starts it when the request comes again, whatever the processor
+/// does then. Of a request with several fields the answer is made while the last one comes. All others are answered when they are
+/// ready.
+///
+/// # Panics
+/// If a clock does not start.
+pub fn encoder(image: &'static str, rate: BitRate) -> ! {
+    let port = rate_of(rate);
+    let Board { clock, transmitter, receiver, watchdog, .. } =
+        Board::new(image, rate.bits_per_second(), port, uart::BITS);
+    let mut device = Device::new(ENCODER_ID, rate);
+    device.set_position(Abs::truncate(0), TURNS);
+    let [wait_cycles, least_cycles] = [TURN_NS, LEAST_TURN_NS].map(|turn_ns| programs::wait_cycles(port, turn_ns));
+    let mut ahead = Ahead { device, transmitter, receiver, expected: None };
     let mut position = 0x12_3456;
-    device.set_position(Abs::truncate(position), TURNS);
-    let mut ahead = prepare(&mut device, Request::ReadAll, &mut position, wait_cycles);
-    let (mut inside, mut last_ns) = (false, 0);
-    let _ = writeln!(console, "T-Format encoder, {} bit/s", rate.bits_per_second());
+    let mut again = Request::ReadAll;
+    let (mut request, mut len, mut last_ns) = ([0; 4], 0, 0);
     loop {
-        let Some(unit) = receiver.take() else {
-            inside = inside && clock.now_ns() - last_ns < FIELD_GAP_NS;
+        watchdog.feed();
+        let Some(Unit { content, framed }) = ahead.receiver.take() else {
+            let now_ns = clock.latest_ns();
+            if now_ns - last_ns >= FIELD_GAP_NS {
+                len = 0;
+                if ahead.expected.is_none() {
+                    position += 1;
+                    ahead.device.set_position(Abs::truncate(position), ahead.device.abm());
+                    ahead.hold(again, now_ns + LATER_NS, wait_cycles);
+                }
+            }
             continue;
         };
-        let byte = unit.content as u8;
-        let prepared = ahead.as_ref().filter(|(control_field, _)| !inside && unit.framed && byte == *control_field);
-        let started = prepared.is_some();
-        if let Some((_, message)) = prepared {
-            transmitter.send(message);
-        }
-        let first = !inside;
-        last_ns = clock.now_ns();
-        let reply = if unit.framed { device.hear(&[byte], last_ns) } else { device.framing_error(last_ns) };
-        inside = reply.is_none();
-        if let Some(reply) = reply.filter(|_| !started) {
-            transmitter.send(&Prepared::new(reply.line.bits(), reply.line.len(), 0));
-        }
-        let request = READS.into_iter().find(|request| first && unit.framed && control_field(*request) == byte);
-        if let Some(request) = request {
-            ahead = prepare(&mut device, request, &mut position, wait_cycles);
-        } else if !inside {
-            // It may have changed what an answer says, and a repetition is counted: nothing is made ahead now.
-            ahead = None;
+        let byte = content as u8;
+        let started = ahead.came(framed.then_some(byte));
+        last_ns = clock.latest_ns();
+        let Some(place) = request.get_mut(len) else { continue };
+        *place = byte;
+        len += 1;
+        let (came, fields) = (&request[..len], fields(request[0]));
+        if !framed {
+            let _ = ahead.device.framing_error(last_ns);
+            len = OVER;
+        } else if len == fields {
+            again = ahead.ended(came, last_ns, started).filter(|_| fields == 1).unwrap_or(again);
+            len = OVER;
+        } else if len + 1 == fields {
+            request[len] = came.iter().fold(0, |sum, field| sum ^ field);
+            if let Ok(request) = Request::parse(&request[..=len]) {
+                ahead.hold(request, last_ns, least_cycles);
+            }
         }
     }
 }
 
-/// The requests that change nothing and are one byte long.
-const READS: [Request; 4] = [Request::ReadSingleTurn, Request::ReadMultiTurn, Request::ReadEncoderId, Request::ReadAll];
-
-fn control_field(request: Request) -> u8 {
-    request.emit().as_bytes().first().copied().unwrap_or_default()
-}
-
-/// The shaft moves, and the answer to `request` is made.
-fn prepare(device: &mut Device<6>, request: Request, position: &mut u32, wait_cycles: u32) -> Option<(u8, Prepared)> {
-    *position += 1;
-    device.set_position(Abs::truncate(*position), device.abm());
-    let answer = device.answer(request, 0)?.emit().line();
-    Some((control_field(request), Prepared::new(answer.bits(), answer.len(), wait_cycles)))
-}
+/// Fields of a request that is over: what comes behind it is not looked at.
+const OVER: usize = usize::MAX;

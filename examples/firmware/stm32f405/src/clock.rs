@@ -2,7 +2,8 @@
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use servowire_drivers::{CounterClock, TickRate};
+use servowire_boards::{Counter, Oscillator, Pll, PllLimits, Source};
+use servowire_core::TickRate;
 use stm32_metapac::flash::vals::Latency;
 use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
 use stm32_metapac::{FLASH, RCC};
@@ -18,33 +19,52 @@ pub const APB1_HZ: u32 = CORE_HZ / 4;
 
 /// Looks at a ready bit before it is given up: some milliseconds.
 const LOOKS: u32 = 100_000;
+/// Of the oscillator in the chip.
+const INTERNAL_HZ: u32 = 16_000_000;
 
-/// From what the core runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
-    /// The crystal: the rates are exact.
-    Crystal,
-    /// The internal oscillator, 1 % off at room temperature: no crystal, or another one than [`CRYSTAL_HZ`].
-    Internal,
-    /// No oscillator and no PLL get ready, as in an emulator without a clock tree.
-    None,
+/// The PLL that makes [`CORE_HZ`]: without one this does not compile.
+const fn pll(hz: u32) -> Pll {
+    match Pll::solve(PllLimits::STM32F4, hz, CORE_HZ) {
+        Some(pll) => pll,
+        None => panic!("no PLL makes the core clock of this crystal"),
+    }
 }
 
-/// 160 MHz, APB1 40 MHz, APB2 80 MHz.
-pub fn start() -> Source {
-    RCC.cr().modify(|w| w.set_hseon(true));
-    let crystal = ready(|| RCC.cr().read().hserdy());
-    let (source, input_hz) = if crystal { (Pllsrc::HSE, CRYSTAL_HZ) } else { (Pllsrc::HSI, 16_000_000) };
-    // 1 MHz into the PLL, 320 MHz in it.
+const OF_CRYSTAL: Pll = pll(CRYSTAL_HZ);
+const OF_INTERNAL: Pll = pll(INTERNAL_HZ);
+
+struct Crystal;
+
+impl Oscillator for Crystal {
+    fn start(&mut self) {
+        RCC.cr().modify(|w| w.set_hseon(true));
+    }
+
+    fn is_ready(&self) -> bool {
+        RCC.cr().read().hserdy()
+    }
+
+    fn stop(&mut self) {
+        RCC.cr().modify(|w| w.set_hseon(false));
+    }
+}
+
+/// 160 MHz, APB1 40 MHz, APB2 80 MHz, and from what; `None` if no PLL gets ready, as in an emulator without a clock tree.
+pub fn start() -> Option<Source> {
+    let source = servowire_boards::start(&mut Crystal, LOOKS);
+    let (input, pll) = match source {
+        Source::Crystal => (Pllsrc::HSE, OF_CRYSTAL),
+        Source::Internal => (Pllsrc::HSI, OF_INTERNAL),
+    };
     RCC.pllcfgr().modify(|w| {
-        w.set_pllsrc(source);
-        w.set_pllm(Pllm::from_bits((input_hz / 1_000_000) as u8));
-        w.set_plln(Plln::from_bits(320));
-        w.set_pllp(Pllp::DIV2);
+        w.set_pllsrc(input);
+        w.set_pllm(Pllm::from_bits(pll.m as u8));
+        w.set_plln(Plln::from_bits(pll.n as u16));
+        w.set_pllp(Pllp::from_bits((pll.r / 2 - 1) as u8));
     });
     RCC.cr().modify(|w| w.set_pllon(true));
     if !ready(|| RCC.cr().read().pllrdy()) {
-        return Source::None;
+        return None;
     }
     FLASH.acr().modify(|w| {
         w.set_latency(Latency::WS5);
@@ -58,22 +78,18 @@ pub fn start() -> Source {
         w.set_ppre2(Ppre::DIV2);
         w.set_sw(Sw::PLL1_P);
     });
-    match (ready(|| RCC.cfgr().read().sws() == Sw::PLL1_P), crystal) {
-        (false, _) => Source::None,
-        (true, true) => Source::Crystal,
-        (true, false) => Source::Internal,
-    }
+    ready(|| RCC.cfgr().read().sws() == Sw::PLL1_P).then_some(source)
 }
 
 fn ready(mut look: impl FnMut() -> bool) -> bool {
     (0..LOOKS).any(|_| look())
 }
 
-/// Starts the SysTick, which counts 24 bits down with an eighth of the core clock. It has to be looked at every 0.4 s.
-pub fn time(mut timer: SYST) -> CounterClock<impl FnMut() -> u32, 24> {
+/// Time from the SysTick, which counts 24 bits down with an eighth of the core clock. Somebody has to look at it every 0.4 s.
+pub fn ticks(mut timer: SYST) -> Counter<24> {
     timer.set_clock_source(SystClkSource::External);
     timer.set_reload(0x00ff_ffff);
     timer.clear_current();
     timer.enable_counter();
-    CounterClock::new(TickRate::of::<{ CORE_HZ / 8 }>(), move || !timer.cvr.read())
+    Counter::new(TickRate::of::<{ CORE_HZ / 8 }>(), || !SYST::get_current())
 }

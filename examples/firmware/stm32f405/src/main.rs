@@ -7,11 +7,30 @@ mod stack;
 mod uart;
 
 use core::fmt::Write;
+use core::panic::PanicInfo;
 
-use panic_halt as _;
-use servowire_drivers::{DirectionPin, Error, Worst, tformat::blocking::Driver};
+use servowire_boards::{Board, FirstLine, Pin, Report, Source};
+use servowire_drivers::{Clock as _, DirectionPin, Error, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{Address, BitRate, Page};
+use tformat::{Address, BitRate, EvidenceCell, Page, Policy, Resolution};
+
+use crate::clock::{CORE_HZ, CRYSTAL_HZ};
+
+/// The pins; where they are is up to the board.
+static BOARD: Board = const {
+    Board {
+        name: "STM32F405RG",
+        crystal_hz: CRYSTAL_HZ,
+        pins: &[
+            Pin { name: "PA9", signal: "DI", at: "USART1" },
+            Pin { name: "PA8", signal: "DE and /RE", at: "GPIO" },
+            Pin { name: "PA10", signal: "RO", at: "USART1" },
+            Pin { name: "PA2", signal: "console", at: "USART2" },
+        ],
+        power_stage: &[],
+    }
+    .checked()
+};
 
 /// The UART begins with its next bit clock; the interrupt of a byte, which may come in between, takes less than 0.9 us; a tick of the
 /// clock is 50 ns.
@@ -26,40 +45,65 @@ fn line() -> Line {
     }
 }
 
+/// That of the encoder.
+const RESOLUTION: Resolution = match Resolution::new(23, 16) {
+    Ok(resolution) => resolution,
+    Err(_) => panic!("possible widths"),
+};
+
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
+/// A position that is printed is no older than this.
+const MAX_AGE_NS: u64 = if cfg!(feature = "emulated") { u64::MAX } else { 200_000 };
+
 #[cortex_m_rt::entry]
 fn main() -> ! {
     stack::paint();
     let source = clock::start();
     let core = cortex_m::Peripherals::take().expect("called once");
     let (uart, de, mut console) = uart::start(BitRate::Mbit2_5.bits_per_second());
-    let clock = clock::time(core.SYST);
-    let _ = writeln!(console, "T-Format master, 2500000 bit/s, clock {source:?}");
+    let ticks = clock::ticks(core.SYST);
+    let mut clock = &ticks;
+    let _ = match source {
+        Some(source) => writeln!(console, "{}", first_line(source)),
+        None => console.write_str("stm32f405: no clock gets ready, so no rate is right\n"),
+    };
     let pin = DirectionPin::new(de, WORST);
     let mut encoder = Driver::new(uart, pin, clock, line()).expect("1.4 us fit four bits");
     match encoder.read_eeprom(Page::truncate(0), Address::truncate(0)) {
         Ok(byte) => drop(writeln!(console, "EEPROM 0: {byte:02x}")),
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }
-    let (mut good, mut bad) = (0_u32, 0_u32);
+    let mut cell = EvidenceCell::new();
+    let (mut writer, mut reader) = cell.split();
+    let mut report = Report::new(PRINTED);
     loop {
-        match encoder.read_data() {
-            Ok(all) => {
-                good += 1;
-                if good % 16 == 1 {
-                    let (abs, abm, enid, stack) = (all.abs.get(), all.abm.get(), all.enid, stack::used());
-                    let _ = writeln!(
-                        console,
-                        "abs {abs} abm {abm} enid {enid:02x}, {good} good, {bad} bad, stack {stack} bytes"
-                    );
-                }
-            }
-            Err(error) => {
-                bad += 1;
-                let _ = match error {
-                    Error::Io(fault) => writeln!(console, "fault: {fault}, {good} good, {bad} bad"),
-                    error => writeln!(console, "fault: {error}, {good} good, {bad} bad"),
-                };
-            }
-        }
+        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
+        let policy = Policy::new(MAX_AGE_NS);
+        let _ = match (read, clock.now_ns()) {
+            (Ok(()), Ok(now_ns)) => match report.good(&mut console, || reader.at(now_ns, policy)) {
+                Ok(true) => writeln!(console, "stack {} bytes", stack::used()),
+                said => said.map(drop),
+            },
+            (Err(Error::Io(fault)), _) => report.fault(&mut console, fault),
+            (Err(error), _) => report.fault(&mut console, error),
+            (_, Err(error)) => report.fault(&mut console, error),
+        };
+    }
+}
+
+fn first_line(source: Source) -> FirstLine {
+    let bits_per_second = BitRate::Mbit2_5.bits_per_second();
+    let version = env!("CARGO_PKG_VERSION");
+    FirstLine { image: "stm32f405", version, board: &BOARD, core_hz: CORE_HZ, source, bits_per_second }
+}
+
+/// Says where; there is nothing that could go on.
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    let _ = writeln!(uart::Console::last_words(), "\n{info}");
+    loop {
+        cortex_m::asm::nop();
     }
 }

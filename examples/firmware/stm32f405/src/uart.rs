@@ -168,6 +168,13 @@ impl OutputPin for DriverEnable {
 /// Prints.
 pub struct Console(());
 
+impl Console {
+    /// For a panic: whoever had it is gone.
+    pub const fn last_words() -> Self {
+        Self(())
+    }
+}
+
 impl fmt::Write for Console {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         put(USART2, text.as_bytes());

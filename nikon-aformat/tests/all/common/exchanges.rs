@@ -9,7 +9,7 @@ use nikon_aformat::{
 };
 use servowire_world::{Id, Scenario, Speaker, Tally, Transmission, Verdict};
 
-use super::line::{Bench, Spoken, between_ns, frame_ns, host_within, idle_ns, value_of};
+use super::line::{Bench, Spoken, between_ns, events, first_seed, frame_ns, host_within, idle_ns, rates, value_of};
 use super::switches::{Mix, Switches};
 
 /// What a run depends on.
@@ -22,6 +22,35 @@ pub struct Setup {
     pub switches: Switches,
     /// Nothing happens to the line: then nothing may be lost or mistaken.
     pub quiet: bool,
+}
+
+impl Setup {
+    /// A line on which anything happens but in every fourth seed.
+    pub fn hostile(seed: u64) -> Self {
+        Self { scenario: Scenario::random(seed, rates(seed)), quiet: seed % 4 == 0, ..Self::still(seed) }
+    }
+
+    /// A line that does nothing by itself.
+    pub fn still(seed: u64) -> Self {
+        let rate = BitRate::ALL[seed as usize % 5];
+        Self { seed, rate, scenario: Scenario::quiet(), switches: Switches::draw(seed), quiet: false }
+    }
+}
+
+/// Runs seeds until enough has happened.
+pub fn seeds<S: Default>(
+    setup: impl Fn(u64) -> Setup,
+    tally: impl Fn(&S) -> &Tally,
+    run: impl Fn(&Setup, &mut S),
+) -> S {
+    let mut shown = S::default();
+    for seed in first_seed().. {
+        run(&setup(seed), &mut shown);
+        if tally(&shown).events() > events() {
+            break;
+        }
+    }
+    shown
 }
 
 /// A request and the response to it, in numbers of the documents.

@@ -63,7 +63,7 @@ impl Bench {
         let mut answers = Vec::new();
         for (at, content) in contents.iter().enumerate() {
             end_ns += FRAME_NS + if at > 0 { u64::from(gap_bits) * BIT_NS } else { 0 };
-            answers.extend(world.encoders.iter_mut().filter_map(|encoder| encoder.hear(*content, end_ns)));
+            answers.extend(world.encoders.iter_mut().filter_map(|encoder| encoder.hear(*content, true, end_ns)));
         }
         world.sent.push((begin_ns, contents));
         for answer in answers {

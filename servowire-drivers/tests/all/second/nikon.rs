@@ -57,15 +57,21 @@ impl Encoder {
         FRAME_BITS * self.bit_ns
     }
 
-    /// A frame ended at `end_ns`; what it answers, if the request is complete. On a bus an encoder waits for those before it: for
+    /// After the supply was gone for a moment.
+    pub fn restart(&mut self) {
+        self.request.clear();
+        (self.reset, self.latched) = ((0, 0), None);
+    }
+
+    /// A frame ended at `end_ns`, with a delimiter of 1 if it is `framed`; what it answers, if the request is complete. On a bus an encoder waits for those before it: for
     /// each 72 bits and 3 us.
-    pub fn hear(&mut self, content: u16, end_ns: u64) -> Option<Answer> {
+    pub fn hear(&mut self, content: u16, framed: bool, end_ns: u64) -> Option<Answer> {
         if end_ns > self.last_ns + 3 * self.frame_ns() {
             self.request.clear();
         }
         self.last_ns = end_ns;
         // A request begins 0, 1, 0 and has its own check of three bits.
-        if content & 7 != 2 || remainder(&bits(u64::from(content) >> 3, 13), 3, 0b1011) != 0 {
+        if !framed || content & 7 != 2 || remainder(&bits(u64::from(content) >> 3, 13), 3, 0b1011) != 0 {
             self.request.clear();
             return None;
         }

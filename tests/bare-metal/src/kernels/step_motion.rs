@@ -20,9 +20,10 @@ const S_CURVE: Limited = Limited { jerk: 5_000_000, ..TRAPEZOID };
 const S_SHORT: Limited = Limited { steps: 20, ..S_CURVE };
 const S_ENTRY: Limited = Limited { steps: 100, ends: [1000, 500], ..S_CURVE };
 const S_ENTRY_FAST: Limited = Limited { steps: 120, ends: [1900, 500], ..S_CURVE };
-const CRUISE: Limited = Limited { steps: 5000, ends: [20_000; 2], ..TRAPEZOID };
-const LONG_TRAPEZOID: Limited = Limited { steps: 5000, speed: 50_000, ..TRAPEZOID };
-const LONG_S_CURVE: Limited = Limited { jerk: 1_000_000, ..LONG_TRAPEZOID };
+const CRUISE: Limited = Limited { steps: 500, ends: [20_000; 2], ..TRAPEZOID };
+const LONG_S_CURVE: Limited = Limited { steps: 5000, speed: 50_000, jerk: 1_000_000, ..TRAPEZOID };
+const TRAPEZOID_64: Limited = Limited { steps: 64, ..TRAPEZOID };
+const S_CURVE_64: Limited = Limited { steps: 64, ..S_CURVE };
 const FAST: Limited = Limited { speed: 250_000, acceleration: 100_000_000, ..TRAPEZOID };
 
 fn limits(move_: &Limited) -> Option<Limits> {
@@ -33,15 +34,6 @@ fn limits(move_: &Limited) -> Option<Limits> {
 fn planned(move_: &Limited) -> Option<Plan> {
     let [entry, exit] = move_.ends;
     Plan::between(Clock::MICROSECONDS, limits(move_)?, move_.steps, entry, exit).ok()
-}
-
-/// A plan, and its steps by the iterator's `next`.
-fn one_by_one(move_: &Limited) -> Option<u64> {
-    let (plan, mut sum) = (planned(move_)?, 0);
-    for tick in plan.pulses() {
-        sum ^= tick;
-    }
-    Some(sum)
 }
 
 kernels! {
@@ -61,48 +53,18 @@ kernels! {
         Some(planned(move_)?.at(0))
     } over [S_ENTRY, S_ENTRY_FAST];
 
-    /// A trapezoid planned, and its 500 steps, all of them on the ramps.
-    fn step_motion_ramp_500(move_: &Limited) -> Option<u64> {
+    /// A trapezoid planned, and its 64 steps, each one exactly.
+    fn step_motion_ramp_64(move_: &Limited) -> Option<u64> {
         Some(planned(move_)?.pulses().fold(0, |sum, tick| sum ^ tick))
-    } over [TRAPEZOID];
+    } over [TRAPEZOID_64];
 
-    /// An S-curve planned, and its 500 steps, all of them on the ramps.
-    fn step_motion_s_ramp_500(move_: &Limited) -> Option<u64> {
+    /// An S-curve planned, and its 64 steps, each one exactly.
+    fn step_motion_s_ramp_64(move_: &Limited) -> Option<u64> {
         Some(planned(move_)?.pulses().fold(1, |sum, tick| sum ^ tick))
-    } over [S_CURVE];
+    } over [S_CURVE_64];
 
-    /// 5000 steps of a trapezoid as a machine has it, all of them on the ramps, and their plan.
-    fn step_motion_ramp_5000(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.pulses().fold(3, |sum, tick| sum ^ tick))
-    } over [LONG_TRAPEZOID];
-
-    /// The same of an S-curve.
-    fn step_motion_s_ramp_5000(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.pulses().fold(4, |sum, tick| sum ^ tick))
-    } over [LONG_S_CURVE];
-
-    /// The short trapezoid step by step, as a timer's interrupt takes them.
-    fn step_motion_next_500(move_: &Limited) -> Option<u64> {
-        one_by_one(move_)
-    } over [TRAPEZOID];
-
-    /// The short S-curve step by step.
-    fn step_motion_s_next_500(move_: &Limited) -> Option<u64> {
-        Some(one_by_one(move_)? ^ 1)
-    } over [S_CURVE];
-
-    /// The long trapezoid step by step.
-    fn step_motion_next_5000(move_: &Limited) -> Option<u64> {
-        Some(one_by_one(move_)? ^ 2)
-    } over [LONG_TRAPEZOID];
-
-    /// The long S-curve step by step.
-    fn step_motion_s_next_5000(move_: &Limited) -> Option<u64> {
-        Some(one_by_one(move_)? ^ 3)
-    } over [LONG_S_CURVE];
-
-    /// 5000 steps at constant speed, and their plan.
-    fn step_motion_cruise_5000(move_: &Limited) -> Option<u64> {
+    /// 500 steps at constant speed, and their plan.
+    fn step_motion_cruise_500(move_: &Limited) -> Option<u64> {
         Some(planned(move_)?.pulses().fold(2, |sum, tick| sum ^ tick))
     } over [CRUISE];
 
@@ -143,11 +105,11 @@ kernels! {
         Some(Reloads::new(plan.pulses(), 65_535).fold(0, |sum, reload| sum ^ reload.ticks))
     } over [TRAPEZOID, S_CURVE];
 
-    /// Three lines of two axes with their corners, planned and run: 300 steps.
+    /// Three lines of two axes with their corners, planned and run: 60 steps.
     fn step_motion_lines(move_: &Limited) -> Option<u64> {
         let axis = AxisSetup::new(limits(move_)?, 80_000);
         let mut path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).ok()?;
-        for corner in [[100, 50], [200, 30], [200, 80]] {
+        for corner in [[20, 10], [40, 6], [40, 16]] {
             path.push(corner, 100_000).ok()?;
         }
         let mut sum = 0;

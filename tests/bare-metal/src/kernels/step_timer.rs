@@ -103,13 +103,13 @@ kernels_on_states! {
         shuttle.axis.poll()
     } as {
         let Some(mut own) = Shuttle::new(&SLICES, 1000, 2_000_000) else { return 0 };
-        most_tenths(4096, || match step_motion_axis_slice(&mut own, &0) {
-            Work::More => true,
+        most_tenths(4096, |clock| match clock(&mut || step_motion_axis_slice(&mut own, &0)) {
+            Work::More => {}
             Work::Rest => {
                 own.way = -own.way;
-                own.axis.move_to(own.way).is_ok()
+                let _: Result<_, _> = own.axis.move_to(own.way);
             }
-            _ => own.timer.fire().wait() > 0,
+            _ => _ = own.timer.fire(),
         })
     }
 }

@@ -3,9 +3,8 @@
 #![no_main]
 
 use nikon_aformat::BitRate;
-use panic_halt as _;
 
 #[rp2040_hal::entry]
 fn main() -> ! {
-    servowire_rp2040::aformat::encoder(BitRate::Mbit8, 277)
+    servowire_rp2040::aformat::encoder("aformat-encoder", BitRate::Mbit8)
 }

@@ -3,9 +3,8 @@
 #![no_main]
 
 use nikon_aformat::BitRate;
-use panic_halt as _;
 
 #[rp2040_hal::entry]
 fn main() -> ! {
-    servowire_rp2040::aformat::master(BitRate::Mbit2_5)
+    servowire_rp2040::aformat::master("aformat-master-2m5", BitRate::Mbit2_5)
 }

@@ -2,10 +2,9 @@
 #![no_std]
 #![no_main]
 
-use panic_halt as _;
 use tformat::BitRate;
 
 #[rp2040_hal::entry]
 fn main() -> ! {
-    servowire_rp2040::tformat::encoder(BitRate::Mbit2_5, 68)
+    servowire_rp2040::tformat::encoder("tformat-encoder", BitRate::Mbit2_5)
 }

@@ -1,0 +1,232 @@
+//! Steps within limits of speed, acceleration and jerk: planned in the background, made in a timer interrupt.
+
+use core::mem::MaybeUninit;
+
+use step_motion::{Axis, Clock, Direction, Error, Limits, Queue, StepTimer, Work};
+
+use crate::border::{OK, Refused, border, in_range, state, there};
+use crate::result::{Protocol, refused, sw_result_t};
+
+/// Slots of a queue.
+const SLOTS: usize = 129;
+
+/// Refusals of motion, in the order of their numbers.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum sw_motion_error_t {
+    /// The axis is still moving.
+    SW_E_MOTION_MOVING = -0x601,
+    /// Two steps could fall into one tick of the clock.
+    SW_E_MOTION_SPEED_ABOVE_CLOCK = -0x602,
+    /// More steps than 31 bits count.
+    SW_E_MOTION_TOO_MANY_STEPS = -0x603,
+    /// No room.
+    SW_E_MOTION_QUEUE_FULL = -0x604,
+    /// A target outside the soft limits.
+    SW_E_MOTION_SOFT_LIMIT = -0x607,
+    /// Too few steps for the change of speed.
+    SW_E_MOTION_TOO_SHORT = -0x608,
+}
+
+/// What the background has left to do.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum sw_motion_work_t {
+    /// At rest where it is to be.
+    SW_MOTION_REST = 0,
+    /// Poll again.
+    SW_MOTION_MORE = 1,
+    /// Fire the interrupt now: it stands, and there is something for it.
+    SW_MOTION_START = 2,
+    /// Nothing before the interrupt has gone on.
+    SW_MOTION_LATER = 3,
+    /// The stop needs more slots than the queue has: the axis comes to rest.
+    SW_MOTION_TOO_FEW_SLOTS = 4,
+}
+
+/// What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+#[repr(C)]
+#[derive(Debug)]
+pub struct sw_motion_queue_t {
+    pub(crate) _private: [MaybeUninit<u64>; 656],
+}
+const _: () = assert!(size_of::<Queue<SLOTS>>() <= size_of::<sw_motion_queue_t>());
+const _: () = assert!(align_of::<Queue<SLOTS>>() <= align_of::<sw_motion_queue_t>());
+
+/// The end of the background. It belongs to its queue: it is not copied.
+#[repr(C)]
+#[derive(Debug)]
+pub struct sw_motion_axis_t {
+    pub(crate) _private: [MaybeUninit<u64>; 460],
+}
+state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, b"SWma");
+
+/// The end of the interrupt. It belongs to its queue: it is not copied.
+#[repr(C)]
+#[derive(Debug)]
+#[expect(missing_copy_implementations, reason = "it belongs to its queue")]
+pub struct sw_motion_timer_t {
+    pub(crate) _private: [MaybeUninit<u64>; 9],
+}
+state!(sw_motion_timer_t, StepTimer<'static, SLOTS>, b"SWmt");
+
+/// How fast an axis may go.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_motion_limits_t {
+    /// Steps/s³; 0 for a trapezoid.
+    pub jerk: u64,
+    /// Steps/s.
+    pub speed: u32,
+    /// Steps/s².
+    pub acceleration: u32,
+}
+
+/// What the interrupt does.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_motion_fired_t {
+    /// Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+    pub wait: u32,
+    /// 1: make a step now. DIR has been right for the time that the driver needs.
+    pub step: u8,
+    /// The level of DIR from now on, 1 for reverse. It never changes together with a step.
+    pub reverse: u8,
+}
+
+#[inline(always)]
+fn error(error: Error) -> Refused {
+    refused(Protocol::Motion, error.class().number())
+}
+
+fn limits(it: &sw_motion_limits_t) -> Result<Limits, Refused> {
+    let limits = in_range(Limits::new(it.speed, it.acceleration).ok())?;
+    if it.jerk == 0 { Ok(limits) } else { in_range(limits.with_jerk(it.jerk).ok()) }
+}
+
+/// An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
+/// second. While it is called neither end is in use.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_start(
+    axis: Option<&mut MaybeUninit<sw_motion_axis_t>>,
+    timer: Option<&mut MaybeUninit<sw_motion_timer_t>>,
+    queue: Option<&'static mut MaybeUninit<sw_motion_queue_t>>,
+    clock_hz: u32,
+    limit: Option<&sw_motion_limits_t>,
+) -> sw_result_t {
+    border(|| {
+        let (axis, timer, place) = (there(axis)?, there(timer)?, there(queue)?.as_mut_ptr().cast::<Queue<SLOTS>>());
+        let (clock, limits) = (in_range(Clock::new(clock_hz))?, limits(there(limit)?)?);
+        // SAFETY: large enough and aligned, as asserted above; nobody uses it.
+        unsafe { place.write(Queue::new()) };
+        // SAFETY: it was written, and the caller leaves it where it is for ever; from now on it is only shared.
+        let queue: &'static Queue<SLOTS> = unsafe { &*place };
+        let (background, interrupt) = Axis::new(queue, clock, limits).map_err(error)?;
+        sw_motion_axis_t::start(Some(axis), background)?;
+        sw_motion_timer_t::start(Some(timer), interrupt)?;
+        OK
+    })
+}
+
+/// The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_fire(
+    timer: Option<&mut sw_motion_timer_t>,
+    fired: Option<&mut MaybeUninit<sw_motion_fired_t>>,
+) -> sw_result_t {
+    border(|| {
+        let (timer, out) = (sw_motion_timer_t::get(timer)?, there(fired)?);
+        let fired = timer.fire();
+        let reverse = u8::from(fired.direction() == Direction::Reverse);
+        out.write(sw_motion_fired_t { wait: fired.wait(), step: fired.is_step().into(), reverse });
+        OK
+    })
+}
+
+/// A slice of planning, in the background: sw_motion_work_t, or a refusal.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_poll(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
+    border(|| {
+        Ok(match sw_motion_axis_t::get(axis)?.poll() {
+            Work::Rest => sw_motion_work_t::SW_MOTION_REST,
+            Work::More => sw_motion_work_t::SW_MOTION_MORE,
+            Work::Start => sw_motion_work_t::SW_MOTION_START,
+            Work::Later => sw_motion_work_t::SW_MOTION_LATER,
+            Work::TooFewSlots => sw_motion_work_t::SW_MOTION_TOO_FEW_SLOTS,
+        } as sw_result_t)
+    })
+}
+
+/// To a position in steps.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_move_to(axis: Option<&mut sw_motion_axis_t>, target: i64) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.move_to(target).map_err(error)?;
+        OK
+    })
+}
+
+/// On and on at this speed, steps/s; `reverse` is 0 or 1.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_run(axis: Option<&mut sw_motion_axis_t>, reverse: u8, speed: u32) -> sw_result_t {
+    border(|| {
+        let direction = in_range(Direction::from_code(reverse))?;
+        sw_motion_axis_t::get(axis)?.run(direction, speed).map_err(error)?;
+        OK
+    })
+}
+
+/// To rest within the limits; the target is forgotten.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_stop(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.stop();
+        OK
+    })
+}
+
+/// No step any more, at once.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_halt(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.halt();
+        OK
+    })
+}
+
+/// To rest within the limits; sw_motion_resume() goes on.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_hold(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.hold();
+        OK
+    })
+}
+
+/// Goes on after sw_motion_hold().
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_resume(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.resume();
+        OK
+    })
+}
+
+/// Where the axis is commanded to be, in steps.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_commanded(
+    axis: Option<&sw_motion_axis_t>,
+    position: Option<&mut MaybeUninit<i64>>,
+) -> sw_result_t {
+    border(|| {
+        let (axis, position) = (sw_motion_axis_t::look(axis)?, there(position)?);
+        position.write(axis.commanded());
+        OK
+    })
+}
+
+/// Whether the axis stands; false for a state that was not started.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_is_at_rest(axis: Option<&sw_motion_axis_t>) -> bool {
+    sw_motion_axis_t::look(axis).is_ok_and(Axis::is_at_rest)
+}

@@ -1,0 +1,144 @@
+//! Blocks of the 16-byte mode to and from C structs.
+
+use core::mem::MaybeUninit;
+
+use rtex_block::{
+    Command, CommandBlock, ControlBits, CyclicCode, Error, LEN, MacId, NonCyclicCode, NonCyclicCommand, Response,
+    ResponseBlock, UpdateCounter,
+};
+
+use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
+use crate::result::{Protocol, refused, sw_result_t};
+
+/// What a controller sends.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_rtex_command_t {
+    /// Command_Data1.
+    pub command_data1: i32,
+    /// Control bits: sw_rtex_control_t; byte 2 is the low one.
+    pub control: u16,
+    /// Bytes 8 to 15, as the non-cyclic command lays them out.
+    pub data: [u8; 8],
+    /// Mac-ID, 0..31.
+    pub mac_id: u8,
+    /// Update_Counter, 0..3.
+    pub update_counter: u8,
+    /// TMG_CNT, 0 or 1.
+    pub tmg_cnt: u8,
+    /// Cyclic code: sw_rtex_mode_t, 0 for NOP.
+    pub cyclic: u8,
+    /// Non-cyclic code.
+    pub noncyclic: u8,
+}
+
+/// What a drive sends: as received, not yet a position.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_rtex_response_t {
+    /// Response_Data1.
+    pub response_data1: i32,
+    /// Status flags: sw_rtex_status_t; byte 2 is the low one.
+    pub status: u16,
+    /// Bytes 8 to 15, as the non-cyclic response lays them out.
+    pub data: [u8; 8],
+    /// Actual_MAC-ID.
+    pub mac_id: u8,
+    /// Update_Counter_Echo.
+    pub update_counter_echo: u8,
+    /// CMD_Error, 0 or 1.
+    pub cmd_error: u8,
+    /// Cyclic code, 0..15.
+    pub cyclic: u8,
+    /// Non-cyclic code, 0..7.
+    pub noncyclic: u8,
+}
+
+#[inline(always)]
+pub(super) fn error(error: Error) -> sw_result_t {
+    refused(Protocol::Rtex, error.class().number())
+}
+
+/// The response in a block of 16 bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_rtex_parse_response(
+    bytes: *const u8,
+    len: usize,
+    response: Option<&mut MaybeUninit<sw_rtex_response_t>>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller of the C function vouches for his memory.
+        let bytes = unsafe { read(bytes, len)? };
+        let response = there(response)?;
+        let block = ResponseBlock::new(bytes).map_err(error)?;
+        // What a block says is what it says whole: the same checks as of the owned form.
+        let _ = Response::parse(bytes).map_err(error)?;
+        response.write(sw_rtex_response_t {
+            response_data1: block.response_data1(),
+            status: u16::from_le_bytes(block.status().to_bytes()),
+            data: block.noncyclic_bytes(),
+            mac_id: block.mac_id().get(),
+            update_counter_echo: block.update_counter_echo().get(),
+            cmd_error: block.cmd_error().into(),
+            cyclic: block.code().cyclic_bits(),
+            noncyclic: block.code().noncyclic_bits(),
+        });
+        OK
+    })
+}
+
+/// The command in a block of 16 bytes, as a drive receives it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_rtex_parse_command(
+    bytes: *const u8,
+    len: usize,
+    command: Option<&mut MaybeUninit<sw_rtex_command_t>>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller of the C function vouches for his memory.
+        let bytes = unsafe { read(bytes, len)? };
+        let command = there(command)?;
+        let block = CommandBlock::new(bytes).map_err(error)?;
+        let whole = block.to_owned().map_err(error)?;
+        command.write(sw_rtex_command_t {
+            command_data1: whole.command_data1,
+            control: u16::from_le_bytes(whole.control.to_bytes()),
+            data: block.noncyclic_bytes(),
+            mac_id: whole.mac_id.get(),
+            update_counter: whole.update_counter.get(),
+            tmg_cnt: whole.tmg_cnt.into(),
+            cyclic: block.code().cyclic_bits(),
+            noncyclic: block.code().noncyclic_bits(),
+        });
+        OK
+    })
+}
+
+fn command(it: &sw_rtex_command_t) -> Result<Command, Refused> {
+    let noncyclic = in_range(NonCyclicCode::from_code(it.noncyclic))?;
+    Ok(Command {
+        mac_id: in_range(MacId::new(it.mac_id))?,
+        update_counter: in_range(UpdateCounter::new(it.update_counter))?,
+        tmg_cnt: in_range((it.tmg_cnt < 2).then_some(it.tmg_cnt == 1))?,
+        cyclic: in_range(CyclicCode::from_code(it.cyclic))?,
+        control: ControlBits::from_bytes(it.control.to_le_bytes()),
+        command_data1: it.command_data1,
+        noncyclic: NonCyclicCommand::parse(noncyclic, it.data),
+    })
+}
+
+/// The block of a command, 16 bytes. Reserved bits are sent as 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_rtex_build_command(
+    it: Option<&sw_rtex_command_t>,
+    bytes: *mut u8,
+    size: usize,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller of the C function vouches for his memory.
+        let bytes = unsafe { room(bytes, size)? };
+        let block: [u8; LEN] = command(there(it)?)?.emit();
+        fill(bytes, &block)?;
+        OK
+    })
+}

@@ -1,0 +1,105 @@
+/* SORTE frames and PTO words, and the step time sequence. */
+#include "rows.h"
+
+/* OUTPUT_LEN FRAME: the frame built again from what was parsed, and its time stamp. */
+static void master(char **a, int n)
+{
+    block_t frame = hex(a[1]);
+    size_t output = (size_t)number(a[0]), len = 0;
+    sw_sorte_master_frame_t it;
+    uint8_t back[2048];
+    sw_result_t r = sw_sorte_parse_master_frame(frame.at, frame.len, output, &it);
+    (void)n;
+    say("%s", sw_text(r));
+    if (r == SW_OK) {
+        r = sw_sorte_build_master_frame(frame.at + SW_SORTE_DATA_AT, output, it.time_stamp, back, sizeof back, &len);
+        say(" %u status %02x %s", it.time_stamp, it.status, sw_text(r));
+        say_hex(back, len);
+        say_hex(frame.at + SW_SORTE_DATA_AT, output);
+    }
+}
+
+static void device(char **a, int n)
+{
+    block_t frame = hex(a[1]);
+    sw_sorte_device_frame_t it;
+    uint8_t back[6];
+    sw_result_t r = sw_sorte_parse_device_frame(frame.at, frame.len, (size_t)number(a[0]), &it);
+    (void)n;
+    say("%s", sw_text(r));
+    if (r == SW_OK) {
+        say(" address %u status %u %s", it.address, it.status,
+            sw_text(sw_sorte_build_device_frame(&it, frame.at + SW_SORTE_DATA_AT, back, sizeof back)));
+        say_hex(back, sizeof back);
+        say_hex(frame.at + SW_SORTE_DATA_AT, 3);
+    }
+}
+
+static void pto(char **a, int n)
+{
+    static const char *const kinds[] = {"no_pulse", "pulse", "driver_off", "reserved"};
+    sw_sorte_pto_t it = {0, 0, 0};
+    (void)n;
+    say("%s", sw_text(sw_sorte_parse_pto((uint16_t)strtoul(a[0], NULL, 16), &it)));
+    say(" %s start %u direction %u", kinds[it.kind], it.start_ns, it.direction);
+}
+
+static void pto_of_step(char **a, int n)
+{
+    uint16_t word = 0;
+    sw_result_t r = sw_sorte_pto_of_step((uint32_t)number(a[0]), (uint8_t)number(a[1]), &word);
+    (void)n;
+    say("%s", sw_text(r));
+    if (r == SW_OK) {
+        say(" %04x", word);
+    }
+}
+
+/* ENTRY SPEED PREV: as the PRU, and corrected. */
+static void step(char **a, int n)
+{
+    uint32_t entry = (uint32_t)number(a[0]), speed = (uint32_t)number(a[1]), prev = (uint32_t)number(a[2]);
+    sw_step_time_t pru = {0, 0}, right = {0, 0};
+    (void)n;
+    (void)sw_step_next_as_pru(entry, speed, prev, &pru);
+    (void)sw_step_next(sw_step_time_ns(entry, speed), prev, &right);
+    say("%u pru %u %u right %u %u", sw_step_time_ns(entry, speed), pru.cnt, pru.sync, right.cnt, right.sync);
+}
+
+static void ramp(char **a, int n)
+{
+    (void)n;
+    say("%u", sw_step_ramp((uint8_t)number(a[0])));
+}
+
+static void speed(char **a, int n)
+{
+    uint32_t it = 0;
+    (void)n;
+    say("%s", sw_text(sw_step_speed((uint32_t)number(a[0]), &it)));
+    say(" %u %s", it, sw_text(sw_step_check(it, 1, 0, NULL)));
+}
+
+static void params(char **a, int n)
+{
+    bool exact = false;
+    sw_result_t r = sw_step_check((uint32_t)number(a[0]), (uint32_t)number(a[1]), (uint32_t)number(a[2]), &exact);
+    (void)n;
+    say("%s", sw_text(r));
+    if (r == SW_OK) {
+        say(" %d", exact);
+    }
+}
+
+static void duration(char **a, int n)
+{
+    uint64_t ns = 0;
+    (void)n;
+    say("%s", sw_text(sw_step_duration_ns((uint32_t)number(a[0]), (uint32_t)number(a[1]), (uint32_t)number(a[2]), (uint32_t)number(a[3]), &ns)));
+    say(" %llu", (unsigned long long)ns);
+}
+
+const entry_t sorte_commands[] = {
+    {"sorte_master", master}, {"sorte_device", device}, {"sorte_pto", pto}, {"sorte_pto_of_step", pto_of_step}, {"step_next", step},
+    {"step_ramp", ramp}, {"step_speed", speed}, {"step_params", params}, {"step_duration", duration}, {NULL, NULL},
+};
