@@ -40,6 +40,7 @@ pub enum sw_code_t {
 pub(crate) enum Protocol {
     Tformat = 1,
     Aformat = 2,
+    Hdsl = 3,
     Rtex = 4,
     Sorte = 5,
     Motion = 6,
@@ -127,6 +128,7 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
     let names: &'static [u8] = match protocol {
         1 => names!(tformat::ErrorClass),
         2 => names!(nikon_aformat::ErrorClass),
+        3 => names!(hdsl::ErrorClass),
         4 => names!(rtex_block::ErrorClass),
         5 => names!(sorte_proto::ErrorClass),
         6 => names!(step_motion::ErrorClass),
@@ -167,6 +169,10 @@ mod tests {
         }
         for class in step_profile::ErrorClass::ALL {
             let code = refused(Protocol::Step, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
+        for class in hdsl::ErrorClass::ALL {
+            let code = refused(Protocol::Hdsl, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
         for class in nikon_aformat::ErrorClass::ALL {
