@@ -1,11 +1,12 @@
-"""Compares the figures in the READMEs of the images with what was measured.
+"""Compares the table of figures in examples/firmware/README.md, and those in the READMEs of the images, with what was measured.
 
     python3 figures.py OBJDUMP MEASURED
 
 MEASURED is what the runs have noted, a line each: image, what, number, between tabs. Flash and static RAM are read from the ELF files;
 the stack of an image that has not run is the bound of stack.py; instructions of what was counted on a Cortex-M4 are those of
 tests/bare-metal/budget.toml, by the name of the kernel that stands behind them in the README. Fails if a README is more than 5 % off,
-if a figure is missing, or if more stack was used than the bound allows.
+if a figure is missing, or if more stack was used than the bound allows. The worst interrupt is the longest way through the handler that
+stands behind it, by interrupts.py; `none` is compared with the vectors.
 """
 
 import json
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tomllib
 
+import interrupts
 import stack
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -24,7 +26,7 @@ FIRMWARE = ROOT / "examples" / "firmware"
 RAM = {"riscv32imc-unknown-none-elf": 0x3FC80000}
 ARM_RAM = 0x20000000
 BAND = 0.05
-COLUMNS = ["image", "flash", "static RAM", "stack", "instructions a cycle"]
+COLUMNS = ["image", "flash", "static RAM", "stack", "instructions a cycle", "worst interrupt"]
 # Folder, target, and whether the stack in the README is that of a run. How deep the interrupts of the STM32F405 nest in QEMU depends on
 # the host, so its README has the bound.
 IMAGES = [
@@ -78,6 +80,17 @@ def rows(text):
         yield names, cells[1:]
 
 
+def interrupted(objdump, path, said):
+    """What is wrong with what a README says of the worst interrupt of an image."""
+    if said == "none":
+        handlers = interrupts.Image(objdump, path).handlers()
+        return [f"{path.name}: it has handlers for {', '.join(sorted(handlers))}"] if handlers else []
+    longest, handler = number(said)
+    is_ = interrupts.longest(objdump, path, handler)
+    print(f"{path.name}: {handler} takes {is_} instructions at the most")
+    return [f"{path.name}, {handler}: the README says {longest:g}, it is {is_}"] if abs(longest - is_) > BAND * is_ else []
+
+
 def main():
     objdump, noted = sys.argv[1:]
     kernels = tomllib.loads((ROOT / "tests/bare-metal/budget.toml").read_text())["kernels"]
@@ -95,10 +108,12 @@ def main():
         if abs(said - is_) > BAND * is_:
             faults.append(f"{place}: the README says {said:g}, measured is {is_:g}")
 
+    table = list(rows((FIRMWARE / "README.md").read_text()))
     for folder, target, runs in IMAGES:
         readme = (FIRMWARE / folder / "README.md").read_text()
         place, images = built(folder, target)
-        for names, cells in rows(readme):
+        for names, cells in [row for row in table if images & set(row[0])]:
+            *cells, interrupt = cells
             (flash, _), (ram, _), (deep, _), (count, kernel) = map(number, cells)
             for name in names:
                 images.discard(name)
@@ -113,10 +128,13 @@ def main():
                 compare(f"{name}, static RAM", ram, is_ram)
                 compare(f"{name}, stack", deep, used)
                 compare(f"{name}, instructions a cycle", count, counted)
+                if target.startswith("thumb"):
+                    compared += 1
+                    faults += interrupted(objdump, path, interrupt)
                 if ran > bound:
                     faults.append(f"{name}: {ran:g} bytes of stack were used, {bound} is the bound")
         if images:
-            faults.append(f"{folder}: the README has no figures of {', '.join(sorted(images))}")
+            faults.append(f"{folder}: README.md has no figures of {', '.join(sorted(images))}")
         # In the text: `1,426 (`tformat_transaction`)`.
         for said, kernel in re.findall(r"([\d,]+)(?: instructions)? \(`(\w+)`", readme):
             compare(f"{folder}, {kernel}", number(said)[0], kernels[kernel]["O3"])
