@@ -10,12 +10,12 @@ use crate::event::{Direction, Event, Place, Value, Verdict};
 const COLUMNS: [&str; 17] = [
     "file",
     "channel",
+    "address",
     "protocol",
     "line",
     "start_us",
     "end_us",
     "direction",
-    "address",
     "kind",
     "position",
     "turns",
@@ -73,6 +73,7 @@ impl<W: Write> Csv<W> {
         let out = &mut self.out;
         out.write_field(&origin.file)?;
         out.write_field(lane.map_or("", |lane| &lane.channel))?;
+        out.write_field(event.address.map_or_else(String::new, |address| address.to_string()))?;
         out.write_field(lane.map_or("", |lane| lane.protocol.title))?;
         match event.place {
             Place::Line(line) => [line.to_string(), String::new(), String::new()],
@@ -85,7 +86,6 @@ impl<W: Write> Csv<W> {
             Some(Direction::Answer) => "answer",
             None => "",
         })?;
-        out.write_field(event.address.map_or_else(String::new, |address| address.to_string()))?;
         out.write_field(event.kind.as_bytes())?;
         out.write_field(event.position.map_or_else(String::new, |position| position.counts.to_string()))?;
         let turns = event.position.and_then(|position| position.turns());
