@@ -1,18 +1,27 @@
 //! What is said of captures and of the lines in them, for every command that decodes.
 
+use std::cell::RefCell;
+use std::error::Error;
 use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
 use std::sync::LazyLock;
 
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use rtex_block::position::Gear;
-use servowire_decode::capture::{Format, Hints};
+use servowire_decode::capture::{self, Format, Hints};
 use servowire_decode::codec::Codec;
+use servowire_decode::fault::Stop;
+use servowire_decode::output::Output;
+use servowire_decode::output::filter::Filter;
+use servowire_decode::output::printer::Printer;
 use servowire_decode::protocols::CODECS;
+use servowire_decode::recognition::Note;
 use servowire_decode::settings::{Options, Rtex, Settings, Widths};
 use servowire_decode::time;
 
 use crate::units::{bit_rate, frequency};
+use crate::{files, interrupt};
 
 /// A protocol by its name, or whatever the capture holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -241,5 +250,50 @@ impl Reading {
                 gear: self.rtex.gear.unwrap_or(Gear::UNITY),
             },
         }
+    }
+}
+
+/// What came of decoding a file.
+#[derive(Debug, Default)]
+pub(crate) struct Read {
+    /// What was found, in sentences.
+    pub(crate) notes: Vec<String>,
+    /// Why nothing more could be read.
+    pub(crate) fault: Option<String>,
+    /// The refused frames in a sentence.
+    pub(crate) refusals: Option<String>,
+}
+
+impl Reading {
+    /// Decodes a file into several printers.
+    pub(crate) fn decode<'a>(
+        &self,
+        path: &Path,
+        first: &'a mut dyn Printer,
+        beside: Vec<&'a mut dyn Printer>,
+        filter: Option<&'a mut Filter>,
+    ) -> Result<Read, Box<dyn Error>> {
+        let input = files::open(path, false)?;
+        let name = input.name().to_owned();
+        let capture = capture::open(input, self.hints())?;
+        let notes = RefCell::new(Vec::new());
+        let note = |note: &Note| notes.borrow_mut().push(note.to_string());
+        let mut out = Output::new(&name, first).with_notes(&note).with_enough(&interrupt::asked);
+        for printer in beside {
+            out = out.with_beside(Some(printer));
+        }
+        if let Some(filter) = filter {
+            out = out.with_filter(filter);
+        }
+        out.begin()?;
+        let fault = match servowire_decode::decode(&name, capture, self.protocol.0, &self.settings(), &mut out) {
+            Ok(()) => None,
+            Err(Stop::Fault(fault)) => Some(fault.to_string()),
+            Err(Stop::Output(error)) => return Err(error.into()),
+        };
+        out.end()?;
+        let refusals = out.refusals();
+        drop(out);
+        Ok(Read { notes: notes.into_inner(), fault, refusals })
     }
 }

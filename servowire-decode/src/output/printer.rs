@@ -41,6 +41,14 @@ impl Origin {
         Speaker { lane: self.speaks, address: event.address }
     }
 
+    /// Whether a speaker is meant by what a person wrote: its name, its channel, its address, or both as `A/3`.
+    pub fn is_meant(&self, speaker: Speaker, what: &str) -> bool {
+        let channel = self.lanes.get(speaker.lane).map_or("", |lane| lane.channel.as_str());
+        let address = speaker.address.map(|address| address.to_string());
+        let both = what.rsplit_once('/').is_some_and(|(a, b)| a == channel && address.as_deref() == Some(b));
+        what == channel || address.as_deref() == Some(what) || both || what == self.name(speaker)
+    }
+
     /// A name of a speaker for a person: its channel, where there are several, and its address. Empty where there is no other.
     pub fn name(&self, speaker: Speaker) -> String {
         let lane = self.lanes.get(speaker.lane).filter(|_| self.lanes.len() > 1);

@@ -402,9 +402,12 @@ fn a_remark_on_the_log_is_counted_nowhere() {
     assert_eq!((events.len(), last["kind"].as_str()), (21, Some("log")), "{last}");
     // It stands at the end of the log.
     assert_eq!(last["line"], events[19]["line"]);
-    let stats = bench.decode("log.txt", &text, &[&options[..], &["--stats"]].concat());
-    assert!(stats.out.contains("14 requests, 6 answers, 0 others"), "{}", stats.out);
-    assert!(stats.out.contains("12 ok, 8 refused"), "{}", stats.out);
+    // All drives together.
+    let figures = bench.decode("log.txt", &text, &[&options[..], &["--stats", "--json"]].concat()).json();
+    let sum = |key: &str| figures.iter().map(|own| own[key].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(["requests", "answers", "others", "ok"].map(sum), [14, 6, 0, 12]);
+    let refused = figures.iter().flat_map(|own| own["refused"].as_object().unwrap().values());
+    assert_eq!(refused.filter_map(serde_json::Value::as_u64).sum::<u64>(), 8);
     // Its line has no verdict, as it is no frame.
     let shown = bench.decode("log.txt", &text, &options).out;
     assert!(!shown.trim_end().ends_with("ok"), "{shown}");
