@@ -10,7 +10,8 @@
 #include <stddef.h>
 
 /**
- * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`.
+ * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
+ * on, so that some time less or more than it is refused too.
  */
 #define SW_NO_TIME UINT64_MAX
 
@@ -330,6 +331,10 @@ enum sw_code_t
      * There is no such value now: nothing was exchanged yet, or it was something else.
      */
     SW_E_NO_VALUE = -6,
+    /**
+     * An exchange is pending, or the line is not free yet at this time: nothing was begun.
+     */
+    SW_E_NOT_FREE = -7,
 };
 #ifndef __cplusplus
 typedef int32_t sw_code_t;
@@ -2084,7 +2089,8 @@ sw_result_t sw_aformat_set_hand_over(sw_aformat_t *m, uint32_t hand_over_ns, uin
 
 /**
  * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
- * way, and those with one answer to one encoder. SW_SEND with `to_send` filled.
+ * way, and those with one answer to one encoder. SW_SEND with `to_send` filled; SW_E_NOT_FREE while an exchange is pending,
+ * and before the time of sw_aformat_until_ns().
  */
 sw_result_t sw_aformat_read(sw_aformat_t *m,
                             uint8_t command,
@@ -2715,7 +2721,7 @@ sw_result_t sw_tformat_tolerate(sw_tformat_t *m,
 
 /**
  * Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
- * and `to_send` is filled.
+ * and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before the time of sw_tformat_until_ns().
  */
 sw_result_t sw_tformat_read(sw_tformat_t *m,
                             uint8_t id,

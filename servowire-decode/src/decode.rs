@@ -26,7 +26,8 @@ pub fn decode(
         // Whatever was asked for: what has packets.
         (Capture::Packets(mut packets), _) => {
             let mut foreign: BTreeMap<&'static str, u64> = BTreeMap::new();
-            while let Some(packet) = packets.packet()? {
+            while let Some(mut packet) = packets.packet()? {
+                packet.has_fcs = settings.fcs.unwrap_or(packet.has_fcs);
                 if let Some(traffic) = packet.traffic() {
                     *foreign.entry(traffic).or_default() += 1;
                 } else {

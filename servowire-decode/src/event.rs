@@ -22,10 +22,14 @@ pub struct Event {
     pub position: Option<Position>,
     /// The encoder, drive or device that speaks or is asked, where the protocol has addresses and this one is known.
     pub address: Option<u32>,
+    /// What happened with this frame that belongs in a list of events: an alarm, a servo that is switched on.
+    pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+    /// Whether the times of its place are counted, as by the update counter of a drive, and not measured.
+    pub counted: bool,
     /// Whether this is no frame but a word about the recording, which is counted nowhere.
     pub remark: bool,
 }
@@ -46,8 +50,10 @@ impl Event {
             fields,
             position: None,
             address: None,
+            happened: Vec::new(),
             delay: None,
             verdict,
+            counted: false,
             remark: false,
         }
     }

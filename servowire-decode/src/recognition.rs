@@ -34,6 +34,8 @@ pub struct Recognition {
     pub rates: Rates,
     /// The first frames by their verdict.
     pub tally: Tally,
+    /// Whether these are all.
+    pub whole: bool,
     /// The next best protocol and rate of the same channel, if it is close.
     pub rival: Option<(&'static dyn Codec, u32)>,
 }
@@ -69,7 +71,8 @@ impl fmt::Display for Recognition {
             (None, None) => {}
         }
         let Tally { ok, refused, .. } = self.tally;
-        write!(f, ": {}, {ok} of {} frames hold", self.protocol.title, ok + refused)?;
+        let first = if self.whole { "" } else { "the first " };
+        write!(f, ": {}, {ok} of {first}{} frames hold", self.protocol.title, ok + refused)?;
         if let Some((protocol, rate)) = self.rival {
             write!(f, "; next {} at {} Mbit/s", protocol.title, mbit(f64::from(rate)))?;
         }

@@ -14,6 +14,7 @@ mod periods;
 mod plot;
 mod power;
 mod program;
+mod queue;
 mod record;
 mod report;
 mod scaling;

@@ -108,6 +108,10 @@ pub(crate) struct FileArgs {
     /// The file still grows: what comes to it is decoded too, until the program is stopped.
     #[arg(long)]
     pub(crate) follow: bool,
+    /// Whether the packets of a network capture end with their frame check sequence, which most network cards take off;
+    /// otherwise as the file says.
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    fcs: Option<bool>,
     /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     threshold: Option<f64>,
@@ -162,7 +166,7 @@ pub(crate) struct RtexArgs {
     /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
     #[arg(long, value_name = "BYTES", value_parser = block_size)]
     block_size: Option<u8>,
-    /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
+    /// Update period, as 500us or 0.5ms: gives a log without times its times, and checks the steps of the position.
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) period: Option<u32>,
     /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
@@ -178,6 +182,14 @@ fn period(text: &str) -> Result<u32, String> {
     match time::duration(text).map(|time| (time.ps() + 500) / 1000) {
         Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
         _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
+    }
+}
+
+fn yes_or_no(text: &str) -> Result<bool, &'static str> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("yes or no"),
     }
 }
 
@@ -204,6 +216,7 @@ impl Reading {
             (self.file.record_size.is_some(), "--record-size"),
             (self.file.threshold.is_some(), "--threshold"),
             (self.file.follow, "--follow"),
+            (self.file.fcs.is_some(), "--fcs"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
             (self.file.unit_size.is_some(), "--unit-size"),
@@ -248,7 +261,9 @@ impl Reading {
                 mac_id: self.rtex.mac_id,
                 period_ns: self.rtex.period,
                 gear: self.rtex.gear.unwrap_or(Gear::UNITY),
+                whole: false,
             },
+            fcs: self.file.fcs,
         }
     }
 }
@@ -288,7 +303,7 @@ impl Reading {
         out.begin()?;
         let fault = match servowire_decode::decode(&name, capture, self.protocol.0, &self.settings(), &mut out) {
             Ok(()) => None,
-            Err(Stop::Fault(fault)) => Some(fault.to_string()),
+            Err(Stop::Fault(fault) | Stop::Trouble(fault)) => Some(fault.to_string()),
             Err(Stop::Output(error)) => return Err(error.into()),
         };
         out.end()?;

@@ -117,7 +117,9 @@ static void exchange(void)
     angle = 5;
     CHECK(!sw_tformat_angle(&m, 1066981, 62500, &angle) && angle == 5);
     CHECK(sw_tformat_doubt(&m, 1066981, 62500) == SW_TFORMAT_DOUBT_OLD);
-    CHECK(!sw_tformat_angle(&m, SW_NO_TIME, UINT64_MAX, &angle) && angle == 5);
+    CHECK(!sw_tformat_angle(&m, SW_NO_TIME, UINT64_MAX, &angle) && !sw_tformat_angle(&m, SW_NO_TIME - 4000, UINT64_MAX, &angle));
+    CHECK(sw_tformat_hear(&m, answer, 11, SW_NO_TIME - 4000) == SW_E_CLOCK && angle == 5);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1050999, &tx) == SW_E_NOT_FREE);
 
     /* A damaged answer is refused, and the position grows old. */
     memcpy(damaged, answer, sizeof damaged);
@@ -127,9 +129,13 @@ static void exchange(void)
     CHECK(strcmp(sw_text(SW_E_TFORMAT_CRC), "crc") == 0 && strcmp(sw_text(-9999), "unknown") == 0);
     CHECK(!sw_tformat_angle(&m, 1155000, 62500, &angle));
 
+    /* A late answer may still come: asked at 1104 us, 10 us for its start, eleven fields. */
+    CHECK(sw_tformat_until_ns(&m) == 1158000 && sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1157999, &tx) == SW_E_NOT_FREE);
+
     /* Nobody answers: 10 us, a field and the time to hand it over, then it is over. */
     CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1200000, &tx) == SW_SEND);
     CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m) - 1) == SW_PENDING);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 9000000, &tx) == SW_E_NOT_FREE);
     CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m)) == SW_E_TFORMAT_NO_RESPONSE);
 }
 
@@ -219,6 +225,7 @@ static void bus(void)
     CHECK(sw_aformat_read(&m, 12, 3, 0, &tx) == SW_E_ARGUMENT && sw_aformat_read(&m, 0, 3, 0, &tx) == SW_E_ARGUMENT);
     CHECK(sw_aformat_read(&m, 4, 0, 0, &tx) == SW_E_ARGUMENT);
     CHECK(sw_aformat_read(&m, 4, 3, 0, &tx) == SW_SEND && tx.len == 1 && tx.end_ns == 4500);
+    CHECK(sw_aformat_read(&m, 4, 3, 9000000, &tx) == SW_E_NOT_FREE);
     CHECK(sw_aformat_hear(&m, contents, framed, 49, 25500) == SW_E_ARGUMENT);
     CHECK(sw_aformat_hear(&m, contents, framed, 4, 25500) == SW_PENDING && sw_aformat_missing(&m) == 2);
     CHECK(sw_aformat_response(&m, 0, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));

@@ -18,6 +18,7 @@ static sw_tformat_t m;
 static sw_tformat_transmission_t tx;
 static sw_clock_t clk;
 static uint32_t angle, ticks_now;
+static uint64_t begin_ns;
 static volatile sw_result_t sink;
 
 static sw_result_t empty(void)
@@ -30,10 +31,11 @@ static sw_result_t parse_single(void) { return sw_tformat_parse_single_turn(sing
 static sw_result_t parse_any(void) { return sw_tformat_parse(&ask_all, all, 11, &response); }
 static sw_result_t exchange(void)
 {
-    (void)sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 0, &tx);
-    return sw_tformat_hear(&m, all, 11, 51000);
+    begin_ns += 100000;
+    (void)sw_tformat_read(&m, SW_TFORMAT_READ_ALL, begin_ns, &tx);
+    return sw_tformat_hear(&m, all, 11, begin_ns + 51000);
 }
-static sw_result_t judged(void) { return sw_tformat_angle(&m, 60000, 100000, &angle) ? 0 : -1; }
+static sw_result_t judged(void) { return sw_tformat_angle(&m, begin_ns + 60000, 100000, &angle) ? 0 : -1; }
 static sw_result_t clock_ns(void)
 {
     ticks_now += 1000;
@@ -78,8 +80,8 @@ int main(void)
     cost("typed parse of ID 3", parse_all, 58);
     cost("typed parse of ID 0", parse_single, 46);
     cost("generic parse of ID 3", parse_any, 132);
-    cost("exchange: read and hear", exchange, 1300);
-    cost("angle, judged", judged, 62);
+    cost("exchange: read and hear", exchange, 1330);
+    cost("angle, judged", judged, 64);
     cost("clock", clock_ns, 34);
     return worst | (all_data.abs != 3915817) | (single_data.abs != 1883572) | (sink < 0);
 }

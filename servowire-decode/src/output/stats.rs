@@ -11,6 +11,8 @@ use crate::time::Time;
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
+/// Events that are listed of each; further ones are counted.
+const EVENTS: usize = 1_000;
 
 /// Collects figures and prints them at the end of a file.
 pub struct Stats<W> {
@@ -45,6 +47,11 @@ struct Figures {
     untimed: u64,
     jumps: u64,
     listed: Vec<Jump>,
+    /// Times are counted and say nothing of a cycle.
+    counted: bool,
+    /// What happened, and where; and how much of it there was.
+    happened: Vec<(Place, String)>,
+    events: usize,
 }
 
 /// A position, and how far it moved at most.
@@ -133,6 +140,10 @@ impl Figures {
             }
             Verdict::Refused(refusal) => *self.refused.entry(refusal.class).or_default() += 1,
         }
+        self.counted |= event.counted;
+        self.events += event.happened.len();
+        let room = EVENTS.saturating_sub(self.happened.len());
+        self.happened.extend(event.happened.iter().take(room).map(|what| (event.place, what.clone())));
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
@@ -153,8 +164,8 @@ impl Figures {
     fn missing(&self) -> Option<&'static str> {
         match (self.positions.is_empty(), self.untimed) {
             (false, _) => None,
-            (true, 0) => Some("no position of a single axis is seen (a log of RTEX blocks needs --mac-id)"),
-            (true, _) => Some("the positions have no times (a log of RTEX blocks needs --period)"),
+            (true, 0) => Some("no position is seen"),
+            (true, _) => Some("the positions have no times (a log of RTEX blocks needs times, or --period)"),
         }
     }
 
@@ -200,7 +211,7 @@ impl Figures {
             ("verdicts", format!("{} ok, {refused} refused{without}", self.ok)),
         ];
         rows.extend(self.refused.iter().map(|(class, count)| ("", format!("{class:<17} {count}"))));
-        rows.extend([("cycle", self.cycle.text()), ("answer delay", self.delay.text())]);
+        rows.extend([("cycle", self.cycle_text()), ("answer delay", self.delay.text())]);
         let several = self.positions.len() > 1;
         let moved = |(name, Followed { largest, .. }): (&&str, &Followed)| {
             if several { format!("{name} {largest} counts") } else { format!("{largest} counts") }
@@ -218,7 +229,31 @@ impl Figures {
             }
             (None, _) => {}
         }
+        if self.events > 0 {
+            rows.push(("events", self.events.to_string()));
+            rows.extend(self.happened.iter().map(|(place, what)| match place {
+                Place::Line(line) => ("", format!("line {line:>9}  {what}")),
+                Place::Time { start, .. } => ("", format!("{:>14.3} us  {what}", start.us())),
+            }));
+        }
         rows
+    }
+
+    fn cycle_text(&self) -> String {
+        match self.cycle {
+            Spread { count: 1.., mean, .. } if self.counted => {
+                format!("{:.3} us on average as counted: the log has no times", mean / 1e6)
+            }
+            cycle => cycle.text(),
+        }
+    }
+
+    fn events_json(&self) -> Vec<Json> {
+        let one = |(place, what): &(Place, String)| match place {
+            Place::Line(line) => json!({ "line": line, "what": what }),
+            Place::Time { start, .. } => json!({ "time_ps": start, "what": what }),
+        };
+        self.happened.iter().map(one).collect()
     }
 }
 
@@ -245,15 +280,19 @@ impl Gathered {
     fn json(&self, origin: &Origin) -> Vec<Json> {
         let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
         let one = |(speaker, f): (&Speaker, &Figures)| {
-            json!({
+            let mut object = json!({
                 "file": origin.file, "channel": origin.lanes.get(speaker.lane).map(|lane| &lane.channel),
                 "address": speaker.address, "requests": f.requests, "answers": f.answers, "others": f.others,
                 "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
-                "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
+                "cycle": if f.counted { Json::Null } else { f.cycle.json() }, "answer_delay": f.delay.json(),
                 "largest_move": f.positions.values().map(|followed| followed.largest).max(),
                 "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
                 "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
-            })
+            });
+            if let Some(object) = object.as_object_mut().filter(|_| f.events > 0) {
+                object.insert("events".to_owned(), f.events_json().into());
+            }
+            object
         };
         self.by.iter().map(one).collect()
     }

@@ -2,6 +2,8 @@
 //!
 //! `TRUTH_CAPTURES=1000 cargo test -p servowire-decode --release --test all truth:: -- --nocapture` draws more and prints the tally.
 
+mod bus;
+mod buses;
 mod dsl;
 mod line;
 mod links;
@@ -23,6 +25,8 @@ enum Shown {
     Number(i64),
     /// The next whole number up or down.
     Near(f64),
+    /// Picoseconds, and by how many more or fewer.
+    Within(f64, f64),
     Text(String),
     /// Whatever it is.
     Any,
@@ -38,6 +42,7 @@ impl Shown {
         match self {
             Self::Number(due) => number == Some(*due),
             Self::Near(due) => number.is_some_and(|number| (number as f64 - due).abs() <= 1.0),
+            Self::Within(due, near) => number.is_some_and(|number| (number as f64 - due).abs() <= *near),
             Self::Text(due) => matches!(value, Value::Text(text) if text == due),
             Self::Any => true,
         }

@@ -13,7 +13,8 @@ use crate::units::moment;
 ///
 /// Prints a transaction a line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
 /// polarity and bit rate are found from the capture; what was found is said on the error output. Exit code 0: all
-/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
+/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use; 4: all frames good, and a drive reported
+/// an alarm, did not answer or stood still; 5: both 1 and 4.
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
   servowire decode line.vcd

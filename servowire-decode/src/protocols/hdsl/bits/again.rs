@@ -1,8 +1,6 @@
 //! A second look at the edges of a frame that failed, as a receiver samples it: its clock runs through from head to head, and the
 //! answer has one place between its bits. So edges may be off by nearly half a bit.
 
-use std::f64::consts::TAU;
-
 use hdsl::frame::{ANSWER_BITS, DELAY_RESERVE_BITS};
 
 use super::{Bits, SAMPLES};
@@ -90,15 +88,7 @@ impl Bits {
         let edges = self.edges(self.time(at), Time::MAX);
         let (from, to) = (len + 0.6, len + TO_TRAILER + 0.4);
         let of_answer = |place: f64| place > from && place < to;
-        // The mean of all places between two bits, on a circle.
-        let (sine, cosine) = edges.iter().map(|(time, _)| place(*time)).filter(|place| of_answer(*place)).fold(
-            (0.0, 0.0),
-            |(sine, cosine), place| {
-                let (s, c) = (place * TAU).sin_cos();
-                (sine + s, cosine + c)
-            },
-        );
-        let phase = f64::atan2(sine, cosine) / TAU;
+        let phase = phase(&edges.iter().map(|(time, _)| place(*time)).filter(|place| of_answer(*place)));
         let olds: Vec<u64> = edges.iter().map(|(time, _)| self.nearest_mark(*time)).collect();
         let Some(first) = self.marks.iter().rposition(|mark| mark.bit <= at) else { return };
         // A stretch on a grid goes on to the next mark.
@@ -144,5 +134,30 @@ impl Bits {
         }
         self.end = at;
         self.asked.set(0);
+    }
+}
+
+/// The mean of all places between two bits, -0.5 to 0.5: on a circle, so by their distances from the first, then from their mean.
+fn phase(places: &(impl Iterator<Item = f64> + Clone)) -> f64 {
+    let within = |place: f64| place - place.round();
+    let mut phase = places.clone().next().map_or(0.0, within);
+    for _ in 0..2 {
+        let (sum, count) = places.clone().fold((0.0, 0.0), |(sum, count), at| (sum + within(at - phase), count + 1.0));
+        phase = within(phase + if count > 0.0 { sum / count } else { 0.0 });
+    }
+    phase
+}
+
+#[cfg(test)]
+mod tests {
+    use super::phase;
+
+    #[test]
+    fn the_phase_is_a_mean_on_a_circle() {
+        let near = |places: &[f64], due: f64| (phase(&places.iter().copied()) - due).abs() < 1e-9;
+        assert!(near(&[3.2, 5.0, 9.1], 0.1) && near(&[], 0.0));
+        // On both sides of the half.
+        assert!(near(&[3.45, 5.55, 8.5], 0.5) || near(&[3.45, 5.55, 8.5], -0.5));
+        assert!(near(&[1.65, 2.75, 7.85], -0.25));
     }
 }
