@@ -115,6 +115,8 @@ emulated() {
     local sources=(examples/tformat_uart.c tests/firmware/run_tformat.c)
     image tformat "${sources[@]}"
     run_image tformat
+    image cost tests/firmware/cost.c
+    run_image cost -icount shift=0
     rustc --edition 2024 --crate-type staticlib --target thumbv7em-none-eabihf -C panic=abort -O -o "$out/libother.a" tests/firmware/other.rs
     arm-none-eabi-gcc "${m4[@]}" "${firmware[@]}" "${sources[@]}" -Wl,-u,other_divide "$out/libother.a" \
         "$out/lib/thumbv7em-none-eabihf/libservowire_c.a" -lc_nano -lgcc -o "$out/two.elf"
@@ -123,7 +125,7 @@ emulated() {
 
 run_image() {
     timeout 60 qemu-system-arm -machine mps2-an386 -display none -serial none -monitor none -semihosting-config enable=on,target=native \
-        -kernel "$out/$1.elf" || fail "$1 ended with $?"
+        "${@:2}" -kernel "$out/$1.elf" || fail "$1 ended with $?"
 }
 
 # The release archive, and programs that find it by CMake and by pkg-config.

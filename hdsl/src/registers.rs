@@ -97,12 +97,14 @@ impl Registers {
     pub const CORE_LEN: usize = 0x40;
 
     /// An image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if that was read. The online
-    /// status is no register there; all its flags are clear here.
+    /// status is no register there. Of its flags POS is set here, since nobody knows whether the fast position is aligned, so
+    /// [`pos`](Self::pos) gives none; all others are clear.
     pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
         let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
         for (address, byte) in (0..).zip(drive) {
             all.set_byte(address, *byte);
         }
+        all.put(Register::OnlineStatusD, OnlineD::POS.bits().to_be_bytes());
         let Some([.., version, _, _, _, id, _, _, _, _, _, _, _, _, s0, s1, s2, s3, s4, s5, s6, s7]) = safe2 else {
             return all;
         };

@@ -215,8 +215,10 @@ impl Alignment {
     pub(crate) fn read_quarter(self, samples: &[u8; WINDOW], quarter: u8) -> (u64, Rssi) {
         let at = usize::from(self.delay.get() & !3).saturating_add(usize::from(quarter).wrapping_mul(16));
         let (before, from) = samples.split_at_checked(at).unwrap_or((&[], samples));
-        let words =
-            from.chunks_exact(4).map(|word| word.first_chunk().map_or(u32::MAX, |word| u32::from_be_bytes(*word)));
+        // A window has room for the last quarter after the longest delay.
+        let four: u128 = from.first_chunk().map_or(u128::MAX, |four| u128::from_le_bytes(*four));
+        let word = |at: u32| low32(four >> at).swap_bytes();
+        let words = [word(0), word(32), word(64), word(96)].into_iter();
         let before = before.last().map_or(u32::MAX, |byte| u32::from(*byte));
         (Words::of_bytes(samples, self.delay).bits(self), self.quarter(before, words, quarter))
     }
@@ -274,6 +276,11 @@ fn short(samples: &[u8], delay: Delay) -> Error {
         got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
         want: u16::try_from(want).unwrap_or(u16::MAX),
     }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the lower 32 bits")]
+const fn low32(line: u128) -> u32 {
+    line as u32
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "masked to 61 bits")]

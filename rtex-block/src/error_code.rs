@@ -85,8 +85,17 @@ impl Alarm {
     pub const COMMAND: Self = Self { main: 91, sub: 1 };
 }
 
+/// As the drive shows it, and what it means where that is confirmed.
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Err{}.{}", self.main, self.sub)
+        write!(f, "Err{}.{}", self.main, self.sub)?;
+        f.write_str(match *self {
+            Self::COMMAND_STEP => " (too large a step of the position command)",
+            Self::CYCLIC_DATA => " (MAC-ID, C/R or Sub_Chk of the commands stayed wrong)",
+            Self::CYCLIC_CODE => " (the cyclic code stayed undefined)",
+            Self::UPDATE_COUNTER => " (the Update_Counter did not count)",
+            Self::COMMAND => " (cyclic command not possible in this mode)",
+            _ => "",
+        })
     }
 }

@@ -35,7 +35,7 @@ void bus_control(uint64_t now)
             motor_off(motor);
         }
     }
-    if (now >= sw_aformat_until_ns(&line) && sw_aformat_read(&line, ABS40_MT, ALL, now, &tx) == SW_SEND) {
+    if (sw_aformat_read(&line, ABS40_MT, ALL, now, &tx) == SW_SEND) {
         port_send(tx.contents, tx.len);
     }
 }

@@ -31,7 +31,7 @@ void example_control(void)
     } else {
         hal_pwm_off();
     }
-    if (now >= sw_tformat_until_ns(&encoder) && sw_tformat_read(&encoder, SW_TFORMAT_READ_ALL, now, &tx) == SW_SEND) {
+    if (sw_tformat_read(&encoder, SW_TFORMAT_READ_ALL, now, &tx) == SW_SEND) { /* refused while the line is not free */
         hal_uart_transmit_dma(tx.bytes, tx.len);
     }
 }

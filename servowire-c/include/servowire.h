@@ -10,9 +10,15 @@
 #include <stddef.h>
 
 /**
- * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`.
+ * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
+ * on, so that some time less or more than it is refused too.
  */
 #define SW_NO_TIME UINT64_MAX
+
+/**
+ * Samples of the window of an answer: bytes, one a bit, eight samples each.
+ */
+#define SW_HDSL_WINDOW 72
 
 /**
  * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
@@ -325,9 +331,96 @@ enum sw_code_t
      * There is no such value now: nothing was exchanged yet, or it was something else.
      */
     SW_E_NO_VALUE = -6,
+    /**
+     * An exchange is pending, or the line is not free yet at this time: nothing was begun.
+     */
+    SW_E_NOT_FREE = -7,
 };
 #ifndef __cplusplus
 typedef int32_t sw_code_t;
+#endif // __cplusplus
+
+/**
+ * Whose rules are followed where sources differ.
+ */
+enum sw_hdsl_dialect_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The manual of the link.
+     */
+    SW_HDSL_SICK = 0,
+    /**
+     * The receiver of TI's Motor Control SDK.
+     */
+    SW_HDSL_TI = 1,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_hdsl_dialect_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of HIPERFACE DSL that these calls give.
+ */
+enum sw_hdsl_error_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * Fewer samples than the window of an answer.
+     */
+    SW_E_HDSL_TRUNCATED = -769,
+};
+#ifndef __cplusplus
+typedef int32_t sw_hdsl_error_t;
+#endif // __cplusplus
+
+/**
+ * Where the receiver is in its start-up.
+ */
+enum sw_hdsl_state_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * RESET.
+     */
+    SW_HDSL_RESET = 0,
+    /**
+     * SYNC.
+     */
+    SW_HDSL_SYNC = 1,
+    /**
+     * START.
+     */
+    SW_HDSL_START = 2,
+    /**
+     * LEARN.
+     */
+    SW_HDSL_LEARN = 3,
+    /**
+     * CHECK.
+     */
+    SW_HDSL_CHECK = 4,
+    /**
+     * IDREQ.
+     */
+    SW_HDSL_IDREQ = 5,
+    /**
+     * WAIT VSYNC.
+     */
+    SW_HDSL_WAIT_VSYNC = 6,
+    /**
+     * RUNNING.
+     */
+    SW_HDSL_RUNNING = 7,
+};
+#ifndef __cplusplus
+typedef int32_t sw_hdsl_state_t;
 #endif // __cplusplus
 
 /**
@@ -1350,6 +1443,64 @@ typedef struct {
 } sw_clock_t;
 
 /**
+ * A receiver: start-up, link, newest positions. Its content is private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[84];
+} sw_hdsl_t;
+
+/**
+ * What is to be sent from the start of an H-frame.
+ */
+typedef struct {
+    /**
+     * SYNC to PARA, the first bit of the line in bit 0 of byte 0.
+     */
+    uint8_t head[16];
+    /**
+     * Bits of it.
+     */
+    uint8_t head_bits;
+    /**
+     * Zeros before the frame.
+     */
+    uint8_t lead_in;
+    /**
+     * 1: an encoder answers; the line is released after PARA, and reception begins one bit later. 0: filler is sent.
+     */
+    uint8_t answered;
+} sw_hdsl_transmission_t;
+
+/**
+ * A fast position that may be used.
+ */
+typedef struct {
+    /**
+     * Steps, turns included.
+     */
+    int64_t position;
+    /**
+     * When it was sampled.
+     */
+    uint64_t sampled_ns;
+    /**
+     * Steps in the last H-frame.
+     */
+    int32_t velocity;
+    /**
+     * The angle in the turn, a turn is 2^32; 0 if the steps of a turn were not told.
+     */
+    uint32_t angle;
+} sw_hdsl_position_t;
+
+/**
+ * A modelled encoder. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[54];
+} sw_hdsl_device_t;
+
+/**
  * The end of the background. It belongs to its queue: it is not copied.
  */
 typedef struct {
@@ -1938,7 +2089,8 @@ sw_result_t sw_aformat_set_hand_over(sw_aformat_t *m, uint32_t hand_over_ns, uin
 
 /**
  * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
- * way, and those with one answer to one encoder. SW_SEND with `to_send` filled.
+ * way, and those with one answer to one encoder. SW_SEND with `to_send` filled; SW_E_NOT_FREE while an exchange is pending,
+ * and before the time of sw_aformat_until_ns().
  */
 sw_result_t sw_aformat_read(sw_aformat_t *m,
                             uint8_t command,
@@ -2088,6 +2240,66 @@ sw_result_t sw_clock_start(sw_clock_t *clock,
  */
 uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
+
+/**
+ * A free-running receiver at the begin of the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
+ * known.
+ */
+sw_result_t sw_hdsl_start(sw_hdsl_t *m,
+                          uint8_t dialect,
+                          uint32_t steps_per_turn);
+
+/**
+ * What the present H-frame sends.
+ */
+sw_result_t sw_hdsl_transmission(const sw_hdsl_t *m, sw_hdsl_transmission_t *to_send);
+
+/**
+ * The H-frame is over: the samples of its window (SW_HDSL_WINDOW bytes where an encoder answers), which ended at `end_ns`. The result is
+ * the state of the receiver, sw_hdsl_state_t.
+ */
+sw_result_t sw_hdsl_hear(sw_hdsl_t *m,
+                         const uint8_t *samples,
+                         size_t len,
+                         uint64_t end_ns);
+
+/**
+ * The same from a receiver that gives bits: the 61 of the answer, the first of the line in bit 0; all ones without an answer.
+ */
+sw_result_t sw_hdsl_hear_bits(sw_hdsl_t *m,
+                              uint64_t bits,
+                              uint64_t end_ns);
+
+/**
+ * The fast position, judged now: **false if it must not be used, and the outputs have to go off**: never heard, no link, estimated, not
+ * aligned with the safe one, too fast, older than `max_age_ns`.
+ */
+bool sw_hdsl_position(const sw_hdsl_t *m,
+                      uint64_t now_ns,
+                      uint64_t max_age_ns,
+                      sw_hdsl_position_t *position);
+
+/**
+ * The safe position of the last V-frame, judged now: false if it must not be used.
+ */
+bool sw_hdsl_safe_position(const sw_hdsl_t *m, uint64_t now_ns, uint64_t max_age_ns, int64_t *position);
+
+/**
+ * Switches a modelled encoder on, with an encoder identifier.
+ */
+sw_result_t sw_hdsl_device_start(sw_hdsl_device_t *device, uint32_t encoder_id);
+
+/**
+ * Turns its shaft.
+ */
+sw_result_t sw_hdsl_device_set_position(sw_hdsl_device_t *device, uint64_t position);
+
+/**
+ * What it answers to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones where it is silent.
+ */
+sw_result_t sw_hdsl_device_hear(sw_hdsl_device_t *device,
+                                const sw_hdsl_transmission_t *heard,
+                                uint64_t *bits);
 
 /**
  * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
@@ -2509,7 +2721,7 @@ sw_result_t sw_tformat_tolerate(sw_tformat_t *m,
 
 /**
  * Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
- * and `to_send` is filled.
+ * and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before the time of sw_tformat_until_ns().
  */
 sw_result_t sw_tformat_read(sw_tformat_t *m,
                             uint8_t id,

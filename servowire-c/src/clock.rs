@@ -7,7 +7,8 @@ use servowire_core::{TickRate, TimeBase};
 use crate::border::{OK, Refused, border, state};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`.
+/// No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
+/// on, so that some time less or more than it is refused too.
 pub const SW_NO_TIME: u64 = u64::MAX;
 
 /// Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
@@ -46,7 +47,7 @@ pub extern "C" fn sw_clock_ns(clock: Option<&mut sw_clock_t>, ticks: u32) -> u64
 /// A time that can be trusted.
 #[inline(always)]
 pub(crate) fn time(ns: u64) -> Result<u64, Refused> {
-    if ns == SW_NO_TIME { Err(sw_code_t::SW_E_CLOCK as sw_result_t) } else { Ok(ns) }
+    if ns >> 63 != 0 { Err(sw_code_t::SW_E_CLOCK as sw_result_t) } else { Ok(ns) }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ extern crate std;
 pub mod aformat;
 mod border;
 mod clock;
+pub mod hdsl;
 pub mod motion;
 pub mod nrz;
 mod result;

@@ -32,6 +32,8 @@ pub enum sw_code_t {
     SW_E_CLOCK = -5,
     /// There is no such value now: nothing was exchanged yet, or it was something else.
     SW_E_NO_VALUE = -6,
+    /// An exchange is pending, or the line is not free yet at this time: nothing was begun.
+    SW_E_NOT_FREE = -7,
 }
 
 /// Which protocol refuses: the high byte of a result.
@@ -40,6 +42,7 @@ pub enum sw_code_t {
 pub(crate) enum Protocol {
     Tformat = 1,
     Aformat = 2,
+    Hdsl = 3,
     Rtex = 4,
     Sorte = 5,
     Motion = 6,
@@ -52,7 +55,7 @@ pub(crate) const fn refused(protocol: Protocol, number: u8) -> sw_result_t {
     ((protocol as i32) << 8 | number as i32).wrapping_neg()
 }
 
-const COMMON: [(sw_result_t, &CStr); 11] = [
+const COMMON: [(sw_result_t, &CStr); 12] = [
     (sw_code_t::SW_OK as sw_result_t, c"ok"),
     (sw_code_t::SW_PENDING as sw_result_t, c"pending"),
     (sw_code_t::SW_SEND as sw_result_t, c"send"),
@@ -62,6 +65,7 @@ const COMMON: [(sw_result_t, &CStr); 11] = [
     (sw_code_t::SW_E_SHORT_BUFFER as sw_result_t, c"short_buffer"),
     (sw_code_t::SW_E_CLOCK as sw_result_t, c"clock"),
     (sw_code_t::SW_E_NO_VALUE as sw_result_t, c"no_value"),
+    (sw_code_t::SW_E_NOT_FREE as sw_result_t, c"not_free"),
     (sw_rtex_error_t::SW_E_RTEX_NOT_NOW as sw_result_t, c"not_now"),
     (sw_rtex_error_t::SW_E_RTEX_TOO_FAR as sw_result_t, c"too_far"),
 ];
@@ -127,6 +131,7 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
     let names: &'static [u8] = match protocol {
         1 => names!(tformat::ErrorClass),
         2 => names!(nikon_aformat::ErrorClass),
+        3 => names!(hdsl::ErrorClass),
         4 => names!(rtex_block::ErrorClass),
         5 => names!(sorte_proto::ErrorClass),
         6 => names!(step_motion::ErrorClass),
@@ -169,6 +174,10 @@ mod tests {
             let code = refused(Protocol::Step, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
         }
+        for class in hdsl::ErrorClass::ALL {
+            let code = refused(Protocol::Hdsl, class.number());
+            assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
+        }
         for class in nikon_aformat::ErrorClass::ALL {
             let code = refused(Protocol::Aformat, class.number());
             assert_eq!(text(code).and_then(|text| text.to_str().ok()), Some(class.name()));
@@ -176,7 +185,7 @@ mod tests {
         assert_eq!(text(-0x101).map(CStr::to_bytes), Some(b"start_bit".as_slice()));
         assert_eq!(text(-0x10d).map(CStr::to_bytes), Some(b"no_response".as_slice()));
         assert_eq!(text(-3).map(CStr::to_bytes), Some(b"not_started".as_slice()));
-        for none in [3, -7, -0x100, -0x1ff, -0x140, -0x1_0101, i32::MIN, i32::MAX] {
+        for none in [3, -8, -0x100, -0x1ff, -0x140, -0x1_0101, i32::MIN, i32::MAX] {
             assert_eq!(text(none), None, "{none:#x}");
         }
     }

@@ -122,10 +122,8 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
     /// Puts a value. Only ever called by one writer.
     pub(crate) fn put(&self, value: &Value<W, E>) {
         let control = self.control.load(Ordering::Relaxed);
-        fence(Barrier::Begins);
-        let pair = !self.announced.load(Ordering::Relaxed) & PAIR;
-        fence(Barrier::Writes);
-        let slot = pair | (!newest(control, pair) & 1);
+        let slot = self.free(control);
+        let pair = slot & PAIR;
         if let Some(slot) = self.slots.get(slot as usize) {
             slot.store(value);
         }
@@ -133,6 +131,14 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         let other_pair = control & !(SLOT << NEWEST).wrapping_shl(pair) & !PAIR;
         let control = other_pair | (slot << NEWEST).wrapping_shl(pair) | pair | SOMETHING;
         self.control.store(control, Ordering::Relaxed);
+    }
+
+    /// The slot for the next value: in the pair that is not announced the one that is not the newest.
+    fn free(&self, control: u32) -> u32 {
+        fence(Barrier::Begins);
+        let pair = !self.announced.load(Ordering::Relaxed) & PAIR;
+        fence(Barrier::Writes);
+        pair | (!newest(control, pair) & 1)
     }
 
     /// The newest value; `None` before the first one. Only ever called by one reader.
@@ -168,4 +174,32 @@ const fn newest(control: u32, pair: u32) -> u32 {
 #[inline(always)]
 fn fence(barrier: Barrier) {
     core::sync::atomic::fence(barrier.ordering());
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    /// What a reader may be in is left alone, whatever pairs it announced before: the announced pair, and in the other one the newest
+    /// slot, to which a reader goes that announces late.
+    #[test]
+    fn the_writer_keeps_off_the_slot_of_the_reader() {
+        for announcements in 0_u32..256 {
+            let slots = FourSlots::<1, 0>::new();
+            let mut newest_of = [None; 2];
+            for value in 0_u32..8 {
+                let announced = 2 * (announcements >> value & 1);
+                slots.announced.store(announced, Ordering::Relaxed);
+                let free = slots.free(slots.control.load(Ordering::Relaxed));
+                let pair = 2 - announced;
+                assert!(free == pair || free == pair + 1, "{announcements:08b}, {value}: {free}");
+                let newest = &mut newest_of[usize::from(pair == 2)];
+                assert_ne!(*newest, Some(free), "{announcements:08b}, {value}");
+                *newest = Some(free);
+                slots.put(&([value], []));
+                assert_eq!(slots.slots[free as usize].load(), ([value], []));
+                assert_eq!(slots.get(), Some(([value], [])));
+            }
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 pub mod analyzer;
 pub mod archive;
+pub mod byte_table;
 mod can;
 mod columns;
 pub mod fst;
@@ -74,6 +75,8 @@ fn known(head: &[u8]) -> Option<Format> {
         Some(Format::SigrokText)
     } else if begins(&[b";rate:", b";size:", b";channels:"]) {
         Some(Format::Ols)
+    } else if byte_table::looks_like(text) {
+        Some(Format::ByteTable)
     } else if analyzer::looks_like(text) {
         Some(Format::AnalyzerTable)
     } else if isf::looks_like(text) {
@@ -140,6 +143,9 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
             let unit = if format == Format::Packed { raw::Unit::Bit } else { raw::Unit::Bytes(hints.unit_size.max(1)) };
             Capture::Samples(raw::Raw::new(input, rate, unit))
         }
+        Format::ByteTable => Capture::Bytes(ByteLog::Table(byte_table::ByteTable::new(input)?)),
+        // Hex bytes in a table are still hex bytes.
+        Format::Hex if byte_table::looks_like(input.peek()?) => decoder(input, Format::ByteTable, hints)?,
         Format::Hex => Capture::Bytes(ByteLog::Hex(hexlog::HexLog::new(input))),
         Format::Records => {
             let Some(size) = hints.record_size else {

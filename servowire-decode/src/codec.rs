@@ -123,8 +123,17 @@ pub trait LogDecoder {
     /// The log ends.
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// Why the log as a whole was not read as it was written.
-    fn fault(&self) -> Option<&'static str> {
-        None
+    /// What was found of the log as a whole.
+    fn found(&self) -> Found {
+        Found::default()
     }
+}
+
+/// What is found of a log as a whole, at its end.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Why it is not read as it was written.
+    pub misread: Option<String>,
+    /// What somebody has to look after, though every frame holds.
+    pub trouble: Option<String>,
 }

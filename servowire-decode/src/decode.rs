@@ -1,12 +1,15 @@
 //! From a capture to events, whatever it is.
 
+use std::collections::BTreeMap;
+
 use crate::capture::Capture;
 use crate::codec::Codec;
 use crate::fault::{At, Fault, Stop};
 use crate::output::Output;
 use crate::protocols::{CODECS, meant};
+use crate::recognition::{self, Note};
 use crate::settings::Settings;
-use crate::sink::Sink;
+use crate::sink::{Sink, Tally};
 use crate::{line, log};
 
 /// Decodes a capture called `file` to its end; `protocol`: otherwise it is found. What comes out before a fault has been
@@ -22,9 +25,15 @@ pub fn decode(
     match (capture, protocol) {
         // Whatever was asked for: what has packets.
         (Capture::Packets(mut packets), _) => {
-            while let Some(packet) = packets.packet()? {
-                for event in CODECS.iter().filter_map(|codec| codec.packet(&packet)) {
-                    out.event(&event)?;
+            let mut foreign: BTreeMap<&'static str, u64> = BTreeMap::new();
+            while let Some(mut packet) = packets.packet()? {
+                packet.has_fcs = settings.fcs.unwrap_or(packet.has_fcs);
+                if let Some(traffic) = packet.traffic() {
+                    *foreign.entry(traffic).or_default() += 1;
+                } else {
+                    for event in CODECS.iter().filter_map(|codec| codec.packet(&packet)) {
+                        out.event(&event)?;
+                    }
                 }
                 if packets.is_live() {
                     out.flush()?;
@@ -34,6 +43,14 @@ pub fn decode(
                     break;
                 }
             }
+            if foreign.is_empty() {
+                return Ok(());
+            }
+            if out.tally == Tally::default() {
+                let what = format!("{}, and nothing else", recognition::traffic(&foreign));
+                return Err(Fault::new(file, At::File, what).into());
+            }
+            out.note(&Note::Traffic { file: file.to_owned(), packets: foreign });
             Ok(())
         }
         (Capture::Bytes(bytes), _) => log::decode(file, bytes, protocol, settings, out),

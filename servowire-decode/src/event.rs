@@ -20,10 +20,16 @@ pub struct Event {
     pub fields: Vec<Field>,
     /// The position that the frame carries.
     pub position: Option<Position>,
+    /// The encoder, drive or device that speaks or is asked, where the protocol has addresses and this one is known.
+    pub address: Option<u32>,
+    /// What happened with this frame that belongs in a list of events: an alarm, a servo that is switched on.
+    pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+    /// Whether the times of its place are counted, as by the update counter of a drive, and not measured.
+    pub counted: bool,
     /// Whether this is no frame but a word about the recording, which is counted nowhere.
     pub remark: bool,
 }
@@ -37,7 +43,19 @@ impl Event {
         fields: Vec<Field>,
         verdict: Verdict,
     ) -> Self {
-        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
+        Self {
+            place,
+            direction,
+            kind: kind.into(),
+            fields,
+            position: None,
+            address: None,
+            happened: Vec::new(),
+            delay: None,
+            verdict,
+            counted: false,
+            remark: false,
+        }
     }
 
     /// Says where fields are, by their names.
@@ -216,6 +234,8 @@ pub enum Value {
 /// A position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Position {
+    /// What it is, in the protocol's own words, as `VPOS`. Positions of two names, or of two addresses, are two series.
+    pub name: &'static str,
     /// Counts, turns included where the frame carries them.
     pub counts: i64,
     /// Counts after which the value begins again, where it does.
@@ -313,12 +333,12 @@ mod tests {
 
     #[test]
     fn the_shorter_way_round() {
-        let at = |counts| Position { counts, span: Some(100), per_turn: None };
+        let at = |counts| Position { name: "ABS", counts, span: Some(100), per_turn: None };
         assert_eq!(at(1).moved_from(&at(99)), 2);
         assert_eq!(at(99).moved_from(&at(1)), -2);
         assert_eq!(at(50).moved_from(&at(0)), 50);
         assert_eq!(at(-1).moved_from(&at(0)), -1);
-        let linear = |counts| Position { counts, span: None, per_turn: None };
+        let linear = |counts| Position { name: "ABS", counts, span: None, per_turn: None };
         assert_eq!(linear(-70).moved_from(&linear(99)), -169);
     }
 }

@@ -48,6 +48,8 @@ impl Fault {
 pub enum Stop {
     /// The input is broken from here on, or nothing in it can be decoded.
     Fault(Fault),
+    /// All was decoded, and shows something that somebody has to look after.
+    Trouble(Fault),
     /// The output takes nothing more.
     Output(io::Error),
 }
@@ -69,7 +71,7 @@ impl std::error::Error for Stop {}
 impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fault(fault) => fault.fmt(f),
+            Self::Fault(fault) | Self::Trouble(fault) => fault.fmt(f),
             Self::Output(error) => write!(f, "cannot write: {error}"),
         }
     }

@@ -8,12 +8,13 @@ use recognise::recognise;
 
 use crate::capture::ByteLog;
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder};
+use crate::codec::{Codec, Found, LogDecoder};
 use crate::fault::{At, Fault, Stop};
 use crate::output::Output;
 use crate::recognition::Note;
 use crate::settings::Settings;
 use crate::sink::Sink;
+use crate::time::{SECOND, Time};
 
 /// Bursts by which the protocol is recognised.
 const SAMPLE: usize = 256;
@@ -28,9 +29,10 @@ pub(crate) fn decode(
 ) -> Result<(), Stop> {
     let mut bursts = Vec::new();
     let mut end = Ok(true);
+    let mut origin = None;
     while bursts.len() < SAMPLE && end == Ok(true) && (bursts.is_empty() || !log.pauses()) {
         match log.burst() {
-            Ok(Some(burst)) => bursts.push(burst),
+            Ok(Some(burst)) => bursts.push(since_first(burst, &mut origin)),
             Ok(None) => end = Ok(false),
             Err(fault) => end = Err(fault),
         }
@@ -50,7 +52,7 @@ pub(crate) fn decode(
         }
         out.tick();
         match log.burst() {
-            Ok(Some(burst)) => join(reader.as_mut(), burst, &mut whole, out)?,
+            Ok(Some(burst)) => join(reader.as_mut(), since_first(burst, &mut origin), &mut whole, out)?,
             Ok(None) => end = Ok(false),
             Err(fault) => end = Err(fault),
         }
@@ -60,8 +62,25 @@ pub(crate) fn decode(
     }
     reader.end(out)?;
     end?;
-    reader.fault().map_or(Ok(()), |what| Err(Fault::new(file, At::File, what).into()))
+    let Found { misread, trouble } = reader.found();
+    let fault = |what| Fault::new(file, At::File, what);
+    match (misread, trouble) {
+        (Some(what), None) => Err(Stop::Fault(fault(what))),
+        (Some(misread), Some(trouble)) => Err(Stop::Fault(fault(format!("{misread}; {trouble}")))),
+        (None, Some(what)) => Err(Stop::Trouble(fault(what))),
+        (None, None) => Ok(()),
+    }
 }
+
+/// Times of day and dates begin with the first, as a capture does; others are times of the log already.
+fn since_first(burst: Burst, origin: &mut Option<Time>) -> Burst {
+    let first = |time| if time < LATER { Time::ZERO } else { time };
+    let time = burst.time.map(|time| time.since(*origin.get_or_insert_with(|| first(time))));
+    Burst { time, ..burst }
+}
+
+/// What begins later is a time of day or a date.
+const LATER: Time = Time::from_ps(1_000 * SECOND as i128);
 
 /// Takes a burst; of lines in one piece, when they are complete.
 fn join(reader: &mut dyn LogDecoder, burst: Burst, whole: &mut Option<Burst>, out: &mut dyn Sink) -> io::Result<()> {

@@ -188,7 +188,7 @@ impl Sink for Output<'_> {
         self.tally.event(event)?;
         let mut errors = false;
         if let Some(filter) = &mut self.filter {
-            if !filter.takes(self.origin.speaks, event) {
+            if !filter.takes(&self.origin, event) {
                 return Ok(());
             }
             errors = filter.errors;

@@ -1,5 +1,6 @@
 //! What was recognised of a capture, and why: values that print as a sentence.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::codec::Codec;
@@ -33,6 +34,8 @@ pub struct Recognition {
     pub rates: Rates,
     /// The first frames by their verdict.
     pub tally: Tally,
+    /// Whether these are all.
+    pub whole: bool,
     /// The next best protocol and rate of the same channel, if it is close.
     pub rival: Option<(&'static dyn Codec, u32)>,
 }
@@ -68,7 +71,8 @@ impl fmt::Display for Recognition {
             (None, None) => {}
         }
         let Tally { ok, refused, .. } = self.tally;
-        write!(f, ": {}, {ok} of {} frames hold", self.protocol.title, ok + refused)?;
+        let first = if self.whole { "" } else { "the first " };
+        write!(f, ": {}, {ok} of {first}{} frames hold", self.protocol.title, ok + refused)?;
         if let Some((protocol, rate)) = self.rival {
             write!(f, "; next {} at {} Mbit/s", protocol.title, mbit(f64::from(rate)))?;
         }
@@ -105,6 +109,13 @@ pub enum Note {
         /// How many were tried.
         tried: usize,
     },
+    /// Packets of ordinary network traffic were passed over.
+    Traffic {
+        /// The file.
+        file: String,
+        /// Their numbers by what they are.
+        packets: BTreeMap<&'static str, u64>,
+    },
     /// A log of bytes was recognised.
     Log {
         /// The protocol.
@@ -123,6 +134,12 @@ pub enum Note {
     Shape(String),
 }
 
+/// Packets of ordinary network traffic in words.
+pub(crate) fn traffic(packets: &BTreeMap<&'static str, u64>) -> String {
+    let kinds: Vec<String> = packets.iter().map(|(name, count)| format!("{name} {count}")).collect();
+    format!("{} packets of ordinary network traffic ({})", packets.values().sum::<u64>(), kinds.join(", "))
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let so = "frames hold so; leave out what says otherwise";
@@ -137,6 +154,7 @@ impl fmt::Display for Note {
             Self::Channels { file, moving, tried } => {
                 write!(f, "{file}: {moving} channels move, and the {tried} busiest were tried: name one by --channel")
             }
+            Self::Traffic { file, packets } => write!(f, "{file}: {} are passed over", traffic(packets)),
             Self::Log { protocol, share } => {
                 write!(f, "taken as {}, of which {share} % of the first frames hold", protocol.title)
             }

@@ -11,6 +11,8 @@ pub struct Settings {
     pub widths: Widths,
     /// About RTEX.
     pub rtex: Rtex,
+    /// Whether the packets of a network end with their frame check sequence; otherwise as the file says.
+    pub fcs: Option<bool>,
 }
 
 /// What the user said about the line.
@@ -54,10 +56,12 @@ pub struct Rtex {
     pub period_ns: Option<u32>,
     /// Electronic gear of the drives, for the same limit.
     pub gear: Gear,
+    /// Every block is shown whole, not what changed in it.
+    pub whole: bool,
 }
 
 impl Default for Rtex {
     fn default() -> Self {
-        Self { block_size: None, mac_id: None, period_ns: None, gear: Gear::UNITY }
+        Self { block_size: None, mac_id: None, period_ns: None, gear: Gear::UNITY, whole: false }
     }
 }

@@ -6,7 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::decode::Decode;
 use crate::terminal::say;
-use crate::{cnc, decode, profile, registers, talk, timing};
+use crate::{cnc, decode, explain, profile, registers, report, talk, timing};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -20,6 +20,10 @@ pub struct Cli {
 enum Command {
     /// Decode captures of a line.
     Decode(Decode),
+    /// Write a report of a capture, for a browser or a printer.
+    Report(report::Arguments),
+    /// Show one frame of a capture, bit by bit.
+    Explain(explain::Arguments),
     /// Times of the steps of a move on a 4 us cycle.
     Profile(profile::Arguments),
     /// The reference machine: SORTE master, four devices, four motors.
@@ -47,6 +51,8 @@ impl Cli {
     pub fn run(self) -> ExitCode {
         match self.command {
             Command::Decode(arguments) => decode::run(&arguments),
+            Command::Report(arguments) => arguments.run(),
+            Command::Explain(arguments) => arguments.run(),
             Command::Profile(arguments) => arguments.run(),
             Command::Cnc(arguments) => arguments.run(),
             Command::Talk(arguments) => arguments.run(),

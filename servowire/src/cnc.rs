@@ -14,6 +14,7 @@ mod periods;
 mod plot;
 mod power;
 mod program;
+mod queue;
 mod record;
 mod report;
 mod scaling;
@@ -22,6 +23,7 @@ mod wires;
 
 use std::error::Error;
 use std::fmt;
+use std::fs;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -32,6 +34,7 @@ use sorte_proto::sync0::Variant;
 use step_motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
+use crate::drawing::Drawn;
 use crate::gcode::{AXES, Part};
 use servowire_decode::time;
 
@@ -228,7 +231,7 @@ impl Arguments {
     pub(crate) fn run(&self) -> ExitCode {
         let mut out = BufWriter::new(io::stdout().lock());
         if self.scaling {
-            let drawn = self.svg.as_deref().map_or(Ok(()), |path| named(path, scaling::draw(path)));
+            let drawn = self.svg.as_deref().map_or(Ok(()), |path| draw(path, scaling::draw));
             return match scaling::table(&mut out).map_err(Into::into).and(drawn) {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(error) => failed(error.as_ref()),
@@ -374,7 +377,7 @@ impl Arguments {
         report::end(out, &line, &host)?;
         out.flush()?;
         if let (Some(curves), Some(path)) = (&curves, &self.svg) {
-            named(path, curves.draw(axes.min(4), path))?;
+            draw(path, || curves.draw(axes))?;
         }
         if let Some(sound) = sound {
             sound.finish()?;
@@ -393,6 +396,11 @@ impl Arguments {
 }
 
 /// The error with the file that it is about.
+/// Writes a picture into a file.
+fn draw(path: &Path, picture: impl FnOnce() -> Drawn<String>) -> Drawn {
+    named(path, picture().and_then(|svg| Ok(fs::write(path, svg)?)))
+}
+
 fn named<T>(path: &Path, result: Result<T, impl fmt::Display>) -> Result<T, Box<dyn Error>> {
     result.map_err(|error| format!("{}: {error}", path.display()).into())
 }

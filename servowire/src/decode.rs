@@ -33,7 +33,29 @@ use crate::terminal;
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
 
-/// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
+/// What was found, as the exit code says it; of several files or findings the sum.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct End {
+    /// A frame is refused, or a file cannot be read to its end.
+    bad: bool,
+    /// Frames hold and show something that somebody has to look after.
+    trouble: bool,
+}
+
+impl End {
+    const BAD: Self = Self { bad: true, trouble: false };
+
+    fn and(self, other: Self) -> Self {
+        Self { bad: self.bad | other.bad, trouble: self.trouble | other.trouble }
+    }
+
+    fn code(self) -> u8 {
+        u8::from(self.bad) | u8::from(self.trouble) << 2
+    }
+}
+
+/// Decodes all files. 0: all frames good; 1: not so; 4: something shows that somebody has to look after; 5: both; 2: the options do
+/// not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
     let described = arguments.reading.describes_a_file();
@@ -86,8 +108,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         })
     };
     match all(arguments, piped, printer.as_mut()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+        Ok(end) => ExitCode::from(end.code()),
         // The reader has seen enough.
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(e) => {
@@ -97,25 +118,25 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     }
 }
 
-/// Whether all files were good.
-fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<bool> {
-    let mut good = true;
+/// What was found in all files.
+fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<End> {
+    let mut end = End::default();
     if let Some(input) = piped {
         return one(arguments, Ok(input), arguments.reading.hints(), &Bar { bar: None }, printer);
     }
     for path in arguments.files.iter().take_while(|_| !interrupt::asked()) {
         let bar = Bar::new(path);
-        good &=
-            one(arguments, files::open(path, arguments.reading.file.follow), arguments.reading.hints(), &bar, printer)?;
+        let input = files::open(path, arguments.reading.file.follow);
+        end = end.and(one(arguments, input, arguments.reading.hints(), &bar, printer)?);
         bar.finish();
     }
     if arguments.files.is_empty() {
         for (name, bytes) in bundled(arguments) {
             let hints = Hints { format: Some(Format::Vcd), ..Hints::default() };
-            good &= one(arguments, Ok(Input::over(name, *bytes)), hints, &Bar { bar: None }, printer)?;
+            end = end.and(one(arguments, Ok(Input::over(name, *bytes)), hints, &Bar { bar: None }, printer)?);
         }
     }
-    Ok(good)
+    Ok(end)
 }
 
 /// The captures that come with the program, of the protocol that is meant.
@@ -123,22 +144,22 @@ fn bundled(arguments: &Decode) -> &'static [(&'static str, &'static [u8])] {
     arguments.reading.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures)
 }
 
-/// Decodes one file; whether it was good.
+/// Decodes one file, and says what is wrong with it.
 fn one(
     arguments: &Decode,
     input: Result<Input, Fault>,
     hints: Hints,
     bar: &Bar,
     printer: &mut dyn Printer,
-) -> io::Result<bool> {
+) -> io::Result<End> {
     let opened = input.and_then(|input| Ok((input.name().to_owned(), input.meter(), capture::open(input, hints)?)));
-    let (name, meter, capture) = match opened {
+    let (name, meter, mut capture) = match opened {
         Ok((name, meter, capture)) => (name, meter, capture),
         Err(fault) => return Ok(complain(&fault, bar)),
     };
     let name = name.as_str();
     let mut filter = arguments.filter();
-    if let Some(what) = cannot(arguments, &capture, filter.has_times()) {
+    if let Some(what) = cannot(arguments, &mut capture, filter.has_times()) {
         return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
     let mut picture = arguments.svg.as_ref().map(|_| Picture::new(name));
@@ -162,8 +183,10 @@ fn one(
     out = out.with_beside(picture.as_mut().map(|picture| picture as &mut dyn Printer));
     out = out.with_enough(&interrupt::asked).until_error(arguments.until.is_some());
     out.begin()?;
-    let end =
-        servowire_decode::decode(name, capture, arguments.reading.protocol.0, &arguments.reading.settings(), &mut out);
+    let mut settings = arguments.reading.settings();
+    // A row of a table stands alone.
+    settings.rtex.whole = arguments.csv;
+    let end = servowire_decode::decode(name, capture, arguments.reading.protocol.0, &settings, &mut out);
     out.end()?;
     let (tally, chosen, refusals, done) = (out.tally, out.chosen, out.refusals(), out.is_done());
     if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {
@@ -180,9 +203,13 @@ fn one(
         Ok(()) if chosen == Tally::default() => {
             format!("none of its {} frames passes the filter", tally.ok + tally.refused)
         }
-        Ok(()) => return Ok(refusals.is_none()),
+        Ok(()) => return Ok(End { bad: refusals.is_some(), trouble: false }),
         // Where the user had enough, what he read was cut there by himself.
-        Err(Stop::Fault(_)) if done => return Ok(refusals.is_none()),
+        Err(Stop::Fault(_) | Stop::Trouble(_)) if done => return Ok(End { bad: refusals.is_some(), trouble: false }),
+        Err(Stop::Trouble(fault)) => {
+            complain(&fault, bar);
+            return Ok(End { bad: refusals.is_some(), trouble: true });
+        }
         Err(Stop::Fault(fault)) => return Ok(complain(&fault, bar)),
         Err(Stop::Output(error)) => return Err(error),
     };
@@ -190,8 +217,11 @@ fn one(
 }
 
 /// Why what is asked cannot be had of a capture of its kind.
-fn cannot(arguments: &Decode, capture: &Capture, has_times: bool) -> Option<&'static str> {
-    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.reading.rtex.period.is_none();
+fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<&'static str> {
+    let timeless = match capture {
+        Capture::Bytes(log) => arguments.reading.rtex.period.is_none() && !log.has_times(),
+        _ => false,
+    };
     let levels = matches!(capture, Capture::Edges(_) | Capture::Samples(_));
     let cannot = [
         (arguments.vcd.is_some() && !levels, "there are no levels in it for a VCD"),
@@ -202,9 +232,9 @@ fn cannot(arguments: &Decode, capture: &Capture, has_times: bool) -> Option<&'st
 }
 
 /// Says what is wrong; the file is not good.
-fn complain(fault: &Fault, bar: &Bar) -> bool {
+fn complain(fault: &Fault, bar: &Bar) -> End {
     bar.say(&format!("error: {fault}"));
-    false
+    End::BAD
 }
 
 /// The progress bar, on a terminal and for a long file.

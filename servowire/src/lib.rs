@@ -9,8 +9,11 @@
 )]
 
 pub mod cli;
+mod clip;
 pub mod cnc;
 mod decode;
+mod drawing;
+mod explain;
 mod files;
 mod gcode;
 mod interrupt;
@@ -19,6 +22,8 @@ mod pipe;
 pub mod profile;
 mod reading;
 pub mod registers;
+mod report;
+mod scope;
 pub mod talk;
 mod terminal;
 pub mod timing;

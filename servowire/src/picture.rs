@@ -1,15 +1,15 @@
-//! One picture of a capture: position over time, errors on the same axis, and how long answers took.
+//! One picture of a capture: of each encoder its position over time and how long its answers took, and all errors on the same
+//! axis.
 
 use std::collections::BTreeMap;
-use std::error::Error;
 use std::io;
-
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use std::ops::Range;
 
 use servowire_decode::event::{Event, Place, Position, Verdict};
-use servowire_decode::output::printer::{Origin, Printer};
+use servowire_decode::output::printer::{Origin, Printer, Speaker};
 use servowire_decode::time::Time;
+
+use crate::drawing::{Chart, Drawn, Row, Rows, Share, Sheet, Stroke};
 
 /// Buckets of a time axis; when there are more, two become one.
 const MOST: usize = 2000;
@@ -18,11 +18,11 @@ const MOST_BARS: usize = 160;
 /// Width of the first buckets, in picoseconds: of times, of delays.
 const FIRST: i128 = 1_000_000;
 const FIRST_BAR: i128 = 10_000;
-/// Classes of errors that have a row of their own.
-const MOST_CLASSES: usize = 12;
-
-type Drawn = Result<(), Box<dyn Error>>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Classes of errors that have a row of their own, and encoders that have a panel.
+const MOST_CLASSES: usize = 24;
+const MOST_ENCODERS: usize = 32;
+/// Instants later than this are shown from the first frame on, in picoseconds: 1000 s.
+const LATE: i128 = 1_000_000_000_000_000;
 
 /// What a bucket gathers.
 trait Gather: Clone {
@@ -84,33 +84,45 @@ impl<T: Gather> Buckets<T> {
     }
 }
 
-/// Positions of one line that can be compared with each other.
+/// Positions that can be compared with each other.
 #[derive(Debug, Clone)]
 struct Curve {
-    /// The name of the line.
-    name: String,
     turns: bool,
     count: u64,
     values: Buckets<Span>,
 }
 
-impl Printer for Picture {
-    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
-        self.add(origin, event);
-        Ok(())
-    }
+/// What an encoder said: its positions, by name and by the counts after which the value begins again, and its delays.
+#[derive(Debug, Clone)]
+struct Encoder {
+    curves: BTreeMap<(&'static str, Option<u64>), Curve>,
+    delays: Buckets<u64>,
 }
 
 /// Gathers what is drawn.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     title: String,
-    /// By line and by the counts after which the value begins again.
-    curves: BTreeMap<(usize, Option<u64>), Curve>,
-    delays: Buckets<u64>,
-    errors: BTreeMap<&'static str, Buckets<u64>>,
+    encoders: BTreeMap<Speaker, Encoder>,
+    /// By who is meant and by class.
+    errors: BTreeMap<(Speaker, &'static str), Buckets<u64>>,
     /// First and last time.
     extent: Option<(Time, Time)>,
+    /// The names of those who spoke, once all lines are known.
+    names: BTreeMap<Speaker, String>,
+}
+
+impl Printer for Picture {
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        self.add(origin.speaker(event), event);
+        Ok(())
+    }
+
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
+        let all = self.encoders.keys().chain(self.errors.keys().map(|(speaker, _)| speaker));
+        self.names = all.map(|speaker| (*speaker, origin.name(*speaker))).collect();
+        Ok(())
+    }
 }
 
 impl Picture {
@@ -118,35 +130,87 @@ impl Picture {
     pub(crate) fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
-            curves: BTreeMap::new(),
-            delays: Buckets::new(FIRST_BAR, MOST_BARS),
+            encoders: BTreeMap::new(),
             errors: BTreeMap::new(),
             extent: None,
+            names: BTreeMap::new(),
         }
     }
 
-    fn add(&mut self, origin: &Origin, event: &Event) {
+    /// When the first frame begins, and when the last one ends.
+    pub(crate) fn extent(&self) -> Option<(Time, Time)> {
+        self.extent
+    }
+
+    fn add(&mut self, speaker: Speaker, event: &Event) {
         let Place::Time { start, end } = event.place else { return };
         let (first, last) = self.extent.unwrap_or((start, end));
         self.extent = Some((first.min(start), last.max(end)));
-        if let Some(delay) = event.delay {
-            self.delays.add(delay.into(), &1);
-        }
         if let Verdict::Refused(refusal) = &event.verdict {
-            let rows = self.errors.len();
-            let class =
-                if rows < MOST_CLASSES || self.errors.contains_key(refusal.class) { refusal.class } else { "other" };
-            self.errors.entry(class).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start.ps(), &1);
+            let known = self.errors.len() < MOST_CLASSES || self.errors.contains_key(&(speaker, refusal.class));
+            let class = if known { refusal.class } else { "other" };
+            self.errors.entry((speaker, class)).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start.ps(), &1);
+        }
+        if event.delay.is_none() && event.position.is_none() {
+            return;
+        }
+        let encoder = self.encoders.entry(speaker).or_insert_with(Encoder::new);
+        if let Some(delay) = event.delay {
+            encoder.delays.add(delay.into(), &1);
         }
         if let Some(position) = event.position {
-            self.position(origin, start, position);
+            encoder.position(start, position);
         }
     }
 
-    fn position(&mut self, origin: &Origin, time: Time, position: Position) {
+    /// The picture as SVG.
+    pub(crate) fn draw(&self) -> Drawn<String> {
+        let more = self.encoders.len().saturating_sub(MOST_ENCODERS);
+        let more = if more > 0 {
+            format!(", the first {MOST_ENCODERS} of {} encoders", more + MOST_ENCODERS)
+        } else {
+            String::new()
+        };
+        let mut sheet = Sheet::new(&format!("{}{more}", self.title), 1000);
+        let clock = Clock::of(self.extent);
+        for (speaker, encoder) in self.encoders.iter().take(MOST_ENCODERS) {
+            let name = self.names.get(speaker).filter(|name| !name.is_empty());
+            encoder.draw(name.map_or("", String::as_str), &clock, &mut sheet);
+        }
+        let rows = self.rows(&clock);
+        sheet.panel(rows.height(), rows);
+        sheet.svg()
+    }
+
+    fn rows(&self, clock: &Clock) -> Rows {
+        let row = |((speaker, class), buckets): (&(Speaker, &'static str), &Buckets<u64>)| {
+            let count: u64 = buckets.iter().map(|(_, count)| *count).sum();
+            let who = self.names.get(speaker).filter(|name| !name.is_empty());
+            Row {
+                name: who.map_or_else(|| (*class).to_owned(), |who| format!("{who}: {class}")),
+                note: count.to_string(),
+                faults: buckets.iter().map(|(time, _)| clock.show(time)).collect(),
+                ..Row::default()
+            }
+        };
+        let title = if self.errors.is_empty() { "no errors" } else { "errors" };
+        Rows {
+            title: title.to_owned(),
+            along: clock.label.clone(),
+            x: clock.range.clone(),
+            each: self.errors.iter().map(row).collect(),
+        }
+    }
+}
+
+impl Encoder {
+    fn new() -> Self {
+        Self { curves: BTreeMap::new(), delays: Buckets::new(FIRST_BAR, MOST_BARS) }
+    }
+
+    fn position(&mut self, time: Time, position: Position) {
         let turns = position.turns();
-        let curve = self.curves.entry((origin.speaks, position.span)).or_insert_with(|| Curve {
-            name: origin.lane().map_or_else(String::new, |lane| lane.channel.clone()),
+        let curve = self.curves.entry((position.name, position.span)).or_insert_with(|| Curve {
             turns: turns.is_some(),
             count: 0,
             values: Buckets::new(FIRST, MOST),
@@ -158,128 +222,79 @@ impl Picture {
         }
     }
 
-    /// The picture as SVG.
-    pub(crate) fn draw(&self) -> Result<String, Box<dyn Error>> {
-        let mut svg = String::new();
-        self.draw_on(&SVGBackend::with_string(&mut svg, (1000, 900)).into_drawing_area())?;
-        Ok(svg)
-    }
-
-    fn draw_on(&self, root: &Area<'_>) -> Drawn {
-        root.fill(&WHITE)?;
-        let root = root.titled(&self.title, ("sans-serif", 18))?;
-        let (positions, rest) = root.split_vertically(390);
-        let (errors, delays) = rest.split_vertically(210);
-        self.draw_positions(&positions)?;
-        self.draw_errors(&errors)?;
-        self.draw_delays(&delays)?;
-        root.present()?;
-        Ok(())
-    }
-
-    /// The time axis, in milliseconds.
-    fn milliseconds(&self) -> std::ops::Range<f64> {
-        let (first, last) = self.extent.unwrap_or((Time::ZERO, Time::ZERO + 1));
-        let (first, last) = (first.ps() as f64 / 1e9, last.ps() as f64 / 1e9);
-        first..last.max(first + 1e-6)
-    }
-
-    fn draw_positions(&self, area: &Area<'_>) -> Drawn {
-        // Of each line the curve that has most points; turns and counts do not go together.
-        let mut best: BTreeMap<usize, &Curve> = BTreeMap::new();
-        for ((lane, _), curve) in &self.curves {
-            if best.get(lane).is_none_or(|known| (known.turns, known.count) < (curve.turns, curve.count)) {
-                best.insert(*lane, curve);
+    /// Its positions below each other, the delays beside the first one.
+    fn draw(&self, who: &str, clock: &Clock, sheet: &mut Sheet) {
+        let of = if who.is_empty() { String::new() } else { format!("{who}: ") };
+        // Of each name the curve that has most points; turns and counts do not go together.
+        let mut best: BTreeMap<&str, &Curve> = BTreeMap::new();
+        for ((name, _), curve) in &self.curves {
+            if best.get(name).is_none_or(|known| (known.turns, known.count) < (curve.turns, curve.count)) {
+                best.insert(name, curve);
             }
         }
-        let turns = best.values().any(|curve| curve.turns);
-        best.retain(|_, curve| curve.turns == turns);
-        let all = || best.values().flat_map(|curve| curve.values.iter()).map(|(_, span)| span);
-        let low = all().map(|span| span.least).fold(f64::INFINITY, f64::min);
-        let high = all().map(|span| span.most).fold(f64::NEG_INFINITY, f64::max);
-        let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
-        let room = ((high - low) * 0.05).max(high.abs() * 1e-9).max(1e-6);
-        let mut chart = ChartBuilder::on(area)
-            .margin(10)
-            .x_label_area_size(32)
-            .y_label_area_size(90)
-            .build_cartesian_2d(self.milliseconds(), low - room..high + room)?;
-        let unit = if turns { "position in turns" } else { "position in counts" };
-        chart.configure_mesh().x_desc("time in ms").y_desc(unit).light_line_style(WHITE).draw()?;
-        for (row, curve) in best.values().enumerate() {
-            let colour = Palette99::pick(row).to_rgba();
+        let curve = |(name, curve): (&&str, &&Curve)| -> Share {
+            let unit = if curve.turns { "turns" } else { "counts" };
+            let title = format!("{of}position {name} in {unit}");
             let points = curve.values.iter().flat_map(|(time, span)| {
-                let time = time as f64 / 1e9;
+                let time = clock.show(time);
                 [(time, span.first), (time, span.least), (time, span.most), (time, span.last)]
             });
-            chart
-                .draw_series(LineSeries::new(points, colour.stroke_width(1)))?
-                .label(curve.name.as_str())
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
-        }
-        if best.len() > 1 {
-            chart.configure_series_labels().background_style(WHITE).border_style(BLACK).draw()?;
-        }
-        Ok(())
+            let chart = Chart::new(title, &clock.label, clock.range.clone());
+            (3, Box::new(chart.with(Stroke::ONLY, points.collect())))
+        };
+        let delays = (!self.delays.held.is_empty()).then(|| -> Share { (2, Box::new(self.delays(&of))) });
+        let mut curves = best.iter().map(curve);
+        let first: Vec<_> = curves.next().into_iter().chain(delays).collect();
+        sheet.beside(230, first);
+        curves.for_each(|panel| sheet.beside(230, vec![panel]));
     }
 
-    fn draw_errors(&self, area: &Area<'_>) -> Drawn {
-        let rows: Vec<(&&'static str, &Buckets<u64>)> = self.errors.iter().collect();
-        let mut chart = ChartBuilder::on(area)
-            .margin(10)
-            .x_label_area_size(32)
-            .y_label_area_size(90)
-            .build_cartesian_2d(self.milliseconds(), 0.0..rows.len().max(1) as f64)?;
-        let title = if rows.is_empty() { "no errors" } else { "errors" };
-        chart
-            .configure_mesh()
-            .x_desc("time in ms")
-            .y_desc(title)
-            .y_labels(0)
-            .disable_y_mesh()
-            .light_line_style(WHITE)
-            .draw()?;
-        let (_, pixels) = area.dim_in_pixel();
-        for (row, (class, buckets)) in rows.iter().enumerate() {
-            let y = rows.len() as f64 - row as f64;
-            let colour = Palette99::pick(row).to_rgba();
-            let marks = buckets.iter().map(|(time, _)| {
-                let time = time as f64 / 1e9;
-                PathElement::new(vec![(time, y - 0.8), (time, y - 0.2)], colour.stroke_width(1))
-            });
-            chart.draw_series(marks)?;
-            let count: u64 = buckets.iter().map(|(_, count)| *count).sum();
-            let at = ((rows.len() as f64 - y + 0.5) * (f64::from(pixels) - 52.0) / rows.len() as f64) as i32 + 10;
-            area.draw(&Text::new(format!("{class} {count}"), (104, at - 6), ("sans-serif", 12).into_font()))?;
-        }
-        Ok(())
-    }
-
-    fn draw_delays(&self, area: &Area<'_>) -> Drawn {
+    fn delays(&self, of: &str) -> Chart {
         let width = self.delays.width;
+        let us = |delay: i128| delay as f64 / 1e6;
         let first = self.delays.iter().next().map_or(0, |(delay, _)| delay);
         let last = self.delays.iter().last().map_or(FIRST, |(delay, _)| delay + width);
-        let most = self.delays.iter().map(|(_, count)| *count).max().unwrap_or(1);
-        let us = |delay: i128| delay as f64 / 1e6;
-        let mut chart = ChartBuilder::on(area)
-            .margin(10)
-            .x_label_area_size(32)
-            .y_label_area_size(90)
-            .build_cartesian_2d(us(first - width)..us(last + width), 0.0..most as f64 * 1.05)?;
-        let title = if self.delays.held.is_empty() { "no answers to requests" } else { "answers" };
-        chart.configure_mesh().x_desc("answer delay in us").y_desc(title).light_line_style(WHITE).draw()?;
-        let colour = Palette99::pick(0).to_rgba();
-        let bars = self.delays.iter().map(|(delay, count)| {
-            Rectangle::new([(us(delay), 0.0), (us(delay + width), *count as f64)], colour.filled())
-        });
-        chart.draw_series(bars)?;
-        Ok(())
+        let bars = self.delays.iter().map(|(delay, count)| (us(delay)..us(delay + width), *count as f64));
+        let chart =
+            Chart::new(format!("{of}answers by their delay"), "delay in us", us(first - width)..us(last + width));
+        Chart { bars: bars.collect(), ..chart }
+    }
+}
+
+/// The time axis: in which unit, and from when on.
+struct Clock {
+    origin: i128,
+    unit: f64,
+    label: String,
+    range: Range<f64>,
+}
+
+impl Clock {
+    fn of(extent: Option<(Time, Time)>) -> Self {
+        let (first, last) = extent.unwrap_or((Time::ZERO, Time::ZERO + 1));
+        let late = first.ps().abs() > LATE;
+        let origin = if late { first.ps() } else { 0 };
+        let (unit, name) = match last - first {
+            ..=2_000_000_000 => (1e6, "us"),
+            2_000_000_001..=2_000_000_000_000 => (1e9, "ms"),
+            _ => (1e12, "s"),
+        };
+        let from = if late { " from the first frame on" } else { "" };
+        let mut clock = Self { origin, unit, label: format!("time in {name}{from}"), range: 0.0..1.0 };
+        clock.range = clock.show(first.ps())..clock.show(last.ps()).max(clock.show(first.ps()) + 1e-3);
+        clock
+    }
+
+    fn show(&self, time: i128) -> f64 {
+        (time - self.origin) as f64 / self.unit
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drawing::geometry::nothing_is_covered;
+    use servowire_decode::event::Refusal;
 
     #[test]
     fn buckets_grow_and_lose_nothing() {
@@ -297,5 +312,45 @@ mod tests {
         let ends = [spans[0].first, spans.last().unwrap().last];
         let extremes = spans.iter().fold([0.0; 2], |[low, high], span| [span.least.min(low), span.most.max(high)]);
         assert!(ends.iter().chain(&extremes).zip([1.0, 5.0, -2.0, 9.0]).all(|(is, due)| (is - due).abs() < 1e-12));
+    }
+
+    fn answer(start: i64, address: u32, counts: i64, verdict: Verdict) -> (Speaker, Event) {
+        let start = Time::from_ps(start.into());
+        let place = Place::Time { start, end: start + 40_000_000 };
+        let event = Event::new(place, None, "ABS40", Vec::new(), verdict);
+        let position = Position { name: "ABS", counts, span: Some(1 << 40), per_turn: Some(1 << 20) };
+        let speaker = Speaker { lane: 0, address: Some(address) };
+        (speaker, Event { position: Some(position), delay: Some(3_000_000 + start.ps() as i64 % 7 * 10_000), ..event })
+    }
+
+    /// Eight encoders that stand far from each other: each has its own panel, and nothing covers anything.
+    #[test]
+    fn a_panel_an_encoder() {
+        let mut picture =
+            Picture::new("/a/long/path/to/a/capture/that/somebody/made/of/a/whole/bus/of/eight/encoders/yesterday.vcd");
+        for k in 0..800_i64 {
+            let address = (k % 8) as u32;
+            let refused = Refusal::new(["crc", "delimiter", "no_response"][(k / 8 % 3) as usize], "damaged").into();
+            let verdict = if k % 29 == 0 { refused } else { Verdict::Ok };
+            let (speaker, event) = answer(k * 100_000_000, address, i64::from(address) * 5_900_000_000 + k, verdict);
+            picture.add(speaker, &event);
+            picture.names.insert(speaker, format!("line, address {address}"));
+        }
+        let svg = picture.draw().unwrap();
+        nothing_is_covered(&svg);
+        for address in 0..8 {
+            assert!(svg.contains(&format!("line, address {address}: position ABS in turns")), "{address}");
+        }
+        // Without anything in it, and with the date of a network card.
+        nothing_is_covered(&Picture::new("nothing").draw().unwrap());
+        let mut late = Picture::new("late");
+        for k in 0..50 {
+            let (speaker, mut event) = answer(k * 1_000_000, 1, k * 47_501_010_355, Verdict::Ok);
+            let start = Time::from_ps(1_700_000_000_000_000_000_000 + i128::from(k) * 1_000_000_000);
+            event.place = Place::Time { start, end: start + 1 };
+            late.add(speaker, &event);
+        }
+        nothing_is_covered(&late.draw().unwrap());
+        assert!(late.draw().unwrap().contains("time in ms from the first frame on"));
     }
 }

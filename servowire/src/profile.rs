@@ -5,7 +5,6 @@ mod drawing;
 mod motion;
 mod part;
 mod ramp;
-mod stroke;
 
 use std::error::Error;
 use std::fmt::Display;

@@ -1,18 +1,27 @@
 //! What is said of captures and of the lines in them, for every command that decodes.
 
+use std::cell::RefCell;
+use std::error::Error;
 use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
 use std::sync::LazyLock;
 
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use rtex_block::position::Gear;
-use servowire_decode::capture::{Format, Hints};
+use servowire_decode::capture::{self, Format, Hints};
 use servowire_decode::codec::Codec;
+use servowire_decode::fault::Stop;
+use servowire_decode::output::Output;
+use servowire_decode::output::filter::Filter;
+use servowire_decode::output::printer::Printer;
 use servowire_decode::protocols::CODECS;
+use servowire_decode::recognition::Note;
 use servowire_decode::settings::{Options, Rtex, Settings, Widths};
 use servowire_decode::time;
 
 use crate::units::{bit_rate, frequency};
+use crate::{files, interrupt};
 
 /// A protocol by its name, or whatever the capture holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,6 +108,10 @@ pub(crate) struct FileArgs {
     /// The file still grows: what comes to it is decoded too, until the program is stopped.
     #[arg(long)]
     pub(crate) follow: bool,
+    /// Whether the packets of a network capture end with their frame check sequence, which most network cards take off;
+    /// otherwise as the file says.
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    fcs: Option<bool>,
     /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     threshold: Option<f64>,
@@ -153,7 +166,7 @@ pub(crate) struct RtexArgs {
     /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
     #[arg(long, value_name = "BYTES", value_parser = block_size)]
     block_size: Option<u8>,
-    /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
+    /// Update period, as 500us or 0.5ms: gives a log without times its times, and checks the steps of the position.
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) period: Option<u32>,
     /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
@@ -169,6 +182,14 @@ fn period(text: &str) -> Result<u32, String> {
     match time::duration(text).map(|time| (time.ps() + 500) / 1000) {
         Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
         _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
+    }
+}
+
+fn yes_or_no(text: &str) -> Result<bool, &'static str> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("yes or no"),
     }
 }
 
@@ -195,6 +216,7 @@ impl Reading {
             (self.file.record_size.is_some(), "--record-size"),
             (self.file.threshold.is_some(), "--threshold"),
             (self.file.follow, "--follow"),
+            (self.file.fcs.is_some(), "--fcs"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
             (self.file.unit_size.is_some(), "--unit-size"),
@@ -239,7 +261,54 @@ impl Reading {
                 mac_id: self.rtex.mac_id,
                 period_ns: self.rtex.period,
                 gear: self.rtex.gear.unwrap_or(Gear::UNITY),
+                whole: false,
             },
+            fcs: self.file.fcs,
         }
+    }
+}
+
+/// What came of decoding a file.
+#[derive(Debug, Default)]
+pub(crate) struct Read {
+    /// What was found, in sentences.
+    pub(crate) notes: Vec<String>,
+    /// Why nothing more could be read.
+    pub(crate) fault: Option<String>,
+    /// The refused frames in a sentence.
+    pub(crate) refusals: Option<String>,
+}
+
+impl Reading {
+    /// Decodes a file into several printers.
+    pub(crate) fn decode<'a>(
+        &self,
+        path: &Path,
+        first: &'a mut dyn Printer,
+        beside: Vec<&'a mut dyn Printer>,
+        filter: Option<&'a mut Filter>,
+    ) -> Result<Read, Box<dyn Error>> {
+        let input = files::open(path, false)?;
+        let name = input.name().to_owned();
+        let capture = capture::open(input, self.hints())?;
+        let notes = RefCell::new(Vec::new());
+        let note = |note: &Note| notes.borrow_mut().push(note.to_string());
+        let mut out = Output::new(&name, first).with_notes(&note).with_enough(&interrupt::asked);
+        for printer in beside {
+            out = out.with_beside(Some(printer));
+        }
+        if let Some(filter) = filter {
+            out = out.with_filter(filter);
+        }
+        out.begin()?;
+        let fault = match servowire_decode::decode(&name, capture, self.protocol.0, &self.settings(), &mut out) {
+            Ok(()) => None,
+            Err(Stop::Fault(fault) | Stop::Trouble(fault)) => Some(fault.to_string()),
+            Err(Stop::Output(error)) => return Err(error.into()),
+        };
+        out.end()?;
+        let refusals = out.refusals();
+        drop(out);
+        Ok(Read { notes: notes.into_inner(), fault, refusals })
     }
 }

@@ -1,5 +1,7 @@
 //! `servowire registers`: the register map of a HIPERFACE DSL receiver in words.
 
+mod ip_core;
+
 use std::error::Error;
 use std::fmt::{self, Display, Write as _};
 use std::fs;
@@ -19,7 +21,7 @@ use crate::terminal::say;
 /// Exit code 0: the map could be read, whatever it says; 2: it could not.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// 86 bytes, 00h to 55h, as they are or as hex digits; - for the standard input. More bytes may follow.
+    /// The registers, as bytes or as hex digits; - for the standard input. More bytes may follow.
     file: PathBuf,
     /// Whose receiver it is.
     #[arg(long, value_enum, default_value_t = Receiver::Ti)]
@@ -31,10 +33,12 @@ pub struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Receiver {
-    /// Firmware of the Motor Control SDK.
+    /// Firmware of the Motor Control SDK: 86 bytes, 00h to 55h.
     Ti,
-    /// SICK IP core.
+    /// SICK IP core: 64 bytes, 00h to 3Fh, and if it was read the bank of safe channel 2, 00h to 1Fh, behind them.
     Sick,
+    /// The map of a receiver made with the crate hdsl, by the rules of SICK's: 86 bytes.
+    Hdsl,
 }
 
 impl Arguments {
@@ -52,17 +56,22 @@ impl Arguments {
     fn text(&self) -> Result<String, Box<dyn Error>> {
         let bytes = bytes(&read(&self.file)?);
         let rest = bytes.get(self.at..).unwrap_or_default();
-        let Some(image) = rest.first_chunk() else {
-            let want = Registers::LEN;
-            return Err(format!("{} bytes from {} on, a register map has {want}", rest.len(), self.at).into());
-        };
-        let dialect = match self.receiver {
-            Receiver::Ti => Dialect::TI,
-            Receiver::Sick => Dialect::SICK,
-        };
         let mut text = String::new();
-        Map { map: Registers::from_bytes(&dialect, *image), receiver: self.receiver }.write(&mut text)?;
+        match self.receiver {
+            Receiver::Ti => Map(Registers::from_bytes(&Dialect::TI, *self.whole(rest)?), false).write(&mut text)?,
+            Receiver::Hdsl => Map(Registers::from_bytes(&Dialect::SICK, *self.whole(rest)?), true).write(&mut text)?,
+            Receiver::Sick => {
+                let drive: &[u8; Registers::CORE_LEN] = self.whole(rest)?;
+                let safe2 = rest.get(Registers::CORE_LEN..).and_then(<[u8]>::first_chunk);
+                ip_core::write(Registers::from_core(drive, safe2), safe2.is_some(), &mut text)?;
+            }
+        }
         Ok(text)
+    }
+
+    fn whole<'r, const N: usize>(&self, rest: &'r [u8]) -> Result<&'r [u8; N], String> {
+        let short = || format!("{} bytes from {} on, a register map has {N}", rest.len(), self.at);
+        rest.first_chunk().ok_or_else(short)
     }
 }
 
@@ -83,25 +92,18 @@ fn bytes(file: &[u8]) -> Vec<u8> {
     bytes.filter(|_| digits.len() % 2 == 0 && digits.iter().all(u8::is_ascii_hexdigit)).unwrap_or_else(|| file.to_vec())
 }
 
-struct Map {
-    map: Registers,
-    receiver: Receiver,
-}
+/// A map in the layout of the SDK, and whether by the rules of SICK's.
+struct Map(Registers, bool);
 
 impl Map {
     fn write(mut self, out: &mut String) -> fmt::Result {
-        let map = &self.map;
+        let map = &self.0;
         let (link, d) = (if map.link() { "up" } else { "down" }, map.online_d());
         line(out, "link", format_args!("{link}, quality {} of 15", map.quality()))?;
         line(out, "drive", d)?;
         line(out, "safe 1", map.online_1())?;
         line(out, "safe 2", map.online_2())?;
-        let id = EncoderId::truncate(u32::from_be_bytes([0, byte(map, 0x0d) & 15, byte(map, 0x0e), byte(map, 0x0f)]));
-        line(out, "encoder", encoder(id))?;
-        let [edges, delay] = map.get(Register::Edges);
-        let periods: Vec<String> = (0..8).filter(|at| edges >> at & 1 == 1).map(|at: u8| at.to_string()).collect();
-        let periods = if periods.is_empty() { "none".to_owned() } else { periods.join(" ") };
-        line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
+        let id = identity(map, out)?;
 
         match (map.pos(), map.vel()) {
             (Some(position), Some(velocity)) => {
@@ -113,20 +115,13 @@ impl Map {
         self.safe(out, id)?;
         self.messages(out)?;
 
-        let masks = format!("{:04X}h", u16::from_be_bytes(self.map.get(Register::MaskH)));
-        let interrupts = self.map.masked_events();
-        let events = self.map.take_events();
-        let (event, event_s) = (events.drive, events.safe);
-        line(out, "events", format_args!("{event}, mask {masks}"))?;
-        let [mask_s] = self.map.get(Register::MaskS);
-        line(out, "safe events", format_args!("{event_s}, mask {mask_s:02X}h"))?;
-        line(out, "interrupts", interrupts)
+        events(&mut self.0, out)
     }
 
     fn safe(&self, out: &mut String, id: EncoderId) -> fmt::Result {
-        let map = &self.map;
+        let map = &self.0;
         let [summary] = map.get(Register::SafeSum);
-        let crc = check(map, Register::SafeSum, Register::VPos, Register::VPosCrc);
+        let crc = check(map, Register::SafeSum as u8, Register::VPos, Register::VPosCrc);
         let stale = match map.online_1() {
             flags if flags.contains(Online1::VPOS) => ", not to be used: VPOS",
             flags if flags.contains(Online1::SCE) => ", not new: SCE",
@@ -134,50 +129,82 @@ impl Map {
         };
         let position = number(id, map.vpos());
         line(out, "safe position", format_args!("{position}, SUMMARY {summary:02X}h, CRC {crc}{stale}"))?;
-        let crc = check(map, Register::Status2, Register::VPos2, Register::VPosCrc2);
         let stale = match map.online_2() {
             flags if flags.contains(Online2::VPOS2) => ", not to be used: VPOS2",
             flags if flags.contains(Online2::SCE2) => ", not new: SCE2",
             _ => "",
         };
-        let (position, status) = (map.vpos2(), map.status_2());
-        let fixed = if status.is_fixed_part_right() { "" } else { " (FIX2 is wrong)" };
-        line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
+        safe_2(map, stale, out)
     }
 
     fn messages(&self, out: &mut String) -> fmt::Result {
-        let map = &self.map;
+        let map = &self.0;
         let [high, low] = map.get(Register::PcAdd);
         let resource = ResourceAddress::truncate(u16::from_be_bytes([high, low]));
         let direction = if high & 0x40 != 0 { "read" } else { "write" };
         let resource = format!("{} {:03X}h", resource.name().unwrap_or("resource"), resource.get());
         let what = if high & 0x10 != 0 { "" } else { ", directly" };
-        let buffer: [u8; 8] = map.get(Register::PcBuffer);
         let free = map.online_d().contains(OnlineD::FREL);
         let state = match (free, map.online_d().contains(OnlineD::ANS)) {
             (false, _) => "under way",
             (true, true) => "not answered well",
             (true, false) => "free",
         };
-        let data = if free && high & 0x20 != 0 {
-            let [first, second, ..] = buffer;
-            let [detail, class] = if self.receiver == Receiver::Sick { [first, second] } else { [second, first] };
-            format!("refused: {}", ResourceError::new(class, detail))
-        } else {
-            let data = buffer.get(..Length::from_code(high >> 2 & 3).map_or(0, Length::bytes)).unwrap_or_default();
-            let text = core::str::from_utf8(data).ok().filter(|text| text.bytes().all(|byte| byte.is_ascii_graphic()));
-            let text = text.filter(|text| !text.is_empty()).map(|text| format!(" {text:?}")).unwrap_or_default();
-            data.iter().fold(String::from("data"), |text, byte| format!("{text} {byte:02X}")) + &text
-        };
+        let bytes = Length::from_code(high >> 2 & 3).map_or(0, Length::bytes);
+        let data = if free && high & 0x20 != 0 { refused(map, self.1) } else { data(map, bytes) };
         line(out, "long message", format_args!("{state}; {direction} {resource}{what}; {data}"))?;
         let free = if map.online_1().contains(Online1::FRES) { "free" } else { "under way" };
-        // The SICK core has PC_DATA at 2Fh.
-        let data = byte(map, if self.receiver == Receiver::Ti { Register::SPcData as u8 } else { 0x2f });
+        let data = byte(map, Register::SPcData as u8);
         line(out, "short message", format_args!("{free}; data {data:02X}h"))?;
         let ([errors], [threshold]) = (map.get(Register::AccErrCnt), map.get(Register::AccErrCntThresh));
         let beyond = if map.too_many_acceleration_errors() { ", too many" } else { "" };
         line(out, "acceleration", format_args!("{errors} words in a row lost, threshold {threshold}{beyond}"))
     }
+}
+
+/// Encoder and cable; the identifier.
+fn identity(map: &Registers, out: &mut String) -> Result<EncoderId, fmt::Error> {
+    let id = EncoderId::truncate(u32::from_be_bytes([0, byte(map, 0x0d) & 15, byte(map, 0x0e), byte(map, 0x0f)]));
+    line(out, "encoder", encoder(id))?;
+    let [edges, delay] = map.get(Register::Edges);
+    let periods: Vec<String> = (0..8).filter(|at| edges >> at & 1 == 1).map(|at: u8| at.to_string()).collect();
+    let periods = if periods.is_empty() { "none".to_owned() } else { periods.join(" ") };
+    line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
+    Ok(id)
+}
+
+fn safe_2(map: &Registers, stale: &str, out: &mut String) -> fmt::Result {
+    let crc = check(map, Register::Status2 as u8, Register::VPos2, Register::VPosCrc2);
+    let (position, status) = (map.vpos2(), map.status_2());
+    let fixed = if status.is_fixed_part_right() { "" } else { " (FIX2 is wrong)" };
+    line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
+}
+
+/// Why the encoder refused a long message: by the rules of SICK's detail and class stand in this order, by those of TI's in the other.
+fn refused(map: &Registers, sick: bool) -> String {
+    let [first, second] = map.get(Register::PcBuffer);
+    let [detail, class] = if sick { [first, second] } else { [second, first] };
+    format!("refused: {}", ResourceError::new(class, detail))
+}
+
+/// The first bytes of the buffer of long messages, as text too if they are text.
+fn data(map: &Registers, bytes: usize) -> String {
+    let buffer: [u8; 8] = map.get(Register::PcBuffer);
+    let data = buffer.get(..bytes).unwrap_or_default();
+    let text = core::str::from_utf8(data).ok().filter(|text| text.bytes().all(|byte| byte.is_ascii_graphic()));
+    let text = text.filter(|text| !text.is_empty()).map(|text| format!(" {text:?}")).unwrap_or_default();
+    data.iter().fold(String::from("data"), |text, byte| format!("{text} {byte:02X}")) + &text
+}
+
+fn events(map: &mut Registers, out: &mut String) -> fmt::Result {
+    let masks = format!("{:04X}h", u16::from_be_bytes(map.get(Register::MaskH)));
+    let interrupts = map.masked_events();
+    let events = map.take_events();
+    let (event, event_s) = (events.drive, events.safe);
+    line(out, "events", format_args!("{event}, mask {masks}"))?;
+    let [mask_s] = map.get(Register::MaskS);
+    line(out, "safe events", format_args!("{event_s}, mask {mask_s:02X}h"))?;
+    line(out, "interrupts", interrupts)
 }
 
 fn line(out: &mut String, name: &str, text: impl Display) -> fmt::Result {
@@ -203,8 +230,8 @@ fn number(id: EncoderId, raw: u64) -> String {
 }
 
 /// Whether the CRC in the map fits to the status byte and the position.
-fn check(map: &Registers, status: Register, position: Register, crc: Register) -> &'static str {
-    let ([status], [p4, p3, p2, p1, p0]) = (map.get(status), map.get(position));
+fn check(map: &Registers, status: u8, position: Register, crc: Register) -> &'static str {
+    let (status, [p4, p3, p2, p1, p0]) = (byte(map, status), map.get(position));
     let want = crc16(&[status, p4, p3, p2, p1, p0]);
     if map.get(crc) == want.to_be_bytes() { "right" } else { "wrong" }
 }

@@ -50,7 +50,7 @@ impl Arguments {
             Protocol::Nikon(arguments) => arguments.plan()?,
         };
         if let Some(path) = &self.svg {
-            fs::write(path, drawing::svg(&plan)).map_err(|error| format!("{}: {error}", path.display()))?;
+            fs::write(path, drawing::svg(&plan)?).map_err(|error| format!("{}: {error}", path.display()))?;
         } else {
             say(format_args!("{plan}"))?;
         }

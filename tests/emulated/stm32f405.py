@@ -121,7 +121,7 @@ def check(said, line):
             parity ^= byte
         assert parity == 0 and answer[:1] == READ_ALL, answer.hex()
         carried.add((int.from_bytes(answer[2:5], "little"), int.from_bytes(answer[6:9], "little"), answer[5] == 0x17))
-    printed = re.findall(r"^turn (\d+), (\d+) counts at \d+ ns, (\d+) good, (\d+) bad, stack (\d+) bytes$", said, re.M)
+    printed = re.findall(r"^turn (\d+), (\d+) counts at \d+ ns, (\d+) good, (\d+) bad\nstack (\d+) bytes$", said, re.M)
     assert len(printed) >= 6, said
     values = [int(abs_) for _, abs_, *_ in printed]
     assert values == sorted(set(values)), values

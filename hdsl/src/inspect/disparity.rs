@@ -19,16 +19,32 @@ impl Chain {
             let [low, high, ..] = (line >> at).to_le_bytes();
             Word::truncate(u16::from_le_bytes([low, high]))
         });
-        let end = |before: RunningDisparity| {
-            words.into_iter().try_fold(before, |rd, word| word.is_in(rd).then(|| rd.after(word)))
-        };
-        let (minus, plus) = (end(RunningDisparity::Minus), end(RunningDisparity::Plus));
-        let before = match (minus, plus) {
-            (Some(_), None) => Some(RunningDisparity::Minus),
-            (None, Some(_)) => Some(RunningDisparity::Plus),
-            _ => None,
-        };
-        Self { before, after: before.and(minus.or(plus)), holds: minus.or(plus).is_some() }
+        let mut chain = Self { before: None, after: None, holds: true };
+        // After the last word that told; words that did, and whether one was in no table before them.
+        let (mut last, mut told, mut spoilt) = (None, 0_u8, false);
+        for word in words {
+            let column = match (word.is_in(RunningDisparity::Minus), word.is_in(RunningDisparity::Plus)) {
+                (true, true) => continue,
+                (true, false) => RunningDisparity::Minus,
+                (false, true) => RunningDisparity::Plus,
+                (false, false) => {
+                    (chain.after, chain.holds, last, spoilt) = (None, false, None, true);
+                    continue;
+                }
+            };
+            let breaks = last.is_some_and(|last| last != column);
+            // Where two words do not go together either may be the wrong one.
+            chain.before = match told {
+                0 => (!spoilt).then_some(column),
+                1 if breaks => None,
+                _ => chain.before,
+            };
+            last = Some(column.after(word));
+            chain.after = last.filter(|_| !breaks);
+            chain.holds &= !breaks;
+            told = told.saturating_add(1);
+        }
+        chain
     }
 
     /// Whether each word stands in the column that the words before it leave.
@@ -36,12 +52,12 @@ impl Chain {
         self.holds
     }
 
-    /// Before the first word, where the words tell.
+    /// Before the first word, where the words tell: also those in front of a damaged one.
     pub const fn before(self) -> Option<RunningDisparity> {
         self.before
     }
 
-    /// After the last word, where the words tell.
+    /// After the last word, where the words tell: also those behind a damaged one.
     pub const fn after(self) -> Option<RunningDisparity> {
         self.after
     }
@@ -92,5 +108,21 @@ mod tests {
         let wrong = chain([NEUTRAL, UP, NEUTRAL, UP, NEUTRAL, NEUTRAL]);
         assert_eq!((wrong.before(), wrong.after(), wrong.holds()), (None, None, false));
         assert!(chain([NEUTRAL, UP, NEUTRAL, DOWN, NEUTRAL, NEUTRAL]).holds());
+    }
+
+    /// Two words in front of the fault, or behind it, tell what is there.
+    #[test]
+    fn a_damaged_answer_tells_its_ends_where_they_are_sound() {
+        const NO_WORD: &str = "1111111111";
+        let ends = |words| {
+            let chain = chain(words);
+            assert!(!chain.holds());
+            (chain.before(), chain.after())
+        };
+        assert_eq!(ends([UP, NO_WORD, NEUTRAL, NEUTRAL, NEUTRAL, DOWN]), (Some(Minus), Some(Minus)));
+        assert_eq!(ends([NO_WORD, UP, NEUTRAL, NEUTRAL, NEUTRAL, NEUTRAL]), (None, Some(Plus)));
+        assert_eq!(ends([UP, NEUTRAL, NEUTRAL, NEUTRAL, NEUTRAL, NO_WORD]), (Some(Minus), None));
+        assert_eq!(ends([UP, DOWN, DOWN, NEUTRAL, NEUTRAL, NEUTRAL]), (Some(Minus), None));
+        assert_eq!(ends([UP, UP, DOWN, NEUTRAL, NEUTRAL, NEUTRAL]), (None, Some(Minus)));
     }
 }

@@ -3,11 +3,13 @@
 use nrz_line::Window;
 
 use crate::error::Error;
-use crate::frame::{Head, ParsedHead};
+use crate::frame::{Head, ParsedHead, STUFFING_BITS};
 use crate::line_code::LineDisparity;
 
 /// SYNC and the two ones of SAMPLE, the first bit in bit 0.
 const PATTERN: u128 = 0b1111_0100;
+/// A block of stuffing, the first bit in bit 0: 0 0 1 0 1 1.
+const STUFFING: u128 = 0b11_0100;
 /// SYNC, SAMPLE and CYCLE RESET: 0 0 1 0 1 1, 1 1 0, 1 1 0.
 const WHOLE: u128 = 0b0110_1111_0100;
 /// Bits of TRAILER and of the longest stuffing in front of a head that [`ends_with_trailer`] looks at.
@@ -128,12 +130,16 @@ pub fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
 /// [`FRONT_BITS`] bits, the last of them before the head; stuffing all over them is taken as good.
 pub fn ends_with_trailer(front: Window) -> bool {
     // The first bit in bit 0.
-    const STUFFING: u128 = 0b11_0100;
     const TRAILER: u128 = 0b11_0000;
     let blocks =
         (1..=front.len() / 6).map(|back| front.bits() >> front.len().saturating_sub(6_u32.wrapping_mul(back)) & 0x3f);
     let last = blocks.into_iter().find(|block| *block != STUFFING);
     last.is_none_or(|block| block == TRAILER)
+}
+
+/// Whether the last six bits are a block of stuffing, 001011.
+pub fn ends_with_stuffing(front: Window) -> bool {
+    front.len() >= STUFFING_BITS && front.bits() >> front.len().saturating_sub(STUFFING_BITS) == STUFFING
 }
 
 #[cfg(test)]
@@ -198,6 +204,8 @@ mod tests {
 
     #[test]
     fn trailers_in_front_of_a_head() {
+        assert!(ends_with_stuffing(line("000011 001011")) && !ends_with_stuffing(line("001011 000011")));
+        assert!(!ends_with_stuffing(line("01011")));
         assert!(ends_with_trailer(line("010101 000011")));
         assert!(ends_with_trailer(line("010101 000011 001011 001011")));
         assert!(ends_with_trailer(line("001011 001011")));

@@ -186,6 +186,10 @@ fn images() {
     remote.bus().registers[0x19..0x1e].copy_from_slice(&[0, 0, 0, 0x12, 0x34]);
     let map = remote.registers().unwrap();
     assert_eq!((map.vpos(), map.byte(0x46), map.byte(0x39), remote.bus().accesses), (0x1234, Some(0), Some(0xff), 0));
+    // LINK and QM 15; whether the position is aligned is in the online status, which is no register.
+    (remote.bus().registers[0x03], remote.bus().registers[0x14]) = (0x8f, 0x05);
+    let map = remote.registers().unwrap();
+    assert_eq!((map.link(), map.pos(), map.vel()), (true, None, None));
     let safe2 = core::array::from_fn(|at| at as u8);
     let map = Registers::from_core(&[0; 0x40], Some(&safe2));
     assert_eq!((map.byte(0x44), map.byte(0x46), map.vpos2()), (Some(0x0b), Some(0x18), 0x19_1a1b_1c1d));

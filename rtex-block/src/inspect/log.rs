@@ -93,12 +93,14 @@ pub enum LogFinding {
 }
 
 servowire_core::codes! {
-    /// What somebody has to look after.
+    /// What a drive did that somebody has to look after.
     pub enum Trouble: u8 {
-        /// A drive reports an alarm.
-        Alarm = 1 => "a drive reports an alarm",
-        /// The counter echo of a drive stood still: the communication, or the drive, did.
-        EchoStood = 2 => "the counter echo of a drive stood still",
+        /// It reported an alarm.
+        Alarm = 1 => "reported an alarm",
+        /// Its counter echo stood still: the communication, or the drive, did.
+        EchoStood = 2 => "sent a counter echo that stood still",
+        /// It did not answer.
+        Silence = 3 => "did not answer",
     }
 }
 
@@ -209,9 +211,10 @@ struct Track {
     /// The request that is out, and, until it is answered, the responses and the busy ones of them.
     request: Option<Request>,
     open: Option<(u32, u32)>,
-    /// Alarm was 1, and the echo stood still, at any time.
+    /// Alarm was 1, the echo stood still, and commands had no answer, at any time.
     alarmed: bool,
     stood: bool,
+    fell_silent: bool,
 }
 
 impl Track {
@@ -231,6 +234,7 @@ impl Track {
         open: None,
         alarmed: false,
         stood: false,
+        fell_silent: false,
     };
 
     /// The counter of a command.
@@ -365,16 +369,15 @@ impl LogAnalysis {
         found.into_iter().flatten()
     }
 
-    /// The gravest of what the log holds, if there is anything that somebody has to look after.
-    pub fn trouble(&self) -> Option<Trouble> {
-        let any = |what: fn(&Track) -> bool| self.tracks.iter().any(what);
-        if any(|track| track.alarmed) {
-            Some(Trouble::Alarm)
-        } else if any(|track| track.stood) {
-            Some(Trouble::EchoStood)
-        } else {
-            None
-        }
+    /// What the log holds that somebody has to look after, drive by drive.
+    pub fn troubles(&self) -> impl Iterator<Item = (MacId, Trouble)> {
+        let answered = self.tracks.iter().any(|track| track.responses > 0);
+        (0..).zip(&self.tracks).flat_map(move |(number, track)| {
+            let silent = track.fell_silent || answered && track.responses == 0 && track.commands > 0;
+            let found =
+                [(track.alarmed, Trouble::Alarm), (track.stood, Trouble::EchoStood), (silent, Trouble::Silence)];
+            found.into_iter().filter(|(is, _)| *is).map(move |(_, trouble)| (MacId::truncate(number), trouble))
+        })
     }
 
     /// At the end of the log: drives that were only on one side of it, and what goes on.
@@ -402,6 +405,7 @@ impl LogAnalysis {
         track.commands = track.commands.saturating_add(1);
         track.unanswered = track.unanswered.saturating_add(1);
         let silent = track.responses > 0 && track.unanswered == NORMAL;
+        track.fell_silent |= silent;
         let jump = track.count(block.update_counter(), block.code() == Code::NOP);
         let too_far = track.go(block, limit);
         let given_up = track.ask(block);

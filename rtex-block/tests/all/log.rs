@@ -362,7 +362,8 @@ fn a_log_from_power_up() {
     }
 }
 
-/// An alarm at any time, or an echo that stood still, is not over with the next block.
+/// An alarm at any time, an echo that stood still, or commands without an answer: none is over with the next block, and each is said
+/// of its drive.
 #[test]
 fn what_somebody_has_to_look_after() {
     let response = |echo: u8, status: u8| {
@@ -370,19 +371,37 @@ fn what_somebody_has_to_look_after() {
         block[..3].copy_from_slice(&[0x85 | echo << 5, 0x20, status]);
         block
     };
+    let said = |log: &LogAnalysis| log.troubles().map(|(id, it)| format!("{id} {}", it.name())).collect::<Vec<_>>();
     let mut log = LogAnalysis::new(None, Gear::UNITY);
     for k in 0..4 {
         log.block(&command(k, 0x20, 0)).count();
         log.block(&response(k, 0x40)).count();
     }
-    assert_eq!(log.trouble(), None);
+    assert_eq!(log.troubles().count(), 0);
     for k in 4..8 {
         log.block(&command(k & 3, 0x20, 0)).count();
         log.block(&response(0, 0x40)).count();
     }
     log.block(&response(1, 0x40)).count();
-    assert_eq!(log.trouble().map(Trouble::name), Some("the counter echo of a drive stood still"));
+    assert_eq!(said(&log), ["5 sent a counter echo that stood still"]);
     log.block(&response(2, 0x60)).count();
     log.block(&response(3, 0x40)).count();
-    assert_eq!(log.trouble(), Some(Trouble::Alarm));
+    assert_eq!(said(&log), ["5 reported an alarm", "5 sent a counter echo that stood still"]);
+    // Two commands may be under way without an answer, three are silence; so is a drive that never answered beside one that does.
+    for (commands, silent) in [(2, false), (3, true)] {
+        let mut log = LogAnalysis::new(None, Gear::UNITY);
+        log.block(&response(0, 0x40)).count();
+        (0..commands).for_each(|k| _ = log.block(&command(k, 0x20, 0)).count());
+        log.block(&response(1, 0x40)).count();
+        let troubles: Vec<_> = log.troubles().collect();
+        let want = (MacId::new(5).unwrap(), Trouble::Silence);
+        assert_eq!(troubles, [want].into_iter().filter(|_| silent).collect::<Vec<_>>(), "{commands}");
+    }
+    let mut log = LogAnalysis::new(None, Gear::UNITY);
+    let mut other = command(0, 0x20, 0);
+    other[0] ^= 2;
+    log.block(&other).count();
+    assert_eq!(log.troubles().count(), 0);
+    log.block(&response(0, 0x40)).count();
+    assert_eq!(said(&log), ["7 did not answer"]);
 }

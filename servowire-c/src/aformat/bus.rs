@@ -109,7 +109,8 @@ pub extern "C" fn sw_aformat_set_hand_over(
 }
 
 /// Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
-/// way, and those with one answer to one encoder. SW_SEND with `to_send` filled.
+/// way, and those with one answer to one encoder. SW_SEND with `to_send` filled; SW_E_NOT_FREE while an exchange is pending,
+/// and before the time of sw_aformat_until_ns().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_read(
     m: Option<&mut sw_aformat_t>,
@@ -125,6 +126,14 @@ pub extern "C" fn sw_aformat_read(
         let ea = in_range(asked.iter().next())?;
         let request = request(&sw_aformat_request_t { data: 0, command, ea: ea.get(), fc: 0, address: 0, bank: 0 })?;
         in_range((request.command().is_multi_response() || asked.len() == 1).then_some(()))?;
+        let is_free = match m.transaction.as_ref().map(BusTransaction::progress) {
+            None => true,
+            Some(Progress::Pending { .. }) => false,
+            Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => start_ns >= ready_ns,
+        };
+        if !is_free {
+            return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
+        }
         let transaction = m.transaction.insert(BusTransaction::start(request, m.resolution, asked, m.line, start_ns));
         if let Progress::Failed { error: refusal, .. } = transaction.progress() {
             return Err(error(refusal));

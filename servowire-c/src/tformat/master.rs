@@ -91,6 +91,9 @@ impl Master {
         start_ns: u64,
         to_send: &mut MaybeUninit<sw_tformat_transmission_t>,
     ) -> Result<sw_result_t, Refused> {
+        if !self.is_free_at(start_ns) {
+            return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
+        }
         if matches!(request, Request::SetSingleTurnZero | Request::ResetTurnsAndErrors) {
             // What was heard before counts from another zero.
             self.evidence = Evidence::NEVER;
@@ -113,6 +116,15 @@ impl Master {
             len: transmission.frame.fields(),
         });
         Ok(sw_code_t::SW_SEND as sw_result_t)
+    }
+
+    /// Whether the last exchange is over by then, its late answer too.
+    fn is_free_at(&self, start_ns: u64) -> bool {
+        match self.transaction.as_ref().map(Transaction::progress) {
+            None => true,
+            Some(Progress::Pending { .. }) => false,
+            Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => start_ns >= ready_ns,
+        }
     }
 
     /// Tells the transaction something, and keeps the position that came of it.
@@ -232,7 +244,7 @@ pub extern "C" fn sw_tformat_tolerate(m: Option<&mut sw_tformat_t>, almc: u8) ->
 }
 
 /// Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
-/// and `to_send` is filled.
+/// and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before the time of sw_tformat_until_ns().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_read(
     m: Option<&mut sw_tformat_t>,

@@ -183,8 +183,9 @@ pub extern "C" fn sw_tformat_next(
                 if let Kind::Detection(detection) = &p.kind {
                     m.line = detection.line();
                 }
+                let sent = m.begin(request, not_before_ns.max(now_ns), to_send)?;
                 p.asked = true;
-                m.begin(request, not_before_ns.max(now_ns), to_send)
+                Ok(sent)
             }
             Step::Done { .. } => OK,
             Step::Failed { error: refusal, .. } => Err(error(refusal)),

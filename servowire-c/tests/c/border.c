@@ -117,7 +117,9 @@ static void exchange(void)
     angle = 5;
     CHECK(!sw_tformat_angle(&m, 1066981, 62500, &angle) && angle == 5);
     CHECK(sw_tformat_doubt(&m, 1066981, 62500) == SW_TFORMAT_DOUBT_OLD);
-    CHECK(!sw_tformat_angle(&m, SW_NO_TIME, UINT64_MAX, &angle) && angle == 5);
+    CHECK(!sw_tformat_angle(&m, SW_NO_TIME, UINT64_MAX, &angle) && !sw_tformat_angle(&m, SW_NO_TIME - 4000, UINT64_MAX, &angle));
+    CHECK(sw_tformat_hear(&m, answer, 11, SW_NO_TIME - 4000) == SW_E_CLOCK && angle == 5);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1050999, &tx) == SW_E_NOT_FREE);
 
     /* A damaged answer is refused, and the position grows old. */
     memcpy(damaged, answer, sizeof damaged);
@@ -127,9 +129,13 @@ static void exchange(void)
     CHECK(strcmp(sw_text(SW_E_TFORMAT_CRC), "crc") == 0 && strcmp(sw_text(-9999), "unknown") == 0);
     CHECK(!sw_tformat_angle(&m, 1155000, 62500, &angle));
 
+    /* A late answer may still come: asked at 1104 us, 10 us for its start, eleven fields. */
+    CHECK(sw_tformat_until_ns(&m) == 1158000 && sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1157999, &tx) == SW_E_NOT_FREE);
+
     /* Nobody answers: 10 us, a field and the time to hand it over, then it is over. */
     CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 1200000, &tx) == SW_SEND);
     CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m) - 1) == SW_PENDING);
+    CHECK(sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 9000000, &tx) == SW_E_NOT_FREE);
     CHECK(sw_tformat_poll(&m, sw_tformat_until_ns(&m)) == SW_E_TFORMAT_NO_RESPONSE);
 }
 
@@ -219,6 +225,7 @@ static void bus(void)
     CHECK(sw_aformat_read(&m, 12, 3, 0, &tx) == SW_E_ARGUMENT && sw_aformat_read(&m, 0, 3, 0, &tx) == SW_E_ARGUMENT);
     CHECK(sw_aformat_read(&m, 4, 0, 0, &tx) == SW_E_ARGUMENT);
     CHECK(sw_aformat_read(&m, 4, 3, 0, &tx) == SW_SEND && tx.len == 1 && tx.end_ns == 4500);
+    CHECK(sw_aformat_read(&m, 4, 3, 9000000, &tx) == SW_E_NOT_FREE);
     CHECK(sw_aformat_hear(&m, contents, framed, 49, 25500) == SW_E_ARGUMENT);
     CHECK(sw_aformat_hear(&m, contents, framed, 4, 25500) == SW_PENDING && sw_aformat_missing(&m) == 2);
     CHECK(sw_aformat_response(&m, 0, &response) == SW_OK && response.abs == (51200ull << 17 | 86639));
@@ -347,6 +354,48 @@ static void sorte_and_steps(void)
     CHECK(sw_step_next(1661380, 0, NULL) == SW_E_NULL && sw_step_check(262144, 0, 0, NULL) == SW_E_STEP_ZERO_SEGMENT_LENGTH);
 }
 
+/* The start-up against the modelled encoder by bits, 7 steps a frame: from 200 frames on the position is that of the shaft. */
+static void hdsl(void)
+{
+    static sw_hdsl_t zeroed_hdsl;
+    sw_hdsl_t m;
+    sw_hdsl_device_t encoder;
+    sw_hdsl_transmission_t tx;
+    sw_hdsl_position_t position;
+    uint8_t samples[SW_HDSL_WINDOW];
+    int64_t safe = -1;
+    uint64_t frame, bits;
+    sw_result_t r = SW_OK;
+
+    memset(samples, 0, sizeof samples);
+    CHECK(sw_hdsl_hear(&zeroed_hdsl, samples, sizeof samples, 0) == SW_E_STATE && sw_hdsl_transmission(&zeroed_hdsl, &tx) == SW_E_STATE);
+    CHECK(!sw_hdsl_position(&zeroed_hdsl, 0, 1, &position) && !sw_hdsl_position(NULL, 0, 1, &position));
+    CHECK(sw_hdsl_start(&m, 2, 0) == SW_E_ARGUMENT && sw_hdsl_start(NULL, SW_HDSL_SICK, 0) == SW_E_NULL);
+    CHECK(sw_hdsl_start(&m, SW_HDSL_SICK, 1u << 20) == SW_OK && sw_hdsl_device_start(&encoder, 0x153) == SW_OK);
+    CHECK(sw_hdsl_hear(&m, NULL, 72, 0) == SW_E_NULL && sw_hdsl_hear_bits(&m, 0, SW_NO_TIME) == SW_E_CLOCK);
+    for (frame = 0; frame < 200; frame++) {
+        CHECK(sw_hdsl_device_set_position(&encoder, 7 * frame) == SW_OK);
+        CHECK(sw_hdsl_transmission(&m, &tx) == SW_OK && tx.head_bits == 26);
+        CHECK(sw_hdsl_device_hear(&encoder, &tx, &bits) == SW_OK);
+        r = sw_hdsl_hear_bits(&m, bits, 11520 * frame + 10560);
+        CHECK(r >= 0);
+    }
+    CHECK(r == SW_HDSL_RUNNING);
+    CHECK(sw_hdsl_position(&m, 11520 * 200, 50000, &position) && position.position == 7 * 199 && position.velocity == 7);
+    CHECK(position.angle == (uint32_t)(7 * 199) << 12);
+    CHECK(!sw_hdsl_position(&m, 11520 * 200 + 100000, 50000, &position));
+    CHECK(sw_hdsl_safe_position(&m, 11520 * 200, 1000000, &safe) && safe > 0 && safe <= 7 * 199);
+    /* Where an encoder answers fewer samples than a window are refused, and nothing has changed. */
+    CHECK(sw_hdsl_hear(&m, samples, sizeof samples - 1, 11520 * 201) == SW_E_HDSL_TRUNCATED);
+    CHECK(sw_hdsl_position(&m, 11520 * 200, 50000, &position) && position.position == 7 * 199);
+    for (frame = 200; frame < 500; frame++) {
+        CHECK(sw_hdsl_hear(&m, samples, sizeof samples, 11520 * frame + 10560) >= 0);
+    }
+    CHECK(!sw_hdsl_position(&m, 11520 * 500, UINT64_MAX, &position));
+    tx.head_bits = 129;
+    CHECK(sw_hdsl_device_hear(&encoder, &tx, &bits) == SW_E_ARGUMENT);
+}
+
 static void clock_of_32_bits(void)
 {
     sw_clock_t clock;
@@ -367,6 +416,7 @@ int main(void)
     axis();
     motion();
     sorte_and_steps();
+    hdsl();
     clock_of_32_bits();
     puts("border: good");
     return 0;

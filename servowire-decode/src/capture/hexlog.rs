@@ -4,13 +4,14 @@
 //! A line of a log is what followed without a pause; a dump or an array is one burst.
 
 mod dump;
-mod words;
+pub(super) mod words;
 
 use std::collections::VecDeque;
 
 use super::input::{HEAD, Input};
 use crate::event::Direction;
 use crate::fault::{At, Fault};
+use crate::time::Time;
 use dump::{Dump, Row};
 
 /// The longest line that is read; longer ones are not a log of a servo line.
@@ -56,6 +57,8 @@ struct Gathered {
 pub struct Burst {
     /// Its number, from 1.
     pub line: u64,
+    /// When it was, where the log says so.
+    pub time: Option<Time>,
     /// Who sent it, where the log says so.
     pub direction: Option<Direction>,
     /// What it holds; at least one byte, unless it is spoilt.
@@ -67,7 +70,17 @@ pub struct Burst {
 impl Burst {
     /// Bytes from `line`.
     pub fn new(line: u64, bytes: Vec<u8>) -> Self {
-        Self { line, direction: None, bytes, spoilt: None }
+        Self { line, time: None, direction: None, bytes, spoilt: None }
+    }
+
+    /// What `line` says.
+    pub(super) fn of(line: u64, said: words::Said) -> Self {
+        Self { time: said.time, direction: said.direction, ..Self::new(line, said.bytes) }
+    }
+
+    /// A line that is not bytes, and why.
+    pub(super) fn spoilt(line: u64, what: String) -> Self {
+        Self { spoilt: Some(what), ..Self::new(line, Vec::new()) }
     }
 }
 
@@ -80,7 +93,7 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
     if array_begins(text) || Dump::of(text, false).is_some() {
         return true;
     }
-    let Sample { good, bad, bytes } = Sample::of(text);
+    let Sample { good, bad, bytes, .. } = Sample::of(text);
     bad.saturating_mul(SOUND) <= good && bytes > 1
 }
 
@@ -92,6 +105,8 @@ struct Sample {
     /// Lines that are something else.
     bad: usize,
     bytes: usize,
+    /// A line says when it was.
+    timed: bool,
 }
 
 impl Sample {
@@ -106,6 +121,7 @@ impl Sample {
                 Ok(said) => {
                     let bytes: usize = said.iter().map(|said| said.bytes.len()).sum();
                     sample.good += usize::from(bytes > 0);
+                    sample.timed |= said.iter().any(|said| said.time.is_some());
                     sample.bytes += bytes;
                 }
                 Err(_) => sample.bad += 1,
@@ -140,6 +156,11 @@ impl HexLog {
     /// The file that is read.
     pub(super) fn input(&mut self) -> &mut Input {
         &mut self.input
+    }
+
+    /// Whether its first lines say when they were. To be asked before anything is read.
+    pub(super) fn has_times(&mut self) -> bool {
+        self.input.peek().is_ok_and(|head| Sample::of(&String::from_utf8_lossy(head)).timed)
     }
 
     /// The next burst; none at the end.
@@ -186,16 +207,14 @@ impl HexLog {
             }
             Shape::Array { open, cells, from } => array_line(&text, number, (open, cells, from), ready),
             Shape::Unknown | Shape::Lines => words::line(&text).map(|said| {
-                ready.extend(
-                    said.into_iter().map(|said| Burst { direction: said.direction, ..Burst::new(number, said.bytes) }),
-                );
+                ready.extend(said.into_iter().map(|said| Burst::of(number, said)));
             }),
         };
         match taken {
             Ok(()) => Ok(()),
             // In a log a wrong digit costs its line; a file without any bytes before it is no log.
             Err(what) if self.good => {
-                self.ready.push_back(Burst { spoilt: Some(what), ..Burst::new(number, Vec::new()) });
+                self.ready.push_back(Burst::spoilt(number, what));
                 Ok(())
             }
             Err(what) => Err(self.input.fault(at, what)),

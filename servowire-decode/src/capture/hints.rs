@@ -27,6 +27,8 @@ pub enum Format {
     Packed,
     /// Bytes as hex digits.
     Hex,
+    /// A table of messages, their bytes as hex digits.
+    ByteTable,
     /// Binary records of one size.
     Records,
     /// Packets of a network capture.
@@ -35,7 +37,7 @@ pub enum Format {
 
 impl Format {
     /// All of them: with their names on a command line, the one to show first, and a line for its help.
-    pub const ALL: [(Self, &'static [&'static str], &'static str); 14] = [
+    pub const ALL: [(Self, &'static [&'static str], &'static str); 15] = [
         (Self::Vcd, &["vcd"], "Value change dump (IEEE 1364)"),
         (Self::Csv, &["csv", "saleae-csv"], "A table of a logic analyser or an oscilloscope"),
         (Self::AnalyzerTable, &["analyzer-table"], "A table of bytes of an analyser of Saleae Logic 2"),
@@ -48,6 +50,7 @@ impl Format {
         (Self::Raw, &["raw"], "One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary)"),
         (Self::Packed, &["packed"], "One channel, eight samples a byte, the oldest in bit 0"),
         (Self::Hex, &["hex"], "Bytes as hex digits, a burst a line"),
+        (Self::ByteTable, &["byte-table"], "A table of messages: columns data, time, direction"),
         (Self::Records, &["records"], "Binary records of one size (--record-size), a burst each"),
         (Self::Pcapng, &["pcapng", "pcap"], "Packets of a network capture, pcap or pcapng"),
     ];
@@ -56,7 +59,14 @@ impl Format {
     pub(super) fn is_text(self) -> bool {
         matches!(
             self,
-            Self::Vcd | Self::Csv | Self::AnalyzerTable | Self::Isf | Self::SigrokText | Self::Ols | Self::Hex
+            Self::Vcd
+                | Self::Csv
+                | Self::AnalyzerTable
+                | Self::Isf
+                | Self::SigrokText
+                | Self::Ols
+                | Self::Hex
+                | Self::ByteTable
         )
     }
 }

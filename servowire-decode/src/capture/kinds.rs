@@ -1,5 +1,6 @@
 //! What a file turns out to be.
 
+use super::byte_table::ByteTable;
 use super::hexlog::{Burst, HexLog};
 use super::pcapng::Pcapng;
 use super::raw::Raw;
@@ -13,18 +14,20 @@ pub enum Capture {
     Edges(Box<dyn Line>),
     /// Samples at a fixed rate.
     Samples(Raw),
-    /// Bytes without time.
+    /// Bytes that were written down, with their times or without.
     Bytes(ByteLog),
     /// Packets of a network.
     Packets(Pcapng),
 }
 
-/// Bytes without time, in bursts.
+/// Bytes that were written down, in bursts.
 pub enum ByteLog {
     /// Hex digits, a burst a line.
     Hex(HexLog),
     /// Records of one size.
     Records(Records),
+    /// A table, a burst a row.
+    Table(ByteTable),
 }
 
 impl ByteLog {
@@ -33,6 +36,16 @@ impl ByteLog {
         match self {
             Self::Hex(log) => log.burst(),
             Self::Records(log) => log.burst(),
+            Self::Table(log) => log.burst(),
+        }
+    }
+
+    /// Whether it says when its bytes were sent. To be asked before anything is read.
+    pub fn has_times(&mut self) -> bool {
+        match self {
+            Self::Hex(log) => log.has_times(),
+            Self::Records(_) => false,
+            Self::Table(log) => log.has_times(),
         }
     }
 
@@ -41,6 +54,7 @@ impl ByteLog {
         match self {
             Self::Hex(log) => log.input().pauses(),
             Self::Records(log) => log.input().pauses(),
+            Self::Table(log) => log.input().pauses(),
         }
     }
 }

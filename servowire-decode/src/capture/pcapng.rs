@@ -52,6 +52,28 @@ pub struct Packet {
     pub bytes: Vec<u8>,
 }
 
+impl Packet {
+    /// What it is by its EtherType, if that is of ordinary network traffic. Frames of a drive bus without an EtherType are none.
+    pub fn traffic(&self) -> Option<&'static str> {
+        if self.link != DataLink::ETHERNET {
+            return None;
+        }
+        match *self.bytes.get(12..14)?.first_chunk()? {
+            [0x08, 0x00] => Some("IPv4"),
+            [0x08, 0x06] => Some("ARP"),
+            [0x86, 0xdd] => Some("IPv6"),
+            [0x81, 0x00] => Some("VLAN"),
+            [0x88, 0xcc] => Some("LLDP"),
+            [0x88, 0xf7] => Some("PTP"),
+            [0x88, 0xa4] => Some("EtherCAT"),
+            [0x88, 0x92] => Some("PROFINET"),
+            // IEEE 802.3 has a length there, and bridges speak so.
+            _ if self.bytes.starts_with(&[0x01, 0x80, 0xc2, 0x00, 0x00]) => Some("bridges"),
+            _ => None,
+        }
+    }
+}
+
 impl Pcapng {
     /// A capture from its beginning.
     pub fn new(mut input: Input) -> Result<Self, Fault> {

@@ -16,8 +16,8 @@ use super::recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
 use crate::time::{Clock, SECOND, Time};
 use cell::{Cell, Threshold};
-pub(super) use heading::titles;
 use heading::{Heading, Times};
+pub(super) use heading::{separator, titles, unit};
 
 /// Changes given at once.
 const BLOCK: usize = 4096;

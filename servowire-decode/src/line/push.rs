@@ -4,7 +4,7 @@ use std::io;
 
 use super::lane::{LineDecoder, Tap, Wires};
 use super::nothing::nothing;
-use super::survey::{Candidates, FEWEST, Found, Speech};
+use super::survey::{Candidates, FEWEST, Found, SAMPLE, Speech};
 use crate::capture::samples::Samples;
 use crate::capture::{Change, Hole};
 use crate::codec::Codec;
@@ -307,7 +307,8 @@ impl PushDecoder {
                 self.pass(tap.channel, None);
             }
         }
-        for found in taken {
+        for mut found in taken {
+            found.whole = end && found.taps.iter().all(|tap| self.edges_of(tap.channel) <= SAMPLE);
             self.take(found, out)?;
         }
         self.let_go(&judged);
@@ -383,6 +384,13 @@ impl PushDecoder {
             taken.truncate(1);
         }
         (taken, passed)
+    }
+
+    /// Edges that are kept of a channel.
+    fn edges_of(&self, channel: u16) -> usize {
+        self.states
+            .get(usize::from(channel))
+            .map_or(0, |state| if let State::Open(edges) = state { edges.len() } else { 0 })
     }
 
     fn pass(&mut self, channel: u16, until: Option<u64>) {

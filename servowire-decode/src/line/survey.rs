@@ -13,7 +13,7 @@ use crate::settings::Settings;
 use crate::time::Time;
 
 /// Edges of a channel that are looked at.
-const SAMPLE: usize = 3000;
+pub(super) const SAMPLE: usize = 3000;
 /// Edges after which a trial may be given up.
 const PIECE: usize = 96;
 /// Fewer changes, the level at the beginning included, are no traffic: the shortest frame has four edges.
@@ -46,6 +46,8 @@ pub(super) struct Found {
     pub(super) seen: Option<f64>,
     /// The next best reading of the same channel.
     pub(super) rival: Option<(Speech, i64)>,
+    /// Whether all that was said was looked at.
+    pub(super) whole: bool,
 }
 
 impl Found {
@@ -73,6 +75,7 @@ impl Found {
             seen: self.seen,
             rates: self.rates,
             tally: self.evidence.tally,
+            whole: self.whole,
             rival: self.rival.map(|(speech, _)| (speech.protocol, speech.rate)),
         }
     }
@@ -123,7 +126,8 @@ impl Candidates {
             for inverted in [false, true].into_iter().filter(|way| self.inverted.is_none_or(|given| given == *way)) {
                 let taps: Vec<Tap> = channels.into_iter().map(|channel| Tap { channel, inverted }).collect();
                 let (evidence, rates) = self.trial(*speech, &taps, &edges);
-                let found = Found { taps, speech: *speech, evidence, rates, idle: None, seen: None, rival: None };
+                let found =
+                    Found { taps, speech: *speech, evidence, rates, idle: None, seen: None, rival: None, whole: false };
                 if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
                     best = Some(found);
                 }
@@ -142,14 +146,16 @@ impl Candidates {
             if !may_run_at(edges, bit) && self.speeches.len() > 1 {
                 continue;
             }
-            let idle = idle_level(edges, bit as i64);
+            // A line with a clock never rests.
+            let idle = if speech.protocol.clocked { None } else { idle_level(edges, bit as i64) };
             for inverted in [false, true] {
                 if self.inverted.is_some_and(|given| given != inverted) {
                     continue;
                 }
                 let taps = vec![Tap { channel, inverted }];
                 let (evidence, rates) = self.trial(*speech, &taps, &[edges]);
-                let found = Found { taps, speech: *speech, evidence, rates, idle, seen: None, rival: None };
+                let found =
+                    Found { taps, speech: *speech, evidence, rates, idle, seen: None, rival: None, whole: false };
                 if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
                     if let Some(old) = best.replace(found).filter(|old| old.speech != *speech) {
                         second = Some((old.speech, old.evidence.score));
@@ -321,8 +327,14 @@ fn may_run_at(edges: &Edges, bit: f64) -> bool {
     5 * short <= 4 * all && 12 * fitting >= all
 }
 
-/// The level of what is longer than any field's run, by time.
+/// The level of what is longer than any field's run, by time. What was before the first edge may have been before the power was
+/// on: it counts only where nothing else does.
 pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
+    let later = edges.get(1..).unwrap_or_default();
+    level_of_rest(later, bit).or_else(|| level_of_rest(edges, bit))
+}
+
+fn level_of_rest(edges: &Edges, bit: i64) -> Option<bool> {
     let (mut high, mut low) = (0_i64, 0_i64);
     for pair in edges.windows(2) {
         let [(from, level), (to, _)] = pair else { continue };

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::event::{Direction, Event, Place, Value};
+use super::printer::Origin;
+use crate::event::{Direction, Event, Place};
 use crate::time::Time;
 
 /// What the user wants to see; what is left empty lets everything through.
@@ -10,6 +11,7 @@ use crate::time::Time;
 pub struct Filter {
     kinds: Vec<String>,
     address: Option<i64>,
+    encoder: Option<String>,
     from: Option<Time>,
     to: Option<Time>,
     /// Only what is refused.
@@ -17,9 +19,6 @@ pub struct Filter {
     /// By line: whether the last request passed by its address.
     passed: BTreeMap<usize, bool>,
 }
-
-/// Fields that hold an address, by the protocols' names.
-const ADDRESSES: [&str; 2] = ["EA", "SA"];
 
 /// After the last time that is asked for, reading goes on for so long: frames that began before it end, in picoseconds.
 const REST: i64 = 10_000_000_000;
@@ -29,7 +28,13 @@ impl Filter {
     /// first, and the one from which on nothing is shown, in picoseconds; `errors`: only what is refused.
     pub fn new(kinds: Vec<String>, address: Option<i64>, times: (Option<Time>, Option<Time>), errors: bool) -> Self {
         let (from, to) = times;
-        Self { kinds, address, from, to, errors, passed: BTreeMap::new() }
+        Self { kinds, address, encoder: None, from, to, errors, passed: BTreeMap::new() }
+    }
+
+    /// Only what this encoder says, and what is asked of it; by its name, channel or address.
+    #[must_use]
+    pub fn with_encoder(self, encoder: Option<String>) -> Self {
+        Self { encoder, ..self }
     }
 
     /// Whether times matter.
@@ -42,8 +47,13 @@ impl Filter {
         self.to.is_some_and(|to| time > to + REST)
     }
 
-    /// Whether an event of line `lane` is asked for; of those that are, only the refused ones may be shown.
-    pub(super) fn takes(&mut self, lane: usize, event: &Event) -> bool {
+    /// Whether an event is asked for; of those that are, only the refused ones may be shown.
+    pub(super) fn takes(&mut self, origin: &Origin, event: &Event) -> bool {
+        let is_meant = |encoder: &String| origin.is_meant(origin.speaker(event), encoder);
+        self.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)
+    }
+
+    fn passes(&mut self, lane: usize, event: &Event) -> bool {
         // The address first: it is remembered from the request for an answer that does not tell it.
         self.is_addressed(lane, event) && self.is_kind(event) && self.is_in_time(event)
     }
@@ -67,14 +77,8 @@ impl Filter {
 
     fn is_addressed(&mut self, lane: usize, event: &Event) -> bool {
         let Some(wanted) = self.address else { return true };
-        let said = event.fields.iter().find(|field| ADDRESSES.contains(&field.name)).and_then(|f| match f.value {
-            Value::Number { value, .. } => Some(value),
-            _ => None,
-        });
-        // RTEX has the address in the kind: `cmd 5`.
-        let said = said.or_else(|| event.kind.strip_prefix("cmd ").or(event.kind.strip_prefix("rsp "))?.parse().ok());
-        let passes = match said {
-            Some(address) => address == wanted,
+        let passes = match event.address {
+            Some(address) => i64::from(address) == wanted,
             None => event.direction == Some(Direction::Answer) && self.passed.get(&lane).copied().unwrap_or(false),
         };
         if event.direction == Some(Direction::Request) {
@@ -87,39 +91,39 @@ impl Filter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::{Field, Verdict};
+    use crate::event::Verdict;
 
-    fn event(direction: Direction, kind: &'static str, address: Option<i64>, start: i128) -> Event {
+    fn event(direction: Direction, kind: &'static str, address: Option<u32>, start: i128) -> Event {
         let start = Time::from_ps(start);
-        let fields = address.map(|address| Field::number("EA", address)).into_iter().collect();
-        Event::new(Place::Time { start, end: start + 10 }, Some(direction), kind, fields, Verdict::Ok)
+        let place = Place::Time { start, end: start + 10 };
+        Event { address, ..Event::new(place, Some(direction), kind, Vec::new(), Verdict::Ok) }
     }
 
     #[test]
     fn kinds_by_name_or_last_word() {
         let mut filter = Filter { kinds: vec!["3".to_owned(), "abs40".to_owned()], ..Filter::default() };
-        assert!(filter.takes(0, &event(Direction::Answer, "ID 3", None, 0)));
-        assert!(filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
-        assert!(!filter.takes(0, &event(Direction::Answer, "ID D", None, 0)));
-        assert!(!filter.takes(0, &event(Direction::Answer, "ABS40_MT", None, 0)));
+        assert!(filter.passes(0, &event(Direction::Answer, "ID 3", None, 0)));
+        assert!(filter.passes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(!filter.passes(0, &event(Direction::Answer, "ID D", None, 0)));
+        assert!(!filter.passes(0, &event(Direction::Answer, "ABS40_MT", None, 0)));
     }
 
     #[test]
     fn an_answer_without_address_goes_with_its_request() {
         let mut filter = Filter { address: Some(2), ..Filter::default() };
-        assert!(!filter.takes(0, &event(Direction::Request, "ABS40", Some(1), 0)));
-        assert!(!filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
-        assert!(filter.takes(0, &event(Direction::Request, "ABS40", Some(2), 0)));
-        assert!(filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(!filter.passes(0, &event(Direction::Request, "ABS40", Some(1), 0)));
+        assert!(!filter.passes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(filter.passes(0, &event(Direction::Request, "ABS40", Some(2), 0)));
+        assert!(filter.passes(0, &event(Direction::Answer, "ABS40", None, 0)));
         // On another line nobody has asked.
-        assert!(!filter.takes(1, &event(Direction::Answer, "ABS40", None, 0)));
-        assert!(filter.takes(0, &event(Direction::Answer, "rsp 2", None, 0)));
+        assert!(!filter.passes(1, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(filter.passes(0, &event(Direction::Answer, "rsp 2", Some(2), 0)));
     }
 
     #[test]
     fn times_from_and_to() {
         let mut filter = Filter { from: Some(Time::from_ps(100)), to: Some(Time::from_ps(200)), ..Filter::default() };
-        let takes = [85, 95, 150, 199, 200].map(|start| filter.takes(0, &event(Direction::Answer, "x", None, start)));
+        let takes = [85, 95, 150, 199, 200].map(|start| filter.passes(0, &event(Direction::Answer, "x", None, start)));
         assert_eq!(takes, [false, true, true, true, false]);
         assert!(!filter.is_over(Time::from_ps(200)) && filter.is_over(Time::from_ps(10_000_000_201)));
     }

@@ -63,6 +63,9 @@ impl Serialize for Object<'_> {
             None => {}
         }
         map.serialize_entry("kind", &event.kind)?;
+        if let Some(address) = event.address {
+            map.serialize_entry("address", &address)?;
+        }
         map.serialize_entry("fields", &Fields(&event.fields))?;
         if let Some(position) = &event.position {
             map.serialize_entry("position", position)?;
@@ -126,6 +129,7 @@ impl Serialize for Value {
 impl Serialize for Position {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("name", self.name)?;
         map.serialize_entry("counts", &self.counts)?;
         if let Some(turns) = self.turns() {
             map.serialize_entry("turns", &turns)?;

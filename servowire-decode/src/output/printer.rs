@@ -35,6 +35,35 @@ impl Origin {
     pub fn lane(&self) -> Option<&Lane> {
         self.lanes.get(self.speaks)
     }
+
+    /// Who says an event, or is asked by it.
+    pub fn speaker(&self, event: &Event) -> Speaker {
+        Speaker { lane: self.speaks, address: event.address }
+    }
+
+    /// Whether a speaker is meant by what a person wrote: its name, its channel, its address, or both as `A/3`.
+    pub fn is_meant(&self, speaker: Speaker, what: &str) -> bool {
+        let channel = self.lanes.get(speaker.lane).map_or("", |lane| lane.channel.as_str());
+        let address = speaker.address.map(|address| address.to_string());
+        let both = what.rsplit_once('/').is_some_and(|(a, b)| a == channel && address.as_deref() == Some(b));
+        what == channel || address.as_deref() == Some(what) || both || what == self.name(speaker)
+    }
+
+    /// A name of a speaker for a person: its channel, where there are several, and its address. Empty where there is no other.
+    pub fn name(&self, speaker: Speaker) -> String {
+        let lane = self.lanes.get(speaker.lane).filter(|_| self.lanes.len() > 1);
+        let address = speaker.address.map(|address| format!("address {address}"));
+        [lane.map(|lane| lane.channel.clone()), address].into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// An encoder, drive or device: what it says goes together, and goes with nothing else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Speaker {
+    /// The number of its line, from 0.
+    pub lane: usize,
+    /// Its address, where the protocol has one.
+    pub address: Option<u32>,
 }
 
 /// A form of output that is written file by file.

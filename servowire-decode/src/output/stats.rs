@@ -5,20 +5,28 @@ use std::io::{self, Write};
 
 use serde_json::{Value as Json, json};
 
-use super::printer::{Origin, Printer};
+use super::printer::{Origin, Printer, Speaker};
 use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
 use crate::time::Time;
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
+/// Events that are listed of each; further ones are counted.
+const EVENTS: usize = 1_000;
 
 /// Collects figures and prints them at the end of a file.
 pub struct Stats<W> {
     out: W,
     json: bool,
+    gathered: Gathered,
+}
+
+/// Figures of each encoder, drive or device by itself.
+#[derive(Debug, Default)]
+pub struct Gathered {
     /// Counts that a position may move from one frame to the next.
     limit: Option<u64>,
-    figures: Figures,
+    by: BTreeMap<Speaker, Figures>,
 }
 
 #[derive(Debug, Default)]
@@ -33,12 +41,24 @@ struct Figures {
     last_start: Option<(Option<Direction>, Time)>,
     cycle: Spread,
     delay: Spread,
-    position: Option<(Time, Position)>,
+    /// By the names of the positions.
+    positions: BTreeMap<&'static str, Followed>,
     /// Positions in frames without a time.
     untimed: u64,
-    largest: u64,
     jumps: u64,
     listed: Vec<Jump>,
+    /// Times are counted and say nothing of a cycle.
+    counted: bool,
+    /// What happened, and where; and how much of it there was.
+    happened: Vec<(Place, String)>,
+    events: usize,
+}
+
+/// A position, and how far it moved at most.
+#[derive(Debug)]
+struct Followed {
+    last: Position,
+    largest: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +140,10 @@ impl Figures {
             }
             Verdict::Refused(refusal) => *self.refused.entry(refusal.class).or_default() += 1,
         }
+        self.counted |= event.counted;
+        self.events += event.happened.len();
+        let room = EVENTS.saturating_sub(self.happened.len());
+        self.happened.extend(event.happened.iter().take(room).map(|what| (event.place, what.clone())));
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
@@ -138,10 +162,10 @@ impl Figures {
 
     /// What there must be to tell jumps, and is not.
     fn missing(&self) -> Option<&'static str> {
-        match (self.position, self.untimed) {
-            (Some(_), _) => None,
-            (None, 0) => Some("no position of a single axis is seen (a log of RTEX blocks needs --mac-id)"),
-            (None, _) => Some("the positions have no times (a log of RTEX blocks needs --period)"),
+        match (self.positions.is_empty(), self.untimed) {
+            (false, _) => None,
+            (true, 0) => Some("no position is seen"),
+            (true, _) => Some("the positions have no times (a log of RTEX blocks needs times, or --period)"),
         }
     }
 
@@ -157,11 +181,15 @@ impl Figures {
     }
 
     fn follow(&mut self, time: Time, position: Position, limit: Option<u64>) {
+        let new = Followed { last: position, largest: 0 };
+        let known = self.positions.entry(position.name).or_insert(new);
+        let before = std::mem::replace(&mut known.last, position);
         // Single-turn and multi-turn positions are not compared with each other.
-        let before = self.position.replace((time, position)).filter(|(_, before)| before.span == position.span);
-        let Some((_, before)) = before else { return };
+        if before.span != position.span {
+            return;
+        }
         let moved = position.moved_from(&before);
-        self.largest = self.largest.max(moved.unsigned_abs());
+        known.largest = known.largest.max(moved.unsigned_abs());
         if limit.is_some_and(|limit| moved.unsigned_abs() > limit) {
             self.jumps += 1;
             if self.listed.len() < LISTED {
@@ -169,72 +197,145 @@ impl Figures {
             }
         }
     }
+
+    /// The figures by what they are called; what belongs to one has no name.
+    fn rows(&self, limit: Option<u64>) -> Vec<(&'static str, String)> {
+        let missing = self.refused.get(NO_RESPONSE).copied().unwrap_or(0);
+        let refused = self.refused.values().sum::<u64>() - missing;
+        let list = |all: Vec<String>| if all.is_empty() { "none".to_owned() } else { all.join(", ") };
+        let kinds = list(self.kinds.iter().map(|(kind, n)| format!("{kind}: {n}")).collect());
+        let without = if missing > 0 { format!(", {missing} answers missing") } else { String::new() };
+        let mut rows = vec![
+            ("frames", format!("{} requests, {} answers, {} others", self.requests, self.answers, self.others)),
+            ("kinds", kinds),
+            ("verdicts", format!("{} ok, {refused} refused{without}", self.ok)),
+        ];
+        rows.extend(self.refused.iter().map(|(class, count)| ("", format!("{class:<17} {count}"))));
+        rows.extend([("cycle", self.cycle_text()), ("answer delay", self.delay.text())]);
+        let several = self.positions.len() > 1;
+        let moved = |(name, Followed { largest, .. }): (&&str, &Followed)| {
+            if several { format!("{name} {largest} counts") } else { format!("{largest} counts") }
+        };
+        if !self.positions.is_empty() {
+            rows.push(("largest move", list(self.positions.iter().map(moved).collect())));
+        }
+        match (limit, self.missing()) {
+            (Some(_), Some(missing)) => rows.push(("jumps", format!("not known: {missing}"))),
+            (Some(limit), None) => {
+                rows.push(("jumps", format!("{} of more than {limit} counts", self.jumps)));
+                rows.extend(self.listed.iter().map(|Jump { time, from, to, moved }| {
+                    ("", format!("{:>14.3} us  {from} to {to}: {moved:+}", time.us()))
+                }));
+            }
+            (None, _) => {}
+        }
+        if self.events > 0 {
+            rows.push(("events", self.events.to_string()));
+            rows.extend(self.happened.iter().map(|(place, what)| match place {
+                Place::Line(line) => ("", format!("line {line:>9}  {what}")),
+                Place::Time { start, .. } => ("", format!("{:>14.3} us  {what}", start.us())),
+            }));
+        }
+        rows
+    }
+
+    fn cycle_text(&self) -> String {
+        match self.cycle {
+            Spread { count: 1.., mean, .. } if self.counted => {
+                format!("{:.3} us on average as counted: the log has no times", mean / 1e6)
+            }
+            cycle => cycle.text(),
+        }
+    }
+
+    fn events_json(&self) -> Vec<Json> {
+        let one = |(place, what): &(Place, String)| match place {
+            Place::Line(line) => json!({ "line": line, "what": what }),
+            Place::Time { start, .. } => json!({ "time_ps": start, "what": what }),
+        };
+        self.happened.iter().map(one).collect()
+    }
+}
+
+impl Gathered {
+    /// `limit`: moves of a position above it are listed as jumps.
+    pub fn new(limit: Option<u64>) -> Self {
+        Self { limit, by: BTreeMap::new() }
+    }
+
+    /// The next event of a file.
+    pub fn add(&mut self, origin: &Origin, event: &Event) {
+        if !event.remark {
+            self.by.entry(origin.speaker(event)).or_default().add(event, self.limit);
+        }
+    }
+
+    /// Who spoke, by name (empty where there is only one), and the figures in the words of a table; what belongs to the row
+    /// above has no name.
+    pub fn tables(&self, origin: &Origin) -> Vec<(String, Vec<(&'static str, String)>)> {
+        let one = |(speaker, figures): (&Speaker, &Figures)| (origin.name(*speaker), figures.rows(self.limit));
+        self.by.iter().map(one).collect()
+    }
+
+    fn json(&self, origin: &Origin) -> Vec<Json> {
+        let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
+        let one = |(speaker, f): (&Speaker, &Figures)| {
+            let mut object = json!({
+                "file": origin.file, "channel": origin.lanes.get(speaker.lane).map(|lane| &lane.channel),
+                "address": speaker.address, "requests": f.requests, "answers": f.answers, "others": f.others,
+                "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
+                "cycle": if f.counted { Json::Null } else { f.cycle.json() }, "answer_delay": f.delay.json(),
+                "largest_move": f.positions.values().map(|followed| followed.largest).max(),
+                "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
+                "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
+            });
+            if let Some(object) = object.as_object_mut().filter(|_| f.events > 0) {
+                object.insert("events".to_owned(), f.events_json().into());
+            }
+            object
+        };
+        self.by.iter().map(one).collect()
+    }
 }
 
 impl<W: Write> Stats<W> {
     /// `limit`: moves of the position above it are listed as jumps.
     pub fn new(out: W, json: bool, limit: Option<u64>) -> Self {
-        Self { out, json, limit, figures: Figures::default() }
-    }
-
-    fn print_text(&mut self, file: &str) -> io::Result<()> {
-        let f = &self.figures;
-        let missing = f.refused.get(NO_RESPONSE).copied().unwrap_or(0);
-        let refused = f.refused.values().sum::<u64>() - missing;
-        let kinds = f.kinds.iter().map(|(kind, n)| format!("{kind}: {n}")).collect::<Vec<_>>().join(", ");
-        writeln!(self.out, "{file}")?;
-        writeln!(self.out, "  frames        {} requests, {} answers, {} others", f.requests, f.answers, f.others)?;
-        writeln!(self.out, "  kinds         {}", if kinds.is_empty() { "none" } else { &kinds })?;
-        let without = if missing > 0 { format!(", {missing} answers missing") } else { String::new() };
-        writeln!(self.out, "  verdicts      {} ok, {refused} refused{without}", f.ok)?;
-        for (class, count) in &f.refused {
-            writeln!(self.out, "    {class:<17} {count}")?;
-        }
-        writeln!(self.out, "  cycle         {}", f.cycle.text())?;
-        writeln!(self.out, "  answer delay  {}", f.delay.text())?;
-        if f.position.is_some() {
-            writeln!(self.out, "  largest move  {} counts", f.largest)?;
-        }
-        if let (Some(_), Some(missing)) = (self.limit, f.missing()) {
-            writeln!(self.out, "  jumps         not known: {missing}")?;
-        } else if let Some(limit) = self.limit {
-            writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
-            for Jump { time, from, to, moved } in &f.listed {
-                writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", time.us())?;
-            }
-        }
-        Ok(())
-    }
-
-    fn print_json(&mut self, file: &str) -> io::Result<()> {
-        let f = &self.figures;
-        let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
-        let object = json!({
-            "file": file, "requests": f.requests, "answers": f.answers, "others": f.others,
-            "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
-            "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
-            "largest_move": f.position.map(|_| f.largest),
-            "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
-            "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
-        });
-        serde_json::to_writer(&mut self.out, &object)?;
-        self.out.write_all(b"\n")
+        Self { out, json, gathered: Gathered::new(limit) }
     }
 }
 
 impl<W: Write> Printer for Stats<W> {
-    fn event(&mut self, _: &Origin, event: &Event) -> io::Result<()> {
-        self.figures.add(event, self.limit);
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        self.gathered.add(origin, event);
         Ok(())
     }
 
     fn end(&mut self, origin: &Origin) -> io::Result<()> {
-        if self.json {
-            self.print_json(&origin.file)?;
-        } else {
-            self.print_text(&origin.file)?;
+        let mut gathered = std::mem::take(&mut self.gathered);
+        self.gathered.limit = gathered.limit;
+        if gathered.by.is_empty() {
+            gathered.by.insert(Speaker { lane: 0, address: None }, Figures::default());
         }
-        self.figures = Figures::default();
+        if self.json {
+            for object in gathered.json(origin) {
+                serde_json::to_writer(&mut self.out, &object)?;
+                self.out.write_all(b"\n")?;
+            }
+            return self.out.flush();
+        }
+        writeln!(self.out, "{}", origin.file)?;
+        for (name, rows) in gathered.tables(origin) {
+            if !name.is_empty() {
+                writeln!(self.out, "  {name}")?;
+            }
+            for (what, text) in rows {
+                match what {
+                    "" => writeln!(self.out, "    {text}")?,
+                    _ => writeln!(self.out, "  {what:<12}  {text}")?,
+                }
+            }
+        }
         self.out.flush()
     }
 }

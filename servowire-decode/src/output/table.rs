@@ -7,9 +7,10 @@ use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Value, Verdict};
 
 /// Columns that every file has; those of the fields follow, and at last what has none.
-const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 17] = [
     "file",
     "channel",
+    "address",
     "protocol",
     "line",
     "start_us",
@@ -72,6 +73,7 @@ impl<W: Write> Csv<W> {
         let out = &mut self.out;
         out.write_field(&origin.file)?;
         out.write_field(lane.map_or("", |lane| &lane.channel))?;
+        out.write_field(event.address.map_or_else(String::new, |address| address.to_string()))?;
         out.write_field(lane.map_or("", |lane| lane.protocol.title))?;
         match event.place {
             Place::Line(line) => [line.to_string(), String::new(), String::new()],

@@ -245,6 +245,20 @@ impl<W: Write> Printer for Text<W> {
     }
 }
 
+/// A field as it is shown: its name and its value.
+pub fn shown(field: &Field) -> String {
+    let mut text = String::new();
+    field_text(&mut text, field);
+    text
+}
+
+/// A verdict as it is shown.
+pub fn verdict(verdict: &Verdict) -> String {
+    let mut text = String::new();
+    verdict_text(&mut text, verdict);
+    text
+}
+
 fn field_text(line: &mut String, field: &Field) {
     let name = field.name;
     let _ = match &field.value {

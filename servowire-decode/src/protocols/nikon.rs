@@ -87,8 +87,6 @@ struct Pending {
     replies: u32,
 }
 
-impl Pending {}
-
 /// Finds requests and replies among the frames of a line.
 #[derive(Debug, Clone)]
 pub struct Decoder {
@@ -191,7 +189,7 @@ impl Decoder {
             }
             (None, Err(error)) => Err(error),
         };
-        let mut event = self.encoder.answer(group, expected.ok(), result, delay);
+        let mut event = self.encoder.answer(group, expected.ok(), asked, result, delay);
         if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, asked) {
             refusal.cause = cause(group, request, expected.ok()).or(refusal.cause.take());
         }

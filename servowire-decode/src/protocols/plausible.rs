@@ -92,7 +92,7 @@ mod tests {
         let mut motion = Motion::default();
         let noted = |(k, counts): (usize, &i64)| {
             let start = Time::from_ps(k as i128 * 125_000_000);
-            let position = Position { counts: *counts, span: Some(1 << 16), per_turn: Some(1000) };
+            let position = Position { name: "ABS", counts: *counts, span: Some(1 << 16), per_turn: Some(1000) };
             motion.note(Place::Time { start, end: start + 1 }, position).map(|_| k)
         };
         counts.iter().enumerate().filter_map(noted).collect()

@@ -86,7 +86,11 @@ fn event(packet: &Packet) -> Event {
     };
     let end = packet.time + BYTE.saturating_mul(packet.bytes.len() as i64);
     let place = Place::Time { start: packet.time, end };
-    let event = Event::new(place, direction, kind, fields, verdict);
+    let mut event = Event::new(place, direction, kind, fields, verdict);
+    event.address = match (error, report.frame()) {
+        (None, Some(Frame::Device(view))) => Some(view.address().get().into()),
+        _ => None,
+    };
     event.locate(|name| {
         let (first, last) = bytes(report.frame()?, packet.bytes.len(), name)?;
         Some(Span::even(place, 8 * packet.bytes.len() as u32, 8 * first as u32, 8 * last as u32 + 7))

@@ -49,21 +49,22 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
             None => Began::Clock,
         };
         let now_ns = self.now_ns()?;
-        let began_ns = self.began_ns(now_ns);
+        let began_ns = self.began_ns(now_ns, began);
         self.exchange(began_ns).map(|exchanged| Period { began, exchanged })
     }
 
     /// When the period began in which it is `now_ns`. An executor wakes late, and a lost edge is noticed half a period late; so the
     /// grid of the periods before says it, for which both clocks may differ by 1/4096. Rather too early than too late: the end of
-    /// the period is when the bank is switched.
-    fn began_ns(&self, now_ns: u64) -> u64 {
+    /// the period is when the bank is switched. An edge that is noticed by more than half a period late is taken for the next one.
+    fn began_ns(&self, now_ns: u64, began: Began) -> u64 {
         let update_ns = u64::from(self.master().config().periods.update_ns);
         let past_ns = now_ns.saturating_sub(self.began_ns.unwrap_or(now_ns));
         let periods = past_ns.checked_div(update_ns).unwrap_or(0);
         let phase_ns = past_ns.saturating_sub(periods.saturating_mul(update_ns));
         let drift_ns = periods.saturating_add(1).saturating_mul(update_ns >> 12);
-        // An edge that is early on the grid is a new one, and the grid follows.
-        let late_ns = if phase_ns.saturating_add(drift_ns) < update_ns { phase_ns.saturating_sub(drift_ns) } else { 0 };
+        // An edge in the second half of a period is a new one that is early on the grid, and the grid follows.
+        let is_new = began == Began::Edge && phase_ns > update_ns >> 1;
+        let late_ns = if is_new { 0 } else { phase_ns.saturating_sub(drift_ns) };
         now_ns.saturating_sub(late_ns)
     }
 }

@@ -1,6 +1,32 @@
 //! One contract for all drivers, call by call, blocking and as futures: over ports that do all that the documents of the HAL traits
 //! allow, with encoders that share nothing with the crates under test.
 
+/// Each test of a contract, for the driver that spins and for the one that waits.
+macro_rules! contract {
+    ($($name:ident),+) => {
+        $(
+            #[test]
+            fn $name() {
+                of_all::$name::<Spinning>();
+                #[cfg(feature = "async")]
+                of_all::$name::<asynch::Waiting>();
+            }
+        )+
+    };
+}
+
+/// Calls of a driver that are made as they are; what is then done with the result of each is `$end`.
+macro_rules! forward {
+    ($driver:ty, |$call:ident| $end:expr, $($name:ident($($argument:ident: $type:ty),*) -> $value:ty),+) => {
+        $(
+            fn $name(&mut self $(, $argument: $type)*) -> Called<$value> {
+                let $call = <$driver>::$name(self $(, $argument)*);
+                $end
+            }
+        )+
+    };
+}
+
 #[cfg(feature = "nikon")]
 mod nikon;
 #[cfg(feature = "tformat")]

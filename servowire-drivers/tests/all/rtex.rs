@@ -475,7 +475,7 @@ mod asynch {
             ring.borrow_mut().let_in();
             let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
-            assert!(!exchanged.torn);
+            assert_eq!((exchanged.frames_late, exchanged.torn), (0, false));
             assert_eq!(driver.master().ring().failure(), None);
         }
     }
@@ -501,11 +501,14 @@ mod asynch {
                 let read = std::mem::take(&mut ring.borrow_mut().read_of);
                 let taken = &read[read.len() - words..][..AXES * 8];
                 assert!(taken.iter().all(|frame| *frame == taken[0]), "{lost} {at}: {read:?}");
-                assert!(exchanged.frames_late <= 1 && !exchanged.torn, "{lost} {at}: {read:?}");
+                assert_eq!((exchanged.frames_late, exchanged.torn), (1, false), "{lost} {at}: {read:?}");
                 (pin.lost, pin.late_ns) = (false, 0);
+                // What follows is in time, and is said to be.
                 for _ in 0..3 {
-                    run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                    let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                    assert_eq!((began, exchanged.frames_late), (Began::Edge, 0), "{lost} {at}");
                 }
+                assert_eq!(driver.late() as usize, at + 1, "{lost}");
                 assert_eq!(driver.master().ring().failure(), None);
             }
         }

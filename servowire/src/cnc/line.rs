@@ -1,7 +1,5 @@
 //! Master, cables and devices: one queue of events, in which the start-up and the exchange share the wires.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
 use std::rc::Rc;
 
 use sorte_proto::device::{Action as Wish, Device, Path, PortId, Trigger};
@@ -15,6 +13,7 @@ use super::host::Host;
 use super::node::{Node, Sent};
 use super::noise::SplitMix64;
 use super::periods::Periods;
+use super::queue::{Event, Place, Queue};
 use super::record::Recorder;
 use super::setup::Setup;
 use super::wires::{Arrival, BYTE_NS, Hit, NEIGHBOUR_NS, REFLECTION_NS, Wires, capture_ns};
@@ -30,80 +29,13 @@ const DEVICE_FRAME: usize = DeviceFrame::<{ InputSlice::LEN }>::LEN;
 /// Lines for the user that are kept; the rest is counted.
 const EVENTS: usize = 50;
 
-/// Something that happens.
-enum Event {
-    /// The master wants to be asked.
-    Master,
-    /// A device wants to be asked, if it has not been since.
-    Device {
-        k: usize,
-        call: u64,
-    },
-    /// A start-up frame begins at a device's port, or has ended at the master.
-    StartUp {
-        at: Place,
-        port: PortId,
-        frame: Vec<u8>,
-        preamble: usize,
-        hit: Hit,
-    },
-    /// A device has dealt with a master frame of the exchange.
-    Dealt {
-        k: usize,
-        arrival: Arrival,
-        sent: Rc<Sent>,
-    },
-    /// A device's frame leaves; one has ended at the master.
-    Leaves {
-        k: usize,
-    },
-    Answer {
-        k: usize,
-        arrival: Arrival,
-        hit: Hit,
-    },
-}
-
-#[derive(Clone, Copy)]
-enum Place {
-    Device(usize),
-    Master { sof: f64 },
-}
-
-struct Due {
-    at: f64,
-    order: u64,
-    event: Event,
-}
-
-impl PartialEq for Due {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Due {}
-
-impl PartialOrd for Due {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Due {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.at.total_cmp(&other.at).then(self.order.cmp(&other.order))
-    }
-}
-
 pub(super) struct Line {
     pub(super) setup: Setup,
     pub(super) master: Master,
     pub(super) nodes: Vec<Node>,
     periods: Periods,
     pub(super) wires: Wires,
-    queue: BinaryHeap<Reverse<Due>>,
-    order: u64,
+    queue: Queue,
     now: f64,
     /// When the master wants to be asked.
     asked: f64,
@@ -145,8 +77,7 @@ impl Line {
             master: Master::new(setup.master()),
             periods: Periods::new(),
             wires: Wires::new(&setup.cables_ns, setup.physics, setup.seed),
-            queue: BinaryHeap::new(),
-            order: 0,
+            queue: Queue::default(),
             now: 0.0,
             asked: 0.0,
             plugged: 0,
@@ -173,7 +104,7 @@ impl Line {
             node.set_up = node.axis.driver.set_up();
         }
         line.plug(line.nodes.len());
-        line.push(0.0, Event::Master);
+        line.queue.push(0.0, Event::Master);
         line
     }
 
@@ -198,14 +129,9 @@ impl Line {
         }
     }
 
-    fn push(&mut self, at: f64, event: Event) {
-        self.order += 1;
-        self.queue.push(Reverse(Due { at, order: self.order, event }));
-    }
-
     /// Goes on until the master has sent something; `None`: it waits for ever.
     pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
-        while let Some(Reverse(Due { at, event, .. })) = self.queue.pop() {
+        while let Some((at, event)) = self.queue.pop() {
             self.now = at;
             match event {
                 Event::Master if at < self.asked => {}
@@ -239,7 +165,7 @@ impl Line {
             Action::Wait { until_ns: u64::MAX } => return Err(Stopped),
             Action::Wait { until_ns } => {
                 self.asked = until_ns as f64;
-                self.push(self.asked, Event::Master);
+                self.queue.push(self.asked, Event::Master);
                 return Ok(None);
             }
             Action::Restart { error } => {
@@ -252,7 +178,7 @@ impl Line {
             }
             Action::Send { at_ns, frame } => {
                 self.start_up(frame, at_ns, record);
-                self.push(self.now, Event::Master);
+                self.queue.push(self.now, Event::Master);
                 return Ok(Some(Progress::StartUp));
             }
             Action::Exchange { at_ns, time_stamp, cycle, stop } => {
@@ -262,11 +188,11 @@ impl Line {
                 if stop && host.is_still() {
                     self.master.halted();
                 }
-                self.push(self.now, Event::Master);
+                self.queue.push(self.now, Event::Master);
                 return Ok(Some(Progress::Cycle));
             }
         }
-        self.push(self.now, Event::Master);
+        self.queue.push(self.now, Event::Master);
         Ok(None)
     }
 
@@ -280,11 +206,11 @@ impl Line {
                 Wish::Wait { until_ns } => {
                     node.call += 1;
                     let (at, call) = (node.when(until_ns, now).max(now) + 0.01, node.call);
-                    return self.push(at, Event::Device { k, call });
+                    return self.queue.push(at, Event::Device { k, call });
                 }
                 Wish::Send { at_ns, .. } => {
                     let at = node.when(at_ns, now).max(now);
-                    self.push(at, Event::Leaves { k });
+                    self.queue.push(at, Event::Leaves { k });
                 }
                 Wish::Lost { cycle } => {
                     let axle = node.lost(cycle);
@@ -321,7 +247,7 @@ impl Line {
             let preamble = frame.preamble().bytes().len();
             let event =
                 Event::StartUp { at: Place::Device(0), port: PortId::A, frame: bytes, preamble, hit: Hit::default() };
-            self.push(at_ns as f64 + self.wires.out(0), event);
+            self.queue.push(at_ns as f64 + self.wires.out(0), event);
         }
     }
 
@@ -351,7 +277,7 @@ impl Line {
             (Path::Forward, PortId::A) => {
                 if k + 1 < self.plugged {
                     let at = sof + self.wires.transit(k) + self.wires.out(k + 1);
-                    self.push(at, Event::StartUp { at: Place::Device(k + 1), port, frame, preamble, hit });
+                    self.queue.push(at, Event::StartUp { at: Place::Device(k + 1), port, frame, preamble, hit });
                 }
                 return;
             }
@@ -364,7 +290,7 @@ impl Line {
             Some(before) => (at, Place::Device(before)),
             None => (at + length, Place::Master { sof: at }),
         };
-        self.push(at, Event::StartUp { at: place, port: PortId::B, frame, preamble, hit });
+        self.queue.push(at, Event::StartUp { at: place, port: PortId::B, frame, preamble, hit });
     }
 
     /// A start-up frame is back at the master.
@@ -379,7 +305,7 @@ impl Line {
         // What the master refuses, it counts.
         let _: Result<_, _> = self.master.hear(&frame, captured.max(0.0).round() as u64);
         self.asked = self.now;
-        self.push(self.now, Event::Master);
+        self.queue.push(self.now, Event::Master);
     }
 
     /// Device k measures the line to the next one, which then does the same. Nothing else is on that wire.
@@ -433,7 +359,7 @@ impl Line {
                 node.truth.again_out += 1;
             }
             let at = arrival.start + wire_ns + RECEIVE_NS;
-            self.push(at, Event::Dealt { k, arrival, sent: Rc::clone(&sent) });
+            self.queue.push(at, Event::Dealt { k, arrival, sent: Rc::clone(&sent) });
         }
     }
 
@@ -472,7 +398,7 @@ impl Line {
         for arrival in arrivals {
             record.exchange(arrival.start as u64, &arrival.bytes, true);
             let at = arrival.start + length;
-            self.push(at, Event::Answer { k, arrival, hit: Rc::clone(&hit) });
+            self.queue.push(at, Event::Answer { k, arrival, hit: Rc::clone(&hit) });
         }
     }
 

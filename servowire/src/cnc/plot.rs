@@ -1,11 +1,10 @@
 //! Speed and position of the axes over time, and the sound of the motors.
 
-use std::error::Error;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use plotters::prelude::*;
+use crate::drawing::{Chart, Drawn, Share, Sheet, Stroke};
 
 /// Points of a curve.
 const POINTS: usize = 2000;
@@ -39,52 +38,29 @@ impl Curves {
         }
     }
 
-    /// Draws the first `axes` axes into `path`.
-    pub(super) fn draw(&self, axes: usize, path: &Path) -> Result<(), Box<dyn Error>> {
-        let root = SVGBackend::new(path, (1000, 700)).into_drawing_area();
-        root.fill(&WHITE)?;
-        let (upper, lower) = root.split_vertically(350);
+    /// The first `axes` axes, each with its speed and its position.
+    pub(super) fn draw(&self, axes: usize) -> Drawn<String> {
         let seconds = |cycle: u64| cycle as f64 * f64::from(self.cycle_ns) * 1e-9;
-        let position = |axis: usize| {
-            self.points.iter().map(move |(cycle, p)| (seconds(*cycle), p.get(axis).copied().unwrap_or(0) as f64))
-        };
-        let speed = |axis: usize| {
-            self.points.windows(2).filter_map(move |pair| {
+        let end = self.points.last().map_or(0.0, |(cycle, _)| seconds(*cycle)).max(1e-6);
+        let mut sheet = Sheet::new("the axes of the machine", 1200);
+        for axis in 0..axes {
+            let position =
+                self.points.iter().map(|(cycle, p)| (seconds(*cycle), p.get(axis).copied().unwrap_or(0) as f64));
+            let speed = self.points.windows(2).filter_map(|pair| {
                 let [(c0, p0), (c1, p1)] = pair else { return None };
                 let steps = p1.get(axis)? - p0.get(axis)?;
                 Some((seconds(*c1), steps as f64 / (seconds(*c1) - seconds(*c0)) / 1000.0))
-            })
-        };
-        curves(&upper, "speed", "steps/ms", &(0..axes).map(|a| speed(a).collect()).collect::<Vec<_>>())?;
-        curves(&lower, "position", "steps", &(0..axes).map(|a| position(a).collect()).collect::<Vec<_>>())?;
-        root.present()?;
-        Ok(())
+            });
+            let panel = |what: &str, points: Vec<(f64, f64)>| -> Share {
+                let title = format!("axis {}: {what}", axis + 1);
+                (1, Box::new(Chart::new(title, "time in s", 0.0..end).with(Stroke::ONLY, points)))
+            };
+            let panels =
+                vec![panel("speed in steps/ms", speed.collect()), panel("position in steps", position.collect())];
+            sheet.beside(240, panels);
+        }
+        sheet.svg()
     }
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-fn curves(area: &Area<'_>, title: &str, unit: &str, curves: &[Vec<(f64, f64)>]) -> Result<(), Box<dyn Error>> {
-    let all = || curves.iter().flatten();
-    let end = all().map(|(x, _)| *x).fold(1e-6, f64::max);
-    let (low, high) = all().fold((0.0, 1.0), |(low, high): (f64, f64), (_, y)| (low.min(*y), high.max(*y)));
-    let room = (high - low) * 0.05;
-    let mut chart = ChartBuilder::on(area)
-        .margin(12)
-        .caption(title, ("sans-serif", 18))
-        .x_label_area_size(34)
-        .y_label_area_size(70)
-        .build_cartesian_2d(0.0..end, low - room..high + room)?;
-    chart.configure_mesh().x_desc("time in s").y_desc(unit).light_line_style(WHITE).draw()?;
-    for (axis, curve) in curves.iter().enumerate() {
-        let color = Palette99::pick(axis).to_rgba();
-        chart
-            .draw_series(LineSeries::new(curve.iter().copied(), color.stroke_width(2)))?
-            .label(format!("axis {}", axis + 1))
-            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], color.stroke_width(2)));
-    }
-    chart.configure_series_labels().background_style(WHITE).border_style(BLACK).draw()?;
-    Ok(())
 }
 
 /// The sound of the motors, written while they run: each hums with its full steps.
@@ -129,5 +105,24 @@ impl Sound {
 
     pub(super) fn finish(self) -> Result<(), hound::Error> {
         self.writer.finalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::geometry::nothing_is_covered;
+
+    #[test]
+    fn every_axis_has_its_panels() {
+        let mut curves = Curves::new(4000);
+        for cycle in 0..5000 {
+            let at = cycle as i64;
+            curves.add(cycle, [at, -at, 1_000_000 * at, 0]);
+        }
+        let svg = curves.draw(4).unwrap();
+        nothing_is_covered(&svg);
+        assert!((1..=4).all(|axis| svg.contains(&format!("axis {axis}: speed in steps/ms"))), "{svg}");
+        nothing_is_covered(&Curves::new(4000).draw(1).unwrap());
     }
 }

@@ -1,11 +1,10 @@
 //! Cycle time against devices, cable and payload: a table, and a picture.
 
-use std::error::Error;
 use std::io::{self, Write};
-use std::path::Path;
 
-use plotters::prelude::*;
 use sorte_proto::timing::{Limit, Timing};
+
+use crate::drawing::{Chart, Drawn, Sheet, Stroke};
 
 /// Device counts of the table.
 const DEVICES: [u8; 14] = [1, 2, 3, 4, 5, 8, 10, 16, 32, 64, 100, 128, 200, 254];
@@ -53,32 +52,26 @@ pub(super) fn table(out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// The picture.
-pub(super) fn draw(path: &Path) -> Result<(), Box<dyn Error>> {
-    let root = SVGBackend::new(path, (900, 560)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let end = f64::from(cycle_ns(254, LINES[4]).0) / 1e3;
-    let mut chart = ChartBuilder::on(&root)
-        .margin(12)
-        .caption("SORTE: shortest cycle against devices", ("sans-serif", 18))
-        .x_label_area_size(36)
-        .y_label_area_size(64)
-        .build_cartesian_2d(0.0..260.0, 0.0..end * 1.02)?;
-    chart.configure_mesh().x_desc("devices").y_desc("us").light_line_style(WHITE).draw()?;
+pub(super) fn draw() -> Drawn<String> {
+    let mut sheet = Sheet::new("SORTE: shortest cycle against devices", 900);
+    let mut chart = Chart::new("cycle in us", "devices", 0.0..254.0);
     for (k, line) in LINES.into_iter().enumerate() {
-        let color = Palette99::pick(k).to_rgba();
         let points = (1..=254).map(|devices| (f64::from(devices), f64::from(cycle_ns(devices, line).0) / 1e3));
         let (cable, output, input) = line;
-        chart
-            .draw_series(LineSeries::new(points, color.stroke_width(2)))?
-            .label(format!("{cable} ns of cable, {output} bytes out, {input} in"))
-            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], color.stroke_width(2)));
+        chart = chart.with(Stroke::number(k), points.collect());
+        sheet.explain(Stroke::number(k), format!("{cable} ns of cable, {output} bytes out, {input} in"));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE)
-        .border_style(BLACK)
-        .draw()?;
-    root.present()?;
-    Ok(())
+    sheet.panel(480, chart);
+    sheet.svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::geometry::nothing_is_covered;
+
+    #[test]
+    fn the_legend_stands_beside_the_curves() {
+        nothing_is_covered(&draw().unwrap());
+    }
 }

@@ -13,8 +13,15 @@ use crate::units::moment;
 ///
 /// Prints a transaction a line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
 /// polarity and bit rate are found from the capture; what was found is said on the error output. Exit code 0: all
-/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
+/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use; 4: all frames good, and a drive reported
+/// an alarm, did not answer or stood still; 5: both 1 and 4.
 #[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  servowire decode line.vcd
+  servowire decode --stats --jump 4000 session.sr
+  servowire decode --errors --from 1ms --to 20ms digital.csv
+  servowire decode --cut 1ms..2ms -o piece.vcd line.vcd
+  sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary | servowire decode --rate 24M -")]
 pub(crate) struct Decode {
     /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
     /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
@@ -62,6 +69,9 @@ pub(crate) struct FilterArgs {
     /// Only the encoder (EA), drive (MAC-ID) or device (SA) of this address.
     #[arg(long, value_name = "N")]
     pub(super) address: Option<u16>,
+    /// Only the encoder of this channel, address, or both as A/3, as the tables name it.
+    #[arg(long, value_name = "NAME")]
+    pub(super) encoder: Option<String>,
     /// Only frames from this time of the capture on, as 20us, 1.5ms or 2s.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
     pub(super) from: Option<Time>,
@@ -90,8 +100,8 @@ fn stretch(text: &str) -> Result<(Time, Time), String> {
 impl Decode {
     /// Which frames are asked for.
     pub(super) fn filter(&self) -> Filter {
-        let FilterArgs { id, address, from, to, errors } = &self.filter;
+        let FilterArgs { id, address, encoder, from, to, errors } = &self.filter;
         let times = self.cut.map_or((*from, *to), |(from, to)| (Some(from), Some(to)));
-        Filter::new(id.clone(), address.map(i64::from), times, *errors)
+        Filter::new(id.clone(), address.map(i64::from), times, *errors).with_encoder(encoder.clone())
     }
 }

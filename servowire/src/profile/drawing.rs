@@ -1,12 +1,11 @@
 //! Speed, acceleration and step time of a move as SVG.
 
-use std::error::Error;
 use std::ops::Range;
 
-use plotters::prelude::*;
 use step_profile::{MoveState, Profile};
 
 use super::ramp::{Stretch, stretches};
+use crate::drawing::{Chart, Drawn, Panel, Sheet, Stroke};
 
 type Points = Vec<(f64, f64)>;
 
@@ -53,7 +52,7 @@ fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
 }
 
 /// The whole move over time on the left, the ramp up over its steps on the right.
-pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Result<String, Box<dyn Error>> {
+pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Drawn<String> {
     let stretches = stretches(profile, steps);
     let k = profile.parameters().steps_per_entry;
     let title = format!(
@@ -61,64 +60,37 @@ pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Result<String, Box<dyn Er
         65_536_000.0 / f64::from(profile.parameters().speed.raw()),
         profile.duration_ns(steps) as f64 / 1e6
     );
-    let mut drawing = String::new();
-    let root = SVGBackend::with_string(&mut drawing, (1200, 1000)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (left, right) = root.titled(&title, ("sans-serif", 22))?.split_horizontally(640);
     let end = stretches.last().map_or(1.0, |last| last.ms.end);
     let up = f64::from(profile.shape(steps).accelerating.max(1)) * 1.05;
     let sides: [(_, Along, _, _); 2] = [
-        (left, |stretch| stretch.ms.clone(), end, "time [ms]"),
-        (right, Stretch::steps, f64::min(up, f64::from(steps.max(1))), "ramp up [steps]"),
+        (7, |stretch| stretch.ms.clone(), end, "time in ms"),
+        (5, Stretch::steps, f64::min(up, f64::from(steps.max(1))), "ramp up in steps"),
     ];
-    for (side, along, until, x) in sides {
-        let areas = side.split_evenly((3, 1));
-        let [top, middle, bottom] = areas.as_slice() else { continue };
-        plot(top, (x, "speed [kHz]"), speed(&stretches, along), until, false)?;
-        plot(middle, (x, "acceleration [10³ steps/s²]"), acceleration(&stretches, k, along), until, false)?;
-        plot(bottom, (x, "step time [µs]"), step_time(&stretches, along), until, true)?;
+    let mut sheet = Sheet::new(&title, 1200);
+    let rows: [(_, &dyn Fn(Along) -> Points, _); 3] = [
+        ("speed in kHz", &|along| speed(&stretches, along), false),
+        ("acceleration in 10³ steps/s²", &|along| acceleration(&stretches, k, along), false),
+        ("step time in µs", &|along| step_time(&stretches, along), true),
+    ];
+    for (name, points, logarithmic) in rows {
+        let panel = |(share, along, until, x): (u32, Along, f64, &str)| {
+            let mut points = points(along);
+            points.retain(|(at, _)| *at <= until);
+            if let Some((_, value)) = points.last().copied() {
+                points.push((until, value));
+            }
+            let chart = Chart { logarithmic, ..Chart::new(name, x, 0.0..until) };
+            (share, Box::new(chart.with(Stroke::ONLY, points)) as Box<dyn Panel>)
+        };
+        sheet.beside(310, sides.map(panel).into());
     }
-    root.present()?;
-    drop(root);
-    Ok(drawing)
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-/// `points` up to `until`.
-fn plot(
-    area: &Area<'_>,
-    (x, y): (&str, &str),
-    mut points: Points,
-    until: f64,
-    logarithmic: bool,
-) -> Result<(), Box<dyn Error>> {
-    points.retain(|(at, _)| *at <= until);
-    if let Some((_, value)) = points.last().copied() {
-        points.push((until, value));
-    }
-    let values = || points.iter().map(|(_, value)| *value);
-    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(1e-3, f64::max));
-    let mut chart = ChartBuilder::on(area);
-    chart.margin(12).x_label_area_size(38).y_label_area_size(104);
-    let line = LineSeries::new(points, BLUE.stroke_width(2));
-    // The two kinds of axes are of different types, so the few calls are there twice.
-    if logarithmic {
-        let mut chart = chart.build_cartesian_2d(0.0..until, (low.min(high) * 0.8..high * 1.25).log_scale())?;
-        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
-        chart.draw_series(line)?;
-    } else {
-        let mut chart = chart.build_cartesian_2d(0.0..until, low.min(0.0) * 1.08..high * 1.08)?;
-        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
-        chart.draw_series(line)?;
-    }
-    Ok(())
+    sheet.svg()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::profile::stroke::geometry::nothing_is_covered;
+    use crate::drawing::geometry::nothing_is_covered;
     use step_profile::{Parameters, Speed};
 
     fn profile(hz: u32, steps_per_entry: u32) -> Profile<'static> {
@@ -129,9 +101,7 @@ mod tests {
     fn every_move_can_be_drawn() {
         for (hz, k, steps) in [(94_570, 20, 23_642), (250_000, 1, 64), (100, 1, 1), (1000, 1, 0)] {
             let svg = svg(profile(hz, k), steps).unwrap();
-            assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{steps} steps");
-            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{steps} steps");
-            for text in ["speed [kHz]", "acceleration", "step time", "ramp up"] {
+            for text in ["speed in kHz", "acceleration", "step time", "ramp up"] {
                 assert!(svg.contains(text), "{steps} steps: {text}");
             }
             nothing_is_covered(&svg);

@@ -7,13 +7,12 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use plotters::prelude::*;
 use step_motion::AxisPulse;
 use step_profile::Direction;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
 use super::Arguments;
-use super::stroke::Stroke;
+use crate::drawing::{Chart, Drawn, Sheet, Stroke};
 use crate::gcode::{AXES, Steps};
 
 const NAMES: [&str; AXES] = ["X", "Y", "Z"];
@@ -207,8 +206,8 @@ impl Wires {
 /// A place of the axes at a time in s.
 type Place = (f64, [i64; AXES]);
 
-/// The path on the left, the positions of the axes over time on the right.
-fn draw(places: &[Place]) -> Result<String, Box<dyn Error>> {
+/// The path, a step as long in X as in Y, and the positions of the axes over time.
+fn draw(places: &[Place]) -> Drawn<String> {
     // A point a pixel is enough.
     let every = (places.len() / 20_000).max(1);
     let thin = || places.iter().step_by(every).chain(places.last());
@@ -219,44 +218,23 @@ fn draw(places: &[Place]) -> Result<String, Box<dyn Error>> {
         let margin = (high - low).max(1.0) * 0.06;
         low - margin..high + margin
     };
-    let mut drawing = String::new();
-    let root = SVGBackend::with_string(&mut drawing, (1200, 600)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (left, right) = root.split_horizontally(600);
-    let mut chart = ChartBuilder::on(&left);
-    let mut plane =
-        chart.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(range(0), range(1))?;
-    plane.configure_mesh().max_light_lines(0).x_desc("X [steps]").y_desc("Y [steps]").draw()?;
-    plane.draw_series(LineSeries::new(thin().map(|place| (value(place, 0), value(place, 1))), BLUE.stroke_width(2)))?;
-    let (head, body) = right.split_vertically(30);
-    for ((axis, name), left) in NAMES.iter().enumerate().zip((70..).step_by(150)) {
-        Stroke::number(axis).legend(&head, left, name)?;
-    }
+    let points = |x: fn(&Place) -> f64, axis: usize| thin().map(|place| (x(place), value(place, axis))).collect();
+    let mut sheet = Sheet::new("the path, and the axes over time", 1200);
+    let plane = Chart { y: Some(range(1)), equal: true, ..Chart::new("Y in steps", "X in steps", range(0)) };
+    let plane = plane.with(Stroke::ONLY, points(|place| place.1.first().map_or(0.0, |steps| *steps as f64), 1));
+    sheet.panel(700, plane);
     let end = places.last().map_or(1.0, |(time, _)| time.max(1e-9));
-    for (axis, (area, name)) in body.split_evenly((AXES, 1)).iter().zip(NAMES).enumerate() {
-        let mut chart = ChartBuilder::on(area);
-        chart.margin(12).x_label_area_size(42).y_label_area_size(70);
-        let mut curve = chart.build_cartesian_2d(0.0..end, range(axis))?;
-        let labels = (8, 5);
-        curve
-            .configure_mesh()
-            .max_light_lines(0)
-            .x_labels(labels.0)
-            .y_labels(labels.1)
-            .x_desc("time [s]")
-            .y_desc(format!("{name} [steps]"))
-            .draw()?;
-        Stroke::number(axis).curve(&mut curve, thin().map(|place| (place.0, value(place, axis))))?;
+    for (axis, name) in NAMES.iter().enumerate() {
+        let chart = Chart { y: Some(range(axis)), ..Chart::new(format!("{name} in steps"), "time in s", 0.0..end) };
+        sheet.panel(220, chart.with(Stroke::ONLY, points(|place| place.0, axis)));
     }
-    root.present()?;
-    drop((root, left, right, head, body, plane));
-    Ok(drawing)
+    sheet.svg()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::profile::stroke::geometry::nothing_is_covered;
+    use crate::drawing::geometry::nothing_is_covered;
 
     /// DIR leads STEP by a microsecond, or by half of the time since the pulse before; each axis by itself.
     #[test]
@@ -286,7 +264,7 @@ mod tests {
         let square = [[0, 0, 0], [80_000, 0, 0], [80_000, 80_000, -20_000], [0, 80_000, 0], [0, 0, 0]];
         let places: Vec<Place> = (0..).map(f64::from).zip(square).collect();
         let svg = draw(&places).unwrap();
-        assert!(svg.contains("X [steps]") && svg.contains("time [s]") && !svg.contains("NaN"));
+        assert!(svg.contains("X in steps") && svg.contains("time in s"));
         nothing_is_covered(&svg);
         nothing_is_covered(&draw(&[(0.0, [0; AXES])]).unwrap());
     }

@@ -59,7 +59,7 @@ fn a_picture() {
     assert_eq!(run.code, 1);
     let svg = std::fs::read_to_string(&out).unwrap();
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
-    for word in ["position in turns", "answer delay in us", "crc 1", "no_response 1", "time in ms"] {
+    for word in ["position ABM, ABS in turns", "answers by their delay", "crc", "no_response", "time in us"] {
         assert!(svg.contains(word), "{word} is not in the picture");
     }
     assert_eq!(common::servowire(&["decode", "--svg", "x.svg"]).code, 2, "one file, one picture");
@@ -190,7 +190,10 @@ fn is_a(kind: &str, value: &Value) -> bool {
         }),
         "position" => {
             let position = value.as_object().unwrap();
-            position["counts"].is_i64() && position.get("turns").is_none_or(Value::is_number) && position.len() <= 2
+            position["name"].is_string()
+                && position["counts"].is_i64()
+                && position.get("turns").is_none_or(Value::is_number)
+                && position.len() <= 3
         }
         other => panic!("the README has no type {other:?}"),
     }

@@ -353,6 +353,25 @@ fn what_is_recorded_is_read_back() {
     assert!(sound.len() > 2 * 44_100 && sound.iter().skip(44).any(|byte| *byte != 0));
 }
 
+/// A SYNC of ten bytes as a network card gives it, in a file that says nothing of a frame check sequence: it is taken for what it is,
+/// unless the user knows that the card keeps them.
+#[test]
+fn a_capture_without_frame_check_sequences() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("card.pcap");
+    let name = path.to_str().unwrap();
+    let frame = [0xff, 0, 5, 0x40, 0xf4, 1, 0, 0, 85, 0];
+    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+    let head = words(&[0xa1b2_c3d4, 4 << 16 | 2, 0, 0, 65_535, 1, 0, 0, 10, 10]);
+    fs::write(&path, [&head[..], &frame].concat()).unwrap();
+    for (more, code) in [(&[][..], 0), (&["--fcs", "no"], 0), (&["--fcs", "yes"], 1)] {
+        let run = servowire(&[&["decode", name], more].concat());
+        assert_eq!(run.status.code(), Some(code), "{more:?}");
+        assert_eq!(text(&run).contains("not captured"), code == 0, "{}", text(&run));
+    }
+    assert_eq!(servowire(&["decode", name, "--fcs", "perhaps"]).status.code(), Some(2));
+}
+
 #[test]
 fn a_damaged_network_capture_is_refused_where_it_breaks() {
     let folder = TempDir::new().unwrap();

@@ -45,9 +45,9 @@ fn positions_need_a_resolution() {
         wave.exchange(&[0x02], &id0(0x8000 + k));
     }
     let plain = bench.decode("a.vcd", wave.vcd(), &["--json"]);
-    assert_eq!(plain.json()[1]["position"], json!({ "counts": 0x8000 }));
+    assert_eq!(plain.json()[1]["position"], json!({ "name": "ABS", "counts": 0x8000 }));
     let wide = bench.decode("a.vcd", wave.vcd(), &["--json", "--single-turn-bits", "17"]);
-    assert_eq!(wide.json()[1]["position"], json!({ "counts": 0x8000, "turns": 0.25 }));
+    assert_eq!(wide.json()[1]["position"], json!({ "name": "ABS", "counts": 0x8000, "turns": 0.25 }));
     let narrow = bench.decode("a.vcd", wave.vcd(), &["--json", "--single-turn-bits", "11"]);
     narrow.is_good();
     assert!(narrow.json()[1].get("position").is_none());

@@ -23,6 +23,7 @@ mod cmd;
 mod cnc;
 mod common;
 mod costs;
+mod explain;
 mod formats;
 mod frames;
 mod hdsl;

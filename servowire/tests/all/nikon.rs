@@ -137,10 +137,16 @@ fn the_type_word_gives_the_resolution() {
     let (wave, _) = traffic(BitRate::Mbit4, 4e6);
     let run = decode(&Bench::new(), &wave, &[]);
     let events = run.json();
-    let position = events.iter().find(|event| event["kind"] == "ABS40" && event["direction"] == "answer").unwrap();
-    let turns = position["position"]["turns"].as_f64().unwrap();
-    let want = 17.0 + f64::from(300_000 + 0x5_1234) / f64::from(1 << 20);
-    assert!((turns - want).abs() < 1e-9, "{position}");
+    let turns = |kind: &str, ea: u32| {
+        let said = |event: &&serde_json::Value| {
+            event["kind"] == kind && event["direction"] == "answer" && event["address"] == ea
+        };
+        events.iter().find(said).unwrap()["position"]["turns"].as_f64()
+    };
+    let want = 17.0 + f64::from(100_000 + 0x5_1234) / f64::from(1 << 20);
+    assert!((turns("ABS40_MT", 1).unwrap() - want).abs() < 1e-9);
+    // Nobody has asked encoder 3 for its type.
+    assert_eq!(turns("ABS40", 3), None);
 }
 
 #[test]
@@ -201,4 +207,43 @@ fn a_recording_that_begins_inside_a_request() {
             assert!(run.code == 0 && (frames - 1..=frames).contains(&whole), "{hertz} {part}: {}", run.out);
         }
     }
+}
+
+/// Eight encoders that stand far from each other and move five counts each: nobody's figures are those of another.
+#[test]
+fn each_encoder_of_a_bus_has_its_own_figures() {
+    let (rate, hertz) = RATES[1];
+    let (mut wave, mut encoders, mut now_ns) = (Wave::new(hertz), encoders(rate), 0);
+    wave.idle_us(50.0);
+    for k in 0..6 {
+        for (device, address) in encoders.all.iter_mut().zip(0..) {
+            device.set_position(address * 100_000 + 0x5_1234 + 5 * k, 17);
+        }
+        exchange(&mut wave, &mut encoders, Request::new(ea(7), Operation::Abs40Mt), rate, &mut now_ns);
+    }
+    let bench = Bench::new();
+    let file = bench.file("bus.vcd", wave.vcd());
+    let figures = common::decode(&file, &["--stats", "--json", "--jump", "100"]);
+    figures.is_good();
+    let figures = figures.json();
+    assert_eq!(figures.len(), 8);
+    for (address, own) in figures.iter().enumerate() {
+        let seen = ["address", "answers", "largest_move", "jumps"].map(|key| own[key].as_u64().unwrap());
+        assert_eq!(seen, [address as u64, 6, 5, 0], "{own}");
+    }
+    let text = common::decode(&file, &["--stats"]).out;
+    assert_eq!(text.matches("  largest move  5 counts").count(), 8, "{text}");
+    let own = common::decode(&file, &["--json", "--encoder", "3"]);
+    own.is_good();
+    assert_eq!(own.json().len(), 6);
+    assert!(own.json().iter().all(|event| event["address"] == 3), "{}", own.out);
+    let table = common::decode(&file, &["--csv", "--encoder", "line/5"]).out;
+    assert!(
+        table.lines().skip(1).all(|row| row.split(',').nth(2) == Some("5")) && table.lines().count() == 7,
+        "{table}"
+    );
+    let svg = bench.path("bus.svg");
+    common::decode(&file, &["--svg", svg.to_str().unwrap()]).is_good();
+    let svg = std::fs::read_to_string(svg).unwrap();
+    assert!((0..8).all(|address| svg.contains(&format!("address {address}: position ABS in "))), "{svg}");
 }

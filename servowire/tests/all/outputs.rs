@@ -204,6 +204,12 @@ fn files_do_not_mix() {
     let rows: Vec<Vec<&str>> = table.out.lines().skip(1).map(|row| row.split(',').take(3).collect()).collect();
     let of = |file: &str, channel: &str| rows.iter().filter(|row| row[0] == file && row[1] == channel).count();
     assert_eq!([of(two, "A"), of(two, "B"), of(one, "line"), of(log, "")], [GOOD_FRAMES, GOOD_FRAMES, GOOD_FRAMES, 2]);
+    // Each line has its own figures, and can be taken alone.
+    let figures = common::decode(&files[0], &["--stats"]).out;
+    assert_eq!(figures.matches("  frames        12 requests, 12 answers, 0 others").count(), 2, "{figures}");
+    assert!(!figures.contains("min -") && figures.contains("\n  A\n") && figures.contains("\n  B\n"), "{figures}");
+    let own = common::decode(&files[0], &["--json", "--encoder", "B"]);
+    assert!(own.json().len() == GOOD_FRAMES && own.json().iter().all(|event| event["channel"] == "B"), "{}", own.out);
     // In the text a line has a name where there are two; the encoder ID is said anew in each file.
     let text = common::servowire(&["decode", two, one, log]);
     let parts: Vec<&str> = text.out.split("\n\n").collect();

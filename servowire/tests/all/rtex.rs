@@ -133,20 +133,16 @@ fn jumps_that_cannot_be_told() {
     for (more, want) in [
         (
             &[][..],
-            "jumps         not known: no position of a single axis is seen (a log of RTEX blocks needs --mac-id)",
+            "jumps         not known: the positions have no times (a log of RTEX blocks needs times, or --period)",
         ),
-        (&["--period", "500us"], "needs --mac-id"),
-        (
-            &["--mac-id", "5"],
-            "jumps         not known: the positions have no times (a log of RTEX blocks needs --period)",
-        ),
-        (&["--mac-id", "5", "--period", "500us"], "jumps         5 of more than 5 counts"),
+        (&["--period", "500us"], "jumps         5 of more than 5 counts"),
     ] {
         let run = bench.decode("log.txt", hex_log(&exchanges()), &[&options[..], more].concat());
         assert!(run.is_good().out.contains(want), "{more:?}: {}", run.out);
     }
-    let json = [&options[..], &["--mac-id", "5", "--json"]].concat();
-    assert!(bench.decode("log.txt", hex_log(&exchanges()), &json).json()[0]["jumps"].is_null());
+    let json = [&options[..], &["--json"]].concat();
+    let figures = bench.decode("log.txt", hex_log(&exchanges()), &json).json();
+    assert!(figures[0]["jumps"].is_null() && figures[0]["address"] == 5, "{figures:?}");
 }
 
 /// 400 M pulses a second in 0.5 ms are 200 000 pulses: 50 000 command units at gear 4/1.
@@ -198,10 +194,10 @@ fn findings_between_blocks() {
         (run.code, run.err.lines().last().unwrap_or_default().to_owned())
     };
     let (code, said) = trouble(&still);
-    assert!(code == 1 && said.ends_with("the counter echo of a drive stood still"), "{said}");
+    assert!(code == 4 && said.ends_with("drive 5 sent a counter echo that stood still"), "{said}");
     let alarm = [1, 2, 3].map(|counter| response(counter, 0x20, 0).replacen("20c1", "20e1", 1));
     let (code, said) = trouble(&alarm);
-    assert!(code == 1 && said.ends_with("a drive reports an alarm"), "{said}");
+    assert!(code == 4 && said.ends_with("drive 5 reported an alarm"), "{said}");
     // The code comes back later than one command after the other.
     let late: Vec<_> =
         (1..=4).flat_map(|k| [command(k & 3, 0x20), response(k & 3, if k == 4 { 0x20 } else { 0x10 }, 0)]).collect();
@@ -313,7 +309,7 @@ fn what_is_left_open() {
     let at_end = |lines: &[String], more: &[&str]| {
         let run =
             bench.decode("log.txt", lines.join("\n"), &[&["--protocol", "rtex", "--bytes", "--json"], more].concat());
-        run.is_good().json().last().unwrap()["fields"]["note"].as_str().unwrap().to_owned()
+        (run.code, run.json().last().unwrap()["fields"]["note"].as_str().unwrap().to_owned())
     };
     let command = |k: u8, code| block([(k % 4) << 5 | 5, code, 0x80, 0, 0, 0, 0, 0, 7, 0]);
     let busy = |k: u8| block([0x80 | (k % 4) << 5 | 5, 0x26, 0xc1, 0, 0, 0, 0, 0, 7, 0x10]);
@@ -322,9 +318,10 @@ fn what_is_left_open() {
     for more in [&[][..], &["--mac-id", "5"], &["--period", "1ms"]] {
         assert_eq!(
             at_end(&asked, more),
-            "at the end drive 5 has not answered CP parameter (26h) in 9 responses, 9 of them busy"
+            (0, "at the end drive 5 has not answered CP parameter (26h) in 9 responses, 9 of them busy".to_owned())
         );
-        assert_eq!(at_end(&silent, more), "at the end drive 5 has not answered the last 8 commands");
+        // A drive that is silent has to be looked after.
+        assert_eq!(at_end(&silent, more), (4, "at the end drive 5 has not answered the last 8 commands".to_owned()));
     }
 }
 
@@ -377,9 +374,10 @@ fn a_drive_that_never_answers() {
         command[0] ^= 2;
     }
     let run = bench.decode("log.txt", hex_log(&all), &["--protocol", "rtex", "--bytes", "--json"]);
-    let events = run.is_good().json();
+    assert_eq!(run.code, 4);
+    assert!(run.err.ends_with("drive 7 did not answer\n"), "{}", run.err);
     assert_eq!(
-        events.last().unwrap()["fields"]["note"],
+        run.json().last().unwrap()["fields"]["note"],
         "drive 5 answers and was never sent a command; drive 7 never answered"
     );
 }
@@ -396,15 +394,18 @@ fn a_remark_on_the_log_is_counted_nowhere() {
     let text = hex_log(&all) + &"45507000000000000000000000000000\n".repeat(8);
     let options = ["--protocol", "rtex", "--bytes"];
     let run = bench.decode("log.txt", &text, &[&options[..], &["--json"]].concat());
-    run.fails_with("8 of 20 frames refused");
+    assert!(run.code == 5 && run.err.contains("8 of 20 frames refused"), "{}", run.err);
     let events = run.json();
     let last = events.last().unwrap();
     assert_eq!((events.len(), last["kind"].as_str()), (21, Some("log")), "{last}");
     // It stands at the end of the log.
     assert_eq!(last["line"], events[19]["line"]);
-    let stats = bench.decode("log.txt", &text, &[&options[..], &["--stats"]].concat());
-    assert!(stats.out.contains("14 requests, 6 answers, 0 others"), "{}", stats.out);
-    assert!(stats.out.contains("12 ok, 8 refused"), "{}", stats.out);
+    // All drives together.
+    let figures = bench.decode("log.txt", &text, &[&options[..], &["--stats", "--json"]].concat()).json();
+    let sum = |key: &str| figures.iter().map(|own| own[key].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(["requests", "answers", "others", "ok"].map(sum), [14, 6, 0, 12]);
+    let refused = figures.iter().flat_map(|own| own["refused"].as_object().unwrap().values());
+    assert_eq!(refused.filter_map(serde_json::Value::as_u64).sum::<u64>(), 8);
     // Its line has no verdict, as it is no frame.
     let shown = bench.decode("log.txt", &text, &options).out;
     assert!(!shown.trim_end().ends_with("ok"), "{shown}");
@@ -440,6 +441,161 @@ fn a_log_from_power_up() {
         assert_eq!(run.code, i32::from(turned), "{said}");
         assert!(!turned || run.err.contains("pack with shifts"), "{said}");
         let drives = run.json().iter().filter(|event| event["kind"].as_str().unwrap().ends_with('5')).count();
-        assert!(turned || drives == 2_012, "{said}: {drives}");
+        assert_eq!(drives, 2_012, "{said}");
     }
+}
+
+/// A table with times, directions and axes: two drives, of which one alarms at 1.0 ms, and a command that is 20 us late.
+fn table() -> String {
+    let mut text = "time_us,direction,axis,data\n".to_owned();
+    for (k, (command, response)) in exchanges().into_iter().enumerate() {
+        for drive in [5_u8, 7] {
+            let begins = 500 * k + if k == 3 { 20 } else { 0 };
+            let (mut command, mut response) = (command, response);
+            (command[0], response[0]) = (command[0] & 0xe0 | drive, response[0] & 0xe0 | drive);
+            response[4..8].copy_from_slice(&(990 + 10 * k as i32 + i32::from(drive)).to_le_bytes());
+            if drive == 7 && k >= 2 {
+                response[2] = 0x20;
+            }
+            for (at, said, block) in [(begins, "command", command), (begins + 30, "response", response)] {
+                writeln!(text, "{at},{said},{drive},{:032x}", u128::from_be_bytes(block)).unwrap();
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn a_service_report_of_a_table() {
+    let bench = Bench::new();
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--stats", "--jump", "1000"]);
+    assert_eq!(run.code, 4, "{}", run.err);
+    assert!(run.err.ends_with("drive 7 reported an alarm\n"), "{}", run.err);
+    for want in [
+        "  address 5\n  frames        6 requests, 6 answers, 0 others\n",
+        "  cycle         min 480.000 us, mean 500.000 us, max 520.000 us, jitter 40.000 us peak to peak",
+        "  largest move  10 counts\n  jumps         0 of more than 1000 counts\n  events        3\n",
+        "          1000.000 us  SERVO_ON 1\n",
+        "          1030.000 us  SERVO_READY 0\n",
+        "          1030.000 us  ALARM 1\n",
+    ] {
+        assert!(run.out.contains(want), "{want}\n{}", run.out);
+    }
+    let (five, seven) = run.out.split_once("  address 7").unwrap();
+    assert!(!five.contains("ALARM") && seven.contains("ALARM"), "{}", run.out);
+    // A row of a table stands alone: the last one has all its values.
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--csv"]);
+    let rows: Vec<Vec<&str>> = run.out.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name| rows[0].iter().position(|title| *title == name).unwrap();
+    let last = rows.last().unwrap();
+    let shown = ["start_us", "direction", "address", "position", "Response_Data2", "Response_Data3"]
+        .map(|name| last[column(name)]);
+    assert_eq!(shown, ["2530.000000", "answer", "7", "1047", "20000", "0"]);
+    // Each axis has its curve.
+    let picture = bench.path("ring.svg");
+    bench.decode("ring.csv", table(), &["--protocol", "rtex", "--svg", picture.to_str().unwrap()]);
+    let svg = std::fs::read_to_string(&picture).unwrap();
+    assert!(svg.contains("address 5") && svg.contains("address 7"));
+    // --bytes names what stands in the cells.
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--bytes", "--json"]);
+    assert_eq!((run.code, run.json().len()), (4, 24));
+}
+
+/// The same in lines of a monitor: times and who spoke stand before the bytes.
+#[test]
+fn a_log_of_a_monitor() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    for (k, (command, response)) in exchanges().into_iter().enumerate() {
+        let (command, response) = (u128::from_be_bytes(command), u128::from_be_bytes(response));
+        writeln!(text, "14:02:07.{:06} TX {command:032x}\n14:02:07.{:06} RX {response:032x}", 500 * k, 500 * k + 30)
+            .unwrap();
+    }
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--stats"]);
+    // Since the first of them.
+    assert!(
+        run.is_good().out.contains("  cycle         min 500.000 us, mean 500.000 us, max 500.000 us"),
+        "{}",
+        run.out
+    );
+    assert!(run.out.contains("          1000.000 us  SERVO_ON 1\n"), "{}", run.out);
+    // What the log says of the direction and C/R have to agree.
+    let run = bench.decode("log.txt", text.replacen("TX", "RX", 1), &["--protocol", "rtex", "--json"]);
+    assert_eq!((run.code, run.verdicts()[0].as_str()), (1, "direction"));
+}
+
+/// Times that are counted by Update_Counter and --period say nothing of a jitter.
+#[test]
+fn counted_times_have_no_jitter() {
+    let bench = Bench::new();
+    let options = ["--protocol", "rtex", "--bytes", "--period", "500us", "--stats"];
+    let run = bench.decode("log.txt", hex_log(&exchanges()), &options);
+    assert!(
+        run.is_good().out.contains("cycle         500.000 us on average as counted: the log has no times"),
+        "{}",
+        run.out
+    );
+    assert!(!run.out.contains("jitter 0"), "{}", run.out);
+}
+
+/// What the drive says when it is asked for its alarm, in words.
+#[test]
+fn an_alarm_in_words() {
+    let bench = Bench::new();
+    let text = "45250000000000000000000000000000\nc5a5200000000000000000001b040000\n65250000000000000000000000000000\n\
+                e52520000000000000000000 1b040000\n";
+    let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--stats"]);
+    assert!(run.out.contains("Err27.4 (too large a step of the position command)"), "{}", run.out);
+}
+
+/// Blocks of which the first is cut, and blocks of which five bytes are missing in the middle of the log: what is whole is shown, and the
+/// log is said not to be what it was written as.
+#[test]
+fn a_log_that_begins_or_goes_on_in_the_middle_of_a_block() {
+    let bench = Bench::new();
+    let bytes: Vec<u8> = (0..40).flat_map(|_| exchanges()).flat_map(|(c, r)| [c, r]).flatten().collect();
+    let dump = |bytes: &[u8]| {
+        bytes
+            .chunks(16)
+            .map(|line| line.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")) + "\n")
+            .collect::<String>()
+    };
+    let of_5 = |run: &common::Run| {
+        run.json().iter().filter(|it| it["kind"].as_str().unwrap().ends_with('5') && it["verdict"] == "ok").count()
+    };
+    for text in [dump(&bytes[5..]), dump(&bytes[..7_680 - 9][5..])] {
+        let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--json"]);
+        assert_eq!(run.code, 1, "{}", run.err);
+        assert!(run.err.contains("begins in the middle of a block: its first 11 bytes are left out"), "{}", run.err);
+        assert!(
+            of_5(&run) >= 478 && run.verdicts().iter().all(|it| *it == "ok" || *it == "truncated"),
+            "{}",
+            of_5(&run)
+        );
+    }
+    let hole = [&bytes[..1_600], &bytes[1_605..]].concat();
+    let run = bench.decode(
+        "log.bin",
+        &hole[..hole.len() / 16 * 16],
+        &["--protocol", "rtex", "--record-size", "16", "--json"],
+    );
+    assert_eq!(run.code, 1);
+    assert!(run.err.contains("from here on the log looks like blocks of 16 bytes"), "{}", run.err);
+    // 100 blocks before it and what follows the blocks by which it was seen.
+    assert!(of_5(&run) > 340, "{}", of_5(&run));
+}
+
+/// The words of 32 bits are turned round, and the blocks are shown as they were meant.
+#[test]
+fn turned_words_are_read() {
+    let bench = Bench::new();
+    let log = hex_log(&exchanges());
+    let turn = |line: &str| {
+        line.as_bytes().chunks(8).flat_map(|w| w.chunks(2).rev()).flatten().map(|b| char::from(*b)).collect::<String>()
+    };
+    let text: String = log.lines().skip(1).map(|line| turn(line) + "\n").collect();
+    let options = ["--protocol", "rtex", "--bytes", "--json"];
+    let (turned, plain) = (bench.decode("log.txt", text, &options), bench.decode("log.txt", log, &options));
+    let fields = |run: &common::Run| run.json().iter().map(|it| it["fields"].clone()).collect::<Vec<_>>();
+    assert_eq!((turned.code, fields(&turned)), (1, fields(&plain)));
 }

@@ -1,8 +1,8 @@
-//! A device on its way through the start-up, for several test programs.
+//! A device on its way through the start-up, and a line that answers a master.
 
 use sorte_proto::device::{Config, Device, FrameTimes, PortId, State, Trigger};
 use sorte_proto::master::Outgoing;
-use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place};
+use sorte_proto::{DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Link, Param, Parameters, Place, Status};
 
 /// A device in the state that waits for a frame, the last of the line or not. Its frames begin at 77,000 ns of its counter.
 pub(crate) fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
@@ -40,3 +40,40 @@ pub(crate) fn capture_ns(frame: &Outgoing) -> u64 {
 
 /// The same for the frames of the exchange.
 pub(crate) const EXCHANGE_CAPTURE_NS: u64 = 120;
+
+/// What device `n` of this many adds to STATUS.
+pub(crate) fn last_of(n: u8, devices: u8) -> Status {
+    if n == devices { Status::LAST } else { Status::empty() }
+}
+
+/// DISCOVERY behind this many devices.
+pub(crate) fn discovery(devices: u8, place: Place) -> Vec<u8> {
+    let mut frame = Discovery::request(place);
+    for n in 1..=devices {
+        frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
+    }
+    frame.emit().to_vec()
+}
+
+/// What a line of this many devices without cables between them answers.
+pub(crate) fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
+    match frame {
+        Outgoing::Discovery { place } => discovery(devices, place),
+        Outgoing::Param(frame) => frame.emit().to_vec(),
+        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
+        Outgoing::Sync(mut frame) => {
+            for n in 1..=devices {
+                frame.pass(0, last_of(n, devices));
+            }
+            frame.emit().to_vec()
+        }
+    }
+}
+
+/// The frame of a device of two, with a payload of zeros.
+pub(crate) fn device_frame(address: u8) -> [u8; 6] {
+    let (address, status) = (DeviceAddress::new(address).unwrap(), last_of(address, 2));
+    let mut bytes = [0; 6];
+    DeviceFrame { address, status, payload: [0; 3] }.emit_into(&mut bytes).unwrap();
+    bytes
+}

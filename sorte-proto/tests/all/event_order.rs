@@ -1,7 +1,7 @@
 //! What comes twice, late, early or not at all, and machines that are asked too late: the order of events that a line and a
 //! busy processor can bring about.
 
-use crate::common::{capture_ns, device_in};
+use crate::common::{answer, capture_ns, device_in};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, Path, PortId};
@@ -13,25 +13,6 @@ use sorte_proto::{
 
 /// 76 ns of cable and 320 ns in the device.
 const ROUND_TRIP: u64 = 472;
-
-/// What two devices without a cable between them answer.
-fn answer(frame: Outgoing) -> Vec<u8> {
-    match frame {
-        Outgoing::Discovery { place } => {
-            let mut frame = Discovery::request(place);
-            frame.pass(Entry::STOCK, Status::empty()).unwrap();
-            frame.pass(Entry::STOCK, Status::LAST).unwrap();
-            frame.emit().to_vec()
-        }
-        Outgoing::Param(frame) => frame.emit().to_vec(),
-        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
-        Outgoing::Sync(mut frame) => {
-            frame.pass(0, Status::empty());
-            frame.pass(0, Status::LAST);
-            frame.emit().to_vec()
-        }
-    }
-}
 
 fn master(config: Config) -> Master {
     let mut master = Master::new(config);
@@ -64,7 +45,7 @@ fn run(master: &mut Master, mut late: impl FnMut() -> u64, mut hear: impl FnMut(
 }
 
 fn hear_once(master: &mut Master, at_ns: u64, frame: Outgoing) {
-    let _: Result<_, _> = master.hear(&answer(frame), at_ns + ROUND_TRIP);
+    let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + ROUND_TRIP);
 }
 
 /// Ten frames must be answered, and the devices must have had the one with STATE_CHANGE.
@@ -138,7 +119,7 @@ fn a_reflection_that_is_older_than_its_request_is_refused() {
 fn old_answers_of_discovery_and_sync_are_refused_and_end_nothing() {
     let mut discovering = master(Config::new());
     let Action::Send { at_ns, frame } = discovering.poll(5_000_000) else { panic!() };
-    let answer_before = answer(frame);
+    let answer_before = answer(frame, 2);
     let stale = discovering.hear(&answer_before, at_ns + 600 - 1);
     assert_eq!(stale, Err(Error::BeforeRequest { early_ns: 1 }));
     assert_eq!((discovering.state(), discovering.network().devices()), (State::Discovery, 0));
@@ -191,7 +172,7 @@ fn one_round_trip_that_cannot_be_spoils_the_measurement() {
             } else {
                 false
             };
-            let _: Result<_, _> = master.hear(&answer(frame), at_ns + if held_up { 30_000 } else { ROUND_TRIP });
+            let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + if held_up { 30_000 } else { ROUND_TRIP });
         },
     );
     assert_eq!(end, Err(Error::ImplausibleRoundTrip { rtt_ns: 30_000 }));
@@ -283,7 +264,7 @@ fn the_answer_of_a_long_line_is_waited_for() {
             Action::Send { at_ns, frame } => {
                 last_ns = at_ns;
                 let way = if let Outgoing::DelayReq(_) = frame { ROUND_TRIP } else { 223_000 };
-                answers.push((at_ns + capture_ns(&frame) + way, answer(frame)));
+                answers.push((at_ns + capture_ns(&frame) + way, answer(frame, 2)));
                 now_ns
             }
             Action::Exchange { at_ns, .. } => {

@@ -1,12 +1,11 @@
 //! The IO exchange at each end: which frames count, in which cycle, and who counts what was lost, doubled, late or stale.
 
-use crate::common::{capture_ns, device_in};
+use crate::common::{answer, capture_ns, device_frame, device_in};
 use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, State};
 use sorte_proto::master::{self, Heard, Master, Outgoing};
 use sorte_proto::timing::Slots;
 use sorte_proto::{
-    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, Link, Parameters, Place, Status, Sync,
-    Tally, emit_master_frame_into,
+    Correction, Discovery, Error, ErrorClass, Link, Parameters, Place, Status, Sync, Tally, emit_master_frame_into,
 };
 
 /// Common time at the start of cycle 0: the last SYNC frame was triggered at 30,500 ns, and 10 us later it begins.
@@ -267,25 +266,6 @@ fn a_slot_before_the_cycle_is_not_used() {
     }
 }
 
-/// Two devices, 76 ns to the first and none between.
-fn answer(frame: Outgoing) -> Vec<u8> {
-    match frame {
-        Outgoing::Discovery { place } => {
-            let mut frame = Discovery::request(place);
-            frame.pass(Entry::STOCK, Status::empty()).unwrap();
-            frame.pass(Entry::STOCK, Status::LAST).unwrap();
-            frame.emit().to_vec()
-        }
-        Outgoing::Param(frame) => frame.emit().to_vec(),
-        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
-        Outgoing::Sync(mut frame) => {
-            frame.pass(0, Status::empty());
-            frame.pass(0, Status::LAST);
-            frame.emit().to_vec()
-        }
-    }
-}
-
 /// A master in its first cycle, and the trigger of that.
 fn master(config: master::Config) -> (Master, u64) {
     let mut master = Master::new(config.with_sync_frames(2));
@@ -295,21 +275,12 @@ fn master(config: master::Config) -> (Master, u64) {
         match master.poll(now_ns) {
             master::Action::Wait { until_ns } => now_ns = until_ns,
             master::Action::Send { at_ns, frame } => {
-                master.hear(&answer(frame), at_ns + capture_ns(&frame) + 472).unwrap();
+                master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 472).unwrap();
             }
             master::Action::Exchange { at_ns, .. } => return (master, at_ns),
             master::Action::Restart { error } => panic!("{error}"),
         }
     }
-}
-
-fn device_frame(address: u8) -> [u8; 6] {
-    let status = if address == 2 { Status::LAST } else { Status::empty() };
-    let mut bytes = [0; 6];
-    DeviceFrame { address: DeviceAddress::new(address).unwrap(), status, payload: [0; 3] }
-        .emit_into(&mut bytes)
-        .unwrap();
-    bytes
 }
 
 /// Published send times of 500 and 900 ns, the cable, a device between, 120 ns to the capture.
@@ -438,7 +409,7 @@ fn a_patient_master_asks_again() {
             match master.poll(now_ns) {
                 master::Action::Wait { until_ns } => now_ns = until_ns,
                 master::Action::Send { at_ns, frame: Outgoing::Discovery { place } } => {
-                    let mut bytes = answer(Outgoing::Discovery { place });
+                    let mut bytes = answer(Outgoing::Discovery { place }, 2);
                     bytes[40] ^= u8::from(damaged(places.len()));
                     places.push(place);
                     let _: Result<_, _> = master.hear(&bytes, at_ns + 1072);

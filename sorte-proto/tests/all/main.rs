@@ -15,6 +15,7 @@ mod common;
 mod device_rules;
 mod event_order;
 mod exchange_rules;
+mod master_bench;
 mod master_rules;
 mod one_check;
 #[cfg(feature = "serde")]

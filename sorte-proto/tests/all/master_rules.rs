@@ -1,136 +1,15 @@
 //! Rules of the master, one by one: when it waits, what it counts as an answer, why it gives up, and what it counts.
 
-use crate::common::{EXCHANGE_CAPTURE_NS, capture_ns};
+use crate::common::{answer, capture_ns, device_frame, discovery};
+use crate::master_bench::{Bench, FOREVER, ROUND_TRIP, running};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::master::{Action, Config, Counters, Heard, Master, Outgoing, State};
 use sorte_proto::timing::Slots;
 use sorte_proto::{
-    DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, FrameType, Param, Parameters,
-    RoundTrips, Status, Sync, Tally, fcs,
+    DelayReq, DeviceAddress, DeviceFrame, Discovery, Error, ErrorClass, FrameType, Param, Parameters, RoundTrips,
+    Status, Sync, Tally, fcs,
 };
-
-/// What device `n` of this many adds to STATUS.
-fn last_of(n: u8, devices: u8) -> Status {
-    if n == devices { Status::LAST } else { Status::empty() }
-}
-
-const FOREVER: Action = Action::Wait { until_ns: u64::MAX };
-/// 76 ns of cable and 320 ns in the device.
-const ROUND_TRIP: u64 = 472;
-
-fn discovery(devices: u8, place: Place) -> Vec<u8> {
-    let mut frame = Discovery::request(place);
-    for n in 1..=devices {
-        frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
-    }
-    frame.emit().to_vec()
-}
-
-/// What a line of this many devices without cables between them answers.
-fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
-    match frame {
-        Outgoing::Discovery { place } => discovery(devices, place),
-        Outgoing::Param(frame) => frame.emit().to_vec(),
-        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
-        Outgoing::Sync(mut frame) => {
-            for n in 1..=devices {
-                frame.pass(0, last_of(n, devices));
-            }
-            frame.emit().to_vec()
-        }
-    }
-}
-
-/// A simulated line: `reply` says what comes back for a frame, if anything.
-struct Bench {
-    master: Master,
-    now_ns: u64,
-    sent: Vec<(u64, Outgoing)>,
-}
-
-impl Bench {
-    fn new(config: Config) -> Self {
-        let mut master = Master::new(config);
-        master.set_link(Link::Up);
-        Self { master, now_ns: 0, sent: Vec::new() }
-    }
-
-    /// Until the master exchanges data, gives up, or waits for ever.
-    fn run(&mut self, mut reply: impl FnMut(usize, Outgoing) -> Option<Vec<u8>>) -> Result<u64, Option<Error>> {
-        loop {
-            match self.master.poll(self.now_ns) {
-                FOREVER => return Err(None),
-                Action::Wait { until_ns } => self.now_ns = until_ns,
-                Action::Send { at_ns, frame } => {
-                    self.sent.push((at_ns, frame));
-                    if let Some(bytes) = reply(self.sent.len() - 1, frame) {
-                        let _: Result<_, _> = self.master.hear(&bytes, at_ns + capture_ns(&frame) + ROUND_TRIP);
-                    }
-                }
-                Action::Exchange { at_ns, .. } => return Ok(at_ns),
-                Action::Restart { error } => return Err(Some(error)),
-            }
-        }
-    }
-
-    /// Until it is in this state and has sent a frame there.
-    fn until(config: Config, state: State) -> Self {
-        let mut bench = Self::new(config);
-        while bench.master.state() != state || !bench.sent.iter().any(|(_, frame)| kind(*frame) == state) {
-            match bench.master.poll(bench.now_ns) {
-                Action::Wait { until_ns } => bench.now_ns = until_ns,
-                Action::Send { at_ns, frame } => {
-                    bench.sent.push((at_ns, frame));
-                    if kind(frame) != state {
-                        bench.master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + ROUND_TRIP).unwrap();
-                    }
-                }
-                other => panic!("{other:?}"),
-            }
-        }
-        bench
-    }
-
-    /// A device frame of the cycle that began last, at its published time: two devices 76 ns apart.
-    fn hear(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let slot = if bytes[0] == 1 { 576 } else { 900 + 76 + 355 };
-        self.master.hear(bytes, self.now_ns - 500 + slot + EXCHANGE_CAPTURE_NS).map(|_| ())
-    }
-
-    /// So many cycles with both devices heard; the last is still open.
-    fn cycles(&mut self, count: u32) {
-        for _ in 0..count {
-            for address in [1, 2] {
-                self.hear(&device_frame(address)).unwrap();
-            }
-            self.now_ns += 4000;
-            assert!(matches!(self.master.poll(self.now_ns), Action::Exchange { stop: false, .. }));
-        }
-    }
-}
-
-fn kind(frame: Outgoing) -> State {
-    match frame {
-        Outgoing::Discovery { .. } => State::Discovery,
-        Outgoing::Param(_) => State::Param,
-        Outgoing::DelayReq(_) => State::LineDelay,
-        Outgoing::Sync(_) => State::Sync,
-    }
-}
-
-fn running(config: Config) -> Bench {
-    let mut bench = Bench::new(config);
-    bench.now_ns = bench.run(|_, frame| Some(answer(frame, 2))).unwrap();
-    bench
-}
-
-fn device_frame(address: u8) -> [u8; 6] {
-    let (address, status) = (DeviceAddress::new(address).unwrap(), last_of(address, 2));
-    let mut bytes = [0; 6];
-    DeviceFrame { address, status, payload: [0; 3] }.emit_into(&mut bytes).unwrap();
-    bytes
-}
 
 #[test]
 fn nothing_happens_without_link_and_enable() {

@@ -1,36 +1,11 @@
 //! Times and limits of master and device as numbers of the published firmware, not of the functions under test.
 
-use crate::common::{EXCHANGE_CAPTURE_NS, capture_ns, device_in};
+use crate::common::{EXCHANGE_CAPTURE_NS, answer, capture_ns, device_frame, device_in};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, PortId};
 use sorte_proto::master::{self, Action, Heard, Master, Outgoing};
-use sorte_proto::{
-    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, emit_master_frame_into,
-};
-
-/// What device `n` of this many adds to STATUS.
-fn last_of(n: u8, devices: u8) -> Status {
-    if n == devices { Status::LAST } else { Status::empty() }
-}
-
-fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
-    match frame {
-        Outgoing::Discovery { place } => {
-            let mut frame = Discovery::request(place);
-            for n in 1..=devices {
-                frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
-            }
-            frame.emit().to_vec()
-        }
-        Outgoing::Sync(mut frame) => {
-            frame.pass(0, Status::LAST);
-            frame.emit().to_vec()
-        }
-        Outgoing::Param(frame) => frame.emit().to_vec(),
-        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
-    }
-}
+use sorte_proto::{Correction, Error, Parameters, Status, Sync, emit_master_frame_into};
 
 /// A master in the IO exchange with two devices, and what it did until then.
 fn running(config: master::Config) -> (Master, Vec<(u64, Outgoing)>, (u64, u16)) {
@@ -94,15 +69,6 @@ fn each_cycle_has_its_own_time_stamp() {
         assert_eq!(time_stamp, stamp.wrapping_add(4000));
         (at_ns, stamp) = (at, time_stamp);
     }
-}
-
-fn device_frame(address: u8) -> [u8; 6] {
-    let status = if address == 2 { Status::LAST } else { Status::empty() };
-    let mut bytes = [0; 6];
-    DeviceFrame { address: DeviceAddress::new(address).unwrap(), status, payload: [0; 3] }
-        .emit_into(&mut bytes)
-        .unwrap();
-    bytes
 }
 
 /// Capture of a device's frame of the cycle that was triggered at `at_ns`: published times, 76 ns to the first device, none between.

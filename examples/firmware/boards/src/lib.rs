@@ -6,14 +6,18 @@
 #[cfg(test)]
 extern crate std;
 
+mod clock;
 mod control;
 mod first_line;
 mod oscillator;
 mod pins;
 mod pll;
+mod report;
 
+pub use clock::Counter;
 pub use control::{Control, Limits, Outputs};
 pub use first_line::FirstLine;
 pub use oscillator::{Oscillator, Source, start};
 pub use pins::{Board, Pin};
 pub use pll::{Pll, PllLimits};
+pub use report::Report;

@@ -7,6 +7,7 @@ use nikon_aformat::master::{GuardedReset, Line, Reset, VerifiedWrite, Write};
 use nikon_aformat::{
     BitRate, EncoderAddress, EvidenceCell, FRAME_BITS, Operation, Policy, Request, Resolution, UserAddress,
 };
+use servowire_boards::Report;
 use servowire_drivers::Clock as _;
 use servowire_drivers::nikon::blocking::Driver;
 
@@ -16,10 +17,11 @@ use crate::commands::{Command, Typed};
 use crate::frames::{self, Frames};
 use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
 use crate::programs::{self, Rate};
-use crate::report::Report;
 
 /// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
 const PAUSE_NS: u64 = 20_000;
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
 /// A position that is printed is no older than this.
 const MAX_AGE_NS: u64 = 200_000;
 /// By how much the end time of a block may be late.
@@ -86,13 +88,13 @@ pub fn master(image: &'static str, rate: BitRate) -> ! {
     let mut cell = EvidenceCell::new();
     let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
-    let mut report = Report::default();
+    let mut report = Report::new(PRINTED);
     loop {
         board.watchdog.feed();
         let read = encoders.read_evidence(EncoderAddress::ZERO).map(|evidence| writer.put(evidence));
         let now_ns = clock.latest_ns();
         let _ = match read {
-            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))),
+            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
             Err(error) => report.fault(console, error),
         };
         if let Some(typed) = typed.take(console) {

@@ -17,7 +17,7 @@ use rp2040_hal::xosc::setup_xosc_blocking;
 use rp2040_hal::{Sio, Watchdog};
 use servowire_boards::{FirstLine, Source};
 
-use crate::clock::Clock;
+use crate::clock::{self, Clock};
 use crate::port::{self, Receiver, Transmitter};
 use crate::programs::{Rate, SYSTEM_HZ};
 
@@ -106,7 +106,7 @@ impl Board {
         };
         let _ = writeln!(console, "{line}");
         watchdog.start(WATCHDOG_MS.millis());
-        Self { console, clock: Clock::new(core.SYST), transmitter, receiver, channel, watchdog }
+        Self { console, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
     }
 }
 

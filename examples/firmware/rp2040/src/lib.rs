@@ -8,6 +8,5 @@ pub mod commands;
 pub mod frames;
 pub mod port;
 pub mod programs;
-pub mod report;
 pub mod tformat;
 pub mod uart;

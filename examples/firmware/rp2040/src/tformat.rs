@@ -2,6 +2,7 @@
 
 use core::fmt::{self, Write};
 
+use servowire_boards::Report;
 use servowire_drivers::tformat::blocking::{Driver, Failure};
 use servowire_drivers::{Automatic, Clock as _, Error};
 use tformat::device::Device;
@@ -13,11 +14,12 @@ use crate::clock::Clock;
 use crate::commands::{Command, Typed};
 use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
 use crate::programs::{self, Rate};
-use crate::report::Report;
 use crate::uart::{self, Uart};
 
 /// From the end of one transaction to the beginning of the next.
 const PAUSE_NS: u64 = 20_000;
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
 /// A position that is printed is no older than this.
 const MAX_AGE_NS: u64 = 200_000;
 
@@ -75,13 +77,13 @@ pub fn master(image: &'static str, rate: BitRate) -> ! {
     let mut cell = EvidenceCell::new();
     let (mut writer, mut reader) = cell.split();
     let mut typed = Typed::default();
-    let mut report = Report::default();
+    let mut report = Report::new(PRINTED);
     loop {
         board.watchdog.feed();
         let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
         let now_ns = clock.latest_ns();
         let _ = match read {
-            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))),
+            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
             Err(Error::Io(fault)) => report.fault(console, fault),
             Err(error) => report.fault(console, error),
         };

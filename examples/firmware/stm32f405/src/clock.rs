@@ -1,12 +1,9 @@
 //! The clock tree, and time.
 
-use core::cell::Cell;
-
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use servowire_boards::{Oscillator, Pll, PllLimits, Source};
-use servowire_core::{ClockError, TickRate, TimeBase};
-use servowire_drivers::Clock;
+use servowire_boards::{Counter, Oscillator, Pll, PllLimits, Source};
+use servowire_core::TickRate;
 use stm32_metapac::flash::vals::Latency;
 use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
 use stm32_metapac::{FLASH, RCC};
@@ -89,25 +86,10 @@ fn ready(mut look: impl FnMut() -> bool) -> bool {
 }
 
 /// Time from the SysTick, which counts 24 bits down with an eighth of the core clock. Somebody has to look at it every 0.4 s.
-pub struct Ticks(Cell<TimeBase<24>>);
-
-impl Ticks {
-    /// Starts the SysTick.
-    pub fn new(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::External);
-        timer.set_reload(0x00ff_ffff);
-        timer.clear_current();
-        timer.enable_counter();
-        Self(Cell::new(TimeBase::new(TickRate::of::<{ CORE_HZ / 8 }>(), !SYST::get_current())))
-    }
-}
-
-impl Clock for &Ticks {
-    #[inline]
-    fn now_ns(&mut self) -> Result<u64, ClockError> {
-        let mut time = self.0.get();
-        let now_ns = time.now_ns(!SYST::get_current());
-        self.0.set(time);
-        now_ns
-    }
+pub fn ticks(mut timer: SYST) -> Counter<24> {
+    timer.set_clock_source(SystClkSource::External);
+    timer.set_reload(0x00ff_ffff);
+    timer.clear_current();
+    timer.enable_counter();
+    Counter::new(TickRate::of::<{ CORE_HZ / 8 }>(), || !SYST::get_current())
 }

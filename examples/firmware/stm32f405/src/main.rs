@@ -9,12 +9,12 @@ mod uart;
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-use servowire_boards::{Board, FirstLine, Pin, Source};
+use servowire_boards::{Board, FirstLine, Pin, Report, Source};
 use servowire_drivers::{Clock as _, DirectionPin, Error, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
 use tformat::{Address, BitRate, EvidenceCell, Page, Policy, Resolution};
 
-use crate::clock::{CORE_HZ, CRYSTAL_HZ, Ticks};
+use crate::clock::{CORE_HZ, CRYSTAL_HZ};
 
 /// The pins; where they are is up to the board.
 static BOARD: Board = const {
@@ -51,6 +51,8 @@ const RESOLUTION: Resolution = match Resolution::new(23, 16) {
     Err(_) => panic!("possible widths"),
 };
 
+/// One position in so many is printed.
+const PRINTED: u32 = 16;
 /// A position that is printed is no older than this.
 const MAX_AGE_NS: u64 = if cfg!(feature = "emulated") { u64::MAX } else { 200_000 };
 
@@ -60,7 +62,7 @@ fn main() -> ! {
     let source = clock::start();
     let core = cortex_m::Peripherals::take().expect("called once");
     let (uart, de, mut console) = uart::start(BitRate::Mbit2_5.bits_per_second());
-    let ticks = Ticks::new(core.SYST);
+    let ticks = clock::ticks(core.SYST);
     let mut clock = &ticks;
     let _ = match source {
         Some(source) => writeln!(console, "{}", first_line(source)),
@@ -74,29 +76,18 @@ fn main() -> ! {
     }
     let mut cell = EvidenceCell::new();
     let (mut writer, mut reader) = cell.split();
-    let (mut good, mut bad) = (0_u32, 0_u32);
+    let mut report = Report::new(PRINTED);
     loop {
         let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
+        let policy = Policy::new(MAX_AGE_NS);
         let _ = match (read, clock.now_ns()) {
-            (Ok(()), Ok(now_ns)) => {
-                good += 1;
-                if good % 16 != 1 {
-                    continue;
-                }
-                let stack = stack::used();
-                match reader.at(now_ns, Policy::new(MAX_AGE_NS)) {
-                    Ok(sample) => writeln!(console, "{sample}, {good} good, {bad} bad, stack {stack} bytes"),
-                    Err(doubt) => writeln!(console, "no position: {doubt}, {good} good, {bad} bad"),
-                }
-            }
-            (Err(error), _) => {
-                bad += 1;
-                match error {
-                    Error::Io(fault) => writeln!(console, "fault: {fault}, {good} good, {bad} bad"),
-                    error => writeln!(console, "fault: {error}, {good} good, {bad} bad"),
-                }
-            }
-            (_, Err(error)) => writeln!(console, "clock: {error}"),
+            (Ok(()), Ok(now_ns)) => match report.good(&mut console, || reader.at(now_ns, policy)) {
+                Ok(true) => writeln!(console, "stack {} bytes", stack::used()),
+                said => said.map(drop),
+            },
+            (Err(Error::Io(fault)), _) => report.fault(&mut console, fault),
+            (Err(error), _) => report.fault(&mut console, error),
+            (_, Err(error)) => report.fault(&mut console, error),
         };
     }
 }

@@ -3,17 +3,20 @@
 use std::iter::Peekable;
 use std::str::Chars;
 
+use super::super::table::cell;
 use crate::event::Direction;
+use crate::time::{self, SECOND, Time};
 
-/// Bytes that followed each other, and who sent them where the line says so.
+/// Bytes that followed each other; when that was and who sent them, where the line says so.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Said {
-    pub(super) direction: Option<Direction>,
-    pub(super) bytes: Vec<u8>,
+pub(in crate::capture) struct Said {
+    pub(in crate::capture) time: Option<Time>,
+    pub(in crate::capture) direction: Option<Direction>,
+    pub(in crate::capture) bytes: Vec<u8>,
 }
 
 /// What a line holds: one burst, or more where it says who spoke.
-pub(super) fn line(text: &str) -> Result<Vec<Said>, String> {
+pub(in crate::capture) fn line(text: &str) -> Result<Vec<Said>, String> {
     let text = text.trim_start_matches('\u{feff}').trim();
     let said = bare(text);
     // What somebody wrote in front is left out, if bytes follow and nothing else.
@@ -31,11 +34,10 @@ fn titled(text: &str) -> Option<Said> {
     let (title, words) = ends.filter_map(|at| text.split_at_checked(at)).find(|(_, after)| {
         after.starts_with(char::is_whitespace) && after.split_whitespace().all(is_byte) && !after.trim().is_empty()
     })?;
-    let speaker = |word: &str| match mark(word, false) {
-        Some(Mark::Speaker(direction)) if word.contains(char::is_alphabetic) => Some(direction),
-        _ => None,
-    };
-    let mut said = Said { direction: title.split_whitespace().filter_map(speaker).next_back(), bytes: Vec::new() };
+    let speaker = |word: &str| speaker(word).filter(|_| word.contains(char::is_alphabetic));
+    let stamps: Vec<&str> = title.split_whitespace().collect();
+    let direction = stamps.iter().copied().filter_map(speaker).next_back();
+    let mut said = Said { time: moment(&stamps), direction, bytes: Vec::new() };
     words.split_whitespace().try_for_each(|word| bytes(word, &mut said.bytes)).ok()?;
     Some(said)
 }
@@ -43,24 +45,27 @@ fn titled(text: &str) -> Option<Said> {
 /// A line without words in front of its bytes, but for times and who spoke.
 fn bare(text: &str) -> Result<Vec<Said>, String> {
     if let Some(bytes) = string(text) {
-        return Ok(vec![Said { direction: None, bytes: bytes? }]);
+        return Ok(vec![Said { bytes: bytes?, ..Said::default() }]);
     }
     let text = without_remarks(text);
     if let Some(monitored) = monitored(&text) {
         return monitored;
     }
     if let Some(bytes) = decimal_list(&text) {
-        return Ok(vec![Said { direction: None, bytes }]);
+        return Ok(vec![Said { bytes, ..Said::default() }]);
     }
     let spread = text.replace("><", "> <").replace("}{", "} {").replace("\\x", " 0x");
     // What comes before the first byte may say when.
     let mut rest = spread.trim_start();
+    let mut stamps = Vec::new();
     while let Some((word, after)) = rest.split_once(char::is_whitespace) {
         if !is_stamp(word, !after.trim().is_empty()) {
             break;
         }
+        stamps.push(word);
         rest = after.trim_start();
     }
+    let time = moment(&stamps);
     let words = rest.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|word| !word.is_empty());
     let mut out = vec![Said::default()];
     let mut begun = false;
@@ -80,7 +85,42 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
         }
     }
     out.retain(|said| !said.bytes.is_empty());
-    Ok(out)
+    Ok(out.into_iter().map(|said| Said { time, ..said }).collect())
+}
+
+/// When a line says that it was, by the words that stand before its bytes: a date with a time of day, a time of day, seconds with a
+/// fraction, or a number with its unit.
+fn moment(words: &[&str]) -> Option<Time> {
+    let bare = |word: &&str| word.trim_matches(['[', ']', '(', ')', ':']).replace(',', ".");
+    let words: Vec<String> = words.iter().map(bare).collect();
+    cell::date(&words.join(" ")).or_else(|| words.iter().find_map(|word| clock(word)))
+}
+
+/// `12:30:00.25`, `30:00.25`, `0.000500`, `500us`, and a date with a T.
+fn clock(word: &str) -> Option<Time> {
+    let Some((hours, seconds)) = word.rsplit_once(':') else {
+        let seconds = word.contains('.').then(|| time::from_decimal(word)).flatten();
+        return seconds.or_else(|| time::duration(word));
+    };
+    if let Some(date) = cell::date(word) {
+        return Some(date);
+    }
+    let (hours, minutes) = match hours.split_once(':') {
+        Some((hours, minutes)) => (hours.parse::<i64>().ok()?, minutes),
+        None if seconds.contains('.') => (0, hours),
+        None => return None,
+    };
+    let minutes: i64 = minutes.parse().ok()?;
+    ((0..100).contains(&hours) && (0..60).contains(&minutes))
+        .then_some(time::from_decimal(seconds)? + (hours * 60 + minutes) * 60 * SECOND)
+}
+
+/// Who spoke, by a word that says so.
+pub(in crate::capture) fn speaker(word: &str) -> Option<Direction> {
+    match mark(word, false) {
+        Some(Mark::Speaker(direction)) => Some(direction),
+        _ => None,
+    }
 }
 
 fn without_remarks(text: &str) -> String {
@@ -141,8 +181,12 @@ fn mark(word: &str, begun: bool) -> Option<Mark> {
         };
     }
     match bare.to_ascii_uppercase().as_str() {
-        "TX" | "TXD" | "OUT" | "SEND" | "SENT" | "WRITE" | "REQ" | "REQUEST" | "H2D" => Some(request),
-        "RX" | "RXD" | "IN" | "RECV" | "RECEIVED" | "READ" | "RESP" | "RSP" | "RESPONSE" | "D2H" => Some(answer),
+        "TX" | "TXD" | "OUT" | "SEND" | "SENT" | "WRITE" | "REQ" | "REQUEST" | "CMD" | "COMMAND" | "H2D" => {
+            Some(request)
+        }
+        "RX" | "RXD" | "IN" | "RECV" | "RECEIVED" | "READ" | "RESP" | "RSP" | "RESPONSE" | "ANSWER" | "D2H" => {
+            Some(answer)
+        }
         _ => None,
     }
 }
@@ -268,7 +312,7 @@ fn monitored(text: &str) -> Option<Result<Vec<Said>, String>> {
             return Some(Err(what));
         }
     }
-    Some(Ok(vec![Said { direction: Some(direction), bytes: out }]))
+    Some(Ok(vec![Said { direction: Some(direction), bytes: out, ..Said::default() }]))
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ fn is_date(cell: &[u8]) -> bool {
     std::str::from_utf8(cell).is_ok_and(|text| cell::date(text).is_some())
 }
 
-fn separator(line: &[u8]) -> u8 {
+pub(crate) fn separator(line: &[u8]) -> u8 {
     if line.contains(&b';') {
         b';'
     } else if line.contains(&b'\t') && !line.contains(&b',') {
@@ -90,7 +90,7 @@ fn is_remark(line: &str) -> bool {
 }
 
 /// Parts of a second in a unit of time.
-fn unit(text: &str) -> Option<i64> {
+pub(crate) fn unit(text: &str) -> Option<i64> {
     match text.trim().trim_matches(['(', ')', '[', ']']).to_ascii_lowercase().as_str() {
         "s" | "sec" | "second" | "seconds" => Some(1),
         "ms" | "milliseconds" => Some(1_000),

@@ -1,5 +1,6 @@
 //! Edges of the pair as bits, with the time of each.
 
+mod again;
 mod grid;
 
 use std::cell::Cell;
@@ -12,6 +13,8 @@ use crate::line::receive::Rates;
 use crate::line::spikes::Spikes;
 use crate::time::{Clock, Time};
 
+pub(super) use again::{Again, RESET};
+
 /// Samples of a bit on a grid of samples.
 pub(super) const SAMPLES: u64 = 8;
 /// Longest run that is taken bit by bit; a longer one is a pause.
@@ -22,6 +25,10 @@ const OFF: i64 = 6;
 const ELSEWHERE: i64 = 30;
 /// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
 const ON_GRID: i64 = 32;
+/// Heads that are measured, and one of so many after them; the bits from a falling edge in CYCLE RESET to their end.
+const MEASURED: u64 = 256;
+const SOME: u64 = 16;
+const FALL: u64 = 15;
 /// Edges after longer runs than this tell nothing of the bit length.
 pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
 /// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
@@ -66,6 +73,8 @@ pub(super) struct Mark {
     /// Number of the bit that begins there.
     pub(super) bit: u64,
     pub(super) time: Time,
+    /// The level from there on.
+    pub(super) level: bool,
     /// Up to the next mark all edges lie on a grid of samples.
     pub(super) grid: Option<Grid>,
 }
@@ -78,16 +87,14 @@ pub(super) struct Grid {
     pub(super) clock: Clock,
 }
 
-/// What was heard of the line: edges, spikes, and bit lengths in parts of a picosecond.
-#[derive(Debug, Clone, Copy)]
+/// What was heard of the line: edges, spikes, and heads with their length in picoseconds and bits.
+#[derive(Debug, Clone, Copy, Default)]
 struct Heard {
     edges: u64,
     spikes: u64,
-    least: i64,
-    most: i64,
-    /// Of the bit lengths beyond the nominal one, and how many.
-    beyond: i64,
-    count: u32,
+    heads: u64,
+    time: i64,
+    bits: i64,
 }
 
 impl Bits {
@@ -106,7 +113,7 @@ impl Bits {
             marks: Vec::new(),
             asked: Cell::new(0),
             paused: None,
-            heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, beyond: 0, count: 0 },
+            heard: Heard::default(),
         };
         bits.invert();
         bits
@@ -129,21 +136,38 @@ impl Bits {
 
     /// What was measured of the line.
     pub(super) fn rates(&self) -> Rates {
-        let Heard { edges, spikes, least, most, beyond, count } = self.heard;
-        let share = |bit: f64| self.fine as f64 / bit;
-        let mut rates = Rates::of(edges, spikes);
-        if count > 0 {
-            rates.measured(share(self.fine as f64 + beyond as f64 / f64::from(count)));
-            (rates.least, rates.most) = (share(most as f64), share(least as f64));
+        let mut rates = Rates::of(self.heard.edges, self.heard.spikes);
+        if self.heard.bits > 0 {
+            // One clock for both sides.
+            rates.measured(self.nominal as f64 / self.mean());
         }
         rates
+    }
+
+    /// The mean length of a bit in picoseconds, by the heads.
+    pub(super) fn mean(&self) -> f64 {
+        let Heard { time, bits, .. } = self.heard;
+        if bits > 0 { time as f64 / bits as f64 } else { self.nominal as f64 }
+    }
+
+    /// A head of so many bits begins at bit `at`: measured are the first ones, then some of them.
+    pub(super) fn heard_head(&mut self, at: u64, len: u64) {
+        self.heard.heads += 1;
+        if self.heard.heads > MEASURED && self.heard.heads % SOME != 0 {
+            return;
+        }
+        // Falling edges, so that what delays rising ones does not matter: of SYNC, and in CYCLE RESET.
+        let to = len.saturating_sub(FALL);
+        let time = self.time(at + to) - self.time(at);
+        let bits = (time as f64 / self.mean()).round() as i64;
+        (self.heard.time, self.heard.bits) = (self.heard.time.saturating_add(time), self.heard.bits + bits);
     }
 
     #[inline]
     pub(super) fn change(&mut self, time: Time, level: bool) {
         if self.last.is_none() {
             self.last = Some((time, level));
-            self.mark(time);
+            self.mark(time, level);
         }
         if let Some(edge) = self.spikes.plain_change(time, level) {
             return self.edge(edge.time, edge.level, edge.spikes);
@@ -186,10 +210,7 @@ impl Bits {
         let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
         let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
         let place = match usize::try_from(count).ok().and_then(|count| ADAPT.get(count)) {
-            Some(_) if off.abs() * ON_GRID <= self.nominal => {
-                self.measured(1);
-                time
-            }
+            Some(_) if off.abs() * ON_GRID <= self.nominal => time,
             Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
                 self.adapt(off * part);
                 // The grid follows half-way.
@@ -203,11 +224,11 @@ impl Bits {
         }
         self.push(before, count.min(PAUSE));
         self.last = Some((place, level));
-        self.mark(time);
+        self.mark(time, level);
     }
 
-    fn mark(&mut self, time: Time) {
-        self.marks.push(Mark { bit: self.end, time, grid: None });
+    fn mark(&mut self, time: Time, level: bool) {
+        self.marks.push(Mark { bit: self.end, time, level, grid: None });
     }
 
     /// An edge after a pause.
@@ -216,7 +237,7 @@ impl Bits {
         self.paused = Some(self.end + PAUSE);
         self.push(before, PAUSE);
         self.last = Some((time, level));
-        self.mark(time);
+        self.mark(time, level);
     }
 
     /// The bit becomes longer by this many parts of a picosecond.
@@ -227,16 +248,6 @@ impl Bits {
         if (self.bit - self.inverse_of).abs() > self.fine >> 11 {
             self.invert();
         }
-        self.measured(1);
-    }
-
-    /// So many edges were heard of bits of the present length.
-    #[inline]
-    fn measured(&mut self, edges: u32) {
-        self.heard.least = self.heard.least.min(self.bit);
-        self.heard.most = self.heard.most.max(self.bit);
-        self.heard.beyond = self.heard.beyond.saturating_add(i64::from(edges) * (self.bit - self.fine));
-        self.heard.count = self.heard.count.saturating_add(edges);
     }
 
     fn push(&mut self, level: bool, count: u64) {
@@ -296,13 +307,21 @@ impl Bits {
             mark -= 1;
         }
         self.asked.set(mark);
-        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return Time::ZERO };
+        let Some(Mark { mut bit, mut time, grid, .. }) = self.marks.get(mark).copied() else { return Time::ZERO };
         if let Some(grid) = grid.filter(|_| bit < at) {
             let edge = self.last_edge(bit, at);
             time = grid.clock.time(grid.sample + (edge - bit) * SAMPLES);
             bit = edge;
         }
         time + ((at as i64 - bit as i64) as f64 * self.length()) as i64
+    }
+
+    /// When bit `at` begins by the clock of who speaks then: the edge before it may be somebody else's.
+    pub(super) fn time_by_next(&self, at: u64) -> Time {
+        let bits = self.load(at.saturating_sub(1));
+        let edge = u64::from((bits ^ bits >> 1).trailing_zeros());
+        let edge = if at + edge < self.end { edge } else { 0 };
+        self.time(at + edge) - (edge as f64 * self.length()) as i64
     }
 
     /// The last bit up to `at` that differs from the one before it; `first` where none does.

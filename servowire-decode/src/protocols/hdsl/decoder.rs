@@ -1,27 +1,29 @@
 //! Bits of the link into frames, answers and messages.
 
 mod answer;
+mod known;
+mod messages;
 
 use std::io;
 use std::ops::Range;
 
-use hdsl::frame::{ANSWER_BITS, H_FRAME_BITS, Head, ParsedHead};
+use hdsl::frame::{ANSWER_BITS, H_FRAME_BITS, Head, ParsedHead, STUFFING_BITS, Stuffing};
 use hdsl::inspect::{
-    CarriedDisparity, Chain, Expected, FRONT_BITS, FoundHead, HeadRules, PERFECT, find_head, head_damage, inspect,
-    score,
+    BrokenRule, CarriedDisparity, Chain, Expected, FRONT_BITS, FoundHead, HeadRules, PERFECT, ends_with_stuffing,
+    ends_with_trailer, find_head, head_damage, inspect, score,
 };
-use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::Delay;
-use hdsl::{
-    Answer, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, FastPosition, MasterSymbol, QualityMonitor,
-    QualityRule, Rule, VFrame, Window,
-};
+use hdsl::{Answer, DeltaDelta, EncoderByte, EncoderId, Error, FastPosition, MasterSymbol, Rule, VFrame, Window};
 
-use super::bits::Bits;
+use known::{Quality, Reach};
+use messages::Messages;
+
+use super::bits::{Again, Bits, RESET};
 use super::refused::{event, refusal};
 use super::said::Said;
 use crate::event::{Direction, Field, NO_RESPONSE, Place, Span};
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
 const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
@@ -29,8 +31,14 @@ const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
 const MANY: u64 = 16 * NEED;
 /// Bits that are kept to say what there was instead of a frame.
 const KEPT: u64 = 4096;
-/// Bits between the heads of two frames at most: the longest frame with its stuffing.
+/// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of that, and how far a
+/// length may be off where other speakers were in between.
+const SHORTEST: u64 = H_FRAME_BITS as u64;
 const LONGEST: u64 = 273 + 4;
+const STUFFING: u64 = STUFFING_BITS as u64;
+const SLACK: u64 = 8;
+/// Frames for which a line is taken as shaky after a second look has helped.
+const SHAKY: u8 = 32;
 
 /// Good words and checks from which an answer is where it was looked for.
 const GOOD: usize = 10;
@@ -53,35 +61,53 @@ struct Break {
     first_failed: Option<bool>,
 }
 
+/// An answer beside another: what its words say of the running disparity, its number, and whether it is good by itself.
+#[derive(Debug, Clone, Copy)]
+struct Neighbour {
+    chain: Chain,
+    number: u64,
+    sound: bool,
+}
+
 /// What is known of the link so far.
 pub(super) struct Decoder {
     /// The bit at which to go on.
     next: u64,
-    /// The last head, and how far it was from the one before.
+    /// The last head, its bits, and how far it was from the one before.
     head: Option<u64>,
+    head_len: u64,
     apart: Option<u64>,
+    /// The head before it, and where its frame's answer was over; the head whose frame was looked at again.
+    before: Option<u64>,
+    after: u64,
+    again: Option<u64>,
+    /// So many frames are looked at again whether they fail or not: it helped not long ago.
+    shaky: u8,
     delay: Option<u32>,
     /// Time from the end of a head to its answer, in picoseconds.
     lag: Option<i64>,
     /// `None` only if there were encoders that it cannot follow.
     fast: Option<FastPosition>,
-    quality: QualityMonitor,
+    /// The identifier, or how far safe positions reached as long as it is not known.
+    id: Option<EncoderId>,
+    reach: Reach,
+    quality: Quality,
     frame: VFrame,
     /// Place in the V-frame, once VSYNC was seen.
     at: Option<u8>,
-    requests: Responder,
-    request: Option<Request>,
-    nibbles: Vec<u8>,
+    messages: Messages,
     heads: HeadRules,
     /// The last frame carried a nibble; the number of its head, if the one before did not.
     talks: bool,
     lone: Option<u64>,
     carried: CarriedDisparity,
-    /// The answer before, if it is good and no frame lies between: its number too.
-    chain: Option<(Chain, u64)>,
+    /// The answer before, if no frame lies between.
+    chain: Option<Neighbour>,
     breaks: Vec<Break>,
     /// Whether a check of the last V-frame failed, of each channel; none while one is not complete.
     failed: Option<[bool; 2]>,
+    /// The first event of this V-frame.
+    begun: Option<u64>,
     /// VSYNC where it was not due, or not where it was.
     strays: u8,
     said: Said,
@@ -92,16 +118,21 @@ impl Decoder {
         Self {
             next: 0,
             head: None,
+            head_len: Head::BITS.into(),
             apart: None,
+            before: None,
+            after: 0,
+            again: None,
+            shaky: 0,
             delay: None,
             lag: None,
             fast: FastPosition::new(WIDEST).ok(),
-            quality: QualityMonitor::new(QualityRule::Sick),
+            id: None,
+            reach: Reach::default(),
+            quality: Quality::default(),
             frame: VFrame::default(),
             at: None,
-            requests: Responder::new(),
-            request: None,
-            nibbles: Vec::new(),
+            messages: Messages::new(),
             heads: HeadRules::default(),
             talks: false,
             lone: None,
@@ -109,6 +140,7 @@ impl Decoder {
             chain: None,
             breaks: Vec::new(),
             failed: None,
+            begun: None,
             strays: 0,
             said: Said::default(),
         }
@@ -116,7 +148,8 @@ impl Decoder {
 
     /// Number of the first event of which later frames may still tell.
     fn settled(&self) -> u64 {
-        let open = [self.lone, self.chain.map(|chain| chain.1), self.breaks.first().map(|first| first.ends)];
+        let open =
+            [self.begun, self.lone, self.chain.map(|chain| chain.number), self.breaks.first().map(|first| first.ends)];
         open.into_iter().flatten().min().unwrap_or(u64::MAX)
     }
 
@@ -149,10 +182,23 @@ impl Decoder {
                 self.next += 1;
                 continue;
             };
+            let (mut heads, due) = (self.heads, self.at);
+            let mut broken = heads.check(found.head, bits.window(at), due);
+            if self.looks_again(bits, at, broken.is_some()) {
+                continue;
+            }
+            bits.heard_head(at, found.len.into());
             self.missed(bits, at);
+            if self.at != due {
+                // It is not the frame that it seemed to be.
+                heads = self.heads;
+                broken = heads.check(found.head, bits.window(at), self.at);
+            }
+            self.heads = heads;
             let symbol = found.head.byte.symbol();
             let len = u64::from(found.len);
-            let running = self.head(found, bits, at..at + len);
+            let running = self.head(found, broken, bits, at..at + len);
+            self.head_len = len;
             self.next = at + len;
             if symbol.is_ok_and(MasterSymbol::is_answered) || running {
                 let whole = self.next + 1 + u64::from(ANSWER_BITS) <= bits.end();
@@ -161,8 +207,10 @@ impl Decoder {
                 }
                 // In a link that runs, no frame asks for a pattern or the identifier.
                 let start_up = symbol.ok().filter(|symbol| symbol.is_start_up() && !found.head.byte.first());
-                self.next = self.answer(start_up, bits, at + len + 1);
+                self.next = self.answer(start_up, bits, at, len);
+                self.after = self.next;
             } else {
+                self.after = self.next;
                 self.chain = None;
             }
             self.said.give(self.settled(), out)?;
@@ -171,14 +219,11 @@ impl Decoder {
         Ok(())
     }
 
-    /// A head with its request; whether it is one of a running link that was damaged.
-    fn head(&mut self, found: FoundHead, bits: &Bits, at: Range<u64>) -> bool {
+    /// A head with its request, and what is `wrong` with it; whether it is one of a running link that was damaged.
+    fn head(&mut self, found: FoundHead, wrong: Option<BrokenRule>, bits: &Bits, at: Range<u64>) -> bool {
         let symbol = found.head.byte.symbol();
-        let wrong = self.heads.check(found.head, bits.window(at.start), self.at);
-        let from = at.start.saturating_sub(FRONT_BITS.into());
-        let front = Window::from_bits(bits.load(from), (at.start - from) as u32).unwrap_or(Window::EMPTY);
-        let trailer = self.head.is_some() && self.heads.is_end_damaged(front);
-        let place = bits.place(at);
+        let trailer = self.head.is_some() && self.heads.is_end_damaged(front(bits, at.start));
+        let place = bits.place(at.clone());
         let damaged = wrong.is_some() && self.delay.is_some();
         let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
         if let Some(number) = self.lone.take().filter(|_| !talks) {
@@ -187,7 +232,8 @@ impl Decoder {
         self.lone = (talks && !self.talks).then(|| self.said.next());
         self.talks = talks;
         let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
-        let event = event(place, Direction::Request, "H-frame", master(found.head, symbol), wrong);
+        let extra = if found.head.extra_bits > 0 { window_bits(bits, &at) } else { 0 };
+        let event = event(place, Direction::Request, "H-frame", master(found.head, symbol, extra), wrong);
         // All of it is in the last word, PARA.
         let mut event = event.locate(|name| {
             let coded = matches!(name, "SYMBOL" | "FIRST" | "MSYNC") && found.len >= 10;
@@ -199,19 +245,39 @@ impl Decoder {
         damaged
     }
 
+    /// The head before that at `at`, if it is not far away.
+    fn before(&self, at: u64) -> Option<u64> {
+        self.before.filter(|before| at - before < 4 * LONGEST)
+    }
+
+    /// Whether the head at `at`, where one was due or not, has a rule `broken` or something else wrong before it: then the edges are
+    /// looked at again, once.
+    fn looks_again(&mut self, bits: &mut Bits, at: u64, broken: bool) -> bool {
+        let Some(last) = self.head.filter(|last| self.is_running() && self.again != Some(*last)) else { return false };
+        let fails = broken || !self.is_one_frame(bits, at - last, at) || !ends_with_trailer(front(bits, at));
+        if bits.paused.is_some() || !fails && self.shaky == 0 {
+            return false;
+        }
+        let beat = bits.beat(last, self.head_len, self.before(last));
+        bits.lay(last, beat, Again::Rest);
+        (self.again, self.next) = (Some(last), self.after);
+        true
+    }
+
     /// Frames follow each other for ever: says where one should have been before the head at `at`.
     fn missed(&mut self, bits: &mut Bits, at: u64) {
+        self.before = self.head;
         let Some(last) = self.head.replace(at) else {
             bits.paused = None;
             return;
         };
-        let (apart, usual) = (at - last, self.apart.unwrap_or(u64::from(H_FRAME_BITS)));
+        let (apart, usual) = (at - last, self.apart.unwrap_or(SHORTEST));
         if bits.paused.take_if(|paused| *paused <= at).is_some() {
             let place = bits.place(last..at);
             self.lose(1);
             let refused = Err(("gap", PAUSED.to_owned()));
             self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), refused));
-        } else if apart > LONGEST || apart + 8 >= 2 * usual {
+        } else if !self.is_one_frame(bits, apart, at) {
             let missing = ((apart as f64 / usual as f64).round() as u64).saturating_sub(1).max(1);
             for k in 1..=missing {
                 let due = last + k * apart / (missing + 1);
@@ -231,6 +297,21 @@ impl Decoder {
         }
     }
 
+    /// Whether nothing is missing between the last head and that at `at`: frames may have any length, but two of them do not
+    /// fit, or it is that of the frame before, or stuffing fills it.
+    fn is_one_frame(&self, bits: &Bits, apart: u64, at: u64) -> bool {
+        let blocks = (1..=u64::from(Stuffing::MAX.get())).take_while(|k| {
+            let from = at.saturating_sub(STUFFING * k);
+            Window::from_bits(bits.load(from), STUFFING as u32).is_some_and(ends_with_stuffing)
+        });
+        // Without stuffing a frame has so many bits more than its head.
+        let filled = self.head_len + SHORTEST - u64::from(Head::BITS) + STUFFING * blocks.count() as u64;
+        apart <= LONGEST
+            && (apart + SLACK < 2 * SHORTEST
+                || self.apart.is_some_and(|usual| usual.abs_diff(apart) <= 2 * SLACK)
+                || filled.abs_diff(apart) <= SLACK / 2)
+    }
+
     fn step(&mut self, value: Option<DeltaDelta>) {
         if let Some(fast) = &mut self.fast {
             fast.step(value);
@@ -248,15 +329,16 @@ impl Decoder {
 
     /// Nobody knows where in a V-frame the next frame is.
     fn lose_v_frame(&mut self) {
-        (self.at, self.failed, self.strays) = (None, None, 0);
+        (self.at, self.failed, self.begun, self.strays) = (None, None, None, 0);
         if let Some(fast) = &mut self.fast {
             fast.interrupt();
         }
         self.settle(None);
     }
 
-    /// The answer that begins at `from` or some bits later; where to go on.
-    fn answer(&mut self, start_up: Option<MasterSymbol>, bits: &Bits, from: u64) -> u64 {
+    /// Where the answer after the head of `len` bits at bit `at` begins at the earliest, the delay with which it does, and how well
+    /// it stands there.
+    fn place_of_answer(&self, start_up: bool, bits: &Bits, from: u64) -> (u32, u32, usize) {
         let line = |delay: u32| bits.window(from + u64::from(delay));
         let usual = match self.delay {
             Some(delay) => delay,
@@ -264,20 +346,39 @@ impl Decoder {
         };
         // The delay of a cable does not change, but it need not be whole bits. What is perfect is where it is; of a
         // damaged answer some words may hold a bit beside it by chance, so there the time decides.
-        let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
+        let since = |delay: u32| bits.time_by_next(from + u64::from(delay)) - released(bits, from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
         let rank = |(delay, score): (u32, usize)| (score >= PERFECT, -off(delay), score);
         let mut best = (usual, score(line(usual)));
-        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && start_up.is_none();
+        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !start_up;
         if !running || best.1 < PERFECT {
             for delay in [usual + 1, usual.saturating_sub(1)] {
                 let next = (delay, score(line(delay)));
                 best = if rank(next) > rank(best) { next } else { best };
             }
         }
-        let (delay, score) = best;
+        (usual, best.0, best.1)
+    }
+
+    /// The answer to the head of `len` bits at bit `at`; where to go on.
+    fn answer(&mut self, start_up: Option<MasterSymbol>, bits: &mut Bits, at: u64, len: u64) -> u64 {
+        let mut from = at + len + 1;
+        let (mut usual, mut delay, mut score) = self.place_of_answer(start_up.is_some(), bits, from);
+        self.shaky = self.shaky.saturating_sub(1);
+        let before = score;
+        if before < PERFECT || self.shaky > 0 {
+            let beat = bits.beat(at, len, self.before(at));
+            bits.lay(at, beat, Again::Answer);
+            from = at + find_head(bits.window(at)).map_or(len, |found| found.len.into()) + 1;
+            (usual, delay, score) = self.place_of_answer(start_up.is_some(), bits, from);
+            if before < PERFECT && score >= PERFECT {
+                self.shaky = SHAKY;
+            }
+        }
+        let bits = &*bits;
+        let line = |delay: u32| bits.window(from + u64::from(delay));
         if score >= GOOD {
-            let now = since(delay);
+            let now = bits.time_by_next(from + u64::from(delay)) - released(bits, from);
             self.lag = Some(self.lag.map_or(now, |lag| lag + (now - lag) / 8));
         }
         let place = bits.place(from + u64::from(delay)..from + u64::from(delay + ANSWER_BITS));
@@ -326,40 +427,41 @@ impl Decoder {
                 lag: self.lag,
                 next: self.next,
                 head: self.head,
+                head_len: self.head_len,
                 apart: self.apart,
                 fast: Some(fast),
+                id: id.ok(),
+                quality: Quality::of_a_new_link(),
                 ..Self::new()
             };
         }
     }
 
-    /// Requests, symbol by symbol.
+    /// A message that the master ends with this symbol.
     fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place) {
-        let Ok(symbol) = symbol else { return };
-        if let Some(request) = self.requests.receive(symbol) {
-            self.request = Some(request);
-            let fields = vec![Field::text("message", request)];
-            self.said.push(event(place, Direction::Request, "message", fields, Ok(())));
+        if let Some(field) = symbol.ok().and_then(|symbol| self.messages.asked(symbol)) {
+            self.said.push(event(place, Direction::Request, "message", vec![field], Ok(())));
         }
     }
 
-    /// Answers: what was gathered until the next IDLE.
+    /// A message that the encoder ends with this byte, or with one that cannot be read.
     fn message_in(&mut self, byte: Option<EncoderByte>, place: Place) {
-        if let Some(Ok(EncoderSymbol::Data(nibble))) = byte.map(EncoderByte::symbol) {
-            self.nibbles.push(nibble.get());
-            return;
-        }
-        let nibbles = std::mem::take(&mut self.nibbles);
-        let (Some(request), false) = (self.request, nibbles.is_empty()) else { return };
-        let bytes: Vec<u8> =
-            nibbles.chunks(2).map(|pair| pair.iter().fold(0, |byte, nibble| byte << 4 | nibble)).collect();
-        let result = match request {
-            Request::Short(request) => request.parse_answer(&bytes).map(|answer| Field::text("message", answer)),
-            Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| Field::text("message", answer)),
-        };
+        let symbol = byte.and_then(|byte| byte.symbol().ok());
+        let Some(result) = self.messages.answered(symbol) else { return };
         let fields = result.iter().cloned().collect();
         self.said.push(event(place, Direction::Answer, "message", fields, result.map(|_| ()).map_err(refusal)));
     }
+}
+
+/// What is in front of a head.
+fn front(bits: &Bits, at: u64) -> Window {
+    let from = at.saturating_sub(FRONT_BITS.into());
+    Window::from_bits(bits.load(from), (at - from) as u32).unwrap_or(Window::EMPTY)
+}
+
+/// When the line is free behind the direction switch, the bit before bit `from`, by the clock of the head.
+fn released(bits: &Bits, from: u64) -> Time {
+    bits.time(from.saturating_sub(RESET + 1)) + ((RESET + 1) as f64 * bits.mean()) as i64
 }
 
 /// The delay at which most of the answers after the next heads hold.
@@ -390,13 +492,20 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     best.map_or(0, |(delay, _)| delay)
 }
 
-fn master(head: ParsedHead, symbol: Result<MasterSymbol, Error>) -> Vec<Field> {
+/// Bits of the EXTRA window in a head: its edge lies somewhere in the last of them, so the time from SYNC to CYCLE RESET tells.
+fn window_bits(bits: &Bits, head: &Range<u64>) -> u32 {
+    let (sync, reset) = (bits.time(head.start), bits.time(head.end - RESET));
+    let whole = ((reset - sync) as f64 / bits.mean()).round() as u32;
+    whole.saturating_sub(Head::BITS - RESET as u32)
+}
+
+fn master(head: ParsedHead, symbol: Result<MasterSymbol, Error>, extra: u32) -> Vec<Field> {
     let mut fields = Vec::with_capacity(4);
     fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
     fields.push(Field::number("FIRST", head.byte.first()));
     fields.push(Field::number("MSYNC", head.byte.msync()));
-    if head.extra_bits > 0 {
-        fields.push(Field::measured("EXTRA", head.extra_bits, "bit"));
+    if extra > 0 {
+        fields.push(Field::measured("EXTRA", extra, "bit"));
     }
     fields
 }

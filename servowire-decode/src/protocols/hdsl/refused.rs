@@ -1,6 +1,6 @@
 //! Events of the link, and why one is refused.
 
-use hdsl::Error;
+use hdsl::{EncoderId, Error, PositionBits};
 
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Verdict};
 
@@ -25,6 +25,9 @@ pub(super) fn event(
     Event::new(place, Some(direction), kind, fields, verdict)
 }
 
-pub(super) fn position(counts: u64) -> Position {
-    Position { counts: i64::try_from(counts).unwrap_or(i64::MAX), span: Some(1 << 40), per_turn: None }
+/// A position of 40 bits by its name in the register map, which also says where it begins again if the encoder is known.
+pub(super) fn position(name: &'static str, raw: u64, id: Option<EncoderId>) -> Position {
+    let bits = id.and_then(|id| id.check().ok()).map_or(40, PositionBits::get);
+    let counts = id.map_or_else(|| i64::try_from(raw).unwrap_or(i64::MAX), |id| id.position(raw));
+    Position { name, counts, span: Some(1 << bits), per_turn: None }
 }

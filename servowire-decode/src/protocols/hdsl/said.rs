@@ -33,6 +33,15 @@ impl Said {
         }
     }
 
+    /// What good events from number `from` on hold as `name` is not certain.
+    pub(super) fn withhold(&mut self, from: u64, name: &str) {
+        let first = self.first;
+        let events = (first..).zip(&mut self.events).filter(|(number, event)| *number >= from && event.verdict.is_ok());
+        for (_, event) in events {
+            event.fields.retain(|field| field.name != name);
+        }
+    }
+
     /// Gives all events before number `until`.
     pub(super) fn give(&mut self, until: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.first < until {

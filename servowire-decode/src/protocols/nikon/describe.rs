@@ -2,8 +2,8 @@
 
 use nikon_aformat::inspect::LineCause;
 use nikon_aformat::{
-    Alm, Body, Command, Data, Doubt, EncoderStatus, Error, Evidence, Expected, Layout, Operation, Policy, Request,
-    Resolution, Response, Tolerated, TypeWord,
+    Alm, Body, Command, Data, Doubt, EncoderAddress, EncoderStatus, Error, Evidence, Expected, Layout, Operation,
+    Policy, Request, Resolution, Response, Tolerated, TypeWord,
 };
 
 use super::frames::Frames;
@@ -49,7 +49,9 @@ pub(super) fn request(group: &Frames, result: Result<Request, Error>) -> Event {
     fields.extend(group.spikes());
     let names: &[&str] = if group.len() > 1 { &["CDF", "MDF", "MDF", "MDF", "MDF"] } else { &["CDF"] };
     let kind = result.map_or("request", |request| request.command().name());
-    let event = Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()));
+    let mut event =
+        Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()));
+    event.address = result.ok().map(|request| request.ea.get().into());
     event.locate(|name| {
         let (first, last) = place_in_request(result.ok()?.operation, name)?;
         group.span(first, last)
@@ -126,15 +128,14 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
     widths: Widths,
-    /// By the type word, once the line has carried it.
-    hint: Option<Resolution>,
-    /// By address.
+    /// By address: what the type word said, once the line has carried it.
+    hints: [Option<Resolution>; 8],
     motion: [Motion; 8],
 }
 
 impl Encoder {
     pub(super) fn new(widths: Widths) -> Self {
-        Self { widths, hint: None, motion: [Motion::default(); 8] }
+        Self { widths, hints: [None; 8], motion: [Motion::default(); 8] }
     }
 
     /// A reply as it was on the line.
@@ -142,6 +143,7 @@ impl Encoder {
         &mut self,
         group: &Frames,
         expected: Option<Expected>,
+        asked: Option<Request>,
         result: Result<Response, Error>,
         delay: Option<i64>,
     ) -> Event {
@@ -170,6 +172,9 @@ impl Encoder {
         });
         event.position = position;
         event.delay = delay;
+        // Whose a damaged reply is tells the request, unless it was for all.
+        let only = asked.filter(|request| !request.command().is_multi_response()).map(|request| request.ea);
+        event.address = result.ok().map(|response| response.ea).or(only).map(|ea| ea.get().into());
         event
     }
 
@@ -196,18 +201,19 @@ impl Encoder {
         let counts = i64::try_from(abs).unwrap_or(i64::MAX);
         fields.push(Field::number("ABS", counts));
         let bits = response.layout().abs_bits();
-        let Some(resolution) = self.resolution() else {
-            return Some(Position { counts, span: Some(1 << bits), per_turn: None });
+        let Some(resolution) = self.resolution(response.ea) else {
+            return Some(Position { name: "ABS", counts, span: Some(1 << bits), per_turn: None });
         };
         // Where the fields put the shaft, for looking at. What else speaks against it stands beside it.
         let shown = Tolerated::SINGLE_TURN.status(EncoderStatus::all()).alarms(Alm::all());
         match Evidence::of(response, resolution, 0).at(0, Policy::new(0).tolerating(shown)) {
             Ok(_) => Some(Position {
+                name: "ABS",
                 counts,
                 span: Some(1 << bits.min(resolution.st_bits() + resolution.mt_bits())),
                 per_turn: Some(resolution.counts_per_turn()),
             }),
-            Err(Doubt::Absent) => Some(Position { counts, span: Some(1 << bits), per_turn: None }),
+            Err(Doubt::Absent) => Some(Position { name: "ABS", counts, span: Some(1 << bits), per_turn: None }),
             Err(doubt) => {
                 fields.push(too_wide(doubt, resolution.st_bits(), resolution.mt_bits()));
                 None
@@ -228,7 +234,9 @@ impl Encoder {
                 if !response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY)) {
                     fields.push(Field::hex("data", data, 4));
                     if address == TypeWord::EEPROM_ADDRESS && response.command() == Some(Command::EepromRead) {
-                        self.hint = TypeWord(data).resolution().or(self.hint);
+                        if let Some(hint) = self.hints.get_mut(usize::from(response.ea.get())) {
+                            *hint = TypeWord(data).resolution().or(*hint);
+                        }
                     }
                 }
             }
@@ -249,9 +257,10 @@ impl Encoder {
         }
     }
 
-    /// The widths as the user gave them, else as the type word has them.
-    fn resolution(&self) -> Option<Resolution> {
-        let (st, mt) = self.widths.or(self.hint.map(|hint| (hint.st_bits(), hint.mt_bits())))?;
+    /// The widths as the user gave them, else as the type word of this encoder has them.
+    fn resolution(&self, ea: EncoderAddress) -> Option<Resolution> {
+        let hint = self.hints.get(usize::from(ea.get())).copied().flatten();
+        let (st, mt) = self.widths.or(hint.map(|hint| (hint.st_bits(), hint.mt_bits())))?;
         Resolution::new(st, mt).ok()
     }
 }
@@ -260,7 +269,8 @@ impl Encoder {
 pub(super) fn silence(request: Request, place: Place, timeout: i64, now: Time, asked: bool) -> Event {
     let kind = request.command().name();
     let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
-    Event { fields: vec![Field::number("EA", request.ea.get())], ..silence }
+    let ea = request.ea.get();
+    Event { fields: vec![Field::number("EA", ea)], address: Some(ea.into()), ..silence }
 }
 
 /// The content bits as vendor documents print them, the first bit of the line in bit 15.

@@ -124,6 +124,7 @@ impl Encoder {
         let resolution = self.resolution()?;
         match shown(full, resolution, Tolerated::NOTHING) {
             Ok(sample) => Some(Position {
+                name: "ABM, ABS",
                 counts: sample.counts()?,
                 span: Some(1 << (resolution.abs_bits() + resolution.abm_bits())),
                 per_turn: Some(resolution.counts_per_turn().into()),
@@ -138,11 +139,13 @@ impl Encoder {
     fn single_turn(&self, abs: Abs, fields: &mut Vec<Field>) -> Option<Position> {
         fields.push(Field::number("ABS", abs.get()));
         let Some(resolution) = self.resolution() else {
-            return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
+            return Some(Position { name: "ABS", counts: abs.get().into(), span: None, per_turn: None });
         };
         let turn = Some(resolution.counts_per_turn().into());
         match shown(AllData { abs, ..NOTHING }, resolution, Tolerated::SINGLE_TURN) {
-            Ok(sample) => Some(Position { counts: sample.single_turn().into(), span: turn, per_turn: turn }),
+            Ok(sample) => {
+                Some(Position { name: "ABS", counts: sample.single_turn().into(), span: turn, per_turn: turn })
+            }
             Err(doubt) => {
                 fields.push(too_wide(doubt, resolution.abs_bits(), resolution.abm_bits()));
                 None

@@ -135,48 +135,23 @@ macro_rules! calls {
             fn open(bench: &Bench) -> Self {
                 $open(bench)
             }
-            fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Called<Sample> {
-                let $call = <$driver>::read_position(self, ea, policy);
-                $end
-            }
-            fn read_evidence(&mut self, ea: EncoderAddress) -> Called<Evidence> {
-                let $call = <$driver>::read_evidence(self, ea);
-                $end
-            }
-            fn read_abs40(&mut self, ea: EncoderAddress) -> Called<Exchange> {
-                let $call = <$driver>::read_abs40(self, ea);
-                $end
-            }
-            fn read_bus(&mut self, operation: Operation, asked: Addresses) -> Called<BusTransaction> {
-                let $call = <$driver>::read_bus(self, operation, asked);
-                $end
-            }
-            fn read_cycle(
-                &mut self,
-                cycle: &mut Cycle,
-                operation: Operation,
-                asked: Addresses,
-            ) -> Called<BusTransaction> {
-                let $call = <$driver>::read_cycle(self, cycle, operation, asked);
-                $end
-            }
-            fn clear_status(&mut self, ea: EncoderAddress) -> Called<Response> {
-                let $call = <$driver>::clear_status(self, ea);
-                $end
-            }
-            fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Called<u16> {
-                let $call = <$driver>::read_eeprom(self, ea, address);
-                $end
-            }
+            forward!(
+                $driver,
+                |$call| $end,
+                read_position(ea: EncoderAddress, policy: Policy) -> Sample,
+                read_evidence(ea: EncoderAddress) -> Evidence,
+                read_abs40(ea: EncoderAddress) -> Exchange,
+                read_bus(operation: Operation, asked: Addresses) -> BusTransaction,
+                read_cycle(cycle: &mut Cycle, operation: Operation, asked: Addresses) -> BusTransaction,
+                clear_status(ea: EncoderAddress) -> Response,
+                read_eeprom(ea: EncoderAddress, address: u8) -> u16,
+                transact(request: Request) -> Exchange
+            );
             fn run<P>(&mut self, procedure: &mut P) -> Called<P::Value>
             where
                 P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
             {
                 let $call = <$driver>::run(self, procedure);
-                $end
-            }
-            fn transact(&mut self, request: Request) -> Called<Exchange> {
-                let $call = <$driver>::transact(self, request);
                 $end
             }
         }
@@ -221,19 +196,6 @@ mod asynch {
         |bench: &Bench| Driver::new(bench.clone(), Looks(bench.clone()), Resolution::default(), line()),
         |called| run(called, usize::MAX).unwrap()
     );
-}
-
-macro_rules! contract {
-    ($($name:ident),+) => {
-        $(
-            #[test]
-            fn $name() {
-                of_all::$name::<Spinning>();
-                #[cfg(feature = "async")]
-                of_all::$name::<asynch::Waiting>();
-            }
-        )+
-    };
 }
 
 contract!(

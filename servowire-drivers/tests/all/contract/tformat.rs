@@ -244,30 +244,17 @@ macro_rules! calls {
             fn open(bench: &Bench) -> Self {
                 $open(bench)
             }
-            fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Called<Sample> {
-                let $call = <$driver>::read_position(self, resolution, policy);
-                $end
-            }
-            fn read_evidence(&mut self, resolution: Resolution) -> Called<Evidence> {
-                let $call = <$driver>::read_evidence(self, resolution);
-                $end
-            }
-            fn read_data(&mut self) -> Called<AllData> {
-                let $call = <$driver>::read_data(self);
-                $end
-            }
-            fn clear_errors(&mut self) -> Called<SingleTurn> {
-                let $call = <$driver>::clear_errors(self);
-                $end
-            }
-            fn read_eeprom(&mut self, page: Page, address: Address) -> Called<u8> {
-                let $call = <$driver>::read_eeprom(self, page, address);
-                $end
-            }
-            fn write_eeprom(&mut self, page: Page, address: Address, data: u8) -> Called<u8> {
-                let $call = <$driver>::write_eeprom(self, page, address, data);
-                $end
-            }
+            forward!(
+                $driver,
+                |$call| $end,
+                read_position(resolution: Resolution, policy: Policy) -> Sample,
+                read_evidence(resolution: Resolution) -> Evidence,
+                read_data() -> AllData,
+                clear_errors() -> SingleTurn,
+                read_eeprom(page: Page, address: Address) -> u8,
+                write_eeprom(page: Page, address: Address, data: u8) -> u8,
+                transact(request: Request) -> Exchange
+            );
             fn detect(&mut self, detection: Detection) -> Called<AllData> {
                 let $call = <$driver>::detect(self, detection, set_rate);
                 $end
@@ -277,10 +264,6 @@ macro_rules! calls {
                 P: Procedure<Request = Request, Response = Response, Error = tformat::Error>,
             {
                 let $call = <$driver>::run(self, procedure);
-                $end
-            }
-            fn transact(&mut self, request: Request) -> Called<Exchange> {
-                let $call = <$driver>::transact(self, request);
                 $end
             }
         }
@@ -331,19 +314,6 @@ mod asynch {
         |bench: &Bench| Driver::new(bench.clone(), Automatic, Looks(bench.clone()), LINE).unwrap(),
         |called| run(called, usize::MAX).unwrap()
     );
-}
-
-macro_rules! contract {
-    ($($name:ident),+) => {
-        $(
-            #[test]
-            fn $name() {
-                of_all::$name::<Spinning>();
-                #[cfg(feature = "async")]
-                of_all::$name::<asynch::Waiting>();
-            }
-        )+
-    };
 }
 
 contract!(

@@ -101,11 +101,10 @@ impl Bits {
             }
             since = from + (self.end - begun) * SAMPLES;
             let time = clock.time(since);
-            self.marks.push(Mark { bit: self.end, time, grid: None });
+            self.marks.push(Mark { bit: self.end, time, level, grid: None });
             self.spikes.settle(time, level);
             self.last = Some((time, level));
             self.heard.edges += u64::from(edges);
-            self.measured(edges);
         }
         Some(Taken { next, since, level })
     }

@@ -1,11 +1,11 @@
 //! Answers of a link that runs: their words, the running disparity between them, their V-frames.
 
 use hdsl::frame::ANSWER_BITS;
-use hdsl::inspect::{Chain, Expected, inspect};
+use hdsl::inspect::{Expected, inspect};
 use hdsl::{Answer, EncoderByte, Error, Policy, Rule, Sample, VFrame, Window};
 
 use super::super::refused::{Refused, event, position, refusal};
-use super::{Break, Decoder};
+use super::{Break, Decoder, Neighbour};
 use crate::event::{Direction, Field, Place, Span};
 
 const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
@@ -23,8 +23,6 @@ const LAST: u8 = 8;
 impl Decoder {
     pub(super) fn normal(&mut self, window: Window, place: Place) {
         let Ok(answer) = Answer::parse(Rule::Strict, window) else { return };
-        let dd = answer.delta_delta();
-        self.step(dd.ok());
         let parameter = answer.parameter();
         let report = inspect(Expected::Normal { at: self.at }, window);
         let chain = report.disparity();
@@ -33,6 +31,9 @@ impl Decoder {
             None => Ok(()),
             Some(error) => Err(refusal(error)),
         };
+        // Words that are all good, but not one after the other, may each be the wrong one.
+        let doubtful = report.error().is_none() && !chain.holds();
+        self.step(answer.delta_delta().ok().filter(|_| !doubtful));
         let sound = verdict.is_ok();
         let verdict = verdict.and_then(|()| self.follow(parameter.is_ok_and(EncoderByte::vsync)));
         let event = event(place, Direction::Answer, "answer", self.fields(answer), verdict);
@@ -53,21 +54,23 @@ impl Decoder {
             let raw = u64::from_le_bytes(sample.position().to_le_bytes()) & 0xff_ffff_ffff;
             event.fields.push(Field::hex("POS", raw, 10));
             event.fields.push(Field::measured("VEL", sample.velocity(), "/frame"));
-            event.position = Some(position(raw));
+            event.position = Some(position("POS", raw, self.id));
         }
         if event.verdict.is_ok() && !answer.switch_ok() {
             event.fields.push(Field::text("note", SWITCH));
         }
         let number = self.said.next();
         self.said.push(event);
-        self.join(sound.then_some((chain, number)));
+        self.join(Neighbour { chain, number, sound });
         self.message_in(parameter.ok(), place);
         self.v_frame(answer, place);
     }
 
     /// The fast position, if a receiver may use it: the same verdict.
     fn sample(&self) -> Option<Sample> {
-        self.fast?.evidence(0, 0).at(0, Policy::new(u64::MAX)).ok()
+        let sample = self.fast?.evidence(0, 0).at(0, Policy::new(u64::MAX)).ok()?;
+        let raw = u64::from_le_bytes(sample.position().to_le_bytes());
+        (self.id.is_some() || self.reach.holds(raw)).then_some(sample)
     }
 
     fn fields(&self, answer: Answer) -> Vec<Field> {
@@ -102,10 +105,20 @@ impl Decoder {
         Err(("vsync", STRAY.to_owned()))
     }
 
-    /// Whether a good answer goes on from the one before.
-    fn join(&mut self, next: Option<(Chain, u64)>) {
-        let (before, Some((chain, begins))) = (std::mem::replace(&mut self.chain, next), next) else { return };
-        let Some((Some(goes_on), ends)) = before.map(|(before, ends)| (before.goes_on_in(chain), ends)) else { return };
+    /// Whether an answer goes on from the one before.
+    fn join(&mut self, next: Neighbour) {
+        let Some(before) = self.chain.replace(next) else { return };
+        let Some(goes_on) = before.chain.goes_on_in(next.chain) else { return };
+        let (ends, begins) = (before.number, next.number);
+        if !before.sound || !next.sound {
+            // A damaged one of which the words do not tell where may be damaged just here.
+            let tells = |it: Neighbour| it.sound || !it.chain.holds();
+            if !goes_on && self.carried.is_rule() && tells(before) && tells(next) {
+                self.said.refuse(ends, ("disparity", TAIL.to_owned()));
+                self.said.refuse(begins, ("disparity", FRONT.to_owned()));
+            }
+            return;
+        }
         if !goes_on && self.carried.is_rule() {
             let first_failed = if self.at == Some(0) { self.failed.map(|[_, second]| second) } else { None };
             self.breaks.push(Break { ends, begins, first_failed });
@@ -147,11 +160,12 @@ impl Decoder {
                     self.end_v_frame(place);
                 }
                 self.at = Some((at + 1) % 8);
+                self.begun = if at == 7 { Some(self.said.next()) } else { self.begun };
                 return;
             }
             None => return,
         }
-        (self.at, self.failed) = (Some(0), None);
+        (self.at, self.failed, self.begun) = (Some(0), None, Some(self.said.next()));
     }
 
     fn end_v_frame(&mut self, place: Place) {
@@ -161,17 +175,24 @@ impl Decoder {
         if let Some(fast) = &mut self.fast {
             fast.align(safe.ok());
         }
+        if let Ok(safe) = safe {
+            self.reach.note(safe);
+        }
         let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
         fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));
         fields.push(Field::hex("STATUS2", safe2.status(), 2));
         fields.extend(safe2.vpos().ok().map(|position| Field::hex("VPOS2", position, 10)));
-        fields.push(Field::number("QM", self.quality.value()));
+        fields.extend(self.quality.value().map(|value| Field::number("QM", value)));
         let second = safe2.vpos();
         let error = safe.err().or(second.err());
         let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
-        event.position = safe.ok().map(position);
+        event.position = safe.ok().map(|raw| position("VPOS", raw, self.id));
         self.said.push(event);
         let failed = [is_damage(safe.err()), is_damage(second.err())];
+        // One of its bytes is wrong, and none says which.
+        for name in ["VERT", "SEC"].into_iter().zip(failed).filter_map(|(name, failed)| failed.then_some(name)) {
+            self.said.withhold(self.begun.unwrap_or(u64::MAX), name);
+        }
         self.failed = Some(failed);
         self.settle(Some(failed));
     }

@@ -1,0 +1,70 @@
+//! What a master says.
+
+use core::fmt::{self, Display, Write};
+
+/// Readings so far; some of the positions are said, and all faults.
+#[derive(Debug, Clone, Copy)]
+pub struct Report {
+    every: u32,
+    good: u32,
+    bad: u32,
+}
+
+impl Report {
+    /// One good reading in so many is said, beginning with the first.
+    pub const fn new(every: u32) -> Self {
+        Self { every, good: 0, bad: 0 }
+    }
+
+    /// A reading was good. If it is one to be said it is judged: a position, or why there is none. Whether it was said.
+    ///
+    /// # Errors
+    /// Those of the console.
+    pub fn good<S: Display, D: Display>(
+        &mut self,
+        console: &mut impl Write,
+        position: impl FnOnce() -> Result<S, D>,
+    ) -> Result<bool, fmt::Error> {
+        let said = self.good.checked_rem(self.every) == Some(0);
+        self.good = self.good.wrapping_add(1);
+        let Self { good, bad, .. } = self;
+        match said.then(position) {
+            None => {}
+            Some(Ok(sample)) => writeln!(console, "{sample}, {good} good, {bad} bad")?,
+            Some(Err(doubt)) => writeln!(console, "no position: {doubt}, {good} good, {bad} bad")?,
+        }
+        Ok(said)
+    }
+
+    /// A reading failed.
+    ///
+    /// # Errors
+    /// Those of the console.
+    pub fn fault(&mut self, console: &mut impl Write, error: impl Display) -> fmt::Result {
+        self.bad = self.bad.wrapping_add(1);
+        let Self { good, bad, .. } = self;
+        writeln!(console, "fault: {error}, {good} good, {bad} bad")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+
+    #[test]
+    fn some_positions_are_said_and_all_faults() {
+        let (mut report, mut console) = (Report::new(3), String::new());
+        let mut said = std::vec::Vec::new();
+        for number in 0..4 {
+            said.push(report.good(&mut console, || Ok::<_, &str>(number)).unwrap());
+        }
+        report.fault(&mut console, "no response").unwrap();
+        for _ in 0..3 {
+            said.push(report.good(&mut console, || Err::<u8, _>("too old")).unwrap());
+        }
+        assert_eq!(said, [true, false, false, true, false, false, true]);
+        let lines = "0, 1 good, 0 bad\n3, 4 good, 0 bad\nfault: no response, 4 good, 1 bad\nno position: too old, 7 good, 1 bad\n";
+        assert_eq!(console, lines);
+    }
+}

@@ -1,0 +1,185 @@
+//! Cuts the lines or records of a log into blocks: their size, the order of their bytes, and where they begin.
+
+use std::collections::HashMap;
+
+use rtex_block::inspect::LogShape;
+use rtex_block::{BlockSize, LEN, LEN32};
+
+use crate::capture::hexlog::Burst;
+
+/// Blocks after which it is asked again whether the shape still holds.
+const WINDOW: usize = 64;
+/// Bytes by which size and byte order are recognised.
+const SAMPLE: usize = WINDOW * LEN32;
+
+/// A log's bytes on their way to blocks.
+pub(super) struct Blocks {
+    /// The size that the user has said.
+    said: Option<usize>,
+    shape: Option<LogShape>,
+    size: usize,
+    /// Bytes of most lines or records.
+    line: usize,
+    /// Blocks go on from one line to the next, as the lines do not hold whole ones.
+    flow: bool,
+    /// Bytes that are still to be left out before the first block.
+    skip: usize,
+    /// What was read and not cut yet, from `at` on, and where the block begins that is under way.
+    rest: Vec<u8>,
+    at: usize,
+    began: Burst,
+    /// Of the block under way a part is lost.
+    lost: bool,
+    /// The last blocks as they were read, and how many of them are what no encoder writes, or NOPs.
+    window: Vec<u8>,
+    seen: usize,
+    unsound: usize,
+}
+
+/// A block as a log has it, with the line in which it begins.
+pub(super) type Piece = Burst;
+
+impl Blocks {
+    pub(super) fn new(said: Option<usize>) -> Self {
+        Self {
+            said,
+            shape: None,
+            size: said.unwrap_or(LEN),
+            line: 0,
+            flow: false,
+            skip: 0,
+            rest: Vec::new(),
+            at: 0,
+            began: Burst::new(0, Vec::new()),
+            lost: false,
+            window: Vec::new(),
+            seen: 0,
+            unsound: 0,
+        }
+    }
+
+    /// The shape that was found, and the size that is taken.
+    pub(super) fn shape(&self) -> (Option<LogShape>, usize) {
+        (self.shape, self.size)
+    }
+
+    /// Whether the log ends inside a block.
+    pub(super) fn is_open(&self) -> bool {
+        self.flow && self.rest.len() > self.at && self.skip == 0
+    }
+
+    /// Finds the shape in this piece of the log, from its beginning.
+    pub(super) fn look_at(&mut self, sample: &[Burst]) {
+        let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
+        self.line = most_common(read().map(Vec::len));
+        // What a line has held that is spoilt, or too short or long, does not matter, but its place does.
+        let line = vec![0; self.line];
+        let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
+        let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
+        let bytes: Vec<u8> = lines.flatten().copied().collect();
+        // NOPs from before the start tell nothing: so the end of what is there, which has more than them.
+        let known = bytes.chunks(SAMPLE).find_map(LogShape::guess);
+        let from_last = bytes.len().saturating_sub(SAMPLE) / LEN32 * LEN32;
+        let shape = known.or_else(|| LogShape::guess(bytes.get(from_last..).unwrap_or_default()));
+        self.take(shape, shape.map_or(0, |shape| shape.skip));
+        let halves = self.size == LEN32 && !line.is_empty() && read().all(|it| it.len() == LEN);
+        self.flow |= halves;
+    }
+
+    /// Cuts in this shape from now on, after this many bytes.
+    fn take(&mut self, shape: Option<LogShape>, skip: usize) {
+        // Lines or records of one block are what they are; a size is guessed where the lines allow both.
+        let guessed = shape.map_or(LEN, |shape| shape.size.bytes());
+        self.size = self.said.unwrap_or(guessed).max(1);
+        (self.shape, self.skip) = (shape, skip);
+        self.flow = shape.is_some_and(|shape| shape.skip > 0) || self.line % self.size != 0 && shape.is_some();
+    }
+
+    /// A line or record; a line that does not have its length is a piece of its own, and its block is lost.
+    pub(super) fn feed(&mut self, burst: &Burst) -> Option<Piece> {
+        if !self.flow {
+            (self.rest, self.at, self.began) = (burst.bytes.clone(), 0, Burst { bytes: Vec::new(), ..burst.clone() });
+            return None;
+        }
+        if burst.bytes.len() != self.line {
+            self.lose();
+            return Some(burst.clone());
+        }
+        if self.at >= self.rest.len() {
+            self.began = Burst { bytes: Vec::new(), ..burst.clone() };
+        }
+        self.rest.drain(..self.at);
+        self.at = 0;
+        self.rest.extend_from_slice(&burst.bytes);
+        None
+    }
+
+    /// A line is lost, and with it the block that it is part of.
+    pub(super) fn lose(&mut self) {
+        if !self.flow {
+            return;
+        }
+        self.rest.drain(..self.at);
+        self.rest.resize(self.rest.len() + self.line, 0);
+        self.at = self.skip.min(self.rest.len());
+        self.skip -= self.at;
+        self.at += (self.rest.len() - self.at) / self.size * self.size;
+        self.lost = self.at < self.rest.len();
+    }
+
+    /// The next block of what was fed, from `line` on; in a log whose lines hold whole blocks also what is left of one.
+    pub(super) fn next(&mut self, line: &Burst) -> Option<Piece> {
+        loop {
+            let skipped = self.skip.min(self.rest.len() - self.at);
+            self.skip -= skipped;
+            self.at += skipped;
+            let left = self.rest.len() - self.at;
+            if left == 0 || self.flow && left < self.size {
+                return None;
+            }
+            let end = self.at + left.min(self.size);
+            let bytes = self.rest.get(self.at..end).unwrap_or_default().to_vec();
+            self.at = end;
+            let of = Burst { bytes: Vec::new(), ..line.clone() };
+            let piece = Piece { bytes, ..std::mem::replace(&mut self.began, of) };
+            if !std::mem::take(&mut self.lost) {
+                return Some(piece);
+            }
+        }
+    }
+
+    /// The bytes of a piece in the order of a block.
+    pub(super) fn in_order(&self, bytes: &[u8]) -> Vec<u8> {
+        let word = self.shape.map_or(1, |shape| shape.word);
+        bytes.chunks(word).flat_map(|word| word.iter().rev()).copied().collect()
+    }
+
+    /// Whether the shape still holds, after one more block as it was read; `sound` if an encoder may write it and it tells something. Where the last ones are
+    /// of another shape, the log goes on in that.
+    pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Option<LogShape> {
+        self.window.extend_from_slice(read);
+        self.seen += 1;
+        self.unsound += usize::from(!sound);
+        if self.seen < WINDOW {
+            return None;
+        }
+        let (window, unsound) = (std::mem::take(&mut self.window), std::mem::take(&mut self.unsound));
+        self.seen = 0;
+        let now = LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) };
+        if self.said.is_some() || unsound * 10 < WINDOW {
+            return None;
+        }
+        let other = LogShape::guess(&window).filter(|other| *other != now)?;
+        let size = other.size.bytes();
+        // The window begins with a block of the old shape, and ends where the bytes go on that are still to come.
+        self.take(Some(other), (other.skip + size - window.len() % size) % size);
+        Some(other)
+    }
+}
+
+/// The length that most lines have; of several the longest.
+fn most_common(lengths: impl Iterator<Item = usize>) -> usize {
+    let mut counts = HashMap::new();
+    lengths.for_each(|len| *counts.entry(len).or_insert(0_usize) += 1);
+    counts.into_iter().max_by_key(|(len, count)| (*count, *len)).map_or(0, |(len, _)| len)
+}

@@ -1,0 +1,185 @@
+//! Truth in every shown value: generated captures, with the truth of all that may be shown of each frame beside them.
+//!
+//! `TRUTH_CAPTURES=1000 cargo test -p servowire-decode --release --test all truth:: -- --nocapture` draws more and prints the tally.
+
+mod bus;
+mod buses;
+mod dsl;
+mod line;
+mod links;
+mod rng;
+
+use servowire_decode::capture::{Capture, Change, Line};
+use servowire_decode::event::{Event, Place, Value};
+use servowire_decode::fault::Fault;
+use servowire_decode::output::Output;
+use servowire_decode::recognition::Note;
+use servowire_decode::settings::Settings;
+use servowire_decode::time::Time;
+
+use crate::Keep;
+
+/// A value as it may be shown.
+#[derive(Debug, Clone, PartialEq)]
+enum Shown {
+    Number(i64),
+    /// The next whole number up or down.
+    Near(f64),
+    /// Picoseconds, and by how many more or fewer.
+    Within(f64, f64),
+    Text(String),
+    /// Whatever it is.
+    Any,
+}
+
+impl Shown {
+    fn allows(&self, value: &Value) -> bool {
+        let number = match value {
+            Value::Number { value, .. } => Some(*value),
+            Value::Hex { value, .. } | Value::Flags { raw: value, .. } => i64::try_from(*value).ok(),
+            Value::Decimal { .. } | Value::Text(_) => None,
+        };
+        match self {
+            Self::Number(due) => number == Some(*due),
+            Self::Near(due) => number.is_some_and(|number| (number as f64 - due).abs() <= 1.0),
+            Self::Within(due, near) => number.is_some_and(|number| (number as f64 - due).abs() <= *near),
+            Self::Text(due) => matches!(value, Value::Text(text) if text == due),
+            Self::Any => true,
+        }
+    }
+}
+
+/// What was said on the line, and every value that may be shown of it.
+#[derive(Debug, Clone)]
+struct Said {
+    kind: &'static str,
+    /// Its first bit, in picoseconds.
+    start: f64,
+    fields: Vec<(&'static str, Shown)>,
+    position: Option<(&'static str, i64)>,
+    /// Bits of it were flipped on the way.
+    damaged: bool,
+}
+
+/// How a capture came out.
+#[derive(Debug, Default)]
+struct Outcome {
+    /// Values shown in frames that are `ok`, and those of them that are not the truth.
+    shown: usize,
+    wrong: Vec<String>,
+    /// Frames that were said whole and are missing or refused.
+    lost: Vec<String>,
+    /// What was said by the decoder beside the events.
+    notes: String,
+}
+
+impl Outcome {
+    fn is_right(&self) -> bool {
+        self.wrong.is_empty() && self.lost.is_empty()
+    }
+
+    /// What went wrong, the first of each.
+    fn told(&self, name: &str, seed: u64) -> String {
+        let few = |list: &[String]| list.iter().take(4).cloned().collect::<Vec<_>>().join("\n    ");
+        format!("{name}, seed {seed}: {}\n    {}\n    lost {}\n", self.notes, few(&self.wrong), few(&self.lost))
+    }
+}
+
+/// Edges in memory.
+struct Memory {
+    names: Vec<String>,
+    changes: Vec<Change>,
+    at: usize,
+    end: Time,
+}
+
+impl Line for Memory {
+    fn channels(&self) -> &[String] {
+        &self.names
+    }
+
+    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
+        let next = (self.at + 1000).min(self.changes.len());
+        changes.extend_from_slice(&self.changes[self.at..next]);
+        self.at = next;
+        Ok(self.at < self.changes.len())
+    }
+
+    fn reached(&self) -> Time {
+        if self.at == self.changes.len() { self.end } else { self.changes[self.at].time }
+    }
+}
+
+/// All events of a line, found without a hint.
+fn decode(edges: &[(i64, bool)], end: f64) -> (Vec<Event>, String) {
+    let change =
+        |(time, level): &(i64, bool)| Change { time: Time::from_ps((*time).into()), channel: 0, level: *level };
+    let changes = edges.iter().map(change).collect();
+    let memory = Memory { names: vec!["LINE".to_owned()], changes, at: 0, end: Time::from_ps(end as i128) };
+    let mut keep = Keep::default();
+    let said = std::cell::RefCell::new(String::new());
+    let notes = |note: &Note| said.borrow_mut().push_str(&note.to_string());
+    let mut out = Output::new("x", &mut keep).with_notes(&notes);
+    let capture = Capture::Edges(Box::new(memory));
+    if let Err(stop) = servowire_decode::decode("x", capture, None, &Settings::default(), &mut out) {
+        said.borrow_mut().push_str(&stop.to_string());
+    }
+    (keep.0, said.into_inner())
+}
+
+/// Holds what is shown against what was said; `near`: picoseconds by which a frame may be shown early or late.
+fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) -> bool) -> Outcome {
+    let mut outcome = Outcome::default();
+    let mut met = vec![false; said.len()];
+    for event in events.iter().filter(|event| event.verdict.is_ok() && !event.remark && event.kind != "cut") {
+        let Place::Time { start, .. } = event.place else { continue };
+        let start = start.ps() as f64;
+        let same = |it: &Said| it.kind == event.kind && (it.start - start).abs() <= near;
+        let Some(at) = (0..said.len()).find(|at| same(&said[*at]) && !met[*at]) else {
+            outcome.wrong.push(format!("nothing like it was said: {event:?}"));
+            continue;
+        };
+        met[at] = true;
+        for field in &event.fields {
+            outcome.shown += 1;
+            // What is said of damage.
+            let note = field.name == "note" && said[at].damaged;
+            let allowed =
+                note || said[at].fields.iter().any(|(name, due)| *name == field.name && due.allows(&field.value));
+            if !allowed {
+                let due = said[at].fields.iter().find(|(name, _)| *name == field.name);
+                outcome.wrong.push(format!("{} {} is {:?}, true is {due:?}", event.kind, field.name, field.value));
+            }
+        }
+        if let Some(delay) = event.delay {
+            outcome.shown += 1;
+            let value = Value::Number { value: delay, unit: "ps" };
+            let due = said[at].fields.iter().find(|(name, _)| *name == "delay");
+            if !due.is_some_and(|(_, due)| due.allows(&value)) {
+                outcome.wrong.push(format!("delay {delay}, true is {due:?}"));
+            }
+        }
+        if let Some(position) = event.position {
+            outcome.shown += 1;
+            if said[at].position != Some((position.name, position.counts)) {
+                outcome.wrong.push(format!("position {position:?}, true is {:?}", said[at].position));
+            }
+        }
+    }
+    for (at, it) in said.iter().enumerate() {
+        if !met[at] && !it.damaged && due(it, at) {
+            let instead = events.iter().find(|event| {
+                matches!(event.place, Place::Time { start, .. } if (start.ps() as f64 - it.start).abs() <= near)
+                    && !event.verdict.is_ok()
+            });
+            outcome.lost.push(format!("{} at {:.2} us: {:?}", it.kind, it.start / 1e6, instead.map(|it| &it.verdict)));
+        }
+    }
+    outcome
+}
+
+/// How many captures a condition gets: `TRUTH_CAPTURES` of all.
+fn captures(few: u64, conditions: usize) -> u64 {
+    let wanted = std::env::var("TRUTH_CAPTURES").ok().and_then(|text| text.parse::<u64>().ok());
+    wanted.map_or(few, |wanted| wanted.div_ceil(conditions as u64))
+}

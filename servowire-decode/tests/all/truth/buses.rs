@@ -1,0 +1,82 @@
+//! T-Format and A-format lines under many conditions.
+
+use super::bus::{Bus, Kind, build};
+use super::line::{Recording, record};
+use super::rng::Rng;
+use super::{Outcome, captures, decode, judge};
+
+/// Draws a line and how it is recorded, as bits a sample.
+type Condition = fn(&mut Rng, Bus) -> (Bus, Option<f64>, Recording);
+
+fn exact(bus: Bus) -> (Bus, Option<f64>, Recording) {
+    (bus, None, Recording::EXACT)
+}
+
+const CONDITIONS: &[(&str, Condition)] = &[
+    ("exact", |_, bus| exact(bus)),
+    ("4 to 20 samples a bit", |rng, bus| (bus, Some(rng.between(4.0, 20.0)), Recording::EXACT)),
+    ("inverted", |_, bus| (bus, Some(8.0), Recording { inverted: true, ..Recording::EXACT })),
+    ("begins low", |_, bus| exact(Bus { begins_low: true, ..bus })),
+    ("begins inside a frame", |rng, bus| {
+        (bus, None, Recording { from: (30.0 + rng.between(0.5, 20.0)) * 1e12 / bus.rate, ..Recording::EXACT })
+    }),
+    ("clocks off by up to 2 %", |rng, bus| {
+        exact(Bus { clocks: [rng.between(0.98, 1.02), rng.between(0.98, 1.02)], ..bus })
+    }),
+    ("edges off by a tenth of a bit", |_, bus| {
+        (bus, Some(12.0), Recording { jitter: 0.1e12 / bus.rate, ..Recording::EXACT })
+    }),
+    ("answers missing", |_, bus| exact(Bus { missing: 0.2, ..bus })),
+    ("bits flipped", |_, bus| exact(Bus { damaged: 0.2, ..bus })),
+    ("spikes", |_, bus| exact(Bus { spikes: 5, ..bus })),
+];
+
+fn run(name: &str, condition: Condition, kind: Kind, seed: u64) -> Outcome {
+    let mut rng = Rng::new(seed ^ 0x00b0_5000 ^ (name.len() as u64) << 32);
+    let rates: &[f64] = match kind {
+        Kind::Tformat => &[2.5e6, 5e6],
+        Kind::Aformat => &[2.5e6, 4e6, 8e6],
+    };
+    let plain = Bus { kind, rate: rng.pick(rates), ..Bus::PLAIN };
+    let (bus, samples, mut recording) = condition(&mut rng, plain);
+    let bit = 1e12 / bus.rate;
+    recording.period = samples.map(|samples| bit / samples);
+    let (wire, said, end) = build(&bus, seed);
+    let edges = record(&wire, recording, &mut rng);
+    let (events, notes) = decode(&edges, end);
+    let from = recording.from + if recording.from > 0.0 { 130.0 * bit } else { 0.0 };
+    let mut outcome = judge(&events, &said, bit, |said, _| said.start > from);
+    if notes.contains("swapped") != recording.inverted {
+        outcome.wrong.push(notes.clone());
+    }
+    outcome.notes = notes;
+    outcome
+}
+
+fn all(kind: Kind) {
+    let mut faults = String::new();
+    for (name, condition) in CONDITIONS {
+        let (mut right, mut shown, mut wrong, mut lost) = (0, 0, 0, 0);
+        let count = captures(2, CONDITIONS.len());
+        for seed in 0..count {
+            let outcome = run(name, *condition, kind, seed);
+            right += u64::from(outcome.is_right());
+            (shown, wrong, lost) = (shown + outcome.shown, wrong + outcome.wrong.len(), lost + outcome.lost.len());
+            if !outcome.is_right() && faults.len() < 6000 {
+                faults.push_str(&outcome.told(name, seed));
+            }
+        }
+        println!("{name:<45} {right:>4} of {count} right; {shown:>7} values shown, {wrong} wrong, {lost} frames lost");
+    }
+    assert!(faults.is_empty(), "{faults}");
+}
+
+#[test]
+fn every_value_of_t_format_is_true() {
+    all(Kind::Tformat);
+}
+
+#[test]
+fn every_value_of_a_format_is_true() {
+    all(Kind::Aformat);
+}
