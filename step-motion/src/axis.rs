@@ -181,13 +181,13 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.commanded().wrapping_sub(ahead.into())
     }
 
-    /// Whether the interrupt stands and nothing is to come (or held).
+    /// Returns whether the interrupt stands and nothing is to come (or held).
     pub fn is_at_rest(&self) -> bool {
         let (current, _) = self.current();
         self.halt.is_none() && self.writer.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())
     }
 
-    /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
+    /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
     pub const fn is_halted(&self) -> bool {
         self.mover.is_halted()
     }

@@ -125,12 +125,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.len
     }
 
-    /// Whether the queue is empty.
+    /// Returns whether the queue is empty.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Whether no line can be pushed.
+    /// Returns whether no line can be pushed.
     pub const fn is_full(&self) -> bool {
         self.len >= M
     }
