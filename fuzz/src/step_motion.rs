@@ -1,6 +1,6 @@
-//! step-motion: plans and paths against their laws.
+//! step-motion: plans, paths and an axis in two halves against their laws.
 
-use step_motion::{AxisSetup, Clock, Error, Limits, Path, PathMover, Plan};
+use step_motion::{Axis, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Queue, StepTimer, Work};
 
 use crate::{byte, word};
 
@@ -101,6 +101,139 @@ impl Watched {
         }
         if time < u64::MAX {
             self.now = self.now.max(time);
+        }
+    }
+}
+
+/// Slots between the halves of an axis, and its soft limits.
+const SLOTS: usize = 129;
+const LOW: i64 = -2000;
+const HIGH: i64 = 3000;
+
+/// An axis in two halves, and requests to it while its background is in time, late, or not there: limits in four bytes, then
+/// commands of three.
+///
+/// ```text
+/// 0     speed / 100     1     acceleration / 1000     2     jerk / 100000, 0 for none     3     reach / 40 us
+/// 4..   command, and two values: a target, a speed, an override, hold, resume, stop, quick stop, halt, some slices, time with and without
+///       a background
+/// ```
+pub fn axis(mut data: &[u8]) {
+    let [speed, acceleration, jerk, reach] = core::array::from_fn(|_| u32::from(byte(&mut data)));
+    let speed = speed * 100 + 100;
+    let limits = Limits::new(speed, acceleration * 1000 + 5000).expect("in range");
+    let limits = if jerk == 0 { limits } else { limits.with_jerk(u64::from(jerk) * 100_000).expect("in range") };
+    let queue = Queue::new();
+    let (axis, timer) = Axis::new(&queue, Clock::MICROSECONDS, limits).expect("a speed below the clock's");
+    let axis = axis.with_reach(500 + reach * 40).with_soft_limits(LOW, HIGH);
+    let mut halves =
+        Halves { axis, timer, now: 0, compare: None, position: 0, last: None, fastest: 1_000_000 / u64::from(speed) };
+    while let [command, a, b, rest @ ..] = data {
+        data = rest;
+        let (value, axis) = (i64::from(i16::from_le_bytes([*a, *b])), &mut halves.axis);
+        match command & 15 {
+            0 | 1 => assert_eq!(axis.move_to(value).is_ok(), (LOW..=HIGH).contains(&value) && !halves.refuses()),
+            2 => {
+                let direction = if value < 0 { Direction::Reverse } else { Direction::Forward };
+                let _: Result<_, _> = axis.run(direction, u32::from(*a) * 100);
+            }
+            3 => axis.set_override(u16::from(*a)),
+            4 => axis.hold(),
+            5 => axis.resume(),
+            6 => axis.stop(),
+            7 => axis.quick_stop(Limits::new(1, u32::from(*b) * 10_000 + 1).expect("in range")),
+            8 => axis.halt(),
+            9 | 10 => {
+                for _ in 0..*a {
+                    halves.slice();
+                }
+            }
+            11 => halves.until(halves.now + u64::from(*a) * 64),
+            _ => halves.run(halves.now + (u64::from(*a) << (b & 7))),
+        }
+    }
+    // Afterwards it can be started again.
+    halves.axis.stop();
+    halves.run(halves.now + 100_000_000);
+    halves.axis.set_override(100);
+    halves.axis.resume();
+    halves.axis.move_to(77).expect("it is at rest");
+    halves.run(halves.now + 100_000_000);
+    assert_eq!((halves.position, halves.axis.is_at_rest()), (77, true));
+}
+
+/// A background and a timer.
+struct Halves<'q> {
+    axis: Axis<'q, SLOTS>,
+    timer: StepTimer<'q, SLOTS>,
+    now: u64,
+    compare: Option<u64>,
+    position: i64,
+    /// The last step: when and which way.
+    last: Option<(u64, Direction)>,
+    /// Ticks of a step at the greatest speed.
+    fastest: u64,
+}
+
+impl Halves<'_> {
+    /// Moves are refused in a quick stop, and before a halt has been seen.
+    fn refuses(&mut self) -> bool {
+        let at = self.axis.commanded();
+        self.axis.move_to(at) == Err(Error::Moving)
+    }
+
+    fn slice(&mut self) -> Work {
+        let work = self.axis.poll();
+        if work == Work::Start {
+            self.fire();
+        }
+        work
+    }
+
+    fn fire(&mut self) {
+        let fired = self.timer.fire();
+        let direction = fired.direction();
+        if fired.is_step() {
+            self.position = direction.advance(self.position);
+            assert!((LOW..=HIGH).contains(&self.position), "{} is beyond the soft limits", self.position);
+            if let Some((last, before)) = self.last {
+                let ticks = self.now - last;
+                // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
+                assert!(
+                    ticks > 0 && (before != direction || ticks + 2 + self.fastest / 8 >= self.fastest),
+                    "{ticks} ticks"
+                );
+            }
+            self.last = Some((self.now, direction));
+        }
+        self.compare = (fired.wait() > 0).then(|| self.now + u64::from(fired.wait()));
+        assert_eq!(self.axis.commanded(), self.position);
+    }
+
+    /// Time goes on, without a background.
+    fn until(&mut self, time: u64) {
+        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
+            self.now = compare;
+            self.fire();
+        }
+        self.now = self.now.max(time);
+    }
+
+    /// With one, every 250 us; until it is at rest, or until a time.
+    fn run(&mut self, time: u64) {
+        loop {
+            let mut slices = 0;
+            let work = loop {
+                match self.slice() {
+                    Work::More | Work::Start => slices += 1,
+                    other => break other,
+                }
+                assert!(slices < 2000, "the background does not end");
+            };
+            if self.now >= time || work == Work::Rest {
+                return;
+            }
+            self.until((self.now + 250).min(time));
         }
     }
 }

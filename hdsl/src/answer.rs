@@ -108,7 +108,7 @@ impl Answer {
         Reading::new(self.secondary, word(self.line >> 51))
     }
 
-    /// Whether the switch bit is the inverse of the bit before it. A wrong one is only worth a note.
+    /// Returns whether the switch bit is the inverse of the bit before it. A wrong one is only worth a note.
     #[inline]
     pub const fn switch_ok(self) -> bool {
         (self.line >> 49 ^ self.line >> 50) & 1 == 1

@@ -54,7 +54,7 @@ impl RunningCrc16 {
         self.0 ^ CRC_16.xorout
     }
 
-    /// Whether the bytes so far end in their right CRC.
+    /// Returns whether the bytes so far end in their right CRC.
     pub const fn is_residue(self) -> bool {
         self.0 == CRC_16.residue
     }

@@ -37,7 +37,7 @@ impl EncoderId {
         if self.is_signed() { signed } else { i64::from_le_bytes(shifted.wrapping_shr(unused).to_le_bytes()) }
     }
 
-    /// Whether the position is signed.
+    /// Returns whether the position is signed.
     pub const fn is_signed(self) -> bool {
         self.get() >> 10 & 1 == 1
     }
@@ -47,7 +47,7 @@ impl EncoderId {
         self.byte(1) >> 4
     }
 
-    /// Whether the identifier is longer than 20 bits.
+    /// Returns whether the identifier is longer than 20 bits.
     pub const fn continues(self) -> bool {
         self.get() >> 19 & 1 == 1
     }

@@ -201,7 +201,7 @@ impl Master {
         self.encoder
     }
 
-    /// Whether the edge of the present frame belongs to the external pulse; `false` when free running.
+    /// Returns whether the edge of the present frame belongs to the external pulse; `false` when free running.
     pub fn is_on_pulse(&self) -> bool {
         self.sync.is_some_and(|sync| sync.is_on_pulse())
     }

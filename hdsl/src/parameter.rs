@@ -69,12 +69,12 @@ symbols! {
 }
 
 impl MasterSymbol {
-    /// Whether it belongs to the start-up: frames that are answered by the test pattern or the identifier.
+    /// Returns whether it belongs to the start-up: frames that are answered by the test pattern or the identifier.
     pub const fn is_start_up(self) -> bool {
         matches!(self, Self::Start | Self::Learn | Self::Check | Self::IdReq)
     }
 
-    /// Whether an encoder answers a frame with this symbol.
+    /// Returns whether an encoder answers a frame with this symbol.
     pub const fn is_answered(self) -> bool {
         !matches!(self, Self::Reset | Self::Sync)
     }

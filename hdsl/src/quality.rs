@@ -228,7 +228,7 @@ impl QualityMonitor {
         self.value
     }
 
-    /// Whether the link is lost.
+    /// Returns whether the link is lost.
     pub const fn is_lost(self) -> bool {
         self.lost
     }

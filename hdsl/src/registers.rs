@@ -243,7 +243,7 @@ impl Registers {
         events
     }
 
-    /// Whether ACC_ERR_CNT exceeds its threshold (`acc_thr_err` of the SICK core).
+    /// Returns whether ACC_ERR_CNT exceeds its threshold (`acc_thr_err` of the SICK core).
     pub fn too_many_acceleration_errors(&self) -> bool {
         let ([errors], [threshold]) = (self.get(Register::AccErrCnt), self.get(Register::AccErrCntThresh));
         errors > threshold

@@ -50,7 +50,7 @@ impl Word {
         k28_plus && matches!(self.get() >> 6, 0b0110 | 0b1010 | 0b0101 | 0b1001)
     }
 
-    /// Whether the word is in the column for this running disparity.
+    /// Returns whether the word is in the column for this running disparity.
     pub const fn is_in(self, column: RunningDisparity) -> bool {
         self.entry() & column.flag() != 0
     }
@@ -168,7 +168,7 @@ impl Character {
         self.0.to_le_bytes()[0]
     }
 
-    /// Whether it is a special character.
+    /// Returns whether it is a special character.
     pub const fn is_control(self) -> bool {
         self.0 & SPECIAL != 0
     }
@@ -300,13 +300,13 @@ impl Reading {
         self.word
     }
 
-    /// Whether the word is no good by the rule it was read with.
+    /// Returns whether the word is no good by the rule it was read with.
     #[inline]
     pub const fn is_byte_error(self) -> bool {
         self.entry.is_byte_error()
     }
 
-    /// Whether the rule takes the word for a special character.
+    /// Returns whether the rule takes the word for a special character.
     #[inline]
     pub const fn is_special(self) -> bool {
         self.entry.0 & SPECIAL != 0
@@ -340,7 +340,7 @@ impl Reading {
         if self.is_byte_error() { Err(Error::InvalidWord { word: self.word.get() }) } else { Ok(self.raw()) }
     }
 
-    /// Whether the word is this special character.
+    /// Returns whether the word is this special character.
     pub const fn is(self, control: Control) -> bool {
         self.entry.0 & (0xff | SPECIAL | INVALID) == control as u16 | SPECIAL
     }

@@ -200,7 +200,7 @@ impl Synchroniser {
         self.state.edge
     }
 
-    /// Whether the edge of the present frame belongs to a pulse.
+    /// Returns whether the edge of the present frame belongs to a pulse.
     pub const fn is_on_pulse(&self) -> bool {
         self.frame == 0
     }

@@ -83,17 +83,17 @@ impl SafeBlock {
         u16::from_be_bytes([high, low])
     }
 
-    /// Whether a word of the block was no good.
+    /// Returns whether a word of the block was no good.
     pub const fn has_byte_error(&self) -> bool {
         self.bad.is_some()
     }
 
-    /// Whether the CRC of the bytes as received is right.
+    /// Returns whether the CRC of the bytes as received is right.
     pub const fn crc_ok(&self) -> bool {
         self.crc.finish() == self.raw_crc()
     }
 
-    /// Whether words and CRC are good; whether the encoder has a position is another matter.
+    /// Returns whether words and CRC are good; whether the encoder has a position is another matter.
     pub fn is_sound(&self) -> bool {
         matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }

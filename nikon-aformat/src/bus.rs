@@ -60,7 +60,7 @@ impl Addresses {
         }
     }
 
-    /// Whether the address is in the set.
+    /// Returns whether the address is in the set.
     pub const fn contains(self, ea: EncoderAddress) -> bool {
         self.0 >> ea.get() & 1 == 1
     }
@@ -81,7 +81,7 @@ impl Addresses {
         self.0.count_ones() as u8
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -263,7 +263,7 @@ impl Bus {
         self.asked.len().saturating_sub(self.arrived())
     }
 
-    /// Whether every address that was asked has sent a good response.
+    /// Returns whether every address that was asked has sent a good response.
     pub const fn heard_all(&self) -> bool {
         self.missing().is_empty()
     }

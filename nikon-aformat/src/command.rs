@@ -73,7 +73,7 @@ servowire_core::codes! {
 }
 
 impl Command {
-    /// Whether encoders of `version` know the command.
+    /// Returns whether encoders of `version` know the command.
     pub fn is_in(self, version: Version) -> bool {
         self.min_version() <= version
     }
@@ -86,7 +86,7 @@ impl Command {
         }
     }
 
-    /// Whether several encoders answer one request, each with a response of its own.
+    /// Returns whether several encoders answer one request, each with a response of its own.
     pub const fn is_multi_response(self) -> bool {
         matches!(
             self,
@@ -102,7 +102,7 @@ impl Command {
         )
     }
 
-    /// Whether the command takes effect only after eight requests in succession.
+    /// Returns whether the command takes effect only after eight requests in succession.
     pub const fn is_reset(self) -> bool {
         matches!(
             self,
@@ -131,7 +131,7 @@ impl Command {
         }
     }
 
-    /// Whether the response comes from the encoder that the request addresses.
+    /// Returns whether the response comes from the encoder that the request addresses.
     ///
     /// Not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), and
     /// for those that change the address (11, 20): whether their response shows the old or the new one is not documented.

@@ -108,7 +108,7 @@ impl Operation {
         }
     }
 
-    /// Whether only encoders of version 3.0 understand it.
+    /// Returns whether only encoders of version 3.0 understand it.
     pub const fn needs_version_3(self) -> bool {
         matches!(self.frame_code(), FrameCode::Fc3) || matches!(self.command().min_version(), Version::V3_0)
     }

@@ -89,12 +89,12 @@ impl Resolution {
         self.version
     }
 
-    /// Whether commands 1 and 5 are answered with the whole position and velocity.
+    /// Returns whether commands 1 and 5 are answered with the whole position and velocity.
     pub const fn has_velocity_in_low(self) -> bool {
         self.low_with_velocity
     }
 
-    /// Whether the resets are answered with the position.
+    /// Returns whether the resets are answered with the position.
     pub const fn has_position_in_resets(self) -> bool {
         self.resets_with_position
     }

@@ -224,7 +224,7 @@ impl Response {
         }
     }
 
-    /// Whether any status bit is set, in both forms.
+    /// Returns whether any status bit is set, in both forms.
     pub const fn has_status(self) -> bool {
         match self.body {
             Body::Abs17 { es_any, .. } => es_any,

@@ -44,7 +44,7 @@ servowire_core::one_line!(Cause {
 });
 
 impl Cause {
-    /// Whether the line did not move at all. A line without bits stands for silence.
+    /// Returns whether the line did not move at all. A line without bits stands for silence.
     pub const fn stuck(line: Window) -> Option<Self> {
         if line.inverted().bits() == 0 {
             Some(Self::StuckHigh)

@@ -33,7 +33,7 @@ impl Samples {
         self.len
     }
 
-    /// Whether all samples were taken.
+    /// Returns whether all samples were taken.
     pub const fn is_empty(self) -> bool {
         self.len == 0
     }

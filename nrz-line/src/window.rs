@@ -85,7 +85,7 @@ impl Window {
         self.len
     }
 
-    /// Whether the window holds no bit.
+    /// Returns whether the window holds no bit.
     pub const fn is_empty(self) -> bool {
         self.len == 0
     }

@@ -78,7 +78,7 @@ impl<'a> CommandBlock<'a> {
         tail
     }
 
-    /// Whether this block makes its drive switch the servo off.
+    /// Returns whether this block makes its drive switch the servo off.
     ///
     /// Servo_On is 0, **and** the code is one with which the drive looks at Servo_On. A NOP is not: a block of
     /// zeros leaves the servo as it is. Nor is a block that the drive refuses for its code.

@@ -146,12 +146,12 @@ pub struct Change {
 const MOST_FINDINGS: usize = 12;
 
 impl Report {
-    /// Whether C/R says response; `None` if there is no byte.
+    /// Returns whether C/R says response; `None` if there is no byte.
     pub const fn is_response(&self) -> Option<bool> {
         self.is_response
     }
 
-    /// Whether lenient decoding, and so a drive, takes the block.
+    /// Returns whether lenient decoding, and so a drive, takes the block.
     pub const fn is_usable(&self) -> bool {
         self.message.is_some()
     }

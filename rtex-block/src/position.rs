@@ -84,7 +84,7 @@ pub fn max_torque(peak: u16, rated: u16) -> Option<u32> {
     u32::try_from(root).ok()
 }
 
-/// Whether a step stays within [`max_step`].
+/// Returns whether a step stays within [`max_step`].
 pub const fn is_within_limit(step: i32, update_ns: u32, gear: Gear) -> bool {
     step.unsigned_abs() <= max_step(update_ns, gear)
 }

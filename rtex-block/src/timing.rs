@@ -122,7 +122,7 @@ pub enum TimerSystem {
 }
 
 impl TimerSystem {
-    /// Whether a pair of periods works with this system.
+    /// Returns whether a pair of periods works with this system.
     pub const fn allows(self, periods: &Periods) -> bool {
         match self {
             Self::External => true,
@@ -130,7 +130,7 @@ impl TimerSystem {
         }
     }
 
-    /// Whether the receive interrupt goes before the NC interrupt.
+    /// Returns whether the receive interrupt goes before the NC interrupt.
     pub const fn reception_first(self) -> bool {
         matches!(self, Self::External)
     }

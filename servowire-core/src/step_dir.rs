@@ -15,7 +15,7 @@ crate::codes! {
 }
 
 impl Direction {
-    /// Whether DIR is high.
+    /// Returns whether DIR is high.
     pub const fn dir(self) -> bool {
         matches!(self, Self::Reverse)
     }

@@ -316,12 +316,12 @@ impl Verdict {
         Refusal { cause, ..Refusal::new("truncated", "a hole in the recording begins inside the frame") }.into()
     }
 
-    /// Whether all checks passed.
+    /// Returns whether all checks passed.
     pub fn is_ok(&self) -> bool {
         *self == Self::Ok
     }
 
-    /// Whether this is no frame but the absence of one.
+    /// Returns whether this is no frame but the absence of one.
     pub fn is_silence(&self) -> bool {
         matches!(self, Self::Refused(refusal) if refusal.class == NO_RESPONSE)
     }

@@ -97,7 +97,7 @@ impl<'a> Output<'a> {
         Self { filter: Some(filter), ..self }
     }
 
-    /// Whether the changes of the line have a taker.
+    /// Returns whether the changes of the line have a taker.
     pub fn wants_changes(&self) -> bool {
         self.printers.iter().any(|printer| printer.wants_changes())
     }
@@ -157,7 +157,7 @@ impl<'a> Output<'a> {
         (!both.is_empty()).then_some(both)
     }
 
-    /// Whether nothing that was asked for can come any more once a recording was read up to `time`.
+    /// Returns whether nothing that was asked for can come any more once a recording was read up to `time`.
     pub fn is_over(&self, time: Time) -> bool {
         self.is_done() || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
     }

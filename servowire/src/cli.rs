@@ -91,7 +91,7 @@ fn man(command: Option<&str>) -> ExitCode {
     };
     let mut text = Vec::new();
     match clap_mangen::Man::new(page).render(&mut text) {
-        Ok(()) => print(&text),
+        Ok(()) => print(sections(&String::from_utf8_lossy(&text)).as_bytes()),
         Err(e) => {
             eprintln!("error: {e}");
             ExitCode::FAILURE
@@ -99,9 +99,30 @@ fn man(command: Option<&str>) -> ExitCode {
     }
 }
 
+/// With the names that manual pages have for examples and exit codes.
+fn sections(page: &str) -> String {
+    let page = page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n.nf\n");
+    let status = ".fi\n.SH \"EXIT STATUS\"\n.TP\n0\nEverything is good.\n.TP\n1\nA frame was refused, or a file could not be \
+                  read or written.\n.TP\n2\nWrong use.\n";
+    format!("{}\n{status}", page.trim_end())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn manual_pages_have_examples_and_exit_codes() {
+        let mut whole = Cli::command();
+        whole.build();
+        for name in ["decode", "report", "explain"] {
+            let mut text = Vec::new();
+            clap_mangen::Man::new(whole.find_subcommand(name).unwrap().clone()).render(&mut text).unwrap();
+            let page = sections(&String::from_utf8(text).unwrap());
+            assert!(page.contains(&format!(".SH EXAMPLES\n.nf\n  servowire {name} ")), "{page}");
+            assert!(page.contains("\n.fi\n.SH \"EXIT STATUS\"\n") && !page.contains("EXTRA"), "{page}");
+        }
+    }
 
     #[test]
     fn the_command_line_is_consistent() {

@@ -274,17 +274,16 @@ impl Arguments {
             if usize::from(self.devices) < AXES || self.dance || self.independent || self.cycles.is_some() {
                 return Err("--gcode moves X, Y and Z, and nothing else: it needs three devices, and no --dance, --independent or --cycles".into());
             }
-            let lines = Part::read(path)?;
+            self.part.check(path)?;
             let limits = Limits::new(self.freq.first().copied().unwrap_or(Part::SPEED), self.accel)?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
-            if limits.speed() > PtoMover::MAX_SPEED {
-                return Err(format!(
-                    "--freq {}: an axis makes a step in each cycle of 4 us at most, 250000",
-                    limits.speed()
-                )
-                .into());
+            let fastest = self.part.axes(limits)?.iter().map(|axis| axis.limits.speed()).max().unwrap_or(0);
+            if fastest > PtoMover::MAX_SPEED {
+                return Err(
+                    format!("{fastest} steps/s: an axis makes a step in each cycle of 4 us at most, 250000").into()
+                );
             }
-            return Ok(Program::part(self.part.steps(lines, limits)?));
+            return Ok(Program::part(self.part.steps(path, limits)?));
         }
         // Programs of four motors repeat them for the axes after the fourth.
         let motors = Motors::new((1 << self.devices.min(4)) - 1).unwrap_or_default();

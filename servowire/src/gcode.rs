@@ -1,16 +1,21 @@
 //! G-code: a part program as straight lines, and the steps that they are made of.
 
-mod lines;
+mod program;
+#[cfg(test)]
+mod programs;
+mod setup;
 mod steps;
+mod words;
 
-use std::fs;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use step_motion::Limits;
-
-pub(crate) use lines::Line;
 use servowire_decode::fault::{At, Fault};
+use step_motion::{AxisSetup, Limits};
+
+use program::{Item, Program};
 pub(crate) use steps::Steps;
 
 /// Axes of a part program: X, Y and Z.
@@ -19,16 +24,23 @@ pub(crate) const AXES: usize = 3;
 /// A part program, and the machine that it is for.
 #[derive(Debug, Args)]
 pub(crate) struct Part {
-    /// Follow a part program: G0, G1, G2, G3 (X, Y, Z, I, J, F), G20, G21, G90, G91, and M2 or M30 at its end. Feeds are
-    /// in mm/min; arcs are in the XY plane, as chords within 2 um.
+    /// Follow a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), rests (G4), references (G28, G30), G53 to
+    /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min; arcs are chords
+    /// within 2 um. What is not in it is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
     /// Steps in a millimetre of each axis of a part program.
     #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     steps_per_mm: u32,
-    /// How far a part program may round a corner, in um; 0 stops at each one.
+    /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000, in mm/min, mm/s² and mm/s³; once for each axis.
+    #[arg(long, value_name = "AXIS", requires = "gcode")]
+    axis: Vec<setup::Setup>,
+    /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P say otherwise.
     #[arg(long, value_name = "UM", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     deviation: u32,
+    /// Leave out the lines of a part program that begin with a slash.
+    #[arg(long, requires = "gcode")]
+    block_delete: bool,
 }
 
 impl Part {
@@ -36,15 +48,38 @@ impl Part {
     pub(crate) const SPEED: u32 = 100_000;
     pub(crate) const ACCELERATION: u32 = 400_000;
 
-    /// The lines of a part program.
-    pub(crate) fn read(path: &Path) -> Result<Vec<Line>, Fault> {
-        let name = path.display().to_string();
-        let text = fs::read(path).map_err(|e| Fault::new(&name, At::File, e.to_string()))?;
-        lines::read(&name, &String::from_utf8_lossy(&text))
+    /// Reads all of a part program for faults; how many straight lines it has.
+    pub(crate) fn check(&self, path: &Path) -> Result<usize, Fault> {
+        let mut lines = 0;
+        for item in self.open(path)? {
+            lines += usize::from(matches!(item?, Item::Line(_)));
+        }
+        if lines == 0 {
+            let what = "no motion in it: a line with G0 or G1 and X, Y or Z begins one";
+            return Err(Fault::new(&path.display().to_string(), At::File, what));
+        }
+        Ok(lines)
     }
 
-    /// Its steps, with the same limits for all axes; ticks are ns.
-    pub(crate) fn steps(&self, lines: Vec<Line>, limits: Limits) -> Result<Steps, step_motion::Error> {
-        Steps::new(lines, limits, self.steps_per_mm, self.deviation)
+    /// Its steps, within limits of each axis that has none of its own; ticks are ns.
+    pub(crate) fn steps(&self, path: &Path, limits: Limits) -> Result<Steps, Box<dyn std::error::Error>> {
+        Ok(Steps::new(self.open(path)?, self.axes(limits)?, self.deviation)?)
+    }
+
+    /// The axes of the machine.
+    pub(crate) fn axes(&self, limits: Limits) -> Result<[AxisSetup; AXES], String> {
+        let mut axes = [AxisSetup::new(limits, self.steps_per_mm * 1000); AXES];
+        for setup in &self.axis {
+            if let Some(axis) = axes.get_mut(setup.axis) {
+                *axis = setup.over(*axis)?;
+            }
+        }
+        Ok(axes)
+    }
+
+    fn open(&self, path: &Path) -> Result<Program<BufReader<File>>, Fault> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|e| Fault::new(&name, At::File, e.to_string()))?;
+        Ok(Program::new(&name, BufReader::new(file), self.block_delete))
     }
 }

@@ -124,13 +124,13 @@ impl Arguments {
     /// A part program.
     fn follow(&self, path: &Path, out: &mut dyn Write) -> ExitCode {
         let planned = || -> Result<_, Box<dyn Error>> {
-            let lines = Part::read(path)?;
+            let lines = self.part.check(path)?;
             let speed = self
                 .freq
                 .map_or(Part::SPEED, |frequency| (frequency.numerator() / u32::from(frequency.denominator())).max(1));
             let limits = Limits::new(speed, self.accel.unwrap_or(Part::ACCELERATION))?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
-            Ok((lines.len(), self.part.steps(lines, limits)?))
+            Ok((lines, self.part.steps(path, limits)?))
         };
         match planned() {
             Ok((lines, steps)) => written(part::write(self, lines, steps, out)),

@@ -63,7 +63,7 @@ impl Status {
         Self(low)
     }
 
-    /// Whether one of the six faults is set.
+    /// Returns whether one of the six faults is set.
     pub const fn is_fault(self) -> bool {
         self.intersects(Self::FAULTS)
     }

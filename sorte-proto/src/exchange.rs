@@ -85,7 +85,7 @@ impl<'a> MasterFrameView<'a> {
         (self.time_stamp as u32).saturating_add(delay_ns)
     }
 
-    /// Whether the time stamp is at most `window_ns` from `expected` (both wrap): the only check it can have.
+    /// Returns whether the time stamp is at most `window_ns` from `expected` (both wrap): the only check it can have.
     ///
     /// # Errors
     /// [`Error::ImplausibleTimeStamp`]

@@ -161,7 +161,7 @@ impl Follower {
         }
     }
 
-    /// Whether the axis was so far behind that it has stopped. It starts again with [`resume`](Self::resume).
+    /// Returns whether the axis was so far behind that it has stopped. It starts again with [`resume`](Self::resume).
     pub const fn is_stopped(&self) -> bool {
         self.stopped
     }

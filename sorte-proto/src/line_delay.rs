@@ -79,7 +79,7 @@ impl LineDelay {
         self.count
     }
 
-    /// Whether sixteen have been taken.
+    /// Returns whether sixteen have been taken.
     pub const fn is_complete(&self) -> bool {
         self.count >= SAMPLES
     }

@@ -15,7 +15,7 @@ servowire_core::codes! {
 }
 
 impl Direction {
-    /// Whether DIR is high.
+    /// Returns whether DIR is high.
     pub const fn is_high(self) -> bool {
         matches!(self, Self::High)
     }

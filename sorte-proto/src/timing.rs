@@ -152,7 +152,7 @@ impl Budget {
         }
     }
 
-    /// Whether a cycle of `cycle_ns` is long enough.
+    /// Returns whether a cycle of `cycle_ns` is long enough.
     pub const fn fits(self, cycle_ns: u32) -> bool {
         self.min_cycle_ns() <= cycle_ns
     }

@@ -34,8 +34,8 @@ pub enum Work {
 /// request acts where the segments that are out end: after twice the [reach](Self::with_reach) at the latest, but for
 /// [`halt`](Self::halt), after which there is no step. Each step is made within 3/4 of a tick, or 25 ns where that is more, of its exact
 /// time. Behind all that is out lies a stop: if [`poll`](Self::poll) is not called
-/// in time the axis comes to rest, and goes on from there when it is. Its intervals are exact
-/// to some hundredths.
+/// in time the axis comes to rest, and goes on from there when it is. Each of its steps is
+/// exact to a sixteenth of an interval.
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -181,13 +181,13 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.commanded().wrapping_sub(ahead.into())
     }
 
-    /// Whether the interrupt stands and nothing is to come (or held).
+    /// Returns whether the interrupt stands and nothing is to come (or held).
     pub fn is_at_rest(&self) -> bool {
         let (current, _) = self.current();
         self.halt.is_none() && self.writer.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())
     }
 
-    /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
+    /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
     pub const fn is_halted(&self) -> bool {
         self.mover.is_halted()
     }

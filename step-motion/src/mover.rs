@@ -179,12 +179,12 @@ impl Mover {
         state.on_axis(self.origin, self.direction)
     }
 
-    /// Whether the axis stands still at a tick, with nothing to come (or held).
+    /// Returns whether the axis stands still at a tick, with nothing to come (or held).
     pub fn is_at_rest(&self, now: u64) -> bool {
         self.due.is_none() && self.clock.moment(now) >= self.phases.end()
     }
 
-    /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
+    /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
     pub const fn is_halted(&self) -> bool {
         self.halted
     }

@@ -97,11 +97,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         let finest = axes.iter().map(|axis| axis.steps_per_m).max().unwrap_or(1);
         let unit = Real::new(finest.into());
-        Ok(Self {
+        let mut new = Self {
             clock,
             axes,
             unit,
-            deviation: unit * Real::new(deviation.into()) / Real::new(1_000_000),
+            deviation: Real::ZERO,
             lines: [None; M],
             first: 0,
             len: 0,
@@ -110,7 +110,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
             speed: Real::ZERO,
             moment: 0,
             offset: Real::ZERO,
-        })
+        };
+        new.set_deviation(deviation);
+        Ok(new)
+    }
+
+    /// With another deviation at corners in µm, at the begin of lines that are pushed from now on.
+    pub fn set_deviation(&mut self, deviation: u32) {
+        self.deviation = self.unit * Real::new(deviation.into()) / Real::new(1_000_000);
     }
 
     /// Lines in the queue.
@@ -118,12 +125,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.len
     }
 
-    /// Whether the queue is empty.
+    /// Returns whether the queue is empty.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Whether no line can be pushed.
+    /// Returns whether no line can be pushed.
     pub const fn is_full(&self) -> bool {
         self.len >= M
     }

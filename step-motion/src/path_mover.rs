@@ -122,12 +122,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.len()
     }
 
-    /// Whether no line runs or waits.
+    /// Returns whether no line runs or waits.
     pub const fn is_empty(&self) -> bool {
         self.path.is_empty()
     }
 
-    /// Whether no line can be pushed.
+    /// Returns whether no line can be pushed.
     pub const fn is_full(&self) -> bool {
         self.path.is_full()
     }
@@ -147,13 +147,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         states
     }
 
-    /// Whether all axes stand still at a tick, with nothing to come (or held).
+    /// Returns whether all axes stand still at a tick, with nothing to come (or held).
     pub fn is_at_rest(&self, now: u64) -> bool {
         let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
         self.due().is_none() && self.clock().moment(now) >= over
     }
 
-    /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
+    /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
     pub const fn is_halted(&self) -> bool {
         self.halted
     }

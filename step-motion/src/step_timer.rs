@@ -15,7 +15,7 @@ pub struct Fired {
 }
 
 impl Fired {
-    /// Whether to make a step now. DIR has been right for the time that the driver needs.
+    /// Returns whether to make a step now. DIR has been right for the time that the driver needs.
     #[inline(always)]
     pub const fn is_step(self) -> bool {
         self.head >> DELTA != 0

@@ -100,7 +100,7 @@ impl<'t> Dance<'t> {
         self.pause = 0;
     }
 
-    /// Whether the last note, with its pause, is over.
+    /// Returns whether the last note, with its pause, is over.
     pub fn is_over(&self) -> bool {
         self.song.is_empty() && self.pause == 0 && self.group.state() == MoveState::Idle
     }

@@ -146,7 +146,7 @@ impl<'t> Profile<'t> {
         self.0
     }
 
-    /// Whether no step of this profile leaves the domain in which the PRU arithmetic is proved exact, so that
+    /// Returns whether no step of this profile leaves the domain in which the PRU arithmetic is proved exact, so that
     /// [`Arithmetic::PruExact`] and [`Arithmetic::Corrected`] give the same pulses.
     ///
     /// With the default ramp: up to speed constant 963131, at 68.045 kHz and above.

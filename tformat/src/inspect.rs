@@ -92,7 +92,7 @@ impl Report {
         self.response
     }
 
-    /// Whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
+    /// Returns whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
     pub const fn status_contradicts_alarms(&self) -> bool {
         matches!(self.response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
     }

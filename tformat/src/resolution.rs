@@ -116,12 +116,12 @@ impl Resolution {
         self.abm_bits
     }
 
-    /// Whether turns are two's complement.
+    /// Returns whether turns are two's complement.
     pub const fn has_signed_turns(self) -> bool {
         self.signed_turns
     }
 
-    /// Whether bits above the widths are refused.
+    /// Returns whether bits above the widths are refused.
     pub const fn checks_upper_bits(self) -> bool {
         self.checks_upper_bits
     }

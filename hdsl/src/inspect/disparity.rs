@@ -47,7 +47,7 @@ impl Chain {
         chain
     }
 
-    /// Whether each word stands in the column that the words before it leave.
+    /// Returns whether each word stands in the column that the words before it leave.
     pub const fn holds(self) -> bool {
         self.holds
     }
@@ -62,7 +62,7 @@ impl Chain {
         self.after
     }
 
-    /// Whether `next` begins where this ends; `None` where one of the two does not tell.
+    /// Returns whether `next` begins where this ends; `None` where one of the two does not tell.
     pub fn goes_on_in(self, next: Self) -> Option<bool> {
         Some(self.after? == next.before?)
     }

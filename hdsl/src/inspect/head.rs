@@ -126,7 +126,7 @@ pub fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
     coded == u128::from(due.equalisation()) | u128::from(due.para().get()) << 4
 }
 
-/// Whether the line in front of a head ends with TRAILER as a master drives it, 000011, and blocks of stuffing. `front`: at most
+/// Returns whether the line in front of a head ends with TRAILER as a master drives it, 000011, and blocks of stuffing. `front`: at most
 /// [`FRONT_BITS`] bits, the last of them before the head; stuffing all over them is taken as good.
 pub fn ends_with_trailer(front: Window) -> bool {
     // The first bit in bit 0.
@@ -137,7 +137,7 @@ pub fn ends_with_trailer(front: Window) -> bool {
     last.is_none_or(|block| block == TRAILER)
 }
 
-/// Whether the last six bits are a block of stuffing, 001011.
+/// Returns whether the last six bits are a block of stuffing, 001011.
 pub fn ends_with_stuffing(front: Window) -> bool {
     front.len() >= STUFFING_BITS && front.bits() >> front.len().saturating_sub(STUFFING_BITS) == STUFFING
 }

@@ -89,7 +89,7 @@ impl HeadRules {
         head_fault(head).map(BrokenRule::Fault).or(broken)
     }
 
-    /// Whether what stands in front of a head, as [`ends_with_trailer`] takes it, is damaged.
+    /// Returns whether what stands in front of a head, as [`ends_with_trailer`] takes it, is damaged.
     pub fn is_end_damaged(&mut self, front: Window) -> bool {
         !self.ended.holds(ends_with_trailer(front))
     }
@@ -147,7 +147,7 @@ impl CarriedDisparity {
         }
     }
 
-    /// Whether nearly all answers so far went on.
+    /// Returns whether nearly all answers so far went on.
     pub const fn is_rule(self) -> bool {
         self.kept >= Self::LEAST && self.kept >= self.broken.saturating_mul(Self::OF)
     }

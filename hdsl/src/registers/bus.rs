@@ -220,7 +220,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(())
     }
 
-    /// Whether the short message has ended, and the data that it brought if it was a reading.
+    /// Returns whether the short message has ended, and the data that it brought if it was a reading.
     ///
     /// # Errors
     /// Those of the bus.

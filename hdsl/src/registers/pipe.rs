@@ -110,7 +110,7 @@ impl PipeFifo {
         self.len
     }
 
-    /// Whether no entry waits.
+    /// Returns whether no entry waits.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -53,7 +53,7 @@ impl Cycle {
         Ok(Self { period_ns, next_ns: first_ns, missed: 0 })
     }
 
-    /// Whether a start is due at `now_ns`; if so, the next one is a period later.
+    /// Returns whether a start is due at `now_ns`; if so, the next one is a period later.
     #[must_use]
     pub fn is_due(&mut self, now_ns: u64) -> bool {
         let Some(late) = now_ns.checked_sub(self.next_ns) else { return false };

@@ -113,7 +113,7 @@ impl EchoWatch {
         }
     }
 
-    /// Whether the limit was reached.
+    /// Returns whether the limit was reached.
     pub const fn is_tripped(&self) -> bool {
         self.updates >= self.limit.get()
     }

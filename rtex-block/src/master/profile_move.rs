@@ -121,7 +121,7 @@ impl ProfileMove {
         self.stage
     }
 
-    /// Whether In_Progress was 1 and the end has not come.
+    /// Returns whether In_Progress was 1 and the end has not come.
     pub const fn is_moving(&self) -> bool {
         matches!(self.stage, MoveStage::Moving)
     }

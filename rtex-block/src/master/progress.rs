@@ -47,7 +47,7 @@ impl<T> Progress<T> {
         }
     }
 
-    /// Whether it goes on.
+    /// Returns whether it goes on.
     pub const fn is_pending(&self) -> bool {
         matches!(self, Self::Pending { .. })
     }

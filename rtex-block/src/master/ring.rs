@@ -163,12 +163,12 @@ impl<const N: usize> Ring<N> {
         self.axes.iter_mut().for_each(Axis::clear);
     }
 
-    /// Whether every axis is in this state.
+    /// Returns whether every axis is in this state.
     pub fn all_are(&self, state: AxisState) -> bool {
         self.axes.iter().all(|axis| axis.state() == state)
     }
 
-    /// Whether the communication with an axis has failed, be it stopped for another reason before.
+    /// Returns whether the communication with an axis has failed, be it stopped for another reason before.
     pub fn is_timed_out(&self) -> bool {
         let lost = |axis: &Axis| matches!(axis.state(), AxisState::Stopped(reason) if reason.is_communication());
         self.axes.iter().any(|axis| axis.is_silent() || lost(axis))

@@ -92,7 +92,7 @@ pub enum AxisState {
 }
 
 impl AxisState {
-    /// Whether the axis commands Servo_On = 1.
+    /// Returns whether the axis commands Servo_On = 1.
     pub const fn is_servo_on(self) -> bool {
         matches!(self, Self::SwitchingOn | Self::On | Self::Stopping(_) | Self::Held(_))
     }

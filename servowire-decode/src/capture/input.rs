@@ -98,12 +98,12 @@ impl Input {
         }
     }
 
-    /// Whether it may be silent for a while.
+    /// Returns whether it may be silent for a while.
     pub fn is_live(&self) -> bool {
         matches!(self.reader.get_ref(), Source::Live(_))
     }
 
-    /// Whether what is complete should be shown now.
+    /// Returns whether what is complete should be shown now.
     pub fn is_due(&mut self) -> bool {
         self.reader.get_mut().live().is_some_and(Live::is_overdue) || self.pauses()
     }

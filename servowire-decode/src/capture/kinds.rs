@@ -40,7 +40,7 @@ impl ByteLog {
         }
     }
 
-    /// Whether it says when its bytes were sent. To be asked before anything is read.
+    /// Returns whether it says when its bytes were sent. To be asked before anything is read.
     pub fn has_times(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.has_times(),
@@ -49,7 +49,7 @@ impl ByteLog {
         }
     }
 
-    /// Whether the next burst has to be waited for.
+    /// Returns whether the next burst has to be waited for.
     pub fn pauses(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.input().pauses(),

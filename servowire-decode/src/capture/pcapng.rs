@@ -88,7 +88,7 @@ impl Pcapng {
         Ok(Self { name, reader, packets: 0, live })
     }
 
-    /// Whether packets may come one by one.
+    /// Returns whether packets may come one by one.
     pub fn is_live(&self) -> bool {
         self.live
     }

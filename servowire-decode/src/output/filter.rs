@@ -37,7 +37,7 @@ impl Filter {
         Self { encoder, ..self }
     }
 
-    /// Whether times matter.
+    /// Returns whether times matter.
     pub fn has_times(&self) -> bool {
         self.from.is_some() || self.to.is_some()
     }

@@ -58,7 +58,7 @@ impl Register {
         Word(0x8000 | (self.code() as u16) << 12)
     }
 
-    /// Whether `read` may be what a register that holds `written` reads.
+    /// Returns whether `read` may be what a register that holds `written` reads.
     ///
     /// # Errors
     /// [`Error::ReadBack`]

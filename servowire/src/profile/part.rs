@@ -69,6 +69,9 @@ pub(super) fn write(
             places.push((pulse.tick as f64 / 1e9, axes.map(|axis| axis.position)));
         }
     }
+    if let Some(fault) = steps.fault() {
+        return Err(fault.to_string().into());
+    }
     writeln!(out, "path    {lines} straight lines in {:.6} s", steps.end() as f64 / 1e9)?;
     for (name, axis) in NAMES.iter().zip(&axes).filter(|(_, axis)| axis.steps > 0) {
         let fastest = axis.shortest.map_or(0.0, |ns| 1e6 / ns as f64);

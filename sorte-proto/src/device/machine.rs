@@ -107,7 +107,7 @@ impl Device {
         self.master_port().map_or(State::Idle, |port| self.port(port).state)
     }
 
-    /// Whether only one port is linked.
+    /// Returns whether only one port is linked.
     pub const fn is_last(&self) -> bool {
         self.a.flags.contains(PortFlags::LAST_DEVICE) || self.b.flags.contains(PortFlags::LAST_DEVICE)
     }

@@ -93,7 +93,7 @@ impl Axis {
         self.begin(handshake.ok_or(AskError::NotARequest)?, false)
     }
 
-    /// Whether a request can be sent now.
+    /// Returns whether a request can be sent now.
     pub fn can_ask(&self) -> bool {
         self.main.slot.asking().is_none() && self.main.quiet.is_kept() && !self.is_moving()
     }

@@ -65,7 +65,7 @@ pub struct Attributes {
 }
 
 impl Attributes {
-    /// Whether the alarm can be cleared, by the bits that the drive's manual names for that.
+    /// Returns whether the alarm can be cleared, by the bits that the drive's manual names for that.
     ///
     /// ```
     /// use rtex_block::master::procedure::{Attributes, ClearableIf};
