@@ -83,19 +83,22 @@ impl Alarm {
     pub const UPDATE_COUNTER: Self = Self { main: 86, sub: 2 };
     /// Err91.1: cyclic command error other than an undefined code.
     pub const COMMAND: Self = Self { main: 91, sub: 1 };
+
+    /// What it means, where a document that is public confirms it.
+    pub const fn meaning(self) -> Option<&'static str> {
+        match self {
+            Self::COMMAND_STEP => Some("too large a step of the position command"),
+            Self::CYCLIC_DATA => Some("MAC-ID, C/R or Sub_Chk of the commands stayed wrong"),
+            Self::CYCLIC_CODE => Some("the cyclic code stayed undefined"),
+            Self::UPDATE_COUNTER => Some("the Update_Counter did not count"),
+            Self::COMMAND => Some("cyclic command not possible in this mode"),
+            _ => None,
+        }
+    }
 }
 
-/// As the drive shows it, and what it means where that is confirmed.
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Err{}.{}", self.main, self.sub)?;
-        f.write_str(match *self {
-            Self::COMMAND_STEP => " (too large a step of the position command)",
-            Self::CYCLIC_DATA => " (MAC-ID, C/R or Sub_Chk of the commands stayed wrong)",
-            Self::CYCLIC_CODE => " (the cyclic code stayed undefined)",
-            Self::UPDATE_COUNTER => " (the Update_Counter did not count)",
-            Self::COMMAND => " (cyclic command not possible in this mode)",
-            _ => "",
-        })
+        write!(f, "Err{}.{}", self.main, self.sub)
     }
 }

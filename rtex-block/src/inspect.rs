@@ -21,7 +21,7 @@ mod log;
 use core::fmt;
 
 pub use fields::{Field, Fields, Value};
-pub use log::{LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
+pub use log::{DriveTrouble, LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
 
 use crate::block::{LEN, LEN32};
 use crate::code::Code;

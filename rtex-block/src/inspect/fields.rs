@@ -45,7 +45,11 @@ impl fmt::Display for Value {
             Self::Error(code) => code.fmt(f),
             Self::AlarmData([main, sub, low, high]) => {
                 let alarm = Alarm { main, sub };
-                write!(f, "{alarm} warning {high:02X}{low:02X}h, or attributes {high:02X}{low:02X}{sub:02X}{main:02X}h")
+                write!(f, "{alarm}")?;
+                if let Some(meaning) = alarm.meaning() {
+                    write!(f, " ({meaning})")?;
+                }
+                write!(f, " warning {high:02X}{low:02X}h, or attributes {high:02X}{low:02X}{sub:02X}{main:02X}h")
             }
             Self::Text(group) => write!(f, "\"{}\"", group.as_slice().escape_ascii()),
         }

@@ -104,6 +104,17 @@ servowire_core::codes! {
     }
 }
 
+/// A drive that somebody has to look after.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DriveTrouble {
+    /// Its address.
+    pub mac_id: MacId,
+    /// What it did.
+    pub trouble: Trouble,
+}
+
 /// What goes on at the end of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -370,13 +381,14 @@ impl LogAnalysis {
     }
 
     /// What the log holds that somebody has to look after, drive by drive.
-    pub fn troubles(&self) -> impl Iterator<Item = (MacId, Trouble)> {
+    pub fn troubles(&self) -> impl Iterator<Item = DriveTrouble> {
         let answered = self.tracks.iter().any(|track| track.responses > 0);
         (0..).zip(&self.tracks).flat_map(move |(number, track)| {
+            let mac_id = MacId::truncate(number);
             let silent = track.fell_silent || answered && track.responses == 0 && track.commands > 0;
             let found =
                 [(track.alarmed, Trouble::Alarm), (track.stood, Trouble::EchoStood), (silent, Trouble::Silence)];
-            found.into_iter().filter(|(is, _)| *is).map(move |(_, trouble)| (MacId::truncate(number), trouble))
+            found.into_iter().filter(|(is, _)| *is).map(move |(_, trouble)| DriveTrouble { mac_id, trouble })
         })
     }
 

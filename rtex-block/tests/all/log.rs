@@ -1,6 +1,6 @@
 //! What a log shows between its blocks, by hand-written bytes.
 
-use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
+use rtex_block::inspect::{DriveTrouble, LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
 use rtex_block::position::Gear;
 use rtex_block::{BlockSize, Code, MacId, UpdateCounter};
 
@@ -371,7 +371,8 @@ fn what_somebody_has_to_look_after() {
         block[..3].copy_from_slice(&[0x85 | echo << 5, 0x20, status]);
         block
     };
-    let said = |log: &LogAnalysis| log.troubles().map(|(id, it)| format!("{id} {}", it.name())).collect::<Vec<_>>();
+    let said =
+        |log: &LogAnalysis| log.troubles().map(|it| format!("{} {}", it.mac_id, it.trouble.name())).collect::<Vec<_>>();
     let mut log = LogAnalysis::new(None, Gear::UNITY);
     for k in 0..4 {
         log.block(&command(k, 0x20, 0)).count();
@@ -394,7 +395,7 @@ fn what_somebody_has_to_look_after() {
         (0..commands).for_each(|k| _ = log.block(&command(k, 0x20, 0)).count());
         log.block(&response(1, 0x40)).count();
         let troubles: Vec<_> = log.troubles().collect();
-        let want = (MacId::new(5).unwrap(), Trouble::Silence);
+        let want = DriveTrouble { mac_id: MacId::new(5).unwrap(), trouble: Trouble::Silence };
         assert_eq!(troubles, [want].into_iter().filter(|_| silent).collect::<Vec<_>>(), "{commands}");
     }
     let mut log = LogAnalysis::new(None, Gear::UNITY);

@@ -10,7 +10,7 @@ mod describe;
 use std::collections::HashMap;
 use std::io;
 
-use rtex_block::inspect::{self, Cause, LogAnalysis, LogFinding, LogShape, Report, Trouble, inspect};
+use rtex_block::inspect::{self, Cause, DriveTrouble, LogAnalysis, LogFinding, LogShape, Report, inspect};
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
@@ -265,7 +265,7 @@ impl LogDecoder for Decoder {
 
     /// What is wrong with the log as a whole, and what somebody has to look after.
     fn found(&self) -> Found {
-        let said = |(drive, trouble): (_, Trouble)| format!("drive {drive} {}", trouble.name());
+        let said = |it: DriveTrouble| format!("drive {} {}", it.mac_id, it.trouble.name());
         let troubles: Vec<String> = self.analysis.troubles().map(said).collect();
         let trouble = (!troubles.is_empty()).then(|| troubles.join("; "));
         Found { misread: self.misread.clone(), trouble }
