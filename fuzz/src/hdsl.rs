@@ -197,7 +197,7 @@ pub fn master(mut data: &[u8]) {
             _ => core::array::from_fn(|_| byte(&mut data)),
         };
         if options & 2 != 0 {
-            master.hear_pulse(i16::from(samples[0].cast_signed()));
+            master.hear_pulse(i16::from(i8::from_le_bytes([samples[0]])));
         }
         let h_frame = *master.hear(&samples, 0).expect("there are enough samples");
         let _ = map.apply(&h_frame);
