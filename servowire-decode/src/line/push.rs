@@ -168,7 +168,8 @@ impl PushDecoder {
             return Ok(());
         };
         out.lane(0);
-        running.decoder.samples(samples.turned(taps.iter().any(|tap| tap.inverted)), out)
+        let samples = if taps.iter().any(|tap| tap.inverted) { samples.inverted() } else { samples };
+        running.decoder.samples(samples, out)
     }
 
     /// Nothing else has changed until `time`. To be called after each piece: what was held back to see what it is, is
