@@ -42,7 +42,7 @@ pub use head::{
     head_fault, is_coded_for_balance,
 };
 pub use nrz_line::Cause as LineCause;
-pub use rules::{BrokenRule, CarriedDisparity, HeadRules};
+pub use rules::{Beginnings, BrokenRule, HeadRules};
 
 /// What a frame is answered with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
