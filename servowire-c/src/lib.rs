@@ -11,6 +11,7 @@ mod clock;
 pub mod hdsl;
 pub mod motion;
 pub mod nrz;
+mod procedure;
 mod result;
 pub mod rtex;
 pub mod sorte;

@@ -96,16 +96,20 @@ impl Transaction {
     /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
     /// [`Error::Line`]: it is not to be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
-        let mut it = Self::IDLE;
-        it.restart(request, resolution, line, start_ns);
-        it
+        Self::begun(request, resolution, line, start_ns)
     }
 
     /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, line: Line, start_ns: u64) {
+        *self = Self::begun(request, resolution, line, start_ns);
+    }
+
+    /// Inlined, so that it is made where it is to be.
+    #[inline(always)]
+    fn begun(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
         let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
-        *self = Self {
+        Self {
             request,
             expected,
             line,
@@ -116,7 +120,7 @@ impl Transaction {
             refused: None,
             end: refusal(request, resolution, &line).map(Err),
             ready_ns: start_ns,
-        };
+        }
     }
 
     /// What is to be sent, and when.
@@ -140,17 +144,6 @@ impl Transaction {
     /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
     /// was switched on. If that is after the request, a response may stand anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
-        self.take(frames, since_ns, end_ns);
-        self.progress()
-    }
-
-    /// The same as [`hear`](Self::hear) for an interrupt: it copies no response, and says [how it ended](Self::outcome).
-    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<&Result<Exchange, Error>> {
-        self.take(frames, 0, end_ns);
-        self.outcome()
-    }
-
-    fn take(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) {
         if self.end.is_none() {
             let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
             let others = expected.command().is_multi_response();
@@ -166,6 +159,13 @@ impl Transaction {
                 Err(error) => *refused = refused.or(Some(error)),
             });
         }
+        self.progress()
+    }
+
+    /// The same as [`hear`](Self::hear) for an interrupt, which has no use for a copy of the response: [how it ended](Self::outcome).
+    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<&Result<Exchange, Error>> {
+        let _ = self.hear(frames, end_ns);
+        self.outcome()
     }
 
     /// Where the transaction stands at `now_ns`; it fails if no answer can come any more.
@@ -182,7 +182,7 @@ impl Transaction {
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress<Exchange> {
         match self.end {
-            None => Progress::Pending { until_ns: self.until_ns() },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
             Some(Ok(value)) => Progress::Done { value, ready_ns: self.ready_ns },
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
         }
@@ -250,13 +250,17 @@ impl BusTransaction {
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
     pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
-        let mut it = Self::IDLE;
-        it.restart(request, resolution, asked, line, start_ns);
-        it
+        Self::begun(request, resolution, asked, line, start_ns)
     }
 
     /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) {
+        *self = Self::begun(request, resolution, asked, line, start_ns);
+    }
+
+    /// Inlined, so that it is made where it is to be.
+    #[inline(always)]
+    fn begun(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
         let line = match asked.highest() {
             Some(highest) => line.with_highest(line.highest.max(highest)),
@@ -264,7 +268,7 @@ impl BusTransaction {
         };
         let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
         let refused = refusal(request, resolution, &line);
-        *self = Self {
+        Self {
             request,
             expected,
             line,
@@ -277,7 +281,7 @@ impl BusTransaction {
             ended: asked.is_empty() || refused.is_some(),
             refused,
             ready_ns: start_ns,
-        };
+        }
     }
 
     /// What is to be sent, and when.
@@ -301,17 +305,6 @@ impl BusTransaction {
     /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
     /// was switched on. If that is after the request, a response may stand anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
-        self.take(frames, since_ns, end_ns);
-        self.progress()
-    }
-
-    /// The same as [`hear`](Self::hear) for an interrupt: it says [how it ended](Self::outcome).
-    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Result<(), Error>> {
-        self.take(frames, 0, end_ns);
-        self.outcome()
-    }
-
-    fn take(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) {
         if !self.ended {
             let Self { hunt, line, expected, bus, began_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
@@ -328,6 +321,13 @@ impl BusTransaction {
             self.ended = self.bus.heard_all();
             self.free();
         }
+        self.progress()
+    }
+
+    /// The same as [`hear`](Self::hear), and it says [how it ended](Self::outcome).
+    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Result<(), Error>> {
+        let _ = self.hear(frames, end_ns);
+        self.outcome()
     }
 
     /// Where the transaction stands at `now_ns`; it is over if no answer can come any more.
@@ -353,7 +353,7 @@ impl BusTransaction {
         match self.outcome() {
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
             Some(Ok(())) => Progress::Done { value: (), ready_ns: self.ready_ns },
-            None => Progress::Pending { until_ns: self.until_ns() },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
         }
     }
 

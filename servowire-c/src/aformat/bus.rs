@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{BusTransaction, Line};
+use nikon_aformat::master::{BusTransaction, Line, Transmission};
 use nikon_aformat::{BitRate, EncoderAddress, Evidence, Policy, Resolution, Tolerated};
 
 use super::codec::{
@@ -48,7 +48,7 @@ pub struct sw_aformat_transmission_t {
 }
 
 /// Frames of a block at most.
-const LONGEST: usize = 48;
+pub(super) const LONGEST: usize = 48;
 
 impl Master {
     /// The transaction, if one was asked for.
@@ -77,6 +77,12 @@ impl Master {
         if let (Some(exchange), Some(evidence)) = (exchange, self.evidence.get_mut(usize::from(ea.get()))) {
             *evidence = exchange.evidence(self.resolution);
         }
+    }
+
+    /// The line and the widths, while no exchange is pending.
+    pub(super) fn idle(&self) -> Result<(Line, Resolution), Refused> {
+        let idle = self.transaction.outcome().is_some();
+        if idle { Ok((self.line, self.resolution)) } else { Err(sw_code_t::SW_E_NOT_FREE as sw_result_t) }
     }
 
     fn of(&self, ea: u8) -> Option<&Evidence> {
@@ -147,19 +153,46 @@ pub extern "C" fn sw_aformat_read(
         if let Some(Err(refusal)) = m.transaction.outcome() {
             return Err(error(refusal));
         }
-        let transmission = m.transaction.transmission();
-        let mut contents = [0; 4];
-        for (to, frame) in contents.iter_mut().zip(transmission.frames.as_slice()) {
-            *to = frame.word(nikon_aformat::BitOrder::LsbFirst);
-        }
-        to_send.write(sw_aformat_transmission_t {
-            start_ns: transmission.start_ns,
-            end_ns: transmission.end_ns,
-            contents,
-            len: u8::try_from(transmission.frames.as_slice().len()).unwrap_or(4),
-        });
+        sent(&m.transaction.transmission(), to_send);
         Ok(sw_code_t::SW_SEND as sw_result_t)
     })
+}
+
+/// What is to be sent as C reads it. A request without a bank has four frames at most.
+pub(super) fn sent(transmission: &Transmission, to_send: &mut MaybeUninit<sw_aformat_transmission_t>) {
+    let mut contents = [0; 4];
+    for (to, frame) in contents.iter_mut().zip(transmission.frames.as_slice()) {
+        *to = frame.word(nikon_aformat::BitOrder::LsbFirst);
+    }
+    to_send.write(sw_aformat_transmission_t {
+        start_ns: transmission.start_ns,
+        end_ns: transmission.end_ns,
+        contents,
+        len: u8::try_from(transmission.frames.as_slice().len()).unwrap_or(4),
+    });
+}
+
+/// The frames of the caller, those that are not framed as `None`.
+///
+/// # Safety
+/// As for [`read`]: `framed` is NULL or has a byte for each of the contents.
+#[inline(always)]
+pub(super) unsafe fn block(
+    contents: *const u16,
+    framed: *const u8,
+    count: usize,
+    frames: &mut [Option<u16>; LONGEST],
+) -> Result<&[Option<u16>], Refused> {
+    // SAFETY: the caller vouches for it.
+    let contents = unsafe { read(contents, count)? };
+    // SAFETY: as above.
+    let framed = if framed.is_null() { None } else { Some(unsafe { read(framed, count)? }) };
+    let block = in_range(frames.get_mut(..count))?;
+    for (at, (to, content)) in block.iter_mut().zip(contents).enumerate() {
+        let sound = framed.and_then(|framed| framed.get(at)).is_none_or(|framed| *framed != 0);
+        *to = sound.then_some(*content);
+    }
+    Ok(block)
 }
 
 /// Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
@@ -174,17 +207,10 @@ pub unsafe extern "C" fn sw_aformat_hear(
     end_ns: u64,
 ) -> sw_result_t {
     border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let contents = unsafe { read(contents, count)? };
-        // SAFETY: as above.
-        let framed = if framed.is_null() { None } else { Some(unsafe { read(framed, count)? }) };
-        let (m, end_ns) = (sw_aformat_t::get(m)?, time(end_ns)?);
         let mut frames = [None; LONGEST];
-        let block = in_range(frames.get_mut(..count))?;
-        for (at, (to, content)) in block.iter_mut().zip(contents).enumerate() {
-            let sound = framed.and_then(|framed| framed.get(at)).is_none_or(|framed| *framed != 0);
-            *to = sound.then_some(*content);
-        }
+        // SAFETY: the caller of the C function vouches for his memory.
+        let block = unsafe { block(contents, framed, count, &mut frames)? };
+        let (m, end_ns) = (sw_aformat_t::get(m)?, time(end_ns)?);
         m.told()?.push(block, end_ns);
         m.result()
     })

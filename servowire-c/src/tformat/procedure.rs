@@ -9,6 +9,7 @@ use super::codec::error;
 use super::master::{sw_tformat_t, sw_tformat_transmission_t};
 use crate::border::{OK, Refused, border, in_range, state, there};
 use crate::clock::time;
+use crate::procedure::{ended, plain};
 use crate::result::{sw_code_t, sw_result_t};
 
 /// A procedure of several exchanges: it says what to send, and decides what to repeat. Its content is private.
@@ -34,11 +35,6 @@ pub(crate) struct Procedure {
     next: Step<u32>,
     /// The exchange of `next` has begun.
     asked: bool,
-}
-
-/// The value of a procedure as a number: what C asks for.
-fn plain<T>(step: Step<T>, number: impl FnOnce(T) -> u32) -> Step<u32> {
-    step.and_then(|value, ready_ns| Step::Done { value: number(value), ready_ns })
 }
 
 impl Kind {
@@ -198,19 +194,5 @@ pub extern "C" fn sw_tformat_value(
     value: Option<&mut MaybeUninit<u32>>,
     ready_ns: Option<&mut MaybeUninit<u64>>,
 ) -> sw_result_t {
-    border(|| {
-        let (p, value) = (sw_tformat_procedure_t::look(p)?, there(value)?);
-        let (result, end_ns) = match p.next {
-            Step::Send { .. } => return Ok(sw_code_t::SW_PENDING as sw_result_t),
-            Step::Done { value: it, ready_ns } => {
-                value.write(it);
-                (OK, ready_ns)
-            }
-            Step::Failed { error: refusal, ready_ns } => (Err(error(refusal)), ready_ns),
-        };
-        if let Some(ready_ns) = ready_ns {
-            ready_ns.write(end_ns);
-        }
-        result
-    })
+    border(|| ended(&sw_tformat_procedure_t::look(p)?.next, value, ready_ns, error))
 }

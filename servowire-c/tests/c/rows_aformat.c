@@ -97,6 +97,61 @@ static void build(char **a, int n)
     say(" %u %u", layout, size);
 }
 
+/* KIND(read, write, reset) EA COMMAND ADDRESS DATA, then an answer each: WORD,WORD... or - for none. What is sent, how long after the end of
+ * the answer before, and the end. */
+static void procedure(char **a, int n)
+{
+    static const sw_aformat_encoder_t encoder = {20, 16, 0};
+    uint8_t ea = U8(a[1]), address = U8(a[3]);
+    uint64_t now = 1000000, ended = 0;
+    sw_aformat_t m;
+    sw_aformat_procedure_t p;
+    sw_aformat_transmission_t tx;
+    uint32_t value = 0;
+    sw_result_t r;
+    int k;
+    (void)sw_aformat_init(&m, 4000000, &encoder);
+    r = strcmp(a[0], "read") == 0    ? sw_aformat_eeprom_read(&p, &m, ea, address, 0, now)
+        : strcmp(a[0], "write") == 0 ? sw_aformat_eeprom_write(&p, &m, ea, address, U16(a[4]), 0, now)
+                                     : sw_aformat_reset(&p, &m, U8(a[2]), ea, 0, now);
+    say("%s", sw_text(r));
+    for (k = 5; (r = sw_aformat_next(&p, now, &tx)) == SW_SEND; k++) {
+        uint16_t *answer, count = 0;
+        char *word;
+        if (ended != 0) {
+            say(" %llu", (unsigned long long)(tx.start_ns - ended) / 1000);
+        }
+        say(" ");
+        for (count = 0; count < tx.len; count++) {
+            say("%04x%s", tx.contents[count], count + 1 < tx.len ? "," : "");
+        }
+        if (k >= n) {
+            say(" and no answer is left");
+            return;
+        }
+        answer = (uint16_t *)(void *)hex("000000000000000000000000").at;
+        count = 0;
+        for (word = a[k]; *word != '-' && count < 6; word += strlen(word) > 4 ? 5 : 4) {
+            if (strlen(word) < 4) {
+                break;
+            }
+            answer[count++] = (uint16_t)strtoul(word, NULL, 16);
+        }
+        if (count > 0) {
+            ended = now = tx.end_ns + 3000 + count * 4500u;
+            say(" %s", sw_text(sw_aformat_procedure_hear(&p, answer, NULL, count, now)));
+        } else {
+            ended = now = sw_aformat_procedure_until_ns(&p);
+            say(" %s", sw_text(sw_aformat_procedure_poll(&p, now)));
+        }
+    }
+    say(" %s", sw_text(r));
+    if (sw_aformat_value(&p, &value, NULL) == SW_OK) {
+        say(" %u", value);
+    }
+}
+
 const entry_t aformat_commands[] = {
-    {"aformat_line", line}, {"aformat_words", words}, {"aformat_asked", asked}, {"aformat_build", build}, {NULL, NULL},
+    {"aformat_line", line}, {"aformat_words", words}, {"aformat_asked", asked}, {"aformat_build", build},
+    {"aformat_procedure", procedure}, {NULL, NULL},
 };

@@ -101,6 +101,36 @@ pub struct Transaction {
     end: Option<Result<Exchange, Error>>,
 }
 
+/// Begins a transaction where it is to be: what a function gives back is copied there.
+macro_rules! begin {
+    ($place:expr, $request:ident, $line:ident, $start_ns:ident) => {
+        let frame = $request.emit();
+        let asked_ns = $start_ns.saturating_add($line.rate.fields_ns(frame.fields()).into());
+        let field_ns = u64::from($line.rate.fields_ns(1));
+        let wait_ns = u64::from($line.response_timeout_ns).saturating_add($line.hand_over_ns.into());
+        let waited_ns = asked_ns.saturating_add(wait_ns);
+        let ends = !$line.leaves_time();
+        $place = Transaction {
+            request: $request,
+            frame,
+            line: $line,
+            fields: $request.data_id().response_fields(),
+            start_ns: $start_ns,
+            asked_ns,
+            earliest_ns: asked_ns.saturating_add($line.turn_around_ns.into()).saturating_add(field_ns),
+            received: [0; Frame::MAX_FIELDS],
+            len: 0,
+            echoed: 0,
+            echo_fault: None,
+            refused: None,
+            broken: false,
+            heard_ns: asked_ns,
+            until_ns: if ends { $start_ns } else { waited_ns.saturating_add(field_ns) },
+            end: if ends { Some(Err(Error::Line)) } else { None },
+        };
+    };
+}
+
 impl Transaction {
     /// Nothing was asked and nothing is answered: a place for [`restart`](Self::restart). It counts as one that has ended with
     /// [`Error::NoResponse`], and its line is free at any time.
@@ -127,37 +157,14 @@ impl Transaction {
     ///
     /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
-        let mut it = Self::IDLE;
-        it.restart(request, line, start_ns);
+        let it;
+        begin!(it, request, line, start_ns);
         it
     }
 
     /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, line: Line, start_ns: u64) {
-        let frame = request.emit();
-        let asked_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
-        let field_ns = u64::from(line.rate.fields_ns(1));
-        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
-        let waited_ns = asked_ns.saturating_add(wait_ns);
-        let ends = !line.leaves_time();
-        *self = Self {
-            request,
-            frame,
-            line,
-            fields: request.data_id().response_fields(),
-            start_ns,
-            asked_ns,
-            earliest_ns: asked_ns.saturating_add(line.turn_around_ns.into()).saturating_add(field_ns),
-            received: [0; Frame::MAX_FIELDS],
-            len: 0,
-            echoed: 0,
-            echo_fault: None,
-            refused: None,
-            broken: false,
-            heard_ns: asked_ns,
-            until_ns: if ends { start_ns } else { waited_ns.saturating_add(field_ns) },
-            end: if ends { Some(Err(Error::Line)) } else { None },
-        };
+        begin!(*self, request, line, start_ns);
     }
 
     /// The fields to send, and when.
@@ -264,7 +271,7 @@ impl Transaction {
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress {
         match self.end {
-            None => Progress::Pending { until_ns: self.until_ns() },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
             Some(Ok(value)) => Progress::Done { value, ready_ns: self.until_ns },
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.until_ns },
         }
