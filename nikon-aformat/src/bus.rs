@@ -23,6 +23,8 @@
 
 use nrz_line::BitOrder;
 
+use crate::abs40::Abs40;
+use crate::data::Data;
 use crate::error::Error;
 use crate::expected::Expected;
 use crate::number::EncoderAddress;
@@ -158,6 +160,11 @@ pub struct Bus {
 }
 
 impl Bus {
+    /// What is expected of each response.
+    pub const fn expected(&self) -> &Expected {
+        &self.expected
+    }
+
     /// Responses of this kind are expected from these addresses.
     pub const fn new(expected: Expected, asked: Addresses) -> Self {
         let expected = expected.any_address();
@@ -181,6 +188,14 @@ impl Bus {
     #[inline(always)]
     pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         self.take(Response::parse_words(&self.expected, words, order))
+    }
+
+    /// The words of a response that [`Abs40`] decodes, where nothing but positions is asked for: it costs less flash than
+    /// [`push_words`](Self::push_words), which knows all layouts.
+    pub fn push_abs40(&mut self, words: &[u16], order: BitOrder) -> Verdict {
+        let outcome = Abs40::parse_words(&self.expected, words, order);
+        let command = self.expected.command();
+        self.take(outcome.map(|Abs40 { ea, es, abs }| Response::new(ea, command, es, Data::Abs40 { abs })))
     }
 
     /// A response that was judged already.

@@ -27,6 +27,26 @@
 #define SW_SORTE_DATA_AT 2
 
 /**
+ * The release of this header, before the first dot.
+ */
+#define SERVOWIRE_VERSION_MAJOR 0
+
+/**
+ * The release of this header, between the dots.
+ */
+#define SERVOWIRE_VERSION_MINOR 1
+
+/**
+ * The release of this header, behind the second dot.
+ */
+#define SERVOWIRE_VERSION_PATCH 0
+
+/**
+ * The release of this header as one number, 8 bits each: a later one is greater.
+ */
+#define SERVOWIRE_VERSION (((SERVOWIRE_VERSION_MAJOR << 16) | (SERVOWIRE_VERSION_MINOR << 8)) | SERVOWIRE_VERSION_PATCH)
+
+/**
  * Refusals of A-format, in the order of their numbers.
  */
 enum sw_aformat_error_t
@@ -1428,6 +1448,24 @@ typedef struct {
 } sw_aformat_request_t;
 
 /**
+ * The response with the whole position.
+ */
+typedef struct {
+    /**
+     * Position bits as received, 40: the single turn in the low ones.
+     */
+    uint64_t abs;
+    /**
+     * EA: who answers.
+     */
+    uint8_t ea;
+    /**
+     * ES: sw_aformat_es_t.
+     */
+    uint8_t es;
+} sw_aformat_abs40_t;
+
+/**
  * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
  * private; it may be copied.
  */
@@ -2200,12 +2238,38 @@ sw_result_t sw_aformat_parse_line(uint8_t command,
                                   sw_aformat_response_t *response);
 
 /**
+ * The response of layout ABS40 to command 0 or 4 from its four frames, a 16-bit word each, with all checks; `ea` 255 is any.
+ */
+sw_result_t sw_aformat_parse_abs40(uint8_t command,
+                                   uint8_t ea,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   uint8_t order,
+                                   sw_aformat_abs40_t *data);
+
+/**
  * Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
  */
 sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
                                  const sw_aformat_request_t *asked,
                                  const sw_aformat_encoder_t *encoder,
                                  uint8_t addresses);
+
+/**
+ * The same for the whole position of all who are asked: command 4 to the highest of them, for sw_aformat_bus_push_abs40().
+ */
+sw_result_t sw_aformat_bus_start_abs40(sw_aformat_bus_t *bus,
+                                       uint8_t addresses);
+
+/**
+ * One response of four frames came, a 16-bit word each. The results are those of sw_aformat_bus_push(), for less flash: nothing but
+ * positions is known. SW_E_ARGUMENT for a bus that was started for another layout.
+ */
+sw_result_t sw_aformat_bus_push_abs40(sw_aformat_bus_t *bus,
+                                      const uint16_t *words,
+                                      size_t count,
+                                      uint8_t order,
+                                      sw_aformat_abs40_t *data);
 
 /**
  * One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
@@ -2910,6 +2974,12 @@ sw_result_t sw_tformat_parse_encoder_id(const uint8_t *bytes, size_t len, sw_tfo
  * The response to ID 3 from UART bytes.
  */
 sw_result_t sw_tformat_parse_all(const uint8_t *bytes, size_t len, sw_tformat_all_t *data);
+
+/**
+ * The release of the library: SERVOWIRE_VERSION, or the header that was compiled in belongs to another one. States and structs may
+ * differ then: compare it once, before the first state is started.
+ */
+uint32_t sw_version(void);
 
 #ifdef __cplusplus
 }  // extern "C"

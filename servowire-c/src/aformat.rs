@@ -15,4 +15,7 @@ pub use codec::{
     sw_aformat_parse_line, sw_aformat_request_t, sw_aformat_response_t,
 };
 pub use names::{sw_aformat_error_t, sw_aformat_es_t, sw_aformat_layout_t, sw_aformat_option_t};
-pub use words::{sw_aformat_bus_missing, sw_aformat_bus_push, sw_aformat_bus_start, sw_aformat_bus_t};
+pub use words::{
+    sw_aformat_abs40_t, sw_aformat_bus_missing, sw_aformat_bus_push, sw_aformat_bus_push_abs40, sw_aformat_bus_start,
+    sw_aformat_bus_start_abs40, sw_aformat_bus_t, sw_aformat_parse_abs40,
+};

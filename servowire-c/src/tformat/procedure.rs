@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, MultiTurnZero, Progress, Reset, SingleTurnZero, Step};
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
 use tformat::{Address, Error, Page, Resolution, Response};
 
 use super::codec::error;
@@ -168,14 +168,11 @@ pub extern "C" fn sw_tformat_next(
         let (p, m) = (sw_tformat_procedure_t::get(p)?, sw_tformat_t::get(m)?);
         let (now_ns, to_send) = (time(now_ns)?, there(to_send)?);
         if p.asked {
-            let ended = m.transaction.map(|transaction| transaction.progress());
-            let (outcome, ready_ns) = match ended {
-                Some(Progress::Pending { .. }) => return Ok(sw_code_t::SW_PENDING as sw_result_t),
-                Some(Progress::Done { value, ready_ns }) => (Ok(value.response), ready_ns),
-                Some(Progress::Failed { error, ready_ns }) => (Err(error), ready_ns),
-                None => return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
-            };
-            p.next = p.kind.receive(outcome, ready_ns);
+            if !m.asked {
+                return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t);
+            }
+            let Some(outcome) = m.transaction.outcome() else { return Ok(sw_code_t::SW_PENDING as sw_result_t) };
+            p.next = p.kind.receive(outcome.map(|value| value.response), m.transaction.until_ns());
             p.asked = false;
         }
         match p.next {

@@ -104,4 +104,5 @@ def tx_transactions(row):
     return [(f"aformat_build {cmd} {row['ea']} {fc} {args.get('addr', 0)} {bank or 0} {data} {options}", expected)]
 
 
-TOPICS = {"rx_responses": rx_responses, "rx_bitflips": judged, "rx_negative": judged, "tx_transactions": tx_transactions}
+rx_bitflips = judged
+rx_negative = judged
