@@ -219,6 +219,15 @@ impl Bus {
         Verdict { outcome, duplicate, extra }
     }
 
+    /// The good response of this address was none: frames of two, with a CRC-8 that is right by chance.
+    pub(crate) fn withdraw(&mut self, ea: EncoderAddress) {
+        if let Some(place) = self.good.get_mut(usize::from(ea.get() & 7)) {
+            *place = None;
+            self.heard = self.heard.without(Addresses::NONE.with(ea));
+            self.damaged = self.damaged.saturating_add(1);
+        }
+    }
+
     /// What came from this address.
     pub fn of(&self, ea: EncoderAddress) -> Outcome {
         match self.good.get(usize::from(ea.get())).copied().flatten() {
@@ -279,7 +288,7 @@ impl Bus {
     }
 
     /// Returns whether every address that was asked has sent a good response.
-    pub const fn heard_all(&self) -> bool {
+    pub(crate) const fn heard_all(&self) -> bool {
         self.missing().is_empty()
     }
 }

@@ -121,7 +121,7 @@ impl<'a> Output<'a> {
     }
 
     /// A further line is decoded; it has the next number, from 0.
-    pub fn begin_lane(&mut self, lane: Lane) {
+    pub(crate) fn begin_lane(&mut self, lane: Lane) {
         self.origin.lanes.push(lane);
     }
 

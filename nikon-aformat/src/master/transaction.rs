@@ -308,6 +308,9 @@ impl BusTransaction {
         if !self.ended {
             let Self { hunt, line, expected, bus, began_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
+                if let Some(ea) = found.instead_of {
+                    bus.withdraw(ea);
+                }
                 if let Ok(response) = found.outcome {
                     if let Some(began) = began_ns.get_mut(usize::from(response.ea.get())) {
                         *began = found.began_ns;

@@ -136,6 +136,32 @@ fn no_response_is_lost_on_a_sound_line() {
     assert!(chances > 100, "{chances}");
 }
 
+/// The last two frames of a response are lost, and the CRC-8 over the first two and those that begin the next one is right by
+/// chance. Frame by frame that is known only when the next one is complete: it is heard, and the other one is withdrawn.
+#[test]
+fn a_response_is_not_lost_in_the_rest_of_another() {
+    let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
+    let expected = request.expected(Resolution::default());
+    let mut chances = 0;
+    for position in 0..1 << 16 {
+        let first = response(Command::Abs40Mt, 0, position).emit().contents().to_vec();
+        let sent = response(Command::Abs40Mt, 1, 0x1234);
+        let second = sent.emit().contents().to_vec();
+        let chance: Vec<_> = first[..2].iter().chain(&second[..2]).copied().collect();
+        if Response::parse_words(&expected, &chance, BitOrder::LsbFirst).is_err() {
+            continue;
+        }
+        chances += 1;
+        let mut bus = bus(0b111, LINE);
+        for (k, content) in (1..).zip(first[..2].iter().chain(&second)) {
+            let _ = bus.hear(&[Some(*content)], 10_000 + k * FRAME_NS);
+        }
+        assert_eq!(bus.bus().of(ea(1)), Outcome::Good(sent), "{position:#x}");
+        assert_eq!((bus.bus().of(ea(0)), bus.bus().damaged()), (Outcome::Missing, 1), "{position:#x}");
+    }
+    assert!(chances > 100, "{chances}");
+}
+
 /// The first frame comes twice, and the CRC-8 over it and the first three frames is right by chance: the response begins with
 /// the second of them.
 #[test]
