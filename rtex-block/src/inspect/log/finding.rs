@@ -1,0 +1,188 @@
+//! What a log shows between its blocks.
+
+use core::fmt;
+
+use crate::code::Code;
+use crate::header::{MacId, UpdateCounter};
+
+/// Something that a log shows between its blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum LogFinding {
+    /// The echo of the counter stands still for more than the two communications that an update period can have.
+    EchoStands {
+        /// Responses in a row with the same echo.
+        responses: u32,
+    },
+    /// The echo of the counter stood still for longer than that, and goes on.
+    EchoGoesOn {
+        /// Responses in a row with the same echo.
+        responses: u32,
+    },
+    /// The counter of the commands did not go on by one, nor stay for the second communication of an update period.
+    CounterJumps {
+        /// Before.
+        from: UpdateCounter,
+        /// Now.
+        to: UpdateCounter,
+    },
+    /// The code of the commands has come back, later than one command after the other.
+    CodeLate {
+        /// Responses from the first command with this code to its echo.
+        responses: u32,
+    },
+    /// A step of the command position above 400 M pulses per second after the electronic gear: Err27.4.
+    PositionStep {
+        /// The step, command units.
+        step: i32,
+        /// The largest, command units.
+        max: u32,
+    },
+    /// A request was answered.
+    Answered {
+        /// Responses from the first command with the request to the first answer without Busy.
+        responses: u32,
+        /// Of these, with Busy.
+        busy: u32,
+    },
+    /// An alarm command with Index 0 was answered with another index. Only the read-out of attributes does that: bytes 12-15 are
+    /// no alarm and no warning.
+    Attributes {
+        /// Index_Echo: the alarm that is being issued.
+        alarm: u16,
+        /// Bytes 12-15, byte 12 in bits 7-0.
+        bits: u32,
+    },
+    /// Another request, or the normal command, takes the place of a request that was not answered in more than three
+    /// responses.
+    GivenUp {
+        /// The code of the request.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+        /// Of these, with Busy.
+        busy: u32,
+    },
+    /// The drive has answered before, and not to the last commands: more than the two communications that an update period
+    /// can have.
+    NoAnswer {
+        /// Commands without an answer.
+        commands: u32,
+    },
+    /// The drive was silent for longer than that, and answers.
+    AnswersAgain {
+        /// Commands without an answer.
+        commands: u32,
+    },
+    /// Drives were sent commands, and this one never answered.
+    NeverAnswered(MacId),
+    /// This drive answers and was never sent a command.
+    NeverAsked(MacId),
+    /// At the end of the log something of a drive goes on.
+    AtEnd(MacId, Unfinished),
+}
+
+servowire_core::codes! {
+    /// What a drive did that somebody has to look after.
+    pub enum Trouble: u8 {
+        /// It reported an alarm.
+        Alarm = 1 => "reported an alarm",
+        /// Its counter echo stood still: the communication, or the drive, did.
+        EchoStood = 2 => "sent a counter echo that stood still",
+        /// It did not answer.
+        Silence = 3 => "did not answer",
+    }
+}
+
+/// A drive that somebody has to look after.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DriveTrouble {
+    /// Its address.
+    pub mac_id: MacId,
+    /// What it did.
+    pub trouble: Trouble,
+}
+
+/// What goes on at the end of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Unfinished {
+    /// The echo of the counter stands still.
+    Echo {
+        /// Responses in a row with the same echo.
+        responses: u32,
+    },
+    /// The drive is silent.
+    Silence {
+        /// Commands without an answer.
+        commands: u32,
+    },
+    /// A request is not answered.
+    Request {
+        /// The code of the request.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+        /// Of these, with Busy.
+        busy: u32,
+    },
+    /// The code of the commands has not come back.
+    Code {
+        /// The code.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+    },
+}
+
+impl fmt::Display for LogFinding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EchoStands { responses } => write!(f, "the counter echo stands still for {responses} responses"),
+            Self::EchoGoesOn { responses } => write!(f, "the counter echo goes on after {responses} responses"),
+            Self::CounterJumps { from, to } => write!(f, "the counter goes from {from} to {to}"),
+            Self::CodeLate { responses } => write!(f, "the code came back after {responses} responses"),
+            Self::PositionStep { step, max } => write!(f, "position step {step}, at most {max}: Err27.4"),
+            Self::Answered { responses, busy } => {
+                write!(f, "answered after {responses} responses, {busy} of them busy")
+            }
+            Self::Attributes { alarm, bits } => {
+                write!(f, "attributes {bits:08X}h of the alarm with index {alarm:04X}h")
+            }
+            Self::GivenUp { code, responses, busy } => {
+                code.write(f)?;
+                write!(f, " is given up after {responses} responses, {busy} of them busy")
+            }
+            Self::NoAnswer { commands } => write!(f, "no answer to the last {commands} commands"),
+            Self::AnswersAgain { commands } => write!(f, "answers again after {commands} commands"),
+            Self::NeverAnswered(mac_id) => write!(f, "drive {mac_id} never answered"),
+            Self::NeverAsked(mac_id) => write!(f, "drive {mac_id} answers and was never sent a command"),
+            Self::AtEnd(mac_id, unfinished) => write!(f, "at the end drive {mac_id} {unfinished}"),
+        }
+    }
+}
+
+impl fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Echo { responses } => write!(f, "has sent the same counter echo in {responses} responses"),
+            Self::Silence { commands } => write!(f, "has not answered the last {commands} commands"),
+            Self::Request { code, responses, busy } => {
+                f.write_str("has not answered ")?;
+                code.write(f)?;
+                write!(f, " in {responses} responses, {busy} of them busy")
+            }
+            Self::Code { code, responses } => {
+                f.write_str("has not sent back ")?;
+                code.write(f)?;
+                write!(f, " in {responses} responses")
+            }
+        }
+    }
+}

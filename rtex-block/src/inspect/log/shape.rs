@@ -1,0 +1,82 @@
+//! Size, byte order and beginning of a log.
+
+use crate::block::BlockSize;
+use crate::inspect::strict;
+
+/// What the whole of a log looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct LogShape {
+    /// The size of the blocks.
+    pub size: BlockSize,
+    /// How many bytes of each word are turned round: 1 none, 2 or 4.
+    pub word: usize,
+    /// Bytes before the first whole block: not 0 where the log begins in the middle of one.
+    pub skip: usize,
+}
+
+impl LogShape {
+    /// The size, byte order and beginning with which most of the blocks make sense. `None` where nothing does, or where there are less
+    /// than four blocks after the NOPs from before the start: they look alike in every shape, so give more of the log then.
+    ///
+    /// In a log of 32-byte blocks every second piece of 16 bytes is a sub block: a command's begins with 80h, 82h or 8Ah, which
+    /// read as a main block would be a response of drive 0, 2 or 10.
+    pub fn guess(bytes: &[u8]) -> Option<Self> {
+        let shapes = || {
+            let sizes = [BlockSize::Bytes16, BlockSize::Bytes32];
+            [1, 2, 4].into_iter().flat_map(move |word| sizes.map(|size| Self { size, word, skip: 0 }))
+        };
+        // More than half.
+        let aligned = Self::best(shapes(), bytes, 501);
+        if aligned.is_some() {
+            return aligned;
+        }
+        let shifted = shapes().flat_map(|shape| (1..shape.size.bytes()).map(move |skip| Self { skip, ..shape }));
+        Self::best(shifted, bytes, 900)
+    }
+
+    /// The first of those that score best, and `least` at the least; a larger size only where it explains more.
+    fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
+        let mut best: Option<(Self, usize)> = None;
+        for shape in shapes {
+            let score = shape.score(bytes).filter(|score| *score >= least);
+            if let Some(score) = score.filter(|score| best.is_none_or(|(_, other)| *score > other)) {
+                best = Some((shape, score));
+            }
+        }
+        best.map(|(shape, _)| shape)
+    }
+
+    /// Sound blocks after the first ones that are NOPs, in thousandths.
+    fn score(self, bytes: &[u8]) -> Option<usize> {
+        let (mut good, mut all) = (0_usize, 0_usize);
+        let blocks = bytes.get(self.skip..)?.chunks_exact(self.size.bytes());
+        for block in blocks.skip_while(|block| self.is_nop(block)).take(256) {
+            all = all.saturating_add(1);
+            good = good.saturating_add(usize::from(self.is_sound(block) && !self.is_nop(block)));
+        }
+        good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
+    }
+
+    /// A block with its bytes in order.
+    fn turned(self, block: &[u8]) -> [u8; 32] {
+        let mut turned = [0; 32];
+        for (to, from) in turned.chunks_exact_mut(self.word).zip(block.chunks_exact(self.word)) {
+            for (to, from) in to.iter_mut().zip(from.iter().rev()) {
+                *to = *from;
+            }
+        }
+        turned
+    }
+
+    /// Code 00h: nothing else in the block is sure to tell anything.
+    fn is_nop(self, block: &[u8]) -> bool {
+        self.turned(block).get(1).is_some_and(|byte1| byte1 & 0x7f == 0)
+    }
+
+    /// Whether a block of this shape is what an encoder writes.
+    fn is_sound(self, block: &[u8]) -> bool {
+        self.turned(block).get(..self.size.bytes()).is_some_and(|turned| strict(turned).is_ok())
+    }
+}

@@ -1,0 +1,92 @@
+//! Two frames are never taken as one, however late the exchange is.
+
+use super::*;
+
+/// The bank is switched in the middle of the exchange, after any access, by the receive interrupt or by XSYNC because the exchange is
+/// late: the blocks of two frames are never taken as one.
+#[test]
+fn a_switch_of_the_bank_never_tears_an_exchange() {
+    for external in [true, false] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        // A block is read again at the end.
+        let words = (AXES + 1) * 8;
+        let mut twice = 0;
+        for at in 0..words {
+            // The exchange begins with a frame, which is back 29.6 us later; the next one begins after 500 us.
+            ring.borrow_mut().stall_in = Some((at as u32, if external { 29_000 } else { 499_000 }));
+            let exchanged = update(&ring, &mut driver).unwrap();
+            ring.borrow_mut().stall_in = None;
+            let read = std::mem::take(&mut ring.borrow_mut().read_of);
+            let taken = &read[read.len() - words..][..AXES * 8];
+            assert!(taken.iter().all(|frame| *frame == taken[0]), "{external} {at}: {read:?}");
+            assert!(!exchanged.torn);
+            assert_eq!(driver.master().ring().failure(), None);
+            twice += usize::from(read.len() > words);
+            for _ in 0..2 {
+                update(&ring, &mut driver).unwrap();
+            }
+        }
+        assert!(twice > words / 2);
+    }
+    let ring = Ring::new(true, false);
+    let mut driver = on::<u16>(&ring);
+    // A bus so slow that a frame comes in every reading: none is taken, and the axes stop before anything worse happens.
+    for _ in 0..LIMIT {
+        ring.borrow_mut().stall_in = None;
+        let mut slow = || {
+            ring.borrow_mut().stall_in = Some((3, 2 * COM_NS));
+            let began_ns = ring.borrow().now_ns;
+            driver.exchange(began_ns).unwrap()
+        };
+        let exchanged = slow();
+        assert!(exchanged.frames_late > 0);
+    }
+    assert!(driver.late() >= u32::from(LIMIT));
+}
+
+/// The interrupt is noticed 60 us late and the exchange goes over the next edge, so the clock sees nothing: what an axis takes is of
+/// the frame that is due, whichever access the bank was switched at.
+#[test]
+fn a_late_interrupt_mixes_no_frames() {
+    let ring = Ring::new(false, false);
+    let mut driver = on::<u16>(&ring);
+    // A block is read again at the end: the bank may have been switched in the middle of the last one.
+    let words = (AXES + 1) * 8;
+    let mut mixed = 0;
+    for at in 0..200 {
+        let began_ns = {
+            let mut ring = ring.borrow_mut();
+            let begins_ns = ring.next_frame_ns();
+            ring.pass(begins_ns + 60_000);
+            ring.in_exchange = true;
+            ring.read_of.clear();
+            ring.stall_in = Some((at % words as u32, 441_000));
+            ring.now_ns
+        };
+        let exchanged = driver.exchange(began_ns).unwrap();
+        let read = {
+            let mut ring = ring.borrow_mut();
+            ring.in_exchange = false;
+            ring.stall_in = None;
+            ring.let_in();
+            std::mem::take(&mut ring.read_of)
+        };
+        // The frame that was there when the interrupt came.
+        let due = read[0];
+        let taken = &read[read.len() - words..][..AXES * 8];
+        mixed += usize::from(read.iter().any(|frame| *frame != due));
+        for (place, axis) in driver.master().ring().axes().iter().enumerate() {
+            let own = &taken[8 * place..8 * place + 8];
+            if axis.arrival() == Arrival::OnTime {
+                assert!(own.iter().all(|frame| *frame == due), "{at}: place {place} of {read:?}");
+            }
+        }
+        assert_eq!((exchanged.torn, driver.master().ring().failure()), (false, None), "{at}");
+        for _ in 0..6 {
+            update(&ring, &mut driver).unwrap();
+        }
+        assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
+    }
+    assert!(mixed > 150, "{mixed}");
+}

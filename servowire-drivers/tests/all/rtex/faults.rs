@@ -1,0 +1,129 @@
+//! Dead places, ports that fail, frames that do not come.
+
+use super::*;
+
+/// The port fails at any one of its calls: the next exchange is good, and nothing stops.
+#[test]
+fn a_fault_of_the_port_is_over_with_the_next_exchange() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        for at in 0..2 * AXES as u32 * 8 {
+            ring.borrow_mut().fail_in = Some(at);
+            update(&ring, &mut driver).unwrap();
+            update(&ring, &mut driver).unwrap();
+            assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
+            assert_eq!(driver.master().ring().failure(), None, "{at}");
+        }
+    }
+}
+
+/// A place that cannot be written: every other drive is written all the same, so a stop reaches it in the period after, and so does
+/// the servo-off after the communication has failed. A place that cannot be read is one axis without a block, and no other.
+#[test]
+fn a_dead_place_is_one_place() {
+    for external in [false, true] {
+        for dead in 0..AXES {
+            let ring = Ring::new(external, false);
+            let mut driver = on::<u16>(&ring);
+            ring.borrow_mut().dead = Some(dead);
+            driver.ring_mut().stop(StopCategory::Zero);
+            for _ in 0..3 {
+                assert_eq!(update(&ring, &mut driver), Err(Error::Io(())));
+            }
+            for place in 0..AXES {
+                assert_eq!(ring.borrow().drives[place].is_active(), place == dead, "{external} {dead} {place}");
+            }
+
+            let ring = Ring::new(external, true);
+            let mut driver = on::<u32>(&ring);
+            ring.borrow_mut().deaf = Some(dead);
+            for _ in 0..2 {
+                assert_eq!(update(&ring, &mut driver), Err(Error::Io(())));
+                assert!((0..AXES).all(|place| place == dead || position(&ring, &driver, place).is_some()));
+            }
+            (0..LIMIT).for_each(|_| _ = update(&ring, &mut driver));
+            let failure = Some(RingFailure { place: dead as u8, reason: StopReason::EchoTimeout });
+            assert_eq!(driver.master().ring().failure(), failure);
+            (0..3).for_each(|_| _ = update(&ring, &mut driver));
+            assert!(!ring.borrow().drives.iter().any(Drive::is_active));
+        }
+    }
+}
+
+/// Frames that do not come: no position is given, and every servo is off within the limit.
+#[test]
+fn silence_switches_every_servo_off() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        ring.borrow_mut().lose_frames = u32::MAX;
+        for period in 0..u32::from(LIMIT) + 2 {
+            update(&ring, &mut driver).unwrap();
+            assert!(period < 2 || (0..AXES).all(|place| position(&ring, &driver, place).is_none()));
+        }
+        let RingFailure { reason, .. } = driver.master().ring().failure().unwrap();
+        assert!(matches!(reason, StopReason::EchoTimeout | StopReason::ReceiveTimeout), "{reason}");
+        assert_eq!(driver.control(), Err(Error::Protocol(ControlError::Timeout)));
+        // The ring is back: all are switched on again.
+        ring.borrow_mut().lose_frames = 0;
+        for drive in &mut ring.borrow_mut().drives {
+            drive.clear_alarm();
+        }
+        driver.clear();
+        for _ in 0..100 {
+            update(&ring, &mut driver).unwrap();
+            driver.ring_mut().switch_on().ok();
+        }
+        assert!(
+            driver.master().ring().all_are(AxisState::On),
+            "{:?} {:?}",
+            driver.master().ring().failure(),
+            ring.borrow().drives.map(|d| d.alarm())
+        );
+    }
+}
+
+/// Faults that the driver has to survive; the environment may want more.
+pub(super) const FAULTS: u64 = 100_000;
+
+/// Faults of the port, lost frames and stalls.
+pub(super) const KINDS: usize = 3;
+
+pub(super) fn hurt(ring: &Shared, draw: &mut Draw, kind: usize) {
+    let mut ring = ring.borrow_mut();
+    match kind {
+        0 => ring.fail_in = Some(draw.below(24) as u32),
+        1 => ring.lose_frames = 1 + draw.below(2) as u32,
+        _ => ring.stall_in = Some((draw.below(24) as u32, draw.below(700_000))),
+    }
+}
+
+/// Faults of the port, lost frames and stalls, 100,000 of them. The exchange after one is good; what it reads was asked for before the
+/// fault, so the one after that gives every position again, and they are those of the last frames.
+#[test]
+fn hostile_events_are_over_with_the_next_call() {
+    let mut draw = Draw::default();
+    let (mut count, mut kinds) = (0, [0_u64; KINDS]);
+    while count < wanted_events(FAULTS).max(FAULTS) {
+        let external = draw.below(2) == 1;
+        let ring = Ring::new(external, draw.below(2) == 1);
+        let mut driver = on::<u32>(&ring);
+        for _ in 0..2_000 {
+            let kind = draw.below(KINDS as u64) as usize;
+            kinds[kind] += 1;
+            count += 1;
+            hurt(&ring, &mut draw, kind);
+            move_on(&mut driver);
+            let late = update(&ring, &mut driver).map_or(0, |exchanged| exchanged.frames_late);
+            heal(&ring);
+            // A late exchange has missed the next interrupt, so the same commands went out twice.
+            for _ in 0..2 + late {
+                update(&ring, &mut driver).unwrap();
+            }
+            is_well(&ring, &driver, &(count, kind, external));
+        }
+    }
+    println!("{kinds:?}");
+    assert!(count >= FAULTS && kinds.iter().all(|kind| *kind > count / 4));
+}

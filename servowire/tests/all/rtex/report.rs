@@ -1,0 +1,109 @@
+//! The service report: times, events, cycles, curves.
+
+use std::fmt::Write as _;
+
+use super::{exchanges, hex_log};
+use crate::common::{self, Bench};
+
+/// A table with times, directions and axes: two drives, of which one alarms at 1.0 ms, and a command that is 20 us late.
+fn table() -> String {
+    let mut text = "time_us,direction,axis,data\n".to_owned();
+    for (k, (command, response)) in exchanges().into_iter().enumerate() {
+        for drive in [5_u8, 7] {
+            let begins = 500 * k + if k == 3 { 20 } else { 0 };
+            let (mut command, mut response) = (command, response);
+            (command[0], response[0]) = (command[0] & 0xe0 | drive, response[0] & 0xe0 | drive);
+            response[4..8].copy_from_slice(&(990 + 10 * k as i32 + i32::from(drive)).to_le_bytes());
+            if drive == 7 && k >= 2 {
+                response[2] = 0x20;
+            }
+            for (at, said, block) in [(begins, "command", command), (begins + 30, "response", response)] {
+                writeln!(text, "{at},{said},{drive},{:032x}", u128::from_be_bytes(block)).unwrap();
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn a_service_report_of_a_table() {
+    let bench = Bench::new();
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--stats", "--jump", "1000"]);
+    assert_eq!(run.code, 4, "{}", run.err);
+    assert!(run.err.ends_with("drive 7 reported an alarm\n"), "{}", run.err);
+    for want in [
+        "  address 5\n  frames        6 requests, 6 answers, 0 others\n",
+        "  cycle         min 480.000 us, mean 500.000 us, max 520.000 us, jitter 40.000 us peak to peak",
+        "  largest move  10 counts\n  jumps         0 of more than 1000 counts\n  events        3\n",
+        "          1000.000 us  SERVO_ON 1\n",
+        "          1030.000 us  SERVO_READY 0\n",
+        "          1030.000 us  ALARM 1\n",
+    ] {
+        assert!(run.out.contains(want), "{want}\n{}", run.out);
+    }
+    let (five, seven) = run.out.split_once("  address 7").unwrap();
+    assert!(!five.contains("ALARM") && seven.contains("ALARM"), "{}", run.out);
+    // A row of a table stands alone: the last one has all its values.
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--csv"]);
+    let rows: Vec<Vec<&str>> = run.out.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name| rows[0].iter().position(|title| *title == name).unwrap();
+    let last = rows.last().unwrap();
+    let shown = ["start_us", "direction", "address", "position", "Response_Data2", "Response_Data3"]
+        .map(|name| last[column(name)]);
+    assert_eq!(shown, ["2530.000000", "answer", "7", "1047", "20000", "0"]);
+    // Each axis has its curve.
+    let picture = bench.path("ring.svg");
+    bench.decode("ring.csv", table(), &["--protocol", "rtex", "--svg", picture.to_str().unwrap()]);
+    let svg = std::fs::read_to_string(&picture).unwrap();
+    assert!(svg.contains("address 5") && svg.contains("address 7"));
+    // --bytes names what stands in the cells.
+    let run = bench.decode("ring.csv", table(), &["--protocol", "rtex", "--bytes", "--json"]);
+    assert_eq!((run.code, run.json().len()), (4, 24));
+}
+
+/// The same in lines of a monitor: times and who spoke stand before the bytes.
+#[test]
+fn a_log_of_a_monitor() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    for (k, (command, response)) in exchanges().into_iter().enumerate() {
+        let (command, response) = (u128::from_be_bytes(command), u128::from_be_bytes(response));
+        writeln!(text, "14:02:07.{:06} TX {command:032x}\n14:02:07.{:06} RX {response:032x}", 500 * k, 500 * k + 30)
+            .unwrap();
+    }
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--stats"]);
+    // Since the first of them.
+    assert!(
+        run.is_good().out.contains("  cycle         min 500.000 us, mean 500.000 us, max 500.000 us"),
+        "{}",
+        run.out
+    );
+    assert!(run.out.contains("          1000.000 us  SERVO_ON 1\n"), "{}", run.out);
+    // What the log says of the direction and C/R have to agree.
+    let run = bench.decode("log.txt", text.replacen("TX", "RX", 1), &["--protocol", "rtex", "--json"]);
+    assert_eq!((run.code, run.verdicts()[0].as_str()), (1, "direction"));
+}
+
+/// Times that are counted by Update_Counter and --period say nothing of a jitter.
+#[test]
+fn counted_times_have_no_jitter() {
+    let bench = Bench::new();
+    let options = ["--protocol", "rtex", "--bytes", "--period", "500us", "--stats"];
+    let run = bench.decode("log.txt", hex_log(&exchanges()), &options);
+    assert!(
+        run.is_good().out.contains("cycle         500.000 us on average as counted: the log has no times"),
+        "{}",
+        run.out
+    );
+    assert!(!run.out.contains("jitter 0"), "{}", run.out);
+}
+
+/// What the drive says when it is asked for its alarm, in words.
+#[test]
+fn an_alarm_in_words() {
+    let bench = Bench::new();
+    let text = "45250000000000000000000000000000\nc5a5200000000000000000001b040000\n65250000000000000000000000000000\n\
+                e52520000000000000000000 1b040000\n";
+    let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--stats"]);
+    assert!(run.out.contains("Err27.4 (too large a step of the position command)"), "{}", run.out);
+}
