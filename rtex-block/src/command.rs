@@ -115,7 +115,7 @@ impl<'a> CommandBlock<'a> {
     ///
     /// # Errors
     /// [`Error::CyclicCode`], [`Error::NonCyclicCode`], [`Error::CodePair`] or the first [`Error::Reserved`].
-    pub const fn check_strict(self) -> Result<(), Error> {
+    pub(crate) const fn check_strict(self) -> Result<(), Error> {
         let code = self.code();
         let noncyclic = match code.codes() {
             Ok(Codes { noncyclic, .. }) => noncyclic,

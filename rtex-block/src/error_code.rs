@@ -35,7 +35,7 @@ impl ErrorCode {
     }
 
     /// What the number means; `None` if that is not confirmed.
-    pub const fn meaning(self) -> Option<&'static str> {
+    const fn meaning(self) -> Option<&'static str> {
         Some(match self {
             Self::MAC_ID => "MAC-ID is not the drive's",
             Self::DIRECTION => "C/R or Sub_Chk wrong",

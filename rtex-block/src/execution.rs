@@ -44,7 +44,7 @@ flag_set! {
 
 impl Execution {
     /// The bits in their places in byte 9, without those that have no name.
-    pub const fn to_byte(self) -> u8 {
+    pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }
 
@@ -61,14 +61,14 @@ impl Execution {
 
 impl LatchFlags {
     /// The bits in their places in byte 9, without those that have no name.
-    pub const fn to_byte(self) -> u8 {
+    pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }
 }
 
 impl ProfileFlags {
     /// The bits in their places in byte 9, without those that have no name.
-    pub const fn to_byte(self) -> u8 {
+    pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }
 }

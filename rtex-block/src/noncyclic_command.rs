@@ -96,7 +96,7 @@ impl NonCyclicCommand {
 
     /// Whether bytes 12-15 belong to the command itself, so that no feed-forward can be sent: homing types 21h and 22h,
     /// parameter write (011h), profile. SX-DSV02310, "Feed-forward".
-    pub const fn needs_data3(&self) -> bool {
+    pub(crate) const fn needs_data3(&self) -> bool {
         match self {
             Self::Homing { type_code: homing::SET_ACTUAL_POSITION | homing::SET_COMMAND_POSITION, .. }
             | Self::Profile { .. } => true,

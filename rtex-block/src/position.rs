@@ -66,7 +66,7 @@ pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
 /// Largest step of the command position in an update period at a speed, command units, rounded down: for the over-speed
 /// level of a drive, given in command units per second.
 #[expect(clippy::cast_possible_truncation, reason = "compared just before")]
-pub const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
+pub(crate) const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
     let nano_units = (units_per_s as u64).saturating_mul(update_ns as u64);
     let steps = nano_units / 1_000_000_000;
     if steps > u32::MAX as u64 { u32::MAX } else { steps as u32 }

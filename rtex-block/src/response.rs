@@ -102,7 +102,7 @@ impl<'a> ResponseBlock<'a> {
     ///
     /// # Errors
     /// [`Error::CyclicCode`], [`Error::NonCyclicCode`] or the first [`Error::Reserved`].
-    pub fn check_strict(self) -> Result<(), Error> {
+    pub(crate) fn check_strict(self) -> Result<(), Error> {
         if !self.cmd_error() {
             self.code().codes()?;
         }

@@ -131,7 +131,7 @@ impl TimerSystem {
     }
 
     /// Returns whether the receive interrupt goes before the NC interrupt.
-    pub const fn reception_first(self) -> bool {
+    pub(crate) const fn reception_first(self) -> bool {
         matches!(self, Self::External)
     }
 }

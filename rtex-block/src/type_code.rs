@@ -214,7 +214,7 @@ impl fmt::Display for Pr {
 
 impl Pr {
     /// The parameter of an Index.
-    pub const fn from_index(index: u16) -> Self {
+    pub(crate) const fn from_index(index: u16) -> Self {
         let [number, class] = index.to_le_bytes();
         Self { class, number }
     }

@@ -1,7 +1,7 @@
 /// From reading the counter to the moment the new value takes effect in the published device: 27 instructions, 135 ns.
-pub const WRITE_DELAY_NS: u32 = 135;
+pub(crate) const WRITE_DELAY_NS: u32 = 135;
 /// Frames that one correction is made from.
-pub const AVERAGE: u8 = 16;
+pub(crate) const AVERAGE: u8 = 16;
 
 /// What the device does to its counter. The IEP counter adds 5 each 5 ns tick, so it counts nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -55,7 +55,7 @@ impl Clock {
     /// Not yet set; a correction is made from this many frames, 16 in the published device. The clock runs free between two
     /// corrections: at 50 ppm 3 ns in 16 cycles of 4 us, and 180 ns in 16 of 224 us, which no gap between two device
     /// frames bears. 0 counts as 1.
-    pub const fn averaging(frames: u8) -> Self {
+    pub(crate) const fn averaging(frames: u8) -> Self {
         Self { set: false, average: frames, count: 0, sum: 0 }
     }
 

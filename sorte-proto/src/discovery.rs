@@ -6,7 +6,7 @@ use crate::place::Place;
 use crate::status::Status;
 
 /// Devices that a discovery frame has room for.
-pub const MAX_DEVICES: usize = 254;
+pub(crate) const MAX_DEVICES: usize = 254;
 const TABLE: usize = MAX_DEVICES * 4;
 const PAYLOAD: usize = 6 + TABLE;
 
@@ -334,7 +334,7 @@ impl TryFrom<Unchecked> for Network {
 
 impl Network {
     /// A line without devices.
-    pub const EMPTY: Self =
+    pub(crate) const EMPTY: Self =
         Self { devices: 0, input_total: 0, output_total: 0, entries: [Entry { input: 0, output: 0 }; MAX_DEVICES] };
 
     /// Checks that there are at most 254 devices and that the totals are the sums of the entries.

@@ -8,9 +8,9 @@ use crate::hex::Hex;
 use crate::status::Status;
 
 /// Output bytes of the published master: four devices with four bytes each.
-pub const STOCK_OUTPUT: usize = 16;
+pub(crate) const STOCK_OUTPUT: usize = 16;
 /// Payload of a device frame: the DRV8711 STATUS byte and two reserved bytes.
-pub const STOCK_INPUT: usize = 3;
+pub(crate) const STOCK_INPUT: usize = 3;
 
 /// The master frame of the IO exchange in a buffer, from SA to the time stamp.
 ///

@@ -6,7 +6,7 @@ use crate::frame_type::FrameType;
 use crate::status::Status;
 
 /// DA of every start-up frame.
-pub const MULTICAST: u8 = 255;
+pub(crate) const MULTICAST: u8 = 255;
 
 /// A long-header frame whose FCS and length are right: from DA to FCS, without preamble.
 ///

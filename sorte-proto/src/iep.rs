@@ -24,7 +24,7 @@ use crate::pto::{Pto, StartTime};
 use crate::sync0::{PULSE_NS, Register, Sync0, Variant, Write, Writes};
 
 /// One tick of the counter in ns.
-pub const TICK_NS: u64 = 5;
+pub(crate) const TICK_NS: u64 = 5;
 /// Ticks of one cycle.
 const CYCLE: u64 = 800;
 /// CMP0 in ticks.

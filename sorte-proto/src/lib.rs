@@ -51,19 +51,19 @@ pub mod timing;
 pub use servowire_core::OutOfRange;
 
 pub use address::DeviceAddress;
-pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
+pub use clock::{Clock, Correction};
 pub use crc::{crc8, crc8_update, fcs};
 pub use delay_req::DelayReq;
-pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Member, Network};
+pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, Member, Network};
 pub use error::{Error, ErrorClass};
 pub use evidence::{Doubt, Evidence, EvidenceCell, Policy, Positions, Sample, Tolerated};
 pub use exchange::{
-    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
+    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame,
     emit_master_frame_into,
 };
-pub use frame::{LongFrame, MULTICAST};
+pub use frame::LongFrame;
 pub use frame_type::FrameType;
-pub use line_delay::{DelayModel, LineDelay, RoundTrips, SAMPLES};
+pub use line_delay::{DelayModel, LineDelay, RoundTrips};
 pub use link::Link;
 pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};
@@ -71,5 +71,5 @@ pub use place::Place;
 pub use preamble::{Preamble, strip_preamble};
 pub use pto::{Direction, Pto, Reserved, StartTime};
 pub use status::Status;
-pub use sync::{Sync, SyncView, TRANSIT_NS, TRIGGER_TO_CAPTURE_NS};
+pub use sync::{Sync, SyncView, TRANSIT_NS};
 pub use tally::Tally;

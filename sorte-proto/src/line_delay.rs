@@ -1,7 +1,7 @@
 use crate::error::Error;
 
 /// Round trips that make one measurement.
-pub const SAMPLES: u8 = 16;
+pub(crate) const SAMPLES: u8 = 16;
 
 /// How round trips become a line delay. The vendor's master and device do it differently; so does this crate.
 ///

@@ -6,7 +6,7 @@ use crate::status::Status;
 
 /// From the trigger of a SYNC frame to the capture of its start at the receiver without the cable: 280 ns, which is
 /// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
-pub const TRIGGER_TO_CAPTURE_NS: u32 = 280;
+pub(crate) const TRIGGER_TO_CAPTURE_NS: u32 = 280;
 
 /// Trigger of the master frame in its cycle, of the first device's frame, and of the first SYNC frame, in ns.
 pub const TRIGGER_NS: u32 = 500;

@@ -14,7 +14,7 @@ pub const CNC_CYCLE_NS: u32 = 4000;
 
 /// Rms jitter that a port adds to a frame, in ps: one that samples at 200 MHz, as the published hardware does, is off by 0 to 5 ns
 /// (uniform: 5 ns / sqrt(12)). One that re-times to the 25-MHz clock of its PHY has 11,547.
-pub const JITTER_PS: u32 = 1443;
+pub(crate) const JITTER_PS: u32 = 1443;
 
 /// Send times of the published device in ns of the common time, for addresses 1, 2, 3, and 4 or more. They are tuned
 /// by hand around the rule of [`Slots::Raster`].
@@ -58,7 +58,7 @@ impl Slots {
 
     /// When the device `address`, which is `delay_ns` away from the master, starts to send, in ns of its cycle. Below 0 it would
     /// have to send before the cycle begins: no device does, and [`Timing::misfit`] names it.
-    pub const fn send_ns(self, address: DeviceAddress, delay_ns: u32) -> i64 {
+    pub(crate) const fn send_ns(self, address: DeviceAddress, delay_ns: u32) -> i64 {
         match self {
             Self::Published => published_send_time_ns(address) as i64,
             Self::Raster { first_ns, slot_ns } => {
@@ -255,7 +255,7 @@ impl Timing<'_> {
 
     /// The least gap between two device frames, in ns, so that those of device `address` and the one before it do not meet on their
     /// way: each of the ports between adds its jitter to each of them, and six sigma of the difference must fit in.
-    pub fn least_gap_ns(&self, address: DeviceAddress) -> u32 {
+    pub(crate) fn least_gap_ns(&self, address: DeviceAddress) -> u32 {
         let jitter = u64::from(self.jitter_ps);
         let square = jitter.saturating_mul(jitter).saturating_mul(u64::from(address.hops_before())).saturating_mul(72);
         u32::try_from(square.isqrt().div_ceil(1000)).unwrap_or(u32::MAX)

@@ -271,7 +271,7 @@ impl Drive {
     }
 
     /// Servo_Ready: main power, no alarm, synchronised.
-    pub const fn is_ready(&self) -> bool {
+    const fn is_ready(&self) -> bool {
         !matches!(self.fault, Fault::NoMainPower | Fault::EmergencyStop)
             && self.alarm.is_none()
             && self.exchanges >= self.config.sync_exchanges

@@ -148,7 +148,8 @@ impl Axis {
             Some(error) => Some(error.class()),
             None => None,
         };
-        self.evidence.refused(refused)
+        let known = if self.watch.is_sure() { self.evidence } else { Evidence::NEVER };
+        known.refused(refused)
     }
 
     /// Status_Flags of the last response on time.
@@ -176,7 +177,7 @@ impl Axis {
         let status = self.evidence.status();
         if !matches!(self.state, AxisState::Off) {
             Err(SwitchOnError::State(self.state))
-        } else if !matches!(self.arrival, Arrival::OnTime) {
+        } else if !matches!(self.arrival, Arrival::OnTime) || !self.watch.is_sure() {
             Err(SwitchOnError::OldPosition)
         } else if status.contains(StatusFlags::ALARM) {
             Err(SwitchOnError::Alarm)

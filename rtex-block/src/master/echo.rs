@@ -33,7 +33,9 @@ servowire_core::one_line!(Arrival {
 /// Judges every block by its counter echo, and notices that no block comes on time.
 ///
 /// The lag from the counter sent to the echo read is the same in every exchange of a system; it is learned with the first block,
-/// and anew from a whole turn of the counter as long as the servo is off. A block with another lag is of another frame.
+/// and anew from a whole turn of the counter as long as the servo is off. A block with another lag is of another frame. The first
+/// block may itself be a late one, if periods without a block came before it: nobody relies on its lag then before a whole turn has
+/// had it.
 ///
 /// `limit` consecutive samples without a block on time trip the watch, and it
 /// stays tripped: command servo-off to **all** axes then ([`ServoOff`](super::ServoOff)). The time is not given by the
@@ -52,12 +54,14 @@ pub struct EchoWatch {
     /// A lag that was seen instead, and how often in a row.
     other: u8,
     seen: u8,
+    /// Blocks that have had the lag.
+    sure: u8,
 }
 
 impl EchoWatch {
     /// A watch that trips after `limit` samples without a new echo.
     pub const fn new(limit: NonZeroU16) -> Self {
-        Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0 }
+        Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0, sure: 0 }
     }
 
     /// Takes a sample where the counter sent is not known; `None` where the update period brought no block of the drive, which
@@ -93,18 +97,29 @@ impl EchoWatch {
     #[inline]
     fn place(&mut self, lag: u8, missed: u8, learns: bool) -> Arrival {
         // In a period that was missed no counter was sent, or it went out a frame later.
-        let due = *self.lag.get_or_insert(lag);
+        let due = self.lag.unwrap_or_else(|| {
+            // What is echoed as soon as it was sent is not late.
+            self.sure = if lag == 0 || self.updates == 0 { TURN } else { 0 };
+            lag
+        });
+        self.lag = Some(due);
         if lag == due || missed > 0 && lag < due && due <= lag.saturating_add(missed) {
             self.seen = 0;
+            self.sure = self.sure.saturating_add(1);
             return Arrival::OnTime;
         }
         self.seen = if self.other == lag { self.seen.saturating_add(1) } else { 1 };
         self.other = lag;
         if learns && self.seen >= TURN {
-            (self.lag, self.seen) = (Some(lag), 0);
+            (self.lag, self.seen, self.sure) = (Some(lag), 0, TURN);
             return Arrival::OnTime;
         }
         Arrival::OffTime { lag }
+    }
+
+    /// Whether the lag is that of the system, and not of a first block that was late.
+    pub(super) const fn is_sure(&self) -> bool {
+        self.sure >= TURN
     }
 
     const fn count(&mut self, on_time: bool) {
@@ -114,7 +129,7 @@ impl EchoWatch {
     }
 
     /// Returns whether the limit was reached.
-    pub const fn is_tripped(&self) -> bool {
+    pub(super) const fn is_tripped(&self) -> bool {
         self.updates >= self.limit.get()
     }
 
@@ -123,9 +138,9 @@ impl EchoWatch {
         self.last = Some(echo);
     }
 
-    /// The link was set up anew. What lies in the memory from before is not new for that.
+    /// The limit runs anew. What lies in the memory from before is not new for that, and the lag is still that of the system.
     pub const fn reset(&mut self) {
-        *self = Self { last: self.last, ..Self::new(self.limit) };
+        self.updates = 0;
     }
 }
 

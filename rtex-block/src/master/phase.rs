@@ -121,7 +121,7 @@ impl PhaseControl {
     }
 
     /// Forgets a time-out, so that the ring can be cleared. A mismatch of the slaves stays: only a system reset releases it.
-    pub const fn release_timeout(&mut self) {
+    pub(super) const fn release_timeout(&mut self) {
         if matches!(self.error, Some(ControlError::Timeout)) {
             self.error = None;
         }

@@ -39,7 +39,7 @@ pub struct CommandEnded {
 
 /// Profile motion: the change of the code from 10h to 17h starts it while In_Progress is 0.
 ///
-/// Target speed may be changed while the axis moves ([`set_speed`](Self::set_speed)); speed 0, or
+/// Target speed may be changed while the axis moves ([`Axis::set_move_speed`](super::Axis::set_move_speed)); speed 0, or
 /// [`PAUSE`](crate::ControlBits::PAUSE), makes it stand with In_Progress still 1. After the end the code goes
 /// back to 10h, ready for the next motion. System Design Guide for Master, "Profile position control".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,7 +89,7 @@ impl ProfileMove {
     }
 
     /// Another target speed, valid at once.
-    pub const fn set_speed(&mut self, target_speed: i32) {
+    pub(super) const fn set_speed(&mut self, target_speed: i32) {
         self.target_speed = target_speed;
     }
 

@@ -45,7 +45,7 @@ pub enum StopReason {
 
 impl StopReason {
     /// Whether commands or responses do not get through: every axis must be switched off then.
-    pub const fn is_communication(self) -> bool {
+    pub(super) const fn is_communication(self) -> bool {
         matches!(self, Self::EchoTimeout | Self::WrongMacId(_) | Self::Refused(_) | Self::ReceiveTimeout)
     }
 }

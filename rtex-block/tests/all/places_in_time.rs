@@ -4,7 +4,8 @@ use crate::common::{CODES, Pair, limits};
 use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::{ReadText, Request};
 use rtex_block::master::{
-    ActiveCode, Arrival, Axis, AxisConfig, AxisState, Heard, Progress, Ring, StopReason, SwitchOnError,
+    ActiveCode, Arrival, Axis, AxisConfig, AxisState, Heard, Progress, Ring, StopCategory, StopReason, SwitchOnError,
+    Turn,
 };
 use rtex_block::{Arguments, MacId, NonCyclicCommand, Policy, Pr, Response, TypeCode};
 
@@ -48,6 +49,55 @@ fn late_answers_give_no_position_and_no_servo_on() {
         assert_ne!(arrival, Arrival::OnTime, "{late}");
         assert!(at(&bench).is_err(), "{late}");
         assert_eq!(bench.pair.axis.switch_on(), Err(SwitchOnError::OldPosition), "{late}");
+    }
+}
+
+/// One late block right after a stop that was cleared teaches no lag: it is no position to switch on with, and what comes on time
+/// after it is.
+#[test]
+fn a_late_block_after_a_clear_is_not_on_time() {
+    for late in 1..=3_usize {
+        let mut bench = Late::new(Pair::on(ActiveCode::CyclicPosition, Behaviour::new()));
+        (0..8).for_each(|_| bench.update(0));
+        bench.pair.axis.stop(StopCategory::Zero);
+        (0..20).for_each(|_| bench.update(0));
+        assert!(matches!(bench.pair.axis.state(), AxisState::Stopped(_)));
+        bench.pair.axis.clear();
+        bench.pair.received = bench.line[late];
+        bench.update(0);
+        assert_ne!(bench.pair.axis.arrival(), Arrival::OnTime, "{late}");
+        assert!(bench.pair.axis.evidence().at(bench.pair.now_ns(), Policy::new(0)).is_err(), "{late}");
+        assert!(bench.pair.axis.switch_on().is_err(), "{late}");
+        bench.update(0);
+        bench.update(0);
+        assert_eq!((bench.pair.axis.arrival(), bench.pair.axis.switch_on()), (Arrival::OnTime, Ok(())), "{late}");
+    }
+}
+
+/// So at the start: what comes late once is neither the first position nor the lag of the system.
+#[test]
+fn a_late_block_at_the_start_is_not_on_time() {
+    for late in 1..=3_usize {
+        let mut bench = Late::new(Pair::new(ActiveCode::CyclicPosition, Behaviour::new()));
+        while bench.pair.sent == Turn::Invalid {
+            bench.update(0);
+        }
+        // The answer to the first valid block comes that late, and those between do not come.
+        let first = bench.pair.received;
+        for _ in 0..late {
+            bench.pair.received = Heard::Nothing;
+            bench.update(0);
+        }
+        bench.pair.received = first;
+        bench.update(0);
+        assert!(bench.pair.axis.clone().switch_on().is_err(), "{late}");
+        assert!(bench.pair.axis.evidence().at(bench.pair.now_ns(), Policy::new(0)).is_err(), "{late}");
+        // A turn, and what was behind the late block.
+        for _ in 0..5 {
+            bench.update(0);
+        }
+        assert_eq!(bench.pair.axis.arrival(), Arrival::OnTime, "{late}");
+        assert!(bench.pair.axis.evidence().at(bench.pair.now_ns(), Policy::new(0)).is_ok(), "{late}");
     }
 }
 

@@ -167,7 +167,7 @@ impl Port {
     }
 
     /// The frame has ended: the next one is looked at again.
-    pub fn end_of_frame(&mut self) {
+    pub(super) fn end_of_frame(&mut self) {
         self.flags.remove(PortFlags::IGNORE_TO_EOF | PortFlags::SWITCH_PORT_CONFIG | PortFlags::NEW_SYNC_FRAME);
     }
 }
