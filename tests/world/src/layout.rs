@@ -62,6 +62,13 @@ impl Layout {
         self.placed.iter().rev().find(|place| place.0 <= at).map_or(0, |place| place.2)
     }
 
+    /// Begin of the last copy of the first unit that left.
+    pub(crate) fn again(&self) -> usize {
+        let mut left = self.placed.iter().filter(|place| place.3);
+        let first = left.next().map_or((0, 0), |place| (place.0, place.2));
+        left.take_while(|place| place.2 == first.1).last().map_or(first.0, |place| place.0)
+    }
+
     /// Begin of the first unit that left, end of the last, and the same for its first copy if it was repeated.
     pub(crate) fn ends(&self) -> (usize, usize, usize) {
         let mut left = self.placed.iter().filter(|place| place.3);

@@ -47,6 +47,9 @@ pub struct Transmission {
     pub asked_ns: u64,
     /// Its first bit on the line.
     pub start_ns: u64,
+    /// The first bit of the last copy of its first unit, where [`Fault::Repeat`](crate::Fault::Repeat) has copied that: a receiver
+    /// that has not heard the first copy takes this for the beginning.
+    pub again_ns: u64,
     /// The end of its last bit.
     pub end_ns: u64,
     /// The end of its last bit, copies by [`Fault::Repeat`](crate::Fault::Repeat) not counted: from here on a device may

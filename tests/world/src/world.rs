@@ -229,6 +229,7 @@ impl World {
             tag: message.tag,
             asked_ns,
             start_ns: times.0,
+            again_ns: begin_ns + layout.again() as u64 * self.wire.bit_ps / 1000,
             end_ns: times.1,
             sent_ns: times.2,
             units: message.units.len(),

@@ -5,7 +5,7 @@ use core::fmt;
 
 use servowire_core::{Ended, Procedure};
 use servowire_world::{
-    Block, Delivery, Draw, Event, Framing, Handed, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict,
+    Block, Delivery, Draw, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Truth, Verdict,
     Wire, World,
 };
 use tformat::device::{Behaviour, Device};
@@ -312,8 +312,8 @@ impl Bench {
                 assert!(!undisturbed, "the response {response} was never sent, nor was anything damaged: {sent:?}");
                 self.seen.undetected += 1;
             }
-            // Damage that happens to make an old value: nothing of that answer was handed over since.
-            Verdict::Old { of } if truth.handed_since(id).all(|handed| handed.origin.transmission != of) => {
+            // Damage that happens to make an old value: that answer was not handed over since, or not as a whole.
+            Verdict::Old { of } if !is_whole(truth, id, of) => {
                 assert!(!undisturbed || !within, "invented: {response} for {sent:?}");
                 self.seen.undetected += 1;
             }
@@ -322,14 +322,14 @@ impl Bench {
                 // Where the request is on the line twice, the encoder answers the first.
                 let own = of.is_some_and(|of| of.answers == Some(id));
                 // Where its first field came twice, and the second time after the request, all that was taken began after it.
-                let begins = |of: &Transmission| {
-                    let first = |handed: &&Handed| handed.origin.transmission == of.id && handed.origin.index == 0;
-                    let copies = truth.handed_since(id).filter(first).count() as u64;
-                    of.start_ns + copies.saturating_sub(1) * field_ns(self.line.rate)
-                };
-                let late = of.is_some_and(|of| begins(of) >= sent.end_ns);
+                let late = of.is_some_and(|of| of.again_ns >= sent.end_ns);
                 self.seen.undetected += u64::from(late);
-                assert!(!within || own || late, "the response {response} is older than its request {sent:?}: {of:?}");
+                let handed = truth.handed_since(id).collect::<Vec<_>>();
+                assert!(
+                    !within || own || late,
+                    "the response {response} is older than its request {sent:?}: {of:?}, {late_ns} ns late, handed {handed:?}, {:?}",
+                    self.line
+                );
             }
         }
     }
@@ -397,4 +397,10 @@ fn tag(frame: &[u8]) -> u64 {
         .iter()
         .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     sum << 8 | u64::from(frame.first().copied().unwrap_or(0))
+}
+
+/// Whether the host was given every field of a transmission since this request.
+fn is_whole(truth: &Truth, since: Id, of: Id) -> bool {
+    let given = |index| truth.handed_since(since).any(|h| (h.origin.transmission, h.origin.index) == (of, index));
+    truth.transmission(of).is_some_and(|of| (0..of.units as u16).all(given))
 }
