@@ -58,8 +58,7 @@ pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, Member, Network
 pub use error::{Error, ErrorClass};
 pub use evidence::{Doubt, Evidence, EvidenceCell, Policy, Positions, Sample, Tolerated};
 pub use exchange::{
-    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame,
-    emit_master_frame_into,
+    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, emit_master_frame_into,
 };
 pub use frame::LongFrame;
 pub use frame_type::FrameType;

@@ -1,7 +1,7 @@
 //! What a log shows between its blocks, and as a whole.
 
 use super::{exchanges, hex_log};
-use crate::common::{self, Bench};
+use crate::common::Bench;
 
 /// Times from the update period; steps, jumps and requests are seen.
 #[test]

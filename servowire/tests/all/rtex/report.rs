@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{exchanges, hex_log};
-use crate::common::{self, Bench};
+use crate::common::Bench;
 
 /// A table with times, directions and axes: two drives, of which one alarms at 1.0 ms, and a command that is 20 us late.
 fn table() -> String {
