@@ -26,19 +26,15 @@ pub type Console =
     UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
 
 /// The pins, of a Raspberry Pi Pico; no power stage is near.
-static PICO: servowire_boards::Board = const {
-    servowire_boards::Board {
-        name: "Raspberry Pi Pico",
-        crystal_hz: CRYSTAL_HZ,
-        pins: &[
-            servowire_boards::Pin { name: "GPIO 2", signal: "DI", at: "pin 4" },
-            servowire_boards::Pin { name: "GPIO 3", signal: "DE and /RE", at: "pin 5" },
-            servowire_boards::Pin { name: "GPIO 4", signal: "RO", at: "pin 6" },
-        ],
-        power_stage: &[],
-    }
-    .checked()
-};
+static PICO: servowire_boards::Board = servowire_boards::Board::plain(
+    "Raspberry Pi Pico",
+    CRYSTAL_HZ,
+    &[
+        servowire_boards::Pin::new("GPIO 2", "DI", "pin 4"),
+        servowire_boards::Pin::new("GPIO 3", "DE and /RE", "pin 5"),
+        servowire_boards::Pin::new("GPIO 4", "RO", "pin 6"),
+    ],
+);
 
 /// All that an image uses.
 pub struct Board {

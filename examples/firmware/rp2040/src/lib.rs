@@ -2,6 +2,7 @@
 #![no_std]
 
 pub mod aformat;
+pub mod answering;
 pub mod board;
 pub mod clock;
 pub mod commands;
