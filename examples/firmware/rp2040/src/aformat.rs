@@ -10,9 +10,10 @@ use servowire_drivers::Clock as _;
 use servowire_drivers::nikon::blocking::Driver;
 
 use crate::answering::Answering;
-use crate::board::{Board, Console};
+use crate::board::Board;
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
+use crate::console::Console;
 use crate::frames::{self, Frames};
 use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
@@ -76,8 +77,8 @@ fn say(console: &mut Console, what: &str, error: impl Display) -> fmt::Result {
 /// At 16 Mbit/s, or if a clock does not start.
 pub fn master(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
-    let mut board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
-    let (mut clock, console) = (&board.clock, &mut board.console);
+    let board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
+    let (mut clock, console) = (&board.clock, &mut Console::new(board.uart, board.usb, board.first, board.before));
     let receiver = RingReceiver::new(board.channel, board.receiver);
     let port = Frames::new(board.transmitter, receiver, clock, rate.bits_ns(FRAME_BITS));
     let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_hand_over_ns(LATENCY_NS);
@@ -87,6 +88,7 @@ pub fn master(image: &'static str, rate: BitRate) -> ! {
     let mut typed = Typed::default();
     loop {
         board.watchdog.feed();
+        console.poll();
         let read = encoders.read_evidence(EncoderAddress::ZERO);
         let _ = readings.take(console, read, clock.now_ns());
         if let Some(typed) = typed.take(console) {

@@ -10,9 +10,10 @@ use tformat::master::{Line, MultiTurnZero};
 use tformat::{Abm, Abs, Address, BitRate, DataId, EvidenceCell, Page, Request};
 
 use crate::answering::Answering;
-use crate::board::{Board, Console};
+use crate::board::Board;
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
+use crate::console::Console;
 use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
 use crate::uart::{self, Uart};
@@ -63,8 +64,8 @@ fn say(console: &mut Console, what: &str, error: Failure<Uart, Automatic>) -> fm
 /// # Panics
 /// If a clock does not start.
 pub fn master(image: &'static str, rate: BitRate) -> ! {
-    let mut board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
-    let (mut clock, console) = (&board.clock, &mut board.console);
+    let board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
+    let (mut clock, console) = (&board.clock, &mut Console::new(board.uart, board.usb, board.first, board.before));
     let uart = Uart::new(board.transmitter, RingReceiver::new(board.channel, board.receiver));
     let mut encoder = Driver::new(uart, Automatic, clock, Line::new(rate)).expect("the PIO switches the driver");
     let mut cell = EvidenceCell::new();
@@ -72,6 +73,7 @@ pub fn master(image: &'static str, rate: BitRate) -> ! {
     let mut typed = Typed::default();
     loop {
         board.watchdog.feed();
+        console.poll();
         let read = encoder.read_evidence(RESOLUTION);
         let _ = readings.take(console, read, clock.now_ns());
         if let Some(typed) = typed.take(console) {
