@@ -7,9 +7,8 @@ use std::fmt::Write as _;
 use std::io::{self, Cursor, Read};
 use std::panic;
 
-use servowire_decode::capture::{Capture, Change, Format, Hints, Input, Line, open};
+use servowire_decode::capture::{Capture, Change, Format, Hints, Input, Line, Memory, open};
 use servowire_decode::event::Event;
-use servowire_decode::fault::Fault;
 use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Origin, Printer};
 use servowire_decode::settings::Settings;
@@ -166,31 +165,6 @@ pub fn any(data: &[u8]) {
     whole_and_in_pieces(None, data);
 }
 
-/// Channels made of bytes: each is a time since the one before, a channel, and a toggle.
-struct Memory {
-    names: Vec<String>,
-    changes: Vec<Change>,
-    end: Time,
-    given: bool,
-}
-
-impl Line for Memory {
-    fn channels(&self) -> &[String] {
-        &self.names
-    }
-
-    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
-        if !std::mem::replace(&mut self.given, true) {
-            changes.extend_from_slice(&self.changes);
-        }
-        Ok(false)
-    }
-
-    fn reached(&self) -> Time {
-        self.end
-    }
-}
-
 /// Counts events and holds their times against the capture's.
 #[derive(Default)]
 struct Counted(u64);
@@ -202,7 +176,8 @@ impl Printer for Counted {
     }
 }
 
-/// The survey of up to four channels, and the decoding of what it finds: it ends, and says not more than was heard.
+/// The survey of up to four channels, and the decoding of what it finds: it ends, and says not more than was heard. The
+/// channels are made of bytes: each is a time since the one before, a channel, and a toggle.
 pub fn survey(mut data: &[u8]) {
     let names: Vec<String> = (0..=byte(&mut data) % 4).map(|name| name.to_string()).collect();
     // Edges on a grid of an eighth of a bit at one of the rates, or of 10 ns.
@@ -220,7 +195,7 @@ pub fn survey(mut data: &[u8]) {
         changes.push(Change { time, channel: channel as u16, level: levels[channel] });
     }
     let edges = changes.len() as u64;
-    let memory = Memory { names, changes, end: time + 100 * grid, given: false };
+    let memory = Memory::new(names, changes, time + 100 * grid);
     let mut counted = Counted::default();
     let mut out = Output::new("fuzz", &mut counted);
     // A fault is as good an end as any.

@@ -282,7 +282,7 @@ impl FastPosition {
     }
 
     /// Missing words in a row up to now: ACC_ERR_CNT without its limit.
-    pub const fn missing_in_a_row(&self) -> u32 {
+    pub(crate) const fn missing_in_a_row(&self) -> u32 {
         self.in_a_row
     }
 

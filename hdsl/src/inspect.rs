@@ -39,10 +39,9 @@ use crate::symbol::{Control, Reading, Rule};
 pub use disparity::Chain;
 pub use head::{
     FRONT_BITS, FoundHead, HeadDamage, HeadFault, ends_with_stuffing, ends_with_trailer, find_head, head_damage,
-    head_fault, is_coded_for_balance,
 };
 pub use nrz_line::Cause as LineCause;
-pub use rules::{BrokenRule, CarriedDisparity, HeadRules};
+pub use rules::{Beginnings, BrokenRule, HeadRules};
 
 /// What a frame is answered with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

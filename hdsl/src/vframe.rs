@@ -84,12 +84,12 @@ impl SafeBlock {
     }
 
     /// Returns whether a word of the block was no good.
-    pub const fn has_byte_error(&self) -> bool {
+    pub(crate) const fn has_byte_error(&self) -> bool {
         self.bad.is_some()
     }
 
     /// Returns whether the CRC of the bytes as received is right.
-    pub const fn crc_ok(&self) -> bool {
+    pub(crate) const fn crc_ok(&self) -> bool {
         self.crc.finish() == self.raw_crc()
     }
 

@@ -1,11 +1,12 @@
 use nrz_line::{BitOrder, Window};
 
-use crate::contents::sound_four;
+use crate::contents::{Contents, sound_four, sound_four_words};
 use crate::error::Error;
 use crate::expected::{Expected, SYNC_CODE};
 use crate::layout::Layout;
 use crate::number::{EncoderAddress, U40};
 use crate::raw_response::RawResponse;
+use crate::response::refusal;
 use crate::status::EncoderStatus;
 
 /// The response with the whole position, decoded from its line bits in the fewest instructions: for the interrupt of a drive.
@@ -41,7 +42,19 @@ impl Abs40 {
     pub fn parse_line(expected: &Expected, line: &[u8; Self::LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
         match Self::of_line(expected, load(line, order)) {
             Some(value) => Ok(value),
-            None => Err(refusal(expected, line, order)),
+            None => Err(line_refusal(expected, line, order)),
+        }
+    }
+
+    /// Decodes the response from its four frames, the 16 content bits of each in a word; words after them are left alone. `expected` is of layout
+    /// [`Layout::Abs40`]; its address and command are checked.
+    ///
+    /// # Errors
+    /// As [`Response::parse_words`](crate::Response::parse_words).
+    pub fn parse_words(expected: &Expected, words: &[u16], order: BitOrder) -> Result<Self, Error> {
+        match sound_four_words(words, order) {
+            Some((contents, wrong)) if wrong | expected.differs(contents) == 0 => Ok(Self::of_contents(contents)),
+            _ => Err(refusal(expected, RawResponse::from_words(Layout::Abs40, words, order))),
         }
     }
 
@@ -53,11 +66,15 @@ impl Abs40 {
         if wrong | expected.differs(contents) != 0 {
             return None;
         }
-        let [p0, p1, _] = contents;
+        Some(Self::of_contents(contents))
+    }
+
+    #[inline(always)]
+    const fn of_contents([p0, p1, _]: Contents) -> Self {
         let [_, b1, b2, b3] = p0.to_le_bytes();
         let [b4, b5, b6, _] = p1.to_le_bytes();
         let (ea, es) = (EncoderAddress::truncate(low_byte(p0 >> 3)), EncoderStatus::from_bits_truncate(b1 >> 4));
-        Some(Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) })
+        Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) }
     }
 
     /// The 72 line bits of the response to the command that `expected` names.
@@ -102,12 +119,9 @@ const fn low_byte(word: u32) -> u8 {
 /// Off the hot path: why a response is refused.
 #[cold]
 #[inline(never)]
-fn refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> Error {
+fn line_refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> Error {
     let line = Window::read(line, 0, Layout::Abs40.line_bits(), order).unwrap_or(Window::EMPTY);
-    match RawResponse::from_line(Layout::Abs40, line) {
-        Ok(raw) => expected.refusal(&raw),
-        Err(error) => error,
-    }
+    refusal(expected, RawResponse::from_line(Layout::Abs40, line))
 }
 
 servowire_core::one_line!(Abs40 { Self { ea, es, abs } => "from {}: ES {} ABS {:#012x}", ea, es, abs.get(); });
@@ -115,6 +129,7 @@ servowire_core::one_line!(Abs40 { Self { ea, es, abs } => "from {}: ES {} ABS {:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bus::{Addresses, Bus};
     use crate::command::Command;
     use crate::response::Response;
     use proptest::prelude::*;
@@ -133,6 +148,14 @@ mod tests {
                     abs: response.abs40().unwrap(),
                 });
                 prop_assert_eq!(Abs40::parse_line(&expected, &line, order), whole);
+                let words: [u16; 4] = core::array::from_fn(|at| (window.bits() >> (18 * at + 1)) as u16);
+                let words = words.map(|word| if msb { word.reverse_bits() } else { word });
+                let short = usize::from(value & 3 > 0) * 4 + usize::from(value & 3 > 2) * 3;
+                let (words, mut bus) = (words.get(..short).unwrap_or(&words), Bus::new(expected, Addresses::ALL));
+                let whole = Response::parse_words(&expected, words, order);
+                let both = Abs40::parse_words(&expected, words, order);
+                prop_assert_eq!(both.map(|it| (it.ea, it.abs)), whole.map(|it| (it.ea, it.abs40().unwrap())));
+                prop_assert_eq!(bus.push_abs40(words, order), Bus::new(expected, Addresses::ALL).push_words(words, order));
                 Ok(())
             };
             same(line)?;

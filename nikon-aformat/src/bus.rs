@@ -23,6 +23,8 @@
 
 use nrz_line::BitOrder;
 
+use crate::abs40::Abs40;
+use crate::data::Data;
 use crate::error::Error;
 use crate::expected::Expected;
 use crate::number::EncoderAddress;
@@ -158,6 +160,11 @@ pub struct Bus {
 }
 
 impl Bus {
+    /// What is expected of each response.
+    pub const fn expected(&self) -> &Expected {
+        &self.expected
+    }
+
     /// Responses of this kind are expected from these addresses.
     pub const fn new(expected: Expected, asked: Addresses) -> Self {
         let expected = expected.any_address();
@@ -183,6 +190,14 @@ impl Bus {
         self.take(Response::parse_words(&self.expected, words, order))
     }
 
+    /// The words of a response that [`Abs40`] decodes, where nothing but positions is asked for: it costs less flash than
+    /// [`push_words`](Self::push_words), which knows all layouts.
+    pub fn push_abs40(&mut self, words: &[u16], order: BitOrder) -> Verdict {
+        let outcome = Abs40::parse_words(&self.expected, words, order);
+        let command = self.expected.command();
+        self.take(outcome.map(|Abs40 { ea, es, abs }| Response::new(ea, command, es, Data::Abs40 { abs })))
+    }
+
     /// A response that was judged already.
     #[inline(always)]
     pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Verdict {
@@ -202,6 +217,15 @@ impl Bus {
             Err(_) => self.damaged = self.damaged.saturating_add(1),
         }
         Verdict { outcome, duplicate, extra }
+    }
+
+    /// The good response of this address was none: frames of two, with a CRC-8 that is right by chance.
+    pub(crate) fn withdraw(&mut self, ea: EncoderAddress) {
+        if let Some(place) = self.good.get_mut(usize::from(ea.get() & 7)) {
+            *place = None;
+            self.heard = self.heard.without(Addresses::NONE.with(ea));
+            self.damaged = self.damaged.saturating_add(1);
+        }
     }
 
     /// What came from this address.
@@ -264,7 +288,7 @@ impl Bus {
     }
 
     /// Returns whether every address that was asked has sent a good response.
-    pub const fn heard_all(&self) -> bool {
+    pub(crate) const fn heard_all(&self) -> bool {
         self.missing().is_empty()
     }
 }

@@ -111,6 +111,12 @@ pub(crate) fn sound_four(bits: u128) -> (Contents, u32) {
     Of::<4>::checked(Of::<4>::from_bits(bits))
 }
 
+/// The same of four frames, from the content bits of each.
+#[inline(always)]
+pub(crate) fn sound_four_words(words: &[u16], order: BitOrder) -> Option<(Contents, u32)> {
+    Of::<4>::from_words(words, order).map(Of::<4>::checked)
+}
+
 /// The same from words, the content bits of a frame each.
 #[inline(always)]
 pub(crate) fn sound_words(frames: u8, words: &[u16], order: BitOrder) -> Option<(Contents, u32)> {

@@ -95,7 +95,7 @@ impl Resolution {
     }
 
     /// Returns whether the resets are answered with the position.
-    pub const fn has_position_in_resets(self) -> bool {
+    pub(crate) const fn has_position_in_resets(self) -> bool {
         self.resets_with_position
     }
 

@@ -294,7 +294,7 @@ impl Response {
 /// Off the hot path: why a response is refused.
 #[cold]
 #[inline(never)]
-fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {
+pub(crate) fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {
     match raw {
         Ok(raw) => expected.refusal(&raw),
         Err(error) => error,

@@ -20,7 +20,7 @@ impl Temperature {
     pub const EEPROM_ADDRESS: u8 = 0xf9;
 
     /// From EEPROM word 0xf9.
-    pub const fn from_eeprom(word: u16) -> Self {
+    pub(crate) const fn from_eeprom(word: u16) -> Self {
         Self(U10::truncate(word))
     }
 

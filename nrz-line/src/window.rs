@@ -107,7 +107,7 @@ impl Window {
     }
 
     /// Every second bit, the first one included: a line that was sampled twice a bit. Half as long, rounded up.
-    pub const fn decimated(self) -> Self {
+    pub(crate) const fn decimated(self) -> Self {
         // Pairs of bits move together, then fours, eights ...
         let mut bits = self.bits & (u128::MAX / 3);
         bits = (bits | bits >> 1) & (u128::MAX / 5);

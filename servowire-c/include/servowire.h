@@ -27,6 +27,26 @@
 #define SW_SORTE_DATA_AT 2
 
 /**
+ * The release of this header, before the first dot.
+ */
+#define SERVOWIRE_VERSION_MAJOR 0
+
+/**
+ * The release of this header, between the dots.
+ */
+#define SERVOWIRE_VERSION_MINOR 1
+
+/**
+ * The release of this header, behind the second dot.
+ */
+#define SERVOWIRE_VERSION_PATCH 0
+
+/**
+ * The release of this header as one number, 8 bits each: a later one is greater.
+ */
+#define SERVOWIRE_VERSION (((SERVOWIRE_VERSION_MAJOR << 16) | (SERVOWIRE_VERSION_MINOR << 8)) | SERVOWIRE_VERSION_PATCH)
+
+/**
  * Refusals of A-format, in the order of their numbers.
  */
 enum sw_aformat_error_t
@@ -1428,6 +1448,61 @@ typedef struct {
 } sw_aformat_request_t;
 
 /**
+ * A modelled encoder with one bank of EEPROM. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[92];
+} sw_aformat_device_t;
+
+/**
+ * What an encoder sends, and when.
+ */
+typedef struct {
+    /**
+     * When the first start bit is on the line.
+     */
+    uint64_t start_ns;
+    /**
+     * When the last bit ends.
+     */
+    uint64_t end_ns;
+    /**
+     * The content of the frames, the first bit of the line in bit 0.
+     */
+    uint16_t contents[6];
+    /**
+     * How many.
+     */
+    uint8_t len;
+} sw_aformat_answer_t;
+
+/**
+ * A procedure of several exchanges with one encoder: it says what to send, takes what is heard, and decides what to repeat. Its
+ * content is private. While it runs the line is its own.
+ */
+typedef struct {
+    uint64_t _private[80];
+} sw_aformat_procedure_t;
+
+/**
+ * The response with the whole position.
+ */
+typedef struct {
+    /**
+     * Position bits as received, 40: the single turn in the low ones.
+     */
+    uint64_t abs;
+    /**
+     * EA: who answers.
+     */
+    uint8_t ea;
+    /**
+     * ES: sw_aformat_es_t.
+     */
+    uint8_t es;
+} sw_aformat_abs40_t;
+
+/**
  * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
  * private; it may be copied.
  */
@@ -2200,12 +2275,184 @@ sw_result_t sw_aformat_parse_line(uint8_t command,
                                   sw_aformat_response_t *response);
 
 /**
+ * Switches an encoder on: position 0, no alarms, with this address.
+ */
+sw_result_t sw_aformat_device_start(sw_aformat_device_t *device,
+                                    uint8_t ea,
+                                    const sw_aformat_encoder_t *encoder,
+                                    uint32_t bits_per_second);
+
+/**
+ * Turns the shaft: counts in the turn before the zero of command 12 is applied, and turns.
+ */
+sw_result_t sw_aformat_device_set_position(sw_aformat_device_t *device, uint32_t single_turn, uint32_t turns);
+
+/**
+ * The causes of these alarms (bits of ALM) come, and those of all others go. A latched alarm stays until a reset.
+ */
+sw_result_t sw_aformat_device_set_alarms(sw_aformat_device_t *device,
+                                         uint16_t alm);
+
+/**
+ * Puts a word into the EEPROM, as its maker does: any address.
+ */
+sw_result_t sw_aformat_device_set_eeprom(sw_aformat_device_t *device, uint8_t address, uint16_t data);
+
+/**
+ * Frames were heard one after the other, as by sw_aformat_hear(): the own requests and the answers of others. SW_SEND with `answer`
+ * filled, or SW_PENDING.
+ */
+sw_result_t sw_aformat_device_hear(sw_aformat_device_t *device,
+                                   const uint16_t *contents,
+                                   const uint8_t *framed,
+                                   size_t count,
+                                   uint64_t end_ns,
+                                   sw_aformat_answer_t *answer);
+
+/**
+ * A reset: command 8 (clears the status), 9 (the turns), 10 (both), 11 (gives the only encoder on the line the address `ea`) or 12
+ * (**makes this position the zero of the turn and shifts the commutation angle**), eight times, and the status 30 ms later: its ALM is
+ * the value. With `careful` 1 the encoder is made to begin its count anew before, and a failure tells whether it was done
+ * (SW_E_AFORMAT_NOT_DONE, SW_E_AFORMAT_EFFECT_UNKNOWN); with 0 it is the eight requests of the documents. The line and the widths are
+ * those of `m`, which is to be left alone meanwhile. Then sw_aformat_next().
+ */
+sw_result_t sw_aformat_reset(sw_aformat_procedure_t *p,
+                             const sw_aformat_t *m,
+                             uint8_t command,
+                             uint8_t ea,
+                             uint8_t careful,
+                             uint64_t now_ns);
+
+/**
+ * Reads the EEPROM word at `address`, which is the value. With `careful` 1 the first response is never trusted: an access that was
+ * broken off may have left it there; with 0 the caller knows that none was.
+ */
+sw_result_t sw_aformat_eeprom_read(sw_aformat_procedure_t *p,
+                                   const sw_aformat_t *m,
+                                   uint8_t ea,
+                                   uint8_t address,
+                                   uint8_t careful,
+                                   uint64_t now_ns);
+
+/**
+ * Writes an EEPROM word at `address`, 0x00..0xef. With `careful` 1 it is read back and a failure tells whether it was written; with 0
+ * the status is read 30 ms later.
+ */
+sw_result_t sw_aformat_eeprom_write(sw_aformat_procedure_t *p,
+                                    const sw_aformat_t *m,
+                                    uint8_t ea,
+                                    uint8_t address,
+                                    uint16_t data,
+                                    uint8_t careful,
+                                    uint64_t now_ns);
+
+/**
+ * Gives the encoder at `ea` an identification code of 24 bits. `careful` as in sw_aformat_eeprom_write().
+ */
+sw_result_t sw_aformat_write_id(sw_aformat_procedure_t *p,
+                                const sw_aformat_t *m,
+                                uint8_t ea,
+                                uint32_t id,
+                                uint8_t careful,
+                                uint64_t now_ns);
+
+/**
+ * Gives the encoder with this identification code the address `ea`.
+ */
+sw_result_t sw_aformat_set_address(sw_aformat_procedure_t *p,
+                                   const sw_aformat_t *m,
+                                   uint32_t id,
+                                   uint8_t ea,
+                                   uint8_t careful,
+                                   uint64_t now_ns);
+
+/**
+ * Finds an encoder and its widths: the one at `ea`, or with 255 the only one on the line. The value is its type word.
+ */
+sw_result_t sw_aformat_detect(sw_aformat_procedure_t *p,
+                              const sw_aformat_t *m,
+                              uint8_t ea,
+                              uint64_t now_ns);
+
+/**
+ * What a procedure wants next: SW_SEND with `to_send` filled (hear and poll by sw_aformat_procedure_hear() and
+ * sw_aformat_procedure_poll() until the exchange ends, then call this again), SW_PENDING while the exchange runs, SW_OK when the
+ * procedure is done, or why it failed.
+ */
+sw_result_t sw_aformat_next(sw_aformat_procedure_t *p,
+                            uint64_t now_ns,
+                            sw_aformat_transmission_t *to_send);
+
+/**
+ * Frames were heard one after the other, as by sw_aformat_hear(). SW_PENDING, or the exchange has ended: SW_OK or its refusal.
+ */
+sw_result_t sw_aformat_procedure_hear(sw_aformat_procedure_t *p,
+                                      const uint16_t *contents,
+                                      const uint8_t *framed,
+                                      size_t count,
+                                      uint64_t end_ns);
+
+/**
+ * It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+ */
+sw_result_t sw_aformat_procedure_poll(sw_aformat_procedure_t *p, uint64_t now_ns);
+
+/**
+ * While an exchange of a procedure is pending, when it is to be polled; afterwards, from when on the line is free. SW_NO_TIME for
+ * a state that was not started.
+ */
+uint64_t sw_aformat_procedure_until_ns(const sw_aformat_procedure_t *p);
+
+/**
+ * What a procedure that has ended with SW_OK was made for: the EEPROM word, the type word, ALM after a reset, else 0. `ready_ns` (may
+ * be NULL) is the time from which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+ */
+sw_result_t sw_aformat_value(const sw_aformat_procedure_t *p,
+                             uint32_t *value,
+                             uint64_t *ready_ns);
+
+/**
+ * After sw_aformat_detect() has ended with SW_OK: the address and the widths of the encoder. SW_E_NO_VALUE before, and for a type word
+ * that is not known.
+ */
+sw_result_t sw_aformat_detected(const sw_aformat_procedure_t *p,
+                                uint8_t *ea,
+                                uint8_t *st_bits,
+                                uint8_t *mt_bits);
+
+/**
+ * The response of layout ABS40 to command 0 or 4 from its four frames, a 16-bit word each, with all checks; `ea` 255 is any.
+ */
+sw_result_t sw_aformat_parse_abs40(uint8_t command,
+                                   uint8_t ea,
+                                   const uint16_t *words,
+                                   size_t count,
+                                   uint8_t order,
+                                   sw_aformat_abs40_t *data);
+
+/**
  * Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
  */
 sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
                                  const sw_aformat_request_t *asked,
                                  const sw_aformat_encoder_t *encoder,
                                  uint8_t addresses);
+
+/**
+ * The same for the whole position of all who are asked: command 4 to the highest of them, for sw_aformat_bus_push_abs40().
+ */
+sw_result_t sw_aformat_bus_start_abs40(sw_aformat_bus_t *bus,
+                                       uint8_t addresses);
+
+/**
+ * One response of four frames came, a 16-bit word each. The results are those of sw_aformat_bus_push(), for less flash: nothing but
+ * positions is known. SW_E_ARGUMENT for a bus that was started for another layout.
+ */
+sw_result_t sw_aformat_bus_push_abs40(sw_aformat_bus_t *bus,
+                                      const uint16_t *words,
+                                      size_t count,
+                                      uint8_t order,
+                                      sw_aformat_abs40_t *data);
 
 /**
  * One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
@@ -2910,6 +3157,12 @@ sw_result_t sw_tformat_parse_encoder_id(const uint8_t *bytes, size_t len, sw_tfo
  * The response to ID 3 from UART bytes.
  */
 sw_result_t sw_tformat_parse_all(const uint8_t *bytes, size_t len, sw_tformat_all_t *data);
+
+/**
+ * The release of the library: SERVOWIRE_VERSION, or the header that was compiled in belongs to another one. States and structs may
+ * differ then: compare it once, before the first state is started.
+ */
+uint32_t sw_version(void);
 
 #ifdef __cplusplus
 }  // extern "C"

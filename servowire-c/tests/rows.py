@@ -76,9 +76,9 @@ def main():
             if reason := module.NOT_IN_C.get(topic):
                 print(f"{protocol}/{topic}: not in the C interface: {reason}")
                 continue
-            if topic not in module.TOPICS:
-                sys.exit(f"{protocol}/{topic}: no topic of this name")
-            lines = lines_of(protocol, topic, module.TOPICS[topic], path)
+            if (make := getattr(module, topic, None)) is None:
+                sys.exit(f"{protocol}/{topic}: no function of this name")
+            lines = lines_of(protocol, topic, make, path)
             ended = subprocess.run([program], input="".join(lines), text=True, capture_output=True)
             if ended.returncode != 0:
                 failed = True

@@ -14,6 +14,7 @@ mod hints;
 mod input;
 pub mod isf;
 mod kinds;
+mod memory;
 pub mod ols;
 pub mod pcapng;
 pub mod raw;
@@ -32,6 +33,7 @@ pub use columns::{Column, columns};
 pub use hints::{Format, Guard, Hints};
 pub use input::{Input, Live, SeekRead};
 pub use kinds::{ByteLog, Capture};
+pub use memory::Memory;
 pub use recording::{Change, Hole, Line};
 
 use crate::fault::{At, Fault};

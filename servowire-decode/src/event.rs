@@ -76,7 +76,7 @@ impl Event {
     }
 
     /// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
-    pub fn cut_off(place: Place) -> Self {
+    pub(crate) fn cut_off(place: Place) -> Self {
         Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
     }
 }
@@ -251,7 +251,7 @@ impl Position {
     }
 
     /// The way from `before`, the shorter one where the value wraps.
-    pub fn moved_from(&self, before: &Self) -> i64 {
+    pub(crate) fn moved_from(&self, before: &Self) -> i64 {
         let way = self.counts.wrapping_sub(before.counts);
         let Some(span) = self.span.and_then(|span| i64::try_from(span).ok()).filter(|span| *span > 0) else {
             return way;
@@ -305,13 +305,13 @@ impl From<Refusal> for Verdict {
 
 impl Verdict {
     /// The capture ends inside a frame: what comes then is not known, so it is not sound.
-    pub fn cut_off() -> Self {
+    pub(crate) fn cut_off() -> Self {
         let cause = Some("the file was cut off, or recording stopped there".to_owned());
         Refusal { cause, ..Refusal::new("truncated", "the capture ends inside a frame") }.into()
     }
 
     /// The recording has a hole that begins inside a frame.
-    pub fn in_a_hole() -> Self {
+    pub(crate) fn in_a_hole() -> Self {
         let cause = Some("recording stopped there for a while".to_owned());
         Refusal { cause, ..Refusal::new("truncated", "a hole in the recording begins inside the frame") }.into()
     }

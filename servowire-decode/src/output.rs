@@ -75,8 +75,8 @@ impl<'a> Output<'a> {
 
     /// The first refused frame that is shown is the last one.
     #[must_use]
-    pub fn until_error(self, until_error: bool) -> Self {
-        Self { until_error, ..self }
+    pub fn until_error(self) -> Self {
+        Self { until_error: true, ..self }
     }
 
     /// Called after every block that was read.
@@ -121,7 +121,7 @@ impl<'a> Output<'a> {
     }
 
     /// A further line is decoded; it has the next number, from 0.
-    pub fn begin_lane(&mut self, lane: Lane) {
+    pub(crate) fn begin_lane(&mut self, lane: Lane) {
         self.origin.lanes.push(lane);
     }
 
@@ -191,7 +191,7 @@ impl Sink for Output<'_> {
             if !filter.takes(&self.origin, event) {
                 return Ok(());
             }
-            errors = filter.errors;
+            errors = filter.wants_errors_only();
         }
         self.chosen.event(event)?;
         if errors && event.verdict.is_ok() {

@@ -107,7 +107,7 @@ impl Serialize for Time {
 const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
 
 /// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
-pub fn from_decimal(text: &str) -> Option<Time> {
+pub(crate) fn from_decimal(text: &str) -> Option<Time> {
     let text = text.trim();
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -129,7 +129,7 @@ pub fn from_decimal(text: &str) -> Option<Time> {
 }
 
 /// Seconds as a floating point number in picoseconds; nothing for what no capture can hold.
-pub fn from_seconds(seconds: f64) -> Option<Time> {
+pub(crate) fn from_seconds(seconds: f64) -> Option<Time> {
     let time = (seconds * 1e12).round();
     (time.abs() < MOST as f64).then_some(Time(time as i128))
 }

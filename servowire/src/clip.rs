@@ -1,7 +1,5 @@
 //! A piece of a recording around one frame: its levels, its bits, and what is wrong in it.
 
-use std::collections::BTreeMap;
-
 use servowire_decode::capture::Change;
 use servowire_decode::event::{Event, Place, Refusal, Verdict};
 use servowire_decode::output::printer::Lane;
@@ -66,23 +64,20 @@ impl Clip {
         Some(Self { event: event.clone(), lane: lane.clone(), from: start - around, to: end + around, traces })
     }
 
-    /// The levels that the channels had before anything else.
-    pub(crate) fn begin(&mut self, levels: &BTreeMap<u16, bool>) {
+    /// The levels that the channels have at the beginning.
+    pub(crate) fn begin(&mut self, level: impl Fn(u16) -> Option<bool>) {
         for (channel, trace) in self.lane.channels.iter().zip(&mut self.traces) {
-            trace.edges.extend(levels.get(channel).map(|level| (self.from, *level)));
+            trace.edges.extend(level(*channel).map(|level| (self.from, level)));
         }
     }
 
-    /// The next change of any channel, in the order of time.
+    /// The next change of any channel after the beginning, in the order of time.
     pub(crate) fn change(&mut self, change: &Change) {
         let own = self.lane.channels.iter().position(|channel| *channel == change.channel);
         let Some(trace) = own.and_then(|own| self.traces.get_mut(own)).filter(|_| change.time <= self.to) else {
             return;
         };
-        if change.time <= self.from {
-            trace.edges.clear();
-        }
-        trace.edges.push((change.time.max(self.from), change.level));
+        trace.edges.push((change.time, change.level));
     }
 
     /// Start and end of the frame.

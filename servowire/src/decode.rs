@@ -92,20 +92,26 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     }
     interrupt::note();
     let stdout = io::stdout();
-    let colour = AutoStream::choice(&stdout) != ColorChoice::Never;
     let out = BufWriter::with_capacity(1 << 16, stdout.lock());
     let mut printer: Box<dyn Printer> = if arguments.stats {
-        Box::new(Stats::new(out, arguments.json, arguments.jump))
+        let stats = Stats::new(out, arguments.jump);
+        Box::new(if arguments.json { stats.in_json() } else { stats })
     } else if arguments.json {
         Box::new(JsonLines::new(out))
     } else if arguments.csv {
         Box::new(Csv::new(out))
     } else {
-        let text = Text::new(out, files != 1 && piped.is_none(), colour);
-        Box::new(match terminal::columns() {
-            Some(columns) => text.with_columns(columns),
-            None => text,
-        })
+        let mut text = Text::new(out);
+        if files != 1 && piped.is_none() {
+            text = text.with_headings();
+        }
+        if AutoStream::choice(&stdout) != ColorChoice::Never {
+            text = text.with_colour();
+        }
+        if let Some(columns) = terminal::columns() {
+            text = text.with_columns(columns);
+        }
+        Box::new(text)
     };
     match all(arguments, piped, printer.as_mut()) {
         Ok(end) => ExitCode::from(end.code()),
@@ -181,7 +187,10 @@ fn one(
     let mut out = Output::new(name, printer).with_progress(&progress).with_notes(&notes).with_filter(&mut filter);
     out = out.with_beside(vcd.as_mut().map(|vcd| vcd as &mut dyn Printer));
     out = out.with_beside(picture.as_mut().map(|picture| picture as &mut dyn Printer));
-    out = out.with_enough(&interrupt::asked).until_error(arguments.until.is_some());
+    out = out.with_enough(&interrupt::asked);
+    if arguments.until.is_some() {
+        out = out.until_error();
+    }
     out.begin()?;
     let mut settings = arguments.reading.settings();
     // A row of a table stands alone.

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use servowire_decode::event::{Direction, Event, Field, Place, Verdict};
-use servowire_decode::output::filter::Filter;
+use servowire_decode::output::filter::{Choice, Filter};
 use servowire_decode::output::text::{shown, verdict};
 use servowire_decode::time::Time;
 
@@ -61,7 +61,7 @@ impl Arguments {
     /// Whether the frame holds.
     fn explain(&self) -> Result<bool, Box<dyn Error>> {
         let mut scope = Scope::new(Wanted::At(self.at));
-        let mut filter = Filter::new(Vec::new(), None, (None, Some(self.at + AFTER)), false);
+        let mut filter = Filter::new(Choice { to: Some(self.at + AFTER), ..Choice::default() });
         let name = self.file.display();
         let read = self.reading.decode(&self.file, &mut scope, Vec::new(), Some(&mut filter))?;
         let Some(clip) = scope.clips().next() else {

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use clap::Args;
 use servowire_decode::event::{Event, Verdict};
 use servowire_decode::output::printer::{Origin, Printer};
-use servowire_decode::output::stats::Gathered;
+use servowire_decode::output::stats::{Gathered, Table};
 use servowire_decode::time::Time;
 use sha2::{Digest, Sha256};
 
@@ -51,7 +51,7 @@ struct Report {
     call: String,
     read: Read,
     /// Who spoke, and their figures.
-    tables: Vec<(String, Vec<(&'static str, String)>)>,
+    tables: Vec<Table>,
     lines: Vec<(&'static str, String)>,
     picture: String,
     scope: Scope,
@@ -69,7 +69,7 @@ struct Listed {
 /// Gathers what no other printer does.
 struct Gatherer {
     figures: Gathered,
-    tables: Vec<(String, Vec<(&'static str, String)>)>,
+    tables: Vec<Table>,
     lines: Vec<(&'static str, String)>,
     listed: Vec<Listed>,
     refused: usize,

@@ -93,8 +93,10 @@ impl Printer for Scope {
     fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
         let (Some(key), Some(lane)) = (self.key(event), origin.lane()) else { return Ok(()) };
         if let Some(mut clip) = Clip::new(event, lane, &self.names) {
-            clip.begin(&self.before);
-            self.recent.iter().for_each(|change| clip.change(change));
+            let first = self.recent.partition_point(|change| change.time <= clip.from);
+            let last = |channel| self.recent.range(..first).rev().find(|change| change.channel == channel);
+            clip.begin(|channel| last(channel).map(|c| c.level).or(self.before.get(&channel).copied()));
+            self.recent.range(first..).for_each(|change| clip.change(change));
             self.clips.insert(key, clip);
         }
         Ok(())

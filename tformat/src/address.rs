@@ -65,7 +65,7 @@ impl Adf {
 
     /// With the busy flag, as an encoder answers.
     #[must_use]
-    pub const fn with_busy(self) -> Self {
+    pub(crate) const fn with_busy(self) -> Self {
         Self(self.0 | Self::BUSY)
     }
 

@@ -84,6 +84,12 @@ impl Frame {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
     }
 
+    /// The first data byte: the control field.
+    pub(crate) const fn first(&self) -> u8 {
+        let [first, ..] = self.bytes;
+        first
+    }
+
     /// Number of fields, 1..=11.
     pub const fn fields(self) -> u8 {
         self.len

@@ -92,11 +92,6 @@ impl Report {
         self.response
     }
 
-    /// Returns whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
-    pub const fn status_contradicts_alarms(&self) -> bool {
-        matches!(self.response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
-    }
-
     /// The whole fields of the line on its grid, at most as many as the response has.
     pub fn fields(&self) -> &[RawField] {
         self.fields.get(..usize::from(self.len)).unwrap_or(&self.fields)
@@ -318,13 +313,6 @@ mod tests {
         assert!(report.findings().iter().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
         assert_eq!(report.error(), Some(Error::StartBit { field: 2 }));
         assert!(!report.fields()[2].start_ok && !report.fields()[3].delimiter_ok);
-    }
-
-    #[test]
-    fn status_that_contradicts_the_alarms() {
-        let mut answer = [0x1a, 0x00, 0, 0, 0, 0x17, 0, 0, 0, 0xc8, 0];
-        answer[10] = crc(&answer);
-        assert!(inspect_bytes(Request::ReadAll, &answer).status_contradicts_alarms());
     }
 
     #[test]

@@ -110,7 +110,7 @@ servowire_core::one_line!(HeadFault {
 });
 
 /// What is wrong with the parameter byte of a head, if anything is.
-pub const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
+pub(crate) const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
     match head.byte.symbol() {
         Err(_) => Some(HeadFault::UndefinedSymbol { symbol: head.byte.raw() & 31 }),
         Ok(_) if head.byte.raw() & 0x20 != 0 => Some(HeadFault::Reserved),
@@ -120,7 +120,7 @@ pub const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
 
 /// Whether EQUALISATION and PARA, the last 14 bits of a head, are coded as for a balanced line: so is every head without an EXTRA
 /// window that follows an answered frame.
-pub fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
+pub(crate) fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
     let due = Head::new(head.byte, None, LineDisparity::ZERO);
     let coded = line.bits() >> head.len.saturating_sub(14) & 0x3fff;
     coded == u128::from(due.equalisation()) | u128::from(due.para().get()) << 4

@@ -2,9 +2,11 @@
 
 use nrz_line::Window;
 
+use super::disparity::Chain;
 use super::head::{HeadFault, ends_with_trailer, head_fault, is_coded_for_balance};
 use crate::frame::ParsedHead;
 use crate::parameter::MasterSymbol;
+use crate::symbol::RunningDisparity;
 
 /// Heads after which what all of them did is a rule.
 const RULE: u8 = 16;
@@ -125,31 +127,47 @@ impl HeadRules {
     }
 }
 
-/// Whether an encoder carries the running disparity from one answer to the next, which no document says: the line tells.
+/// With which running disparity the answers of an encoder begin, which no document says: the line tells.
+///
+/// An answer that begins with + after one that ended with + was carried on; one that begins with - there began anew. After
+/// one that ended with - both begin with -, so that tells nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub struct CarriedDisparity {
-    kept: u32,
-    broken: u32,
+pub struct Beginnings {
+    carried: u32,
+    anew: u32,
 }
 
-impl CarriedDisparity {
-    /// Answers that have to go on from each other before it is taken for a rule.
-    const LEAST: u32 = 8;
-    /// One of this many may not.
+impl Beginnings {
+    /// Answers that have to tell one and the same before it is taken for a rule.
+    const LEAST: u32 = 4;
+    /// One of this many may tell the other.
     const OF: u32 = 8;
 
-    /// Two answers followed each other; `goes_on` as by [`Chain::goes_on_in`](super::Chain::goes_on_in).
-    pub fn note(&mut self, goes_on: bool) {
-        let count = if goes_on { &mut self.kept } else { &mut self.broken };
+    /// Two answers followed each other.
+    pub fn note(&mut self, before: Chain, next: Chain) {
+        let count = match (before.after(), next.before()) {
+            (Some(RunningDisparity::Plus), Some(RunningDisparity::Plus)) => &mut self.carried,
+            (Some(RunningDisparity::Plus), Some(RunningDisparity::Minus)) => &mut self.anew,
+            _ => return,
+        };
         *count = count.saturating_add(1);
-        if self.kept.saturating_add(self.broken) > 4096 {
-            (self.kept, self.broken) = (self.kept / 2, self.broken / 2);
+        if self.carried.saturating_add(self.anew) > 4096 {
+            (self.carried, self.anew) = (self.carried / 2, self.anew / 2);
         }
     }
 
-    /// Returns whether nearly all answers so far went on.
-    pub const fn is_rule(self) -> bool {
-        self.kept >= Self::LEAST && self.kept >= self.broken.saturating_mul(Self::OF)
+    /// Returns whether nearly all answers so far began where the one before ended.
+    pub const fn are_carried(self) -> bool {
+        Self::is_rule(self.carried, self.anew)
+    }
+
+    /// Returns whether nearly all answers so far began with -, wherever the one before ended.
+    pub const fn are_anew(self) -> bool {
+        Self::is_rule(self.anew, self.carried)
+    }
+
+    const fn is_rule(told: u32, other: u32) -> bool {
+        told >= Self::LEAST && told >= other.saturating_mul(Self::OF)
     }
 }
 
@@ -160,21 +178,40 @@ mod tests {
     use crate::line_code::LineDisparity;
     use crate::parameter::ParameterByte;
 
+    /// An answer that begins and ends so: D16.0 in the column of its beginning, then D3.0, which changes the disparity, or
+    /// D21.5, which does not.
+    fn answer(begins: char, ends: char) -> Chain {
+        let first = if begins == '-' { "0110110100" } else { "1001001011" };
+        let last = match (begins, ends) {
+            ('-', '+') => "1100011011",
+            ('+', '-') => "1100010100",
+            _ => "1010101010",
+        };
+        let text = [first, "1010101010", "1010101010", "1010101010", "1010101010", "1", last].concat();
+        let chain = Chain::of(text.bytes().rev().fold(0, |bits, bit| bits << 1 | u64::from(bit == b'1')));
+        assert!(chain.holds());
+        chain
+    }
+
     #[test]
-    fn disparity_is_a_rule_where_most_answers_keep_it() {
-        let mut carried = CarriedDisparity::default();
-        (0..7).for_each(|_| carried.note(true));
-        assert!(!carried.is_rule());
-        carried.note(true);
-        assert!(carried.is_rule());
-        carried.note(false);
-        assert!(carried.is_rule());
-        carried.note(false);
-        assert!(!carried.is_rule());
-        // An encoder that begins anew with each answer is right by chance half of the time.
-        let mut anew = CarriedDisparity::default();
-        (0..10_000).for_each(|k| anew.note(k % 2 == 0));
-        assert!(!anew.is_rule());
+    fn answers_tell_whether_they_are_carried_on_or_begin_anew() {
+        let noted = |pairs: &[(&str, &str)]| {
+            let mut beginnings = Beginnings::default();
+            for (before, next) in pairs {
+                let [before, next] = [before, next].map(|it| answer(it.as_bytes()[0].into(), it.as_bytes()[1].into()));
+                beginnings.note(before, next);
+            }
+            (beginnings.are_carried(), beginnings.are_anew())
+        };
+        // After - both begin with -: as many as one likes are no rule.
+        assert_eq!(noted(&[("+-", "-+"); 20]), (false, false));
+        assert_eq!(noted(&[("-+", "+-"); 3]), (false, false));
+        assert_eq!(noted(&[("-+", "+-"); 4]), (true, false));
+        assert_eq!(noted(&[("-+", "-+"); 3]), (false, false));
+        assert_eq!(noted(&[("-+", "-+"); 4]), (false, true));
+        // One of eight may be damaged.
+        assert_eq!(noted(&[&[("-+", "+-"); 8][..], &[("-+", "-+")]].concat()), (true, false));
+        assert_eq!(noted(&[&[("-+", "+-"); 7][..], &[("-+", "-+")]].concat()), (false, false));
     }
 
     #[test]

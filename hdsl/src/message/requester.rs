@@ -95,7 +95,7 @@ impl Requester {
     }
 
     /// FREL: no long message is under way.
-    pub const fn is_long_free(&self) -> bool {
+    pub(crate) const fn is_long_free(&self) -> bool {
         self.long.is_free()
     }
 
@@ -134,7 +134,7 @@ impl Requester {
     }
 
     /// Drops all messages without telling the encoder: the link is being started anew.
-    pub fn drop_all(&mut self) -> Finished {
+    pub(crate) fn drop_all(&mut self) -> Finished {
         let mut finished = Finished::default();
         self.drop_into(&mut finished);
         finished

@@ -3,6 +3,7 @@ use crate::error::Error;
 use crate::expected::{Expected, SYNC_CODE};
 use crate::frame::truncated;
 use crate::layout::FRAME_BITS;
+use crate::number::EncoderAddress;
 use crate::raw_response::RawResponse;
 use crate::response::Response;
 
@@ -22,6 +23,9 @@ pub(super) struct Hunt {
     got: usize,
     /// End of the last one, by its stamp.
     end_ns: u64,
+    /// So many of the first ones belong to a sound response that was given already, which is this encoder's.
+    given: usize,
+    giver: EncoderAddress,
 }
 
 /// What was found.
@@ -33,6 +37,9 @@ pub(super) struct Found {
     pub(super) began_ns: u64,
     /// Its last delimiter, by the stamps.
     pub(super) end_ns: u64,
+    /// It begins inside a response of this encoder that was given, and behind that nothing began: that one had lost frames, and
+    /// its CRC-8 was right by chance.
+    pub(super) instead_of: Option<EncoderAddress>,
 }
 
 /// Frames that are handed over together: `None` for one whose delimiter read 0.
@@ -52,6 +59,8 @@ impl Hunt {
             begun_ns: [0; RawResponse::MAX_FRAMES],
             got: 0,
             end_ns: 0,
+            given: 0,
+            giver: EncoderAddress::ZERO,
         }
     }
 
@@ -68,6 +77,10 @@ impl Hunt {
                 self.broken(expected, &times, at, &mut found);
                 continue;
             };
+            // Frame by frame, what is behind a response comes only now. If that begins one, nothing was lost.
+            if self.given != 0 && self.given == self.got && expected.differs_first(content) == 0 {
+                self.clear();
+            }
             self.push(content, times.begun(at));
             if self.got >= usize::from(expected.layout().frames()) {
                 self.judge(expected, &times, at, &mut found);
@@ -106,10 +119,12 @@ impl Hunt {
         if fresh && begins_a_response(first) && !self.is_overtaken(expected, times, at) {
             let raw = RawResponse::of(self.contents, expected.layout());
             let outcome = Response::parse(expected, &raw);
-            found(Found { outcome, began_ns, end_ns: self.end_ns });
-            if outcome.is_ok() {
-                self.clear();
-                return;
+            let instead_of = (self.given != 0).then_some(self.giver);
+            if outcome.is_ok() || instead_of.is_none() {
+                found(Found { outcome, began_ns, end_ns: self.end_ns, instead_of });
+            }
+            if let Ok(response) = outcome {
+                (self.given, self.giver) = (self.got, response.ea);
             }
         }
         self.drop_first();
@@ -147,34 +162,45 @@ impl Hunt {
         let [_, b1, b2, b3, b4, b5] = self.begun_ns;
         self.begun_ns = [b1, b2, b3, b4, b5, 0];
         self.got = self.got.saturating_sub(1);
+        self.given = self.given.saturating_sub(1);
     }
 
     /// A pause: what was begun is not continued.
     fn cut(&mut self, expected: &Expected, found: &mut impl FnMut(Found)) {
+        self.forget_given();
         let ([first, ..], [begun_ns, ..]) = (self.contents, self.begun_ns);
         // Without frames it is 0, which begins no response.
         if begun_ns >= self.from_ns && begins_a_response(first) {
             let got = u32::try_from(self.got).unwrap_or(0).wrapping_mul(FRAME_BITS);
             let outcome = Err(truncated(got, expected.layout().line_bits()));
-            found(Found { outcome, began_ns: begun_ns, end_ns: self.end_ns });
+            found(Found { outcome, began_ns: begun_ns, end_ns: self.end_ns, instead_of: None });
         }
         self.clear();
     }
 
     /// A delimiter read 0.
     fn broken(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
+        self.forget_given();
         let last_of_block = at.saturating_add(1) == times.count;
         let begun_ns = if last_of_block { times.begun(at).max(times.begun_of_tail(0)) } else { times.begun(at) };
         if begun_ns >= self.from_ns {
             let most = expected.layout().frames().saturating_sub(1);
             let frame = u8::try_from(self.got).unwrap_or(most).min(most);
-            found(Found { outcome: Err(Error::Delimiter { frame }), began_ns: begun_ns, end_ns: self.end_ns });
+            let outcome = Err(Error::Delimiter { frame });
+            found(Found { outcome, began_ns: begun_ns, end_ns: self.end_ns, instead_of: None });
         }
         self.clear();
     }
 
+    /// Nothing follows any more on the response that was given.
+    fn forget_given(&mut self) {
+        while self.given != 0 {
+            self.drop_first();
+        }
+    }
+
     fn clear(&mut self) {
-        self.got = 0;
+        (self.got, self.given) = (0, 0);
         self.contents = [0; RawResponse::MAX_FRAMES];
     }
 }

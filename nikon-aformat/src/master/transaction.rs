@@ -1,13 +1,17 @@
 use super::hunt::{Block, Found, Hunt};
 use super::{Line, Progress};
 use crate::bus::{Addresses, Bus, Outcome};
+use crate::command::Command;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::expected::Expected;
+use crate::layout::Layout;
 use crate::number::EncoderAddress;
+use crate::operation::Operation;
 use crate::request::{Frames, Request};
 use crate::resolution::Resolution;
 use crate::response::Response;
+use crate::timing::BitRate;
 
 /// A response with all checks passed, and when its values were sampled: not documented, but after the end of the request and
 /// before the response began.
@@ -71,12 +75,38 @@ pub struct Transaction {
 }
 
 impl Transaction {
+    /// Nothing was asked and nothing is answered: a place for [`restart`](Self::restart). It counts as one that has ended with
+    /// [`Error::NoResponse`], and its line is free at any time.
+    pub const IDLE: Self = Self {
+        request: NOTHING,
+        expected: Expected::new(Layout::Abs40, Command::Abs40),
+        line: Line::new(BitRate::Mbit2_5),
+        hunt: Hunt::new(0),
+        start_ns: 0,
+        asked_ns: 0,
+        until_ns: 0,
+        refused: None,
+        end: Some(Err(Error::NoResponse)),
+        ready_ns: 0,
+    };
+
     /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `start_ns`.
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
     /// [`Error::Line`]: it is not to be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
+        Self::begun(request, resolution, line, start_ns)
+    }
+
+    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    pub fn restart(&mut self, request: Request, resolution: Resolution, line: Line, start_ns: u64) {
+        *self = Self::begun(request, resolution, line, start_ns);
+    }
+
+    /// Inlined, so that it is made where it is to be.
+    #[inline(always)]
+    fn begun(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
         let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
         Self {
@@ -132,6 +162,12 @@ impl Transaction {
         self.progress()
     }
 
+    /// The same as [`hear`](Self::hear) for an interrupt, which has no use for a copy of the response: [how it ended](Self::outcome).
+    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<&Result<Exchange, Error>> {
+        let _ = self.hear(frames, end_ns);
+        self.outcome()
+    }
+
     /// Where the transaction stands at `now_ns`; it fails if no answer can come any more.
     pub fn poll(&mut self, now_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() && now_ns > self.until_ns {
@@ -150,6 +186,16 @@ impl Transaction {
             Some(Ok(value)) => Progress::Done { value, ready_ns: self.ready_ns },
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
         }
+    }
+
+    /// How it ended; `None` while it is pending.
+    pub const fn outcome(&self) -> Option<&Result<Exchange, Error>> {
+        self.end.as_ref()
+    }
+
+    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    pub const fn until_ns(&self) -> u64 {
+        if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.ready_ns }
     }
 }
 
@@ -177,6 +223,25 @@ pub struct BusTransaction {
 }
 
 impl BusTransaction {
+    /// Nobody was asked: a place for [`restart`](Self::restart). It counts as one that has ended, and its line is free at any time.
+    pub const IDLE: Self = {
+        let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
+        Self {
+            request: NOTHING,
+            expected,
+            line: Line::new(BitRate::Mbit2_5),
+            hunt: Hunt::new(0),
+            bus: Bus::new(expected, Addresses::NONE),
+            start_ns: 0,
+            asked_ns: 0,
+            began_ns: [0; 8],
+            until_ns: 0,
+            ended: true,
+            refused: None,
+            ready_ns: 0,
+        }
+    };
+
     /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `start_ns`.
     ///
     /// What EA of the request means to the encoders is not documented. [`Addresses::highest`] of those that are asked is
@@ -185,6 +250,17 @@ impl BusTransaction {
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
     pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
+        Self::begun(request, resolution, asked, line, start_ns)
+    }
+
+    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    pub fn restart(&mut self, request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) {
+        *self = Self::begun(request, resolution, asked, line, start_ns);
+    }
+
+    /// Inlined, so that it is made where it is to be.
+    #[inline(always)]
+    fn begun(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
         let line = match asked.highest() {
             Some(highest) => line.with_highest(line.highest.max(highest)),
@@ -232,6 +308,9 @@ impl BusTransaction {
         if !self.ended {
             let Self { hunt, line, expected, bus, began_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
+                if let Some(ea) = found.instead_of {
+                    bus.withdraw(ea);
+                }
                 if let Ok(response) = found.outcome {
                     if let Some(began) = began_ns.get_mut(usize::from(response.ea.get())) {
                         *began = found.began_ns;
@@ -246,6 +325,12 @@ impl BusTransaction {
             self.free();
         }
         self.progress()
+    }
+
+    /// The same as [`hear`](Self::hear), and it says [how it ended](Self::outcome).
+    pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Result<(), Error>> {
+        let _ = self.hear(frames, end_ns);
+        self.outcome()
     }
 
     /// Where the transaction stands at `now_ns`; it is over if no answer can come any more.
@@ -268,11 +353,25 @@ impl BusTransaction {
 
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress<()> {
-        match (self.refused, self.ended) {
-            (Some(error), _) => Progress::Failed { error, ready_ns: self.ready_ns },
-            (None, true) => Progress::Done { value: (), ready_ns: self.ready_ns },
-            (None, false) => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
+        match self.outcome() {
+            Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
+            Some(Ok(())) => Progress::Done { value: (), ready_ns: self.ready_ns },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
         }
+    }
+
+    /// How it ended; `None` while it is pending. That nobody has answered is no failure: [`bus`](Self::bus) says who has not.
+    pub const fn outcome(&self) -> Option<Result<(), Error>> {
+        match (self.refused, self.ended) {
+            (Some(error), _) => Some(Err(error)),
+            (None, true) => Some(Ok(())),
+            (None, false) => None,
+        }
+    }
+
+    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    pub const fn until_ns(&self) -> u64 {
+        if self.ended { self.ready_ns } else { self.until_ns.saturating_add(1) }
     }
 
     /// What has come so far.
@@ -287,6 +386,9 @@ impl BusTransaction {
         Some(Exchange { response, sampled_ns: self.asked_ns, began_ns })
     }
 }
+
+/// What nobody was asked.
+const NOTHING: Request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
 
 /// Why a request is not to be sent.
 fn refusal(request: Request, resolution: Resolution, line: &Line) -> Option<Error> {

@@ -136,6 +136,32 @@ fn no_response_is_lost_on_a_sound_line() {
     assert!(chances > 100, "{chances}");
 }
 
+/// The last two frames of a response are lost, and the CRC-8 over the first two and those that begin the next one is right by
+/// chance. Frame by frame that is known only when the next one is complete: it is heard, and the other one is withdrawn.
+#[test]
+fn a_response_is_not_lost_in_the_rest_of_another() {
+    let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
+    let expected = request.expected(Resolution::default());
+    let mut chances = 0;
+    for position in 0..1 << 16 {
+        let first = response(Command::Abs40Mt, 0, position).emit().contents().to_vec();
+        let sent = response(Command::Abs40Mt, 1, 0x1234);
+        let second = sent.emit().contents().to_vec();
+        let chance: Vec<_> = first[..2].iter().chain(&second[..2]).copied().collect();
+        if Response::parse_words(&expected, &chance, BitOrder::LsbFirst).is_err() {
+            continue;
+        }
+        chances += 1;
+        let mut bus = bus(0b111, LINE);
+        for (k, content) in (1..).zip(first[..2].iter().chain(&second)) {
+            let _ = bus.hear(&[Some(*content)], 10_000 + k * FRAME_NS);
+        }
+        assert_eq!(bus.bus().of(ea(1)), Outcome::Good(sent), "{position:#x}");
+        assert_eq!((bus.bus().of(ea(0)), bus.bus().damaged()), (Outcome::Missing, 1), "{position:#x}");
+    }
+    assert!(chances > 100, "{chances}");
+}
+
 /// The first frame comes twice, and the CRC-8 over it and the first three frames is right by chance: the response begins with
 /// the second of them.
 #[test]
@@ -439,4 +465,44 @@ fn cycles() {
     assert_eq!((cycle.next_ns(), cycle.missed()), (1_500, 2));
     assert!(cycle.is_due(1_700));
     assert_eq!((cycle.next_ns(), cycle.missed()), (1_800, 4));
+}
+
+/// In the same place as in a new one, after whatever was before; nobody was asked before the first.
+#[test]
+fn a_transaction_begins_anew_in_its_place() {
+    let (resolution, line) = (Resolution::default(), Line::new(BitRate::Mbit4));
+    let one = Request::new(ea(0), Operation::Abs40);
+    let mut place = Transaction::IDLE;
+    assert_eq!(place.poll(u64::MAX), Progress::Failed { error: Error::NoResponse, ready_ns: 0 });
+    let data = Data::Abs40 { abs: U40::truncate(77) };
+    let answer = Response::new(ea(0), Command::Abs40, EncoderStatus::empty(), data).emit().units();
+    for start_ns in [0, 1_000_000] {
+        place.restart(one, resolution, line, start_ns);
+        let mut new = Transaction::start(one, resolution, line, start_ns);
+        assert_eq!(place, new);
+        assert_eq!((place.outcome(), Progress::Pending { until_ns: place.until_ns() }), (None, new.progress()));
+        let heard = place.push(answer.as_slice(), start_ns + 100_000).copied();
+        let Progress::Done { value, ready_ns } = new.hear(answer.as_slice(), start_ns + 100_000) else { panic!() };
+        assert_eq!((heard, place.until_ns(), place), (Some(Ok(value)), ready_ns, new));
+    }
+    let all = Request::new(EncoderAddress::truncate(1), Operation::Abs40Mt);
+    let mut place = BusTransaction::IDLE;
+    assert_eq!(place.poll(u64::MAX), Progress::Done { value: (), ready_ns: 0 });
+    for start_ns in [0, 1_000_000] {
+        place.restart(all, resolution, Addresses::first(2), line, start_ns);
+        let mut new = BusTransaction::start(all, resolution, Addresses::first(2), line, start_ns);
+        assert_eq!((place, place.outcome()), (new, None));
+        for (k, ea) in [(1, 0), (2, 1)] {
+            let response = Response::new(EncoderAddress::truncate(ea), Command::Abs40Mt, EncoderStatus::empty(), data);
+            let units = response.emit().units();
+            let heard = place.push(units.as_slice(), start_ns + 100_000 * k);
+            let progress = new.hear(units.as_slice(), start_ns + 100_000 * k);
+            assert_eq!((place, heard), (new, (k == 2).then_some(Ok(()))));
+            assert!(match progress {
+                Progress::Pending { until_ns } => heard.is_none() && until_ns == place.until_ns(),
+                Progress::Done { ready_ns, .. } => heard.is_some() && ready_ns == place.until_ns(),
+                Progress::Failed { .. } => false,
+            });
+        }
+    }
 }

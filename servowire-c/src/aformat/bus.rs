@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{BusTransaction, Line, Progress};
+use nikon_aformat::master::{BusTransaction, Line, Transmission};
 use nikon_aformat::{BitRate, EncoderAddress, Evidence, Policy, Resolution, Tolerated};
 
 use super::codec::{
@@ -27,7 +27,9 @@ state!(sw_aformat_t, Master, b"SWaf");
 pub(crate) struct Master {
     line: Line,
     resolution: Resolution,
-    transaction: Option<BusTransaction>,
+    transaction: BusTransaction,
+    /// The transaction is one that was asked for.
+    asked: bool,
     evidence: [Evidence; 8],
 }
 
@@ -46,31 +48,41 @@ pub struct sw_aformat_transmission_t {
 }
 
 /// Frames of a block at most.
-const LONGEST: usize = 48;
+pub(super) const LONGEST: usize = 48;
 
 impl Master {
-    /// Tells the transaction something, and keeps the positions that came of it.
-    fn tell(&mut self, act: impl FnOnce(&mut BusTransaction) -> Progress<()>) -> Result<sw_result_t, Refused> {
-        let Some(transaction) = &mut self.transaction else { return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) };
-        let progress = act(transaction);
-        self.keep(progress)
+    /// The transaction, if one was asked for.
+    #[inline(always)]
+    fn told(&mut self) -> Result<&mut BusTransaction, Refused> {
+        if self.asked { Ok(&mut self.transaction) } else { Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) }
     }
 
-    /// Out of line: two functions need it.
+    /// What became of it, and the positions that came of it. Out of line: two functions need it.
     #[inline(never)]
-    fn keep(&mut self, progress: Progress<()>) -> Result<sw_result_t, Refused> {
-        let Some(transaction) = &self.transaction else { return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) };
-        for (ea, evidence) in (0..).zip(&mut self.evidence) {
-            let exchange = EncoderAddress::new(ea).and_then(|ea| transaction.exchange(ea));
-            if let Some(exchange) = exchange.filter(|exchange| exchange.response.abs().is_some()) {
-                *evidence = exchange.evidence(self.resolution);
-            }
+    fn result(&mut self) -> Result<sw_result_t, Refused> {
+        for ea in self.transaction.bus().asked().without(self.transaction.bus().missing()).iter() {
+            self.keep(ea);
         }
-        match progress {
-            Progress::Pending { .. } => Ok(sw_code_t::SW_PENDING as sw_result_t),
-            Progress::Done { .. } => OK,
-            Progress::Failed { error: refusal, .. } => Err(error(refusal)),
+        match self.transaction.outcome() {
+            None => Ok(sw_code_t::SW_PENDING as sw_result_t),
+            Some(Ok(())) => OK,
+            Some(Err(refusal)) => Err(error(refusal)),
         }
+    }
+
+    /// Out of line: eight times the same would be too much.
+    #[inline(never)]
+    fn keep(&mut self, ea: EncoderAddress) {
+        let exchange = self.transaction.exchange(ea).filter(|exchange| exchange.response.abs().is_some());
+        if let (Some(exchange), Some(evidence)) = (exchange, self.evidence.get_mut(usize::from(ea.get()))) {
+            *evidence = exchange.evidence(self.resolution);
+        }
+    }
+
+    /// The line and the widths, while no exchange is pending.
+    pub(super) fn idle(&self) -> Result<(Line, Resolution), Refused> {
+        let idle = self.transaction.outcome().is_some();
+        if idle { Ok((self.line, self.resolution)) } else { Err(sw_code_t::SW_E_NOT_FREE as sw_result_t) }
     }
 
     fn of(&self, ea: u8) -> Option<&Evidence> {
@@ -88,7 +100,14 @@ pub extern "C" fn sw_aformat_init(
     border(|| {
         let rate = in_range(BitRate::ALL.into_iter().find(|rate| rate.bits_per_second() == bits_per_second))?;
         let (line, resolution) = (Line::new(rate), resolution(*there(encoder)?)?);
-        sw_aformat_t::start(m, Master { line, resolution, transaction: None, evidence: [Evidence::NEVER; 8] })?;
+        let state = Master {
+            line,
+            resolution,
+            transaction: BusTransaction::IDLE,
+            asked: false,
+            evidence: [Evidence::NEVER; 8],
+        };
+        sw_aformat_t::start(m, state)?;
         OK
     })
 }
@@ -126,31 +145,54 @@ pub extern "C" fn sw_aformat_read(
         let ea = in_range(asked.iter().next())?;
         let request = request(&sw_aformat_request_t { data: 0, command, ea: ea.get(), fc: 0, address: 0, bank: 0 })?;
         in_range((request.command().is_multi_response() || asked.len() == 1).then_some(()))?;
-        let is_free = match m.transaction.as_ref().map(BusTransaction::progress) {
-            None => true,
-            Some(Progress::Pending { .. }) => false,
-            Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => start_ns >= ready_ns,
-        };
-        if !is_free {
+        if m.transaction.outcome().is_none() || start_ns < m.transaction.until_ns() {
             return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
         }
-        let transaction = m.transaction.insert(BusTransaction::start(request, m.resolution, asked, m.line, start_ns));
-        if let Progress::Failed { error: refusal, .. } = transaction.progress() {
+        m.asked = true;
+        m.transaction.restart(request, m.resolution, asked, m.line, start_ns);
+        if let Some(Err(refusal)) = m.transaction.outcome() {
             return Err(error(refusal));
         }
-        let transmission = transaction.transmission();
-        let mut contents = [0; 4];
-        for (to, frame) in contents.iter_mut().zip(transmission.frames.as_slice()) {
-            *to = frame.word(nikon_aformat::BitOrder::LsbFirst);
-        }
-        to_send.write(sw_aformat_transmission_t {
-            start_ns: transmission.start_ns,
-            end_ns: transmission.end_ns,
-            contents,
-            len: u8::try_from(transmission.frames.as_slice().len()).unwrap_or(4),
-        });
+        sent(&m.transaction.transmission(), to_send);
         Ok(sw_code_t::SW_SEND as sw_result_t)
     })
+}
+
+/// What is to be sent as C reads it. A request without a bank has four frames at most.
+pub(super) fn sent(transmission: &Transmission, to_send: &mut MaybeUninit<sw_aformat_transmission_t>) {
+    let mut contents = [0; 4];
+    for (to, frame) in contents.iter_mut().zip(transmission.frames.as_slice()) {
+        *to = frame.word(nikon_aformat::BitOrder::LsbFirst);
+    }
+    to_send.write(sw_aformat_transmission_t {
+        start_ns: transmission.start_ns,
+        end_ns: transmission.end_ns,
+        contents,
+        len: u8::try_from(transmission.frames.as_slice().len()).unwrap_or(4),
+    });
+}
+
+/// The frames of the caller, those that are not framed as `None`.
+///
+/// # Safety
+/// As for [`read`]: `framed` is NULL or has a byte for each of the contents.
+#[inline(always)]
+pub(super) unsafe fn block(
+    contents: *const u16,
+    framed: *const u8,
+    count: usize,
+    frames: &mut [Option<u16>; LONGEST],
+) -> Result<&[Option<u16>], Refused> {
+    // SAFETY: the caller vouches for it.
+    let contents = unsafe { read(contents, count)? };
+    // SAFETY: as above.
+    let framed = if framed.is_null() { None } else { Some(unsafe { read(framed, count)? }) };
+    let block = in_range(frames.get_mut(..count))?;
+    for (at, (to, content)) in block.iter_mut().zip(contents).enumerate() {
+        let sound = framed.and_then(|framed| framed.get(at)).is_none_or(|framed| *framed != 0);
+        *to = sound.then_some(*content);
+    }
+    Ok(block)
 }
 
 /// Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
@@ -165,18 +207,12 @@ pub unsafe extern "C" fn sw_aformat_hear(
     end_ns: u64,
 ) -> sw_result_t {
     border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let contents = unsafe { read(contents, count)? };
-        // SAFETY: as above.
-        let framed = if framed.is_null() { None } else { Some(unsafe { read(framed, count)? }) };
-        let (m, end_ns) = (sw_aformat_t::get(m)?, time(end_ns)?);
         let mut frames = [None; LONGEST];
-        let block = in_range(frames.get_mut(..count))?;
-        for (at, (to, content)) in block.iter_mut().zip(contents).enumerate() {
-            let sound = framed.and_then(|framed| framed.get(at)).is_none_or(|framed| *framed != 0);
-            *to = sound.then_some(*content);
-        }
-        m.tell(|transaction| transaction.hear(block, end_ns))
+        // SAFETY: the caller of the C function vouches for his memory.
+        let block = unsafe { block(contents, framed, count, &mut frames)? };
+        let (m, end_ns) = (sw_aformat_t::get(m)?, time(end_ns)?);
+        m.told()?.push(block, end_ns);
+        m.result()
     })
 }
 
@@ -185,7 +221,9 @@ pub unsafe extern "C" fn sw_aformat_hear(
 pub extern "C" fn sw_aformat_poll(m: Option<&mut sw_aformat_t>, now_ns: u64) -> sw_result_t {
     border(|| {
         let now_ns = time(now_ns)?;
-        sw_aformat_t::get(m)?.tell(|transaction| transaction.poll(now_ns))
+        let m = sw_aformat_t::get(m)?;
+        let _ = m.told()?.poll(now_ns);
+        m.result()
     })
 }
 
@@ -193,19 +231,14 @@ pub extern "C" fn sw_aformat_poll(m: Option<&mut sw_aformat_t>, now_ns: u64) -> 
 /// SW_NO_TIME for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_until_ns(m: Option<&sw_aformat_t>) -> u64 {
-    let Ok(m) = sw_aformat_t::look(m) else { return crate::clock::SW_NO_TIME };
-    match m.transaction.map(|transaction| transaction.progress()) {
-        None => 0,
-        Some(Progress::Pending { until_ns }) => until_ns,
-        Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => ready_ns,
-    }
+    sw_aformat_t::look(m).map_or(crate::clock::SW_NO_TIME, |m| m.transaction.until_ns())
 }
 
 /// Who was asked and has not answered, a bit each; 0xff for a state that was not started or has not asked.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_missing(m: Option<&sw_aformat_t>) -> u8 {
-    let transaction = sw_aformat_t::look(m).ok().and_then(|m| m.transaction.as_ref());
-    transaction.map_or(0xff, |transaction| transaction.bus().missing().bits())
+    let asked = sw_aformat_t::look(m).ok().filter(|m| m.asked);
+    asked.map_or(0xff, |m| m.transaction.bus().missing().bits())
 }
 
 /// The good response of an encoder to the newest request: raw fields. SW_E_NO_VALUE if there is none.
@@ -217,7 +250,7 @@ pub extern "C" fn sw_aformat_response(
 ) -> sw_result_t {
     border(|| {
         let (m, response, ea) = (sw_aformat_t::look(m)?, there(response)?, in_range(EncoderAddress::new(ea))?);
-        let exchange = m.transaction.as_ref().and_then(|transaction| transaction.exchange(ea));
+        let exchange = m.transaction.exchange(ea);
         response.write(flat(&exchange.ok_or(sw_code_t::SW_E_NO_VALUE as sw_result_t)?.response));
         OK
     })

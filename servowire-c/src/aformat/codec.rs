@@ -170,6 +170,23 @@ fn written(
     OK
 }
 
+/// What is made of the caller's words.
+///
+/// # Safety
+/// As for [`read`].
+#[inline(always)]
+pub(super) unsafe fn of_words(
+    words: *const u16,
+    count: usize,
+    order: u8,
+    act: impl FnOnce(&[u16], BitOrder) -> Result<sw_result_t, Refused>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        act(unsafe { read(words, count)? }, bit_order(order)?)
+    })
+}
+
 /// The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15 (sw_bit_order_t), at most 4: start bit and
 /// delimiter are left to the port.
 #[unsafe(no_mangle)]
@@ -221,15 +238,15 @@ pub unsafe extern "C" fn sw_aformat_parse(
     order: u8,
     response: Option<&mut MaybeUninit<sw_aformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let words = unsafe { read(words, count)? };
+    let parse = |words: &_, order| {
         let expected = request(there(asked)?)?.expected(resolution(*there(encoder)?)?);
-        written(Response::parse_words(&expected, words, bit_order(order)?), response)
-    })
+        written(Response::parse_words(&expected, words, order), response)
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { of_words(words, count, order, parse) }
 }
 
-fn expected(command: u8, layout: u8, ea: u8) -> Result<Expected, Refused> {
+pub(super) fn expected(command: u8, layout: u8, ea: u8) -> Result<Expected, Refused> {
     let layout = *in_range(Layout::ALL.get(usize::from(layout)))?;
     let expected = Expected::new(layout, in_range(Command::from_code(command))?);
     Ok(if ea == 255 { expected } else { expected.from_address(in_range(EncoderAddress::new(ea))?) })
@@ -246,11 +263,10 @@ pub unsafe extern "C" fn sw_aformat_parse_as(
     order: u8,
     response: Option<&mut MaybeUninit<sw_aformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let words = unsafe { read(words, count)? };
-        written(Response::parse_words(&expected(command, layout, ea)?, words, bit_order(order)?), response)
-    })
+    let parse =
+        |words: &_, order| written(Response::parse_words(&expected(command, layout, ea)?, words, order), response);
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { of_words(words, count, order, parse) }
 }
 
 /// The same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after the 128th are left alone.

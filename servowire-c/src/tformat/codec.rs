@@ -150,6 +150,25 @@ pub(super) fn written<T, U>(
     }
 }
 
+/// What `parse` makes of the caller's bytes or words.
+///
+/// # Safety
+/// As for [`read`].
+#[inline(always)]
+pub(super) unsafe fn answer<T>(
+    asked: Option<&sw_tformat_request_t>,
+    data: *const T,
+    len: usize,
+    response: Option<&mut MaybeUninit<sw_tformat_response_t>>,
+    parse: impl FnOnce(Request, &[T]) -> Result<Response, Error>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        let data = unsafe { read(data, len)? };
+        written(parse(request(*there(asked)?)?, data), response, flat)
+    })
+}
+
 /// The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_parse(
@@ -158,11 +177,8 @@ pub unsafe extern "C" fn sw_tformat_parse(
     len: usize,
     response: Option<&mut MaybeUninit<sw_tformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        written(Response::parse(request(*there(asked)?)?, bytes), response, flat)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { answer(asked, bytes, len, response, Response::parse) }
 }
 
 /// The response from what a UART received since the request began, with the receiver on all the time: the own request, then the
@@ -174,11 +190,8 @@ pub unsafe extern "C" fn sw_tformat_parse_echoed(
     len: usize,
     response: Option<&mut MaybeUninit<sw_tformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        written(parse_echoed(request(*there(asked)?)?, bytes), response, flat)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { answer(asked, bytes, len, response, parse_echoed) }
 }
 
 /// The response from line bits on a grid of ten bits a field, start bits and delimiters included: `bits` of them in `bytes`, in the
@@ -248,11 +261,23 @@ pub unsafe extern "C" fn sw_tformat_why(
 }
 
 /// Copies a frame to the caller.
-fn give(frame: Frame, bytes: &mut [MaybeUninit<u8>], len: Option<&mut MaybeUninit<usize>>) -> Result<i32, Refused> {
-    let len = there(len)?;
-    fill(bytes, frame.as_bytes())?;
-    len.write(frame.as_bytes().len());
-    OK
+///
+/// # Safety
+/// As for [`room`].
+unsafe fn give(
+    frame: impl FnOnce() -> Result<Frame, Refused>,
+    bytes: *mut u8,
+    size: usize,
+    len: Option<&mut MaybeUninit<usize>>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        let bytes = unsafe { room(bytes, size)? };
+        let (frame, len) = (frame()?, there(len)?);
+        fill(bytes, frame.as_bytes())?;
+        len.write(frame.as_bytes().len());
+        OK
+    })
 }
 
 /// The fields to send for a request, at most 4 bytes.
@@ -263,11 +288,8 @@ pub unsafe extern "C" fn sw_tformat_build(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { room(bytes, size)? };
-        give(request(*there(asked)?)?.emit(), bytes, len)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { give(|| Ok(request(*there(asked)?)?.emit()), bytes, size, len) }
 }
 
 /// The line bits of a request, start bits and delimiters included, in the order of sw_bit_order_t, at most 40 bits in 5 bytes; `bits`
@@ -300,11 +322,8 @@ pub unsafe extern "C" fn sw_tformat_build_response(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { room(bytes, size)? };
-        give(deep(*there(response)?)?.emit(), bytes, len)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { give(|| Ok(deep(*there(response)?)?.emit()), bytes, size, len) }
 }
 
 /// The control field of a data ID, 0..15: sink code, ID and parity. IDs above 15 are cut.

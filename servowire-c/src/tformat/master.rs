@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use tformat::master::{Line, Progress, Transaction};
+use tformat::master::{Line, Transaction};
 use tformat::{Almc, BitRate, DataId, Doubt, Evidence, Policy, Request, Resolution, Response, Tolerated};
 
 use super::codec::{error, flat, request, sw_tformat_request_t, sw_tformat_response_t};
@@ -26,7 +26,9 @@ pub(crate) struct Master {
     pub(super) line: Line,
     resolution: Resolution,
     tolerated: Almc,
-    pub(super) transaction: Option<Transaction>,
+    pub(super) transaction: Transaction,
+    /// The transaction is one that was asked for.
+    pub(super) asked: bool,
     evidence: Evidence,
 }
 
@@ -91,18 +93,20 @@ impl Master {
         start_ns: u64,
         to_send: &mut MaybeUninit<sw_tformat_transmission_t>,
     ) -> Result<sw_result_t, Refused> {
-        if !self.is_free_at(start_ns) {
+        // The last exchange is over by then, its late answer too.
+        if self.transaction.outcome().is_none() || start_ns < self.transaction.until_ns() {
             return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
         }
         if matches!(request, Request::SetSingleTurnZero | Request::ResetTurnsAndErrors) {
             // What was heard before counts from another zero.
             self.evidence = Evidence::NEVER;
         }
-        let transaction = self.transaction.insert(Transaction::start(request, self.line, start_ns));
-        if let Progress::Failed { error: refusal, .. } = transaction.progress() {
-            return Err(error(refusal));
+        self.asked = true;
+        self.transaction.restart(request, self.line, start_ns);
+        if let Some(Err(refusal)) = self.transaction.outcome() {
+            return Err(error(*refusal));
         }
-        let transmission = transaction.transmission();
+        let transmission = self.transaction.transmission();
         let mut bytes = [0; 4];
         for (to, from) in bytes.iter_mut().zip(transmission.frame.as_bytes()) {
             *to = *from;
@@ -118,28 +122,24 @@ impl Master {
         Ok(sw_code_t::SW_SEND as sw_result_t)
     }
 
-    /// Whether the last exchange is over by then, its late answer too.
-    fn is_free_at(&self, start_ns: u64) -> bool {
-        match self.transaction.as_ref().map(Transaction::progress) {
-            None => true,
-            Some(Progress::Pending { .. }) => false,
-            Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => start_ns >= ready_ns,
-        }
+    /// The transaction, if one was asked for.
+    #[inline(always)]
+    fn told(&mut self) -> Result<&mut Transaction, Refused> {
+        if self.asked { Ok(&mut self.transaction) } else { Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) }
     }
 
-    /// Tells the transaction something, and keeps the position that came of it.
-    #[inline(always)]
-    fn tell(&mut self, act: impl FnOnce(&mut Transaction) -> Progress) -> Result<sw_result_t, Refused> {
-        let Some(transaction) = &mut self.transaction else { return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) };
-        match act(transaction) {
-            Progress::Pending { .. } => Ok(sw_code_t::SW_PENDING as sw_result_t),
-            Progress::Done { value, .. } => {
+    /// What became of it, and the position that came of it. Out of line: three functions need it.
+    #[inline(never)]
+    fn result(&mut self) -> Result<sw_result_t, Refused> {
+        match self.transaction.outcome() {
+            None => Ok(sw_code_t::SW_PENDING as sw_result_t),
+            Some(Ok(value)) => {
                 if matches!(value.response, Response::ReadSingleTurn(_) | Response::ReadAll(_)) {
                     self.evidence = value.evidence(self.resolution);
                 }
                 OK
             }
-            Progress::Failed { error: refusal, .. } => Err(error(refusal)),
+            Some(Err(refusal)) => Err(error(*refusal)),
         }
     }
 
@@ -164,7 +164,14 @@ pub extern "C" fn sw_tformat_init(
     border(|| {
         let line = Line::new(rate(bits_per_second)?);
         let resolution = in_range(Resolution::new(abs_bits, abm_bits).ok())?;
-        let state = Master { line, resolution, tolerated: Almc::empty(), transaction: None, evidence: Evidence::NEVER };
+        let state = Master {
+            line,
+            resolution,
+            tolerated: Almc::empty(),
+            transaction: Transaction::IDLE,
+            asked: false,
+            evidence: Evidence::NEVER,
+        };
         sw_tformat_t::start(m, state)?;
         OK
     })
@@ -292,7 +299,9 @@ pub unsafe extern "C" fn sw_tformat_hear(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let end_ns = time(end_ns)?;
-        sw_tformat_t::get(m)?.tell(|transaction| transaction.hear(bytes, end_ns))
+        let m = sw_tformat_t::get(m)?;
+        m.told()?.push(bytes, end_ns);
+        m.result()
     })
 }
 
@@ -301,7 +310,9 @@ pub unsafe extern "C" fn sw_tformat_hear(
 pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns: u64) -> sw_result_t {
     border(|| {
         let end_ns = time(end_ns)?;
-        sw_tformat_t::get(m)?.tell(|transaction| transaction.framing_error(end_ns))
+        let m = sw_tformat_t::get(m)?;
+        let _ = m.told()?.framing_error(end_ns);
+        m.result()
     })
 }
 
@@ -310,7 +321,9 @@ pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns:
 pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> sw_result_t {
     border(|| {
         let now_ns = time(now_ns)?;
-        sw_tformat_t::get(m)?.tell(|transaction| transaction.poll(now_ns))
+        let m = sw_tformat_t::get(m)?;
+        let _ = m.told()?.poll(now_ns);
+        m.result()
     })
 }
 
@@ -318,12 +331,7 @@ pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> 
 /// SW_NO_TIME for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_until_ns(m: Option<&sw_tformat_t>) -> u64 {
-    let Ok(m) = sw_tformat_t::look(m) else { return crate::clock::SW_NO_TIME };
-    match m.transaction.map(|transaction| transaction.progress()) {
-        None => 0,
-        Some(Progress::Pending { until_ns }) => until_ns,
-        Some(Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. }) => ready_ns,
-    }
+    sw_tformat_t::look(m).map_or(crate::clock::SW_NO_TIME, |m| m.transaction.until_ns())
 }
 
 /// The response of the exchange, once it has ended with SW_OK: raw fields. For control use sw_tformat_angle() and
@@ -335,13 +343,9 @@ pub extern "C" fn sw_tformat_response(
 ) -> sw_result_t {
     border(|| {
         let (m, response) = (sw_tformat_t::look(m)?, there(response)?);
-        match m.transaction.map(|transaction| transaction.progress()) {
-            Some(Progress::Done { value, .. }) => {
-                response.write(flat(&value.response));
-                OK
-            }
-            _ => Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
-        }
+        let Some(Ok(value)) = m.transaction.outcome() else { return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) };
+        response.write(flat(&value.response));
+        OK
     })
 }
 

@@ -2,13 +2,14 @@
 
 use core::mem::MaybeUninit;
 
-use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, MultiTurnZero, Progress, Reset, SingleTurnZero, Step};
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
 use tformat::{Address, Error, Page, Resolution, Response};
 
 use super::codec::error;
 use super::master::{sw_tformat_t, sw_tformat_transmission_t};
 use crate::border::{OK, Refused, border, in_range, state, there};
 use crate::clock::time;
+use crate::procedure::{ended, plain};
 use crate::result::{sw_code_t, sw_result_t};
 
 /// A procedure of several exchanges: it says what to send, and decides what to repeat. Its content is private.
@@ -34,11 +35,6 @@ pub(crate) struct Procedure {
     next: Step<u32>,
     /// The exchange of `next` has begun.
     asked: bool,
-}
-
-/// The value of a procedure as a number: what C asks for.
-fn plain<T>(step: Step<T>, number: impl FnOnce(T) -> u32) -> Step<u32> {
-    step.and_then(|value, ready_ns| Step::Done { value: number(value), ready_ns })
 }
 
 impl Kind {
@@ -168,14 +164,11 @@ pub extern "C" fn sw_tformat_next(
         let (p, m) = (sw_tformat_procedure_t::get(p)?, sw_tformat_t::get(m)?);
         let (now_ns, to_send) = (time(now_ns)?, there(to_send)?);
         if p.asked {
-            let ended = m.transaction.map(|transaction| transaction.progress());
-            let (outcome, ready_ns) = match ended {
-                Some(Progress::Pending { .. }) => return Ok(sw_code_t::SW_PENDING as sw_result_t),
-                Some(Progress::Done { value, ready_ns }) => (Ok(value.response), ready_ns),
-                Some(Progress::Failed { error, ready_ns }) => (Err(error), ready_ns),
-                None => return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
-            };
-            p.next = p.kind.receive(outcome, ready_ns);
+            if !m.asked {
+                return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t);
+            }
+            let Some(outcome) = m.transaction.outcome() else { return Ok(sw_code_t::SW_PENDING as sw_result_t) };
+            p.next = p.kind.receive(outcome.map(|value| value.response), m.transaction.until_ns());
             p.asked = false;
         }
         match p.next {
@@ -201,19 +194,5 @@ pub extern "C" fn sw_tformat_value(
     value: Option<&mut MaybeUninit<u32>>,
     ready_ns: Option<&mut MaybeUninit<u64>>,
 ) -> sw_result_t {
-    border(|| {
-        let (p, value) = (sw_tformat_procedure_t::look(p)?, there(value)?);
-        let (result, end_ns) = match p.next {
-            Step::Send { .. } => return Ok(sw_code_t::SW_PENDING as sw_result_t),
-            Step::Done { value: it, ready_ns } => {
-                value.write(it);
-                (OK, ready_ns)
-            }
-            Step::Failed { error: refusal, ready_ns } => (Err(error(refusal)), ready_ns),
-        };
-        if let Some(ready_ns) = ready_ns {
-            ready_ns.write(end_ns);
-        }
-        result
-    })
+    border(|| ended(&sw_tformat_procedure_t::look(p)?.next, value, ready_ns, error))
 }

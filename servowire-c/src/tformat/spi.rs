@@ -4,8 +4,8 @@ use core::mem::MaybeUninit;
 
 use tformat::spi::{parse_spi10, parse_spi16, spi10_words, spi16_words};
 
-use super::codec::{flat, request, sw_tformat_request_t, sw_tformat_response_t, written};
-use crate::border::{OK, Refused, border, read, room, there};
+use super::codec::{answer, request, sw_tformat_request_t, sw_tformat_response_t};
+use crate::border::{OK, Refused, border, room, there};
 use crate::result::{sw_code_t, sw_result_t};
 
 fn give(
@@ -46,11 +46,8 @@ pub unsafe extern "C" fn sw_tformat_parse_spi10(
     count: usize,
     response: Option<&mut MaybeUninit<sw_tformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let words = unsafe { read(words, count)? };
-        written(parse_spi10(request(*there(asked)?)?, words), response, flat)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { answer(asked, words, count, response, parse_spi10) }
 }
 
 /// What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
@@ -76,9 +73,6 @@ pub unsafe extern "C" fn sw_tformat_parse_spi16(
     count: usize,
     response: Option<&mut MaybeUninit<sw_tformat_response_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let words = unsafe { read(words, count)? };
-        written(parse_spi16(request(*there(asked)?)?, words), response, flat)
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { answer(asked, words, count, response, parse_spi16) }
 }

@@ -406,8 +406,37 @@ static void clock_of_32_bits(void)
     CHECK(sw_clock_ns(&clock, 27) == SW_NO_TIME && sw_clock_ns(&clock, 197) == 3000);
 }
 
+/* Two encoders on a line, in words: ABS40 to command 4 from encoder 0 (a manual's answer), from a bus of positions. */
+static void words_of_a_bus(void)
+{
+    static const uint16_t words[4] = {0x2085, 0xf64a, 0x8009, 0x80a1};
+    uint16_t damaged[4] = {0x2085, 0xf64a, 0x8009, 0x80a0};
+    sw_aformat_bus_t bus;
+    sw_aformat_abs40_t data = {1, 9, 9};
+    memset(&bus, 0, sizeof bus);
+    CHECK(sw_aformat_bus_push_abs40(&bus, words, 4, SW_MSB_FIRST, &data) == SW_E_STATE);
+    CHECK(sw_aformat_bus_start_abs40(&bus, 0) == SW_E_ARGUMENT && sw_aformat_bus_start_abs40(NULL, 3) == SW_E_NULL);
+    CHECK(sw_aformat_bus_start_abs40(&bus, 3) == SW_OK && sw_aformat_bus_missing(&bus) == 3);
+    CHECK(sw_aformat_bus_push_abs40(&bus, damaged, 4, SW_MSB_FIRST, &data) == SW_E_AFORMAT_CRC && data.abs == 1);
+    CHECK(sw_aformat_bus_push_abs40(&bus, words, 3, SW_MSB_FIRST, &data) == SW_E_AFORMAT_TRUNCATED && data.abs == 1);
+    CHECK(sw_aformat_bus_push_abs40(&bus, words, 4, SW_MSB_FIRST, &data) == SW_OK && sw_aformat_bus_missing(&bus) == 2);
+    CHECK((data.abs & 0x1ffff) == 86639 && data.abs >> 17 == 51200 && data.ea == 0);
+    CHECK(sw_aformat_bus_push_abs40(&bus, words, 4, SW_MSB_FIRST, &data) == SW_E_AFORMAT_TWO_RESPONSES);
+    CHECK(sw_aformat_bus_start_abs40(&bus, 2) == SW_OK);
+    CHECK(sw_aformat_bus_push_abs40(&bus, words, 4, SW_MSB_FIRST, &data) == SW_E_AFORMAT_ADDRESS_MISMATCH);
+}
+
+/* The header and the library are of one release. */
+static void version(void)
+{
+    CHECK(sw_version() == SERVOWIRE_VERSION);
+    CHECK(SERVOWIRE_VERSION == SERVOWIRE_VERSION_MAJOR * 65536u + SERVOWIRE_VERSION_MINOR * 256u + SERVOWIRE_VERSION_PATCH);
+}
+
 int main(void)
 {
+    version();
+    words_of_a_bus();
     pointers();
     states();
     exchange();

@@ -27,6 +27,9 @@ extern const entry_t tformat_commands[], aformat_commands[], rtex_commands[], so
 
 void say(const char *format, ...);
 uint64_t number(const char *text);       /* decimal, or hexadecimal behind 0x; - is 0 */
+#define U8(text) ((uint8_t)number(text))
+#define U16(text) ((uint16_t)number(text))
+#define U32(text) ((uint32_t)number(text))
 int64_t signed_number(const char *text);
 block_t hex(const char *text);           /* bytes; - for none */
 block_t packed(const char *text);        /* 0 and 1, the first of the line in bit 0 */

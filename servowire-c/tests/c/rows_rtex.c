@@ -66,20 +66,11 @@ static void axis(char **a, int n)
     static const char *const reasons[] = {"", "echo_timeout", "wrong_mac_id", "refused", "receive_timeout", "alarm", "not_ready", "not_active",
         "ready_timeout", "active_timeout", "inactive_timeout", "command_error", "other_axis", "requested", "homing_timeout"};
     sw_rtex_axis_t it;
-    sw_rtex_config_t config;
+    sw_rtex_config_t config = {.mac_id = U8(a[0]), .mode = U8(a[1]), .update_ns = U32(a[2]), .gear_numerator = U32(a[3]),
+        .gear_denominator = U32(a[4]), .echo = U16(a[5]), .command_errors = U16(a[6]), .wait = U32(a[7]), .ready = U32(a[8]),
+        .inactive = U32(a[9])};
     sw_rtex_state_of_t state;
     int k;
-    memset(&config, 0, sizeof config);
-    config.mac_id = (uint8_t)number(a[0]);
-    config.mode = (uint8_t)number(a[1]);
-    config.update_ns = (uint32_t)number(a[2]);
-    config.gear_numerator = (uint32_t)number(a[3]);
-    config.gear_denominator = (uint32_t)number(a[4]);
-    config.echo = (uint16_t)number(a[5]);
-    config.command_errors = (uint16_t)number(a[6]);
-    config.wait = (uint32_t)number(a[7]);
-    config.ready = (uint32_t)number(a[8]);
-    config.inactive = (uint32_t)number(a[9]);
     say("%s", sw_text(sw_rtex_axis_start(&it, &config)));
     for (k = 10; k < n; k++) {
         char *action = a[k], *value = strchr(action, ','), *text = value == NULL ? NULL : strchr(value + 1, ',');
@@ -109,7 +100,7 @@ static void axis(char **a, int n)
         } else if (strcmp(action, "set_rate") == 0) {
             done = sw_rtex_axis_set_rate(&it, (int32_t)signed_number(value));
         } else if (strcmp(action, "set_control") == 0) {
-            done = sw_rtex_axis_set_control(&it, (uint16_t)number(value));
+            done = sw_rtex_axis_set_control(&it, U16(value));
         } else if (strcmp(action, "-") != 0) {
             say(" no action %s", action);
         }

@@ -47,7 +47,7 @@ static void pto(char **a, int n)
 static void pto_of_step(char **a, int n)
 {
     uint16_t word = 0;
-    sw_result_t r = sw_sorte_pto_of_step((uint32_t)number(a[0]), (uint8_t)number(a[1]), &word);
+    sw_result_t r = sw_sorte_pto_of_step(U32(a[0]), U8(a[1]), &word);
     (void)n;
     say("%s", sw_text(r));
     if (r == SW_OK) {
@@ -58,7 +58,7 @@ static void pto_of_step(char **a, int n)
 /* ENTRY SPEED PREV: as the PRU, and corrected. */
 static void step(char **a, int n)
 {
-    uint32_t entry = (uint32_t)number(a[0]), speed = (uint32_t)number(a[1]), prev = (uint32_t)number(a[2]);
+    uint32_t entry = U32(a[0]), speed = U32(a[1]), prev = U32(a[2]);
     sw_step_time_t pru = {0, 0}, right = {0, 0};
     (void)n;
     (void)sw_step_next_as_pru(entry, speed, prev, &pru);
@@ -69,21 +69,21 @@ static void step(char **a, int n)
 static void ramp(char **a, int n)
 {
     (void)n;
-    say("%u", sw_step_ramp((uint8_t)number(a[0])));
+    say("%u", sw_step_ramp(U8(a[0])));
 }
 
 static void speed(char **a, int n)
 {
     uint32_t it = 0;
     (void)n;
-    say("%s", sw_text(sw_step_speed((uint32_t)number(a[0]), &it)));
+    say("%s", sw_text(sw_step_speed(U32(a[0]), &it)));
     say(" %u %s", it, sw_text(sw_step_check(it, 1, 0, NULL)));
 }
 
 static void params(char **a, int n)
 {
     bool exact = false;
-    sw_result_t r = sw_step_check((uint32_t)number(a[0]), (uint32_t)number(a[1]), (uint32_t)number(a[2]), &exact);
+    sw_result_t r = sw_step_check(U32(a[0]), U32(a[1]), U32(a[2]), &exact);
     (void)n;
     say("%s", sw_text(r));
     if (r == SW_OK) {
@@ -95,7 +95,7 @@ static void duration(char **a, int n)
 {
     uint64_t ns = 0;
     (void)n;
-    say("%s", sw_text(sw_step_duration_ns((uint32_t)number(a[0]), (uint32_t)number(a[1]), (uint32_t)number(a[2]), (uint32_t)number(a[3]), &ns)));
+    say("%s", sw_text(sw_step_duration_ns(U32(a[0]), U32(a[1]), U32(a[2]), U32(a[3]), &ns)));
     say(" %llu", (unsigned long long)ns);
 }
 

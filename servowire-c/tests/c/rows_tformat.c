@@ -3,10 +3,7 @@
 
 static sw_tformat_request_t asked_of(char **a)
 {
-    sw_tformat_request_t asked;
-    asked.id = (uint8_t)number(a[0]);
-    asked.adf = (uint8_t)number(a[1]);
-    asked.edf = (uint8_t)number(a[2]);
+    sw_tformat_request_t asked = {U8(a[0]), U8(a[1]), U8(a[2])};
     return asked;
 }
 
@@ -158,7 +155,7 @@ static void parse_request(char **a, int n)
 
 static void control_field(char **a, int n)
 {
-    uint8_t id = (uint8_t)number(a[0]), found = 99, cf = sw_tformat_control_field(id);
+    uint8_t id = U8(a[0]), found = 99, cf = sw_tformat_control_field(id);
     sw_result_t r = sw_tformat_parse_control_field(cf, &found);
     sw_tformat_request_t asked = {0, 0, 0};
     uint8_t bytes[5];
@@ -181,7 +178,7 @@ static void control_field(char **a, int n)
 static void classify(char **a, int n)
 {
     uint8_t id = 0;
-    sw_result_t r = sw_tformat_parse_control_field((uint8_t)number(a[0]), &id);
+    sw_result_t r = sw_tformat_parse_control_field(U8(a[0]), &id);
     (void)n;
     say("%s", sw_text(r));
     if (r == SW_OK) {
@@ -243,8 +240,8 @@ static void say_position(uint32_t abs, uint32_t abm, char **a, uint8_t flags)
     answer.abs = abs;
     answer.abm = abm;
     (void)sw_tformat_build_response(&answer, bytes, sizeof bytes, &len);
-    say("%s", sw_text(sw_tformat_init(&m, 2500000, (uint8_t)number(a[2]), (uint8_t)number(a[3]))));
-    (void)sw_tformat_set_resolution(&m, (uint8_t)number(a[2]), (uint8_t)number(a[3]), flags);
+    say("%s", sw_text(sw_tformat_init(&m, 2500000, U8(a[2]), U8(a[3]))));
+    (void)sw_tformat_set_resolution(&m, U8(a[2]), U8(a[3]), flags);
     (void)sw_tformat_read(&m, SW_TFORMAT_READ_ALL, 0, &tx);
     say(" %s", sw_text(sw_tformat_hear(&m, bytes, len, 51000)));
     if (sw_tformat_position(&m, 51000, 100000, &position) && sw_tformat_angle(&m, 51000, 100000, &angle)) {
@@ -258,20 +255,20 @@ static void say_position(uint32_t abs, uint32_t abm, char **a, uint8_t flags)
 static void position(char **a, int n)
 {
     (void)n;
-    say_position((uint32_t)number(a[0]), (uint32_t)number(a[1]), a, SW_TFORMAT_UNSIGNED_TURNS);
-    say_position((uint32_t)number(a[0]), (uint32_t)number(a[1]), a, 0);
+    say_position(U32(a[0]), U32(a[1]), a, SW_TFORMAT_UNSIGNED_TURNS);
+    say_position(U32(a[0]), U32(a[1]), a, 0);
 }
 
 static void oversampled(char **a, int n)
 {
     static sw_nrz_t receiver;
     sw_nrz_field_t fields[64];
-    uint8_t level = (uint8_t)number(a[1]);
+    uint8_t level = U8(a[1]);
     uint32_t spikes = 0;
     size_t count = 0, k;
     int at;
     bool framed = true;
-    say("%s", sw_text(sw_nrz_start(&receiver, (uint32_t)number(a[0]), 8)));
+    say("%s", sw_text(sw_nrz_start(&receiver, U32(a[0]), 8)));
     for (at = 2; at < n; at++, level ^= 1) {
         count += sw_nrz_run(&receiver, level, number(a[at]), &fields[count]) == SW_OK && count < 63;
     }
@@ -328,7 +325,7 @@ static bool at_encoder(uint8_t id, uint64_t now_ns, sw_tformat_response_t *it)
 /* ID DELAY_US: the starts of the requests with this ID in us from the first, the wait after the last one, and what it did. */
 static void reset(char **a, int n)
 {
-    uint8_t id = (uint8_t)number(a[0]);
+    uint8_t id = U8(a[0]);
     /* A field takes 4 us; the answer has six. */
     uint64_t lasts_ns = (4 + number(a[1]) + 24) * 1000, now = 0, first = 0, end = 0;
     unsigned sent = 0;

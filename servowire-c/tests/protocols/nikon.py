@@ -17,7 +17,6 @@ NOT_IN_C = {
     "rx_bus": "bits of a line without times",
     "rx_oversampled": "start-stop reception of 16 bits is not in the C interface",
     "rx_unaligned": "bits of a line without times",
-    "sessions": "procedures of A-format are not in the C interface",
     "temperature": VALUES,
     "timing": VALUES,
     "tx_cdf": "frames alone; requests are in tx_transactions",
@@ -104,4 +103,31 @@ def tx_transactions(row):
     return [(f"aformat_build {cmd} {row['ea']} {fc} {args.get('addr', 0)} {bank or 0} {data} {options}", expected)]
 
 
-TOPICS = {"rx_responses": rx_responses, "rx_bitflips": judged, "rx_negative": judged, "tx_transactions": tx_transactions}
+rx_bitflips = judged
+rx_negative = judged
+
+
+def turned(words):
+    """The first bit of the line in bit 0, where the row has it in bit 15."""
+    return ",".join(f"{int(f'{int(word, 16):016b}'[::-1], 2):04x}" for word in words)
+
+
+def sessions(row):
+    row.ignore("n")
+    kind = {"eeprom_read": "read", "eeprom_write": "write"}.get(row["procedure"], "reset")
+    expect, steps = row["expect"], row["steps"]
+    command = f"aformat_procedure {kind} {row['ea']} {row.get('cmd', 0)} {row.get('addr', 0)} {row.get('data', 0)} "
+    command += " ".join(turned(step["rx"]) if step["rx"] else "-" for step in steps)
+    expected = "ok"
+    for at, step in enumerate(steps):
+        if at > 0:
+            # What C counts from the end of an answer has the line's own gap of 10 us in it; the row's "repeat" does not name its time.
+            expected += {"wait_300us_and_repeat": " 310", "wait_30ms": " 30010", "repeat": " 20"}[steps[at - 1]["then"]]
+        expected += f" {turned(step['tx'])} {'ok' if step['rx'] else 'no_response'}"
+    if expect.get("error"):
+        assert expect["error"] == "timeout" and steps[-1]["then"] == "restart_count"
+        assert expect["consecutive_done"] == sum(1 for step in steps if step["rx"])
+        return [(command, f"{expected} interrupted")]
+    assert steps[-1]["then"] == "done"
+    assert expect.get("requests_of_this_code", 8) == 8
+    return [(command, f"{expected} ok {expect.get('data', expect.get('alm_after', 0))}")]

@@ -40,27 +40,24 @@ NOT_IN_C = {
 }
 
 
-def commands16(row):
-    # Bytes 8 to 15 are handed over as they are: what `data` names in them is the program's.
-    row.ignore("data")
-    assert (row["mode"], row["dir"]) == (16, "cmd")
-    block, control = row["hex"], row["control"]
-    text = (f"ok mac {row['mac_id']} counter {row['update_counter']} tmg {row['tmg_cnt']} cyclic {CYCLIC[row['cyclic']]} "
-            f"noncyclic {NONCYCLIC[row['noncyclic']]} data1 {row['command_data1']} ")
-    assert set(control) == set(CONTROL)
-    text += " ".join(f"{name} {control[name]}" for name in CONTROL)
-    return [(f"rtex_command {block}", f"{text} {block[16:]} ok {block}")]
+def whole(command, direction, head, flags, names):
+    """Rows of whole blocks: `head` are their keys and how the command says them, and `flags` has the bits of bytes 2 and 3."""
+    def of(row):
+        # Bytes 8 to 15 are handed over as they are: what `data` names in them is the program's.
+        row.ignore("data")
+        assert (row["mode"], row["dir"]) == (16, direction)
+        block, bits = row["hex"], row[flags]
+        assert set(bits) == set(names)
+        said = [f"{word} {row[key]}" for key, word in head.items()]
+        said += [f"cyclic {CYCLIC[row['cyclic']]} noncyclic {NONCYCLIC[row['noncyclic']]} data1 {row[f'{command}_data1']}"]
+        said += [f"{name} {bits[name]}" for name in names]
+        again = f" ok {block}" if command == "command" else ""
+        return [(f"rtex_{command} {block}", f"ok {' '.join(said)} {block[16:]}{again}")]
+    return of
 
 
-def responses16(row):
-    row.ignore("data")
-    assert (row["mode"], row["dir"]) == (16, "rsp")
-    block, status = row["hex"], row["status"]
-    text = (f"ok mac {row['actual_mac_id']} echo {row['update_counter_echo']} error {row['cmd_error']} cyclic {CYCLIC[row['cyclic']]} "
-            f"noncyclic {NONCYCLIC[row['noncyclic']]} data1 {row['response_data1']} ")
-    assert set(status) == set(STATUS)
-    text += " ".join(f"{name} {status[name]}" for name in STATUS)
-    return [(f"rtex_response {block}", f"{text} {block[16:]}")]
+commands16 = whole("command", "cmd", {"mac_id": "mac", "update_counter": "counter", "tmg_cnt": "tmg"}, "control", CONTROL)
+responses16 = whole("response", "rsp", {"actual_mac_id": "mac", "update_counter_echo": "echo", "cmd_error": "error"}, "status", STATUS)
 
 
 def axis_traces(row):
@@ -77,6 +74,3 @@ def axis_traces(row):
         command += f" {name},{value},{step['response'] or '-'}"
         expected += f" ok ok {step['state']} {step['sent']}"
     return [(command, expected)]
-
-
-TOPICS = {"commands16": commands16, "responses16": responses16, "axis_traces": axis_traces}

@@ -71,11 +71,3 @@ def process_data_slice(row):
     start = row.get("start_ns", row.get("raw_time", 0)) or 0
     row.ignore("raw_time")
     return [(f"sorte_pto {raw:04x}", f"{result} {KINDS[kind]} start {start} direction {row.get('direction') or 0}")]
-
-
-TOPICS = {
-    "ioex_master": ioex_master,
-    "ioex_master_negative": ioex_master_negative,
-    "ioex_device": ioex_device,
-    "process_data_slice": process_data_slice,
-}

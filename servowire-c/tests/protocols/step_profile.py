@@ -68,12 +68,4 @@ def pto_word(row):
     return [(f"sorte_pto {word}", f"ok {name} start {row.get('sync') or 0} direction {row.get('dir') or 0}")]
 
 
-TOPICS = {
-    "step_trace": step_trace,
-    "step_trace_edge": step_trace,
-    "ramp_table": ramp_table,
-    "speed_const": speed_const,
-    "params": params,
-    "profile": profile,
-    "pto_word": pto_word,
-}
+step_trace_edge = step_trace

@@ -197,17 +197,3 @@ def procedures(row):
         edf = int(response[4:6], 16)
     text = f"ok {response} {row['adf']} {int(row['busy'])} {edf} {row['page']}"
     return [*begin, (f"tformat_eeprom {row['t_us']} {row['request']}", text)]
-
-
-TOPICS = {
-    "control_field": control_field,
-    "crc": crc,
-    "negatives": negatives,
-    "oversampled": oversampled,
-    "position": position,
-    "procedures": procedures,
-    "request_decode": request_decode,
-    "requests": requests,
-    "responses": responses,
-    "uart_echo": uart_echo,
-}

@@ -99,7 +99,7 @@ impl Input {
     }
 
     /// Returns whether it may be silent for a while.
-    pub fn is_live(&self) -> bool {
+    pub(crate) fn is_live(&self) -> bool {
         matches!(self.reader.get_ref(), Source::Live(_))
     }
 
@@ -139,7 +139,7 @@ impl Input {
     }
 
     /// Text of two bytes a character as UTF-8.
-    pub fn in_utf8(mut self) -> Result<Self, Fault> {
+    pub(crate) fn in_utf8(mut self) -> Result<Self, Fault> {
         let Some(unit) = utf16::mark(self.peek()?) else { return Ok(self) };
         let (name, meter) = (self.name.clone(), self.meter());
         let text = Self::over(&name, Utf16::new(self, unit));
@@ -147,7 +147,7 @@ impl Input {
     }
 
     /// The same content in a form that can be read backwards.
-    pub fn seekable(mut self) -> Result<Box<dyn SeekRead>, Fault> {
+    pub(crate) fn seekable(mut self) -> Result<Box<dyn SeekRead>, Fault> {
         if let Source::File(file) = self.reader.get_mut() {
             let mut file = std::mem::replace(file, Box::new(Cursor::new(Vec::new())));
             file.seek(SeekFrom::Start(0)).map_err(|e| self.io_fault(At::File, &e))?;
@@ -203,7 +203,7 @@ impl Input {
     }
 
     /// The reader ended with an error at `at`.
-    pub fn io_fault(&self, at: At, error: &io::Error) -> Fault {
+    pub(crate) fn io_fault(&self, at: At, error: &io::Error) -> Fault {
         self.fault(at, format!("cannot be read: {}", plain(error)))
     }
 
@@ -226,7 +226,7 @@ impl Input {
     }
 
     /// Fills `buffer` as far as the file goes; of one that pauses, with the whole units of `unit` bytes that are there.
-    pub fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
+    pub(crate) fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
         let mut filled = 0;
         while let Some(free) = buffer.get_mut(filled..).filter(|free| !free.is_empty()) {
             if filled > 0 && filled % unit == 0 && self.pauses() {

@@ -89,7 +89,7 @@ impl Pcapng {
     }
 
     /// Returns whether packets may come one by one.
-    pub fn is_live(&self) -> bool {
+    pub(crate) fn is_live(&self) -> bool {
         self.live
     }
 

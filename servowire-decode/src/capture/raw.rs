@@ -45,7 +45,7 @@ impl Raw {
     }
 
     /// `channels`: bit of the sample and name.
-    pub fn with_channels(input: Input, rate: u64, unit: Unit, channels: Vec<(u16, String)>) -> Self {
+    pub(crate) fn with_channels(input: Input, rate: u64, unit: Unit, channels: Vec<(u16, String)>) -> Self {
         let unit = match unit {
             Unit::Bit => Unit::Bit,
             Unit::Bytes(n) => Unit::Bytes(n.clamp(1, 8)),

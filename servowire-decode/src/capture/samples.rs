@@ -20,10 +20,10 @@ impl<'a> Samples<'a> {
         Self { bytes, first, before, clock, inverted: false }
     }
 
-    /// The same line upside down, or not.
+    /// The same line upside down.
     #[must_use]
-    pub fn turned(self, inverted: bool) -> Self {
-        Self { inverted: self.inverted != inverted, before: self.before != inverted, ..self }
+    pub fn inverted(self) -> Self {
+        Self { inverted: !self.inverted, before: !self.before, ..self }
     }
 
     /// Number of the first sample.
@@ -132,7 +132,8 @@ mod tests {
             before: bool,
             inverted: bool,
         ) {
-            let samples = Samples::new(&bytes, 64, before, Clock::new(1_000_000)).turned(inverted);
+            let samples = Samples::new(&bytes, 64, before, Clock::new(1_000_000));
+            let samples = if inverted { samples.inverted() } else { samples };
             let want: Vec<_> =
                 plain(&bytes, before).iter().map(|(time, level)| (*time + 64_000_000, *level != inverted)).collect();
             prop_assert_eq!(samples.changes().collect::<Vec<_>>(), want);

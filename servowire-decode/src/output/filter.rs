@@ -8,14 +8,25 @@ use crate::time::Time;
 
 /// What the user wants to see; what is left empty lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Filter {
-    kinds: Vec<String>,
-    address: Option<i64>,
-    encoder: Option<String>,
-    from: Option<Time>,
-    to: Option<Time>,
+pub struct Choice {
+    /// The whole name of a frame or its last word, in any case.
+    pub kinds: Vec<String>,
+    /// Of an encoder, drive or device.
+    pub address: Option<i64>,
+    /// Only what this encoder says, and what is asked of it; by its name, channel or address.
+    pub encoder: Option<String>,
+    /// The first instant that is shown.
+    pub from: Option<Time>,
+    /// From here on nothing is shown.
+    pub to: Option<Time>,
     /// Only what is refused.
-    pub(super) errors: bool,
+    pub errors: bool,
+}
+
+/// Lets through what was chosen.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Filter {
+    choice: Choice,
     /// By line: whether the last request passed by its address.
     passed: BTreeMap<usize, bool>,
 }
@@ -24,33 +35,30 @@ pub struct Filter {
 const REST: i64 = 10_000_000_000;
 
 impl Filter {
-    /// `kinds`: the whole name or its last word, in any case; `address`: of an encoder, drive or device; `times`: the
-    /// first, and the one from which on nothing is shown, in picoseconds; `errors`: only what is refused.
-    pub fn new(kinds: Vec<String>, address: Option<i64>, times: (Option<Time>, Option<Time>), errors: bool) -> Self {
-        let (from, to) = times;
-        Self { kinds, address, encoder: None, from, to, errors, passed: BTreeMap::new() }
-    }
-
-    /// Only what this encoder says, and what is asked of it; by its name, channel or address.
-    #[must_use]
-    pub fn with_encoder(self, encoder: Option<String>) -> Self {
-        Self { encoder, ..self }
+    /// Lets through what the user chose.
+    pub fn new(choice: Choice) -> Self {
+        Self { choice, passed: BTreeMap::new() }
     }
 
     /// Returns whether times matter.
     pub fn has_times(&self) -> bool {
-        self.from.is_some() || self.to.is_some()
+        self.choice.from.is_some() || self.choice.to.is_some()
+    }
+
+    /// Returns whether only refused frames are shown.
+    pub(super) fn wants_errors_only(&self) -> bool {
+        self.choice.errors
     }
 
     /// Whether nothing of interest can come any more once a recording was read up to `time`.
     pub(super) fn is_over(&self, time: Time) -> bool {
-        self.to.is_some_and(|to| time > to + REST)
+        self.choice.to.is_some_and(|to| time > to + REST)
     }
 
     /// Whether an event is asked for; of those that are, only the refused ones may be shown.
     pub(super) fn takes(&mut self, origin: &Origin, event: &Event) -> bool {
         let is_meant = |encoder: &String| origin.is_meant(origin.speaker(event), encoder);
-        self.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)
+        self.choice.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)
     }
 
     fn passes(&mut self, lane: usize, event: &Event) -> bool {
@@ -63,20 +71,20 @@ impl Filter {
             event.kind.eq_ignore_ascii_case(kind)
                 || event.kind.rsplit(' ').next().is_some_and(|last| last.eq_ignore_ascii_case(kind))
         };
-        self.kinds.is_empty() || self.kinds.iter().any(same)
+        self.choice.kinds.is_empty() || self.choice.kinds.iter().any(same)
     }
 
     fn is_in_time(&self, event: &Event) -> bool {
         match event.place {
             Place::Time { start, end } => {
-                self.from.is_none_or(|from| end > from) && self.to.is_none_or(|to| start < to)
+                self.choice.from.is_none_or(|from| end > from) && self.choice.to.is_none_or(|to| start < to)
             }
             Place::Line(_) => true,
         }
     }
 
     fn is_addressed(&mut self, lane: usize, event: &Event) -> bool {
-        let Some(wanted) = self.address else { return true };
+        let Some(wanted) = self.choice.address else { return true };
         let passes = match event.address {
             Some(address) => i64::from(address) == wanted,
             None => event.direction == Some(Direction::Answer) && self.passed.get(&lane).copied().unwrap_or(false),
@@ -101,7 +109,7 @@ mod tests {
 
     #[test]
     fn kinds_by_name_or_last_word() {
-        let mut filter = Filter { kinds: vec!["3".to_owned(), "abs40".to_owned()], ..Filter::default() };
+        let mut filter = Filter::new(Choice { kinds: vec!["3".to_owned(), "abs40".to_owned()], ..Choice::default() });
         assert!(filter.passes(0, &event(Direction::Answer, "ID 3", None, 0)));
         assert!(filter.passes(0, &event(Direction::Answer, "ABS40", None, 0)));
         assert!(!filter.passes(0, &event(Direction::Answer, "ID D", None, 0)));
@@ -110,7 +118,7 @@ mod tests {
 
     #[test]
     fn an_answer_without_address_goes_with_its_request() {
-        let mut filter = Filter { address: Some(2), ..Filter::default() };
+        let mut filter = Filter::new(Choice { address: Some(2), ..Choice::default() });
         assert!(!filter.passes(0, &event(Direction::Request, "ABS40", Some(1), 0)));
         assert!(!filter.passes(0, &event(Direction::Answer, "ABS40", None, 0)));
         assert!(filter.passes(0, &event(Direction::Request, "ABS40", Some(2), 0)));
@@ -122,7 +130,8 @@ mod tests {
 
     #[test]
     fn times_from_and_to() {
-        let mut filter = Filter { from: Some(Time::from_ps(100)), to: Some(Time::from_ps(200)), ..Filter::default() };
+        let mut filter =
+            Filter::new(Choice { from: Some(Time::from_ps(100)), to: Some(Time::from_ps(200)), ..Choice::default() });
         let takes = [85, 95, 150, 199, 200].map(|start| filter.passes(0, &event(Direction::Answer, "x", None, start)));
         assert_eq!(takes, [false, true, true, true, false]);
         assert!(!filter.is_over(Time::from_ps(200)) && filter.is_over(Time::from_ps(10_000_000_201)));

@@ -21,6 +21,15 @@ pub struct Stats<W> {
     gathered: Gathered,
 }
 
+/// The figures of one that spoke, in words.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Table {
+    /// Its name; empty where there is only one.
+    pub speaker: String,
+    /// What is counted, and the figures; what belongs to the row above has no name.
+    pub rows: Vec<(&'static str, String)>,
+}
+
 /// Figures of each encoder, drive or device by itself.
 #[derive(Debug, Default)]
 pub struct Gathered {
@@ -270,10 +279,12 @@ impl Gathered {
         }
     }
 
-    /// Who spoke, by name (empty where there is only one), and the figures in the words of a table; what belongs to the row
-    /// above has no name.
-    pub fn tables(&self, origin: &Origin) -> Vec<(String, Vec<(&'static str, String)>)> {
-        let one = |(speaker, figures): (&Speaker, &Figures)| (origin.name(*speaker), figures.rows(self.limit));
+    /// A table for each that spoke.
+    pub fn tables(&self, origin: &Origin) -> Vec<Table> {
+        let one = |(speaker, figures): (&Speaker, &Figures)| Table {
+            speaker: origin.name(*speaker),
+            rows: figures.rows(self.limit),
+        };
         self.by.iter().map(one).collect()
     }
 
@@ -300,8 +311,14 @@ impl Gathered {
 
 impl<W: Write> Stats<W> {
     /// `limit`: moves of the position above it are listed as jumps.
-    pub fn new(out: W, json: bool, limit: Option<u64>) -> Self {
-        Self { out, json, gathered: Gathered::new(limit) }
+    pub fn new(out: W, limit: Option<u64>) -> Self {
+        Self { out, json: false, gathered: Gathered::new(limit) }
+    }
+
+    /// JSON Lines in place of tables.
+    #[must_use]
+    pub fn in_json(self) -> Self {
+        Self { json: true, ..self }
     }
 }
 
@@ -325,9 +342,9 @@ impl<W: Write> Printer for Stats<W> {
             return self.out.flush();
         }
         writeln!(self.out, "{}", origin.file)?;
-        for (name, rows) in gathered.tables(origin) {
-            if !name.is_empty() {
-                writeln!(self.out, "  {name}")?;
+        for Table { speaker, rows } in gathered.tables(origin) {
+            if !speaker.is_empty() {
+                writeln!(self.out, "  {speaker}")?;
             }
             for (what, text) in rows {
                 match what {

@@ -40,16 +40,29 @@ pub struct Text<W> {
 }
 
 impl<W: Write> Text<W> {
-    /// `headings`: print the file's name above its lines; `colour`: let refused frames stand out.
-    pub fn new(out: W, headings: bool, colour: bool) -> Self {
+    /// Plain lines.
+    pub fn new(out: W) -> Self {
         Self {
             out,
-            line: Columns { text: String::new(), pieces: Vec::new(), colour, most: COLUMNS },
+            line: Columns { text: String::new(), pieces: Vec::new(), colour: false, most: COLUMNS },
             held: BTreeMap::new(),
-            headings,
+            headings: false,
             widths: HashMap::new(),
             steady: HashMap::new(),
         }
+    }
+
+    /// Prints the name of each file above its lines.
+    #[must_use]
+    pub fn with_headings(self) -> Self {
+        Self { headings: true, ..self }
+    }
+
+    /// Lets refused frames stand out.
+    #[must_use]
+    pub fn with_colour(mut self) -> Self {
+        self.line.colour = true;
+        self
     }
 
     /// Breaks lines at the width of a terminal.

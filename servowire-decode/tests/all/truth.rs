@@ -9,9 +9,8 @@ mod line;
 mod links;
 mod rng;
 
-use servowire_decode::capture::{Capture, Change, Line};
+use servowire_decode::capture::{Capture, Change, Memory};
 use servowire_decode::event::{Event, Place, Value};
-use servowire_decode::fault::Fault;
 use servowire_decode::output::Output;
 use servowire_decode::recognition::Note;
 use servowire_decode::settings::Settings;
@@ -85,37 +84,12 @@ impl Outcome {
     }
 }
 
-/// Edges in memory.
-struct Memory {
-    names: Vec<String>,
-    changes: Vec<Change>,
-    at: usize,
-    end: Time,
-}
-
-impl Line for Memory {
-    fn channels(&self) -> &[String] {
-        &self.names
-    }
-
-    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
-        let next = (self.at + 1000).min(self.changes.len());
-        changes.extend_from_slice(&self.changes[self.at..next]);
-        self.at = next;
-        Ok(self.at < self.changes.len())
-    }
-
-    fn reached(&self) -> Time {
-        if self.at == self.changes.len() { self.end } else { self.changes[self.at].time }
-    }
-}
-
 /// All events of a line, found without a hint.
 fn decode(edges: &[(i64, bool)], end: f64) -> (Vec<Event>, String) {
     let change =
         |(time, level): &(i64, bool)| Change { time: Time::from_ps((*time).into()), channel: 0, level: *level };
     let changes = edges.iter().map(change).collect();
-    let memory = Memory { names: vec!["LINE".to_owned()], changes, at: 0, end: Time::from_ps(end as i128) };
+    let memory = Memory::new(vec!["LINE".to_owned()], changes, Time::from_ps(end as i128));
     let mut keep = Keep::default();
     let said = std::cell::RefCell::new(String::new());
     let notes = |note: &Note| said.borrow_mut().push_str(&note.to_string());
@@ -182,4 +156,23 @@ fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) 
 fn captures(few: u64, conditions: usize) -> u64 {
     let wanted = std::env::var("TRUTH_CAPTURES").ok().and_then(|text| text.parse::<u64>().ok());
     wanted.map_or(few, |wanted| wanted.div_ceil(conditions as u64))
+}
+
+/// Judges some captures of each condition and prints how many came out right; panics where one did not.
+fn hold<C: Copy>(conditions: &[(&str, C)], run: impl Fn(&str, C, u64) -> Outcome) {
+    let mut faults = String::new();
+    for (name, condition) in conditions {
+        let (mut right, mut shown, mut wrong, mut lost) = (0, 0, 0, 0);
+        let count = captures(2, conditions.len());
+        for seed in 0..count {
+            let outcome = run(name, *condition, seed);
+            right += u64::from(outcome.is_right());
+            (shown, wrong, lost) = (shown + outcome.shown, wrong + outcome.wrong.len(), lost + outcome.lost.len());
+            if !outcome.is_right() && faults.len() < 6000 {
+                faults.push_str(&outcome.told(name, seed));
+            }
+        }
+        println!("{name:<45} {right:>4} of {count} right; {shown:>7} values shown, {wrong} wrong, {lost} frames lost");
+    }
+    assert!(faults.is_empty(), "{faults}");
 }

@@ -27,9 +27,11 @@ struct Wire {
 type Shared = Rc<RefCell<Wire>>;
 
 impl Wire {
-    fn put(&mut self, word: u8) {
-        let driven = self.driven;
-        self.levels.extend((0..8).rev().map(|bit| !driven || word >> bit & 1 == 1));
+    /// Sends a word; gives what is on the line meanwhile.
+    fn put(&mut self, word: u8) -> u8 {
+        let heard = if self.driven { word } else { 0xff };
+        self.levels.extend((0..8).rev().map(|bit| heard >> bit & 1 == 1));
+        heard
     }
 
     /// What a UART makes of it: bytes, and whether their stop bit was 1.
@@ -57,23 +59,28 @@ impl ErrorType for Spi {
 }
 
 impl SpiBus for Spi {
-    fn read(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-        unimplemented!()
+    /// What it sends while it only reads are ones.
+    fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
+        self.transfer(words, &[])
     }
 
     fn write(&mut self, words: &[u8]) -> Result<(), Infallible> {
-        for word in words {
-            self.0.borrow_mut().put(*word);
+        self.transfer(&mut [], words)
+    }
+
+    fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), Infallible> {
+        for at in 0..read.len().max(write.len()) {
+            let heard = self.0.borrow_mut().put(sent(write, at));
+            keep(read, at, heard);
         }
         Ok(())
     }
 
-    fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
-        unimplemented!()
-    }
-
     fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
-        self.write(words)
+        for word in words {
+            *word = self.0.borrow_mut().put(*word);
+        }
+        Ok(())
     }
 
     fn flush(&mut self) -> Result<(), Infallible> {
@@ -82,28 +89,42 @@ impl SpiBus for Spi {
 }
 
 impl embedded_hal_async::spi::SpiBus for Spi {
-    async fn read(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-        unimplemented!()
+    async fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
+        embedded_hal_async::spi::SpiBus::transfer(self, words, &[]).await
     }
 
     async fn write(&mut self, words: &[u8]) -> Result<(), Infallible> {
-        for word in words {
+        embedded_hal_async::spi::SpiBus::transfer(self, &mut [], words).await
+    }
+
+    async fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), Infallible> {
+        for at in 0..read.len().max(write.len()) {
             pause().await;
-            self.0.borrow_mut().put(*word);
+            let heard = self.0.borrow_mut().put(sent(write, at));
+            keep(read, at, heard);
         }
         Ok(())
     }
 
-    async fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
-        unimplemented!()
-    }
-
     async fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
-        embedded_hal_async::spi::SpiBus::write(self, words).await
+        let sent = words.to_vec();
+        embedded_hal_async::spi::SpiBus::transfer(self, words, &sent).await
     }
 
     async fn flush(&mut self) -> Result<(), Infallible> {
         Ok(())
+    }
+}
+
+/// The word of a transfer that goes out at a place: ones behind the last.
+fn sent(words: &[u8], at: usize) -> u8 {
+    words.get(at).copied().unwrap_or(0xff)
+}
+
+/// What was heard at a place of a transfer, if anybody wants it.
+fn keep(words: &mut [u8], at: usize, heard: u8) {
+    if let Some(word) = words.get_mut(at) {
+        *word = heard;
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use servowire_decode::output::filter::Filter;
+use servowire_decode::output::filter::{Choice, Filter};
 use servowire_decode::time::Time;
 
 use crate::reading::Reading;
@@ -101,7 +101,8 @@ impl Decode {
     /// Which frames are asked for.
     pub(super) fn filter(&self) -> Filter {
         let FilterArgs { id, address, encoder, from, to, errors } = &self.filter;
-        let times = self.cut.map_or((*from, *to), |(from, to)| (Some(from), Some(to)));
-        Filter::new(id.clone(), address.map(i64::from), times, *errors).with_encoder(encoder.clone())
+        let (from, to) = self.cut.map_or((*from, *to), |(from, to)| (Some(from), Some(to)));
+        let (address, encoder) = (address.map(i64::from), encoder.clone());
+        Filter::new(Choice { kinds: id.clone(), address, encoder, from, to, errors: *errors })
     }
 }

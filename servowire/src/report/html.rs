@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::time::{Duration, UNIX_EPOCH};
 
-use servowire_decode::event::Place;
-use servowire_decode::event::Verdict;
+use servowire_decode::event::{Place, Verdict};
+use servowire_decode::output::stats::Table;
 use servowire_decode::time::{SECOND, Time};
 
 use super::Report;
@@ -108,9 +108,9 @@ fn found(report: &Report, out: &mut String) {
 }
 
 fn figures(report: &Report, out: &mut String) {
-    for (name, table) in &report.tables {
-        let title = if name.is_empty() { "Figures".to_owned() } else { format!("Figures of {name}") };
-        rows(&title, table, out);
+    for Table { speaker, rows: figures } in &report.tables {
+        let title = if speaker.is_empty() { "Figures".to_owned() } else { format!("Figures of {speaker}") };
+        rows(&title, figures, out);
     }
 }
 

@@ -4,9 +4,8 @@ use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::io;
 
-use servowire_decode::capture::{Capture as Opened, Change, Line};
+use servowire_decode::capture::{Capture as Opened, Change, Memory};
 use servowire_decode::event::{Direction, Event, Value, Verdict};
-use servowire_decode::fault::Fault;
 use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Lane, Origin, Printer};
 use servowire_decode::recognition::Note;
@@ -15,31 +14,6 @@ use servowire_decode::time::Time;
 
 use super::speech::Expect;
 use super::wire::Capture;
-
-/// A capture in memory.
-struct Memory {
-    names: Vec<String>,
-    changes: Vec<Change>,
-    at: usize,
-    end: Time,
-}
-
-impl Line for Memory {
-    fn channels(&self) -> &[String] {
-        &self.names
-    }
-
-    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
-        let next = (self.at + 4096).min(self.changes.len());
-        changes.extend_from_slice(&self.changes[self.at..next]);
-        self.at = next;
-        Ok(self.at < self.changes.len())
-    }
-
-    fn reached(&self) -> Time {
-        if self.at == self.changes.len() { self.end } else { self.changes[self.at].time }
-    }
-}
 
 /// Keeps all events by their line.
 #[derive(Default)]
@@ -89,7 +63,7 @@ pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     }
     changes.sort_by_key(|change| change.time);
     let names = capture.channels.iter().map(|channel| channel.name.clone()).collect();
-    let memory = Memory { names, changes, at: 0, end: Time::from_ps(capture.end.into()) };
+    let memory = Memory::new(names, changes, Time::from_ps(capture.end.into()));
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
     let notes = |note: &Note| {

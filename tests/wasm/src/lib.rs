@@ -44,11 +44,11 @@ impl io::Write for Shared {
 pub fn outputs(name: &str, bytes: &[u8]) -> String {
     let mut all = String::new();
     let printed = [
-        ("text", |out| Box::new(Text::new(out, true, false)) as Box<dyn Printer>),
+        ("text", |out| Box::new(Text::new(out).with_headings()) as Box<dyn Printer>),
         ("json", |out| Box::new(JsonLines::new(out))),
         ("csv", |out| Box::new(Csv::new(out))),
-        ("stats", |out| Box::new(Stats::new(out, false, Some(100)))),
-        ("stats json", |out| Box::new(Stats::new(out, true, None))),
+        ("stats", |out| Box::new(Stats::new(out, Some(100)))),
+        ("stats json", |out| Box::new(Stats::new(out, None).in_json())),
     ] as [(&str, fn(Shared) -> Box<dyn Printer>); 5];
     for (what, printer) in printed {
         let out = Shared::default();

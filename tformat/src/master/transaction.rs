@@ -3,10 +3,11 @@ use crate::data_id::DataId;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::frame::Frame;
-use crate::message::CF3;
+use crate::message::{CF3, refusal};
 use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
+use crate::timing::BitRate;
 
 /// A response with all checks passed, and when its position was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -76,8 +77,7 @@ pub struct Transaction {
     request: Request,
     frame: Frame,
     line: Line,
-    /// The control field of the request and of its response, and how many fields that has.
-    cf: u8,
+    /// Fields of the response.
     fields: u8,
     start_ns: u64,
     /// The end of the request's last bit.
@@ -96,34 +96,28 @@ pub struct Transaction {
     broken: bool,
     /// End of the last byte.
     heard_ns: u64,
+    /// Until the end its time-out, afterwards from when on the line is free.
     until_ns: u64,
-    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
-    /// listened to any longer.
-    latest_ns: u64,
-    end: Option<(Result<Exchange, Error>, u64)>,
+    end: Option<Result<Exchange, Error>>,
 }
 
-impl Transaction {
-    /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
-    ///
-    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
-    pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
-        let frame = request.emit();
-        let asked_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
-        let field_ns = u64::from(line.rate.fields_ns(1));
-        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
+/// Begins a transaction where it is to be: what a function gives back is copied there.
+macro_rules! begin {
+    ($place:expr, $request:ident, $line:ident, $start_ns:ident) => {
+        let frame = $request.emit();
+        let asked_ns = $start_ns.saturating_add($line.rate.fields_ns(frame.fields()).into());
+        let field_ns = u64::from($line.rate.fields_ns(1));
+        let wait_ns = u64::from($line.response_timeout_ns).saturating_add($line.hand_over_ns.into());
         let waited_ns = asked_ns.saturating_add(wait_ns);
-        let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
-        let id = request.data_id();
-        Self {
-            request,
+        let ends = !$line.leaves_time();
+        $place = Transaction {
+            request: $request,
             frame,
-            line,
-            cf: id.control_field().get(),
-            fields: id.response_fields(),
-            start_ns,
+            line: $line,
+            fields: $request.data_id().response_fields(),
+            start_ns: $start_ns,
             asked_ns,
-            earliest_ns: asked_ns.saturating_add(line.turn_around_ns.into()).saturating_add(field_ns),
+            earliest_ns: asked_ns.saturating_add($line.turn_around_ns.into()).saturating_add(field_ns),
             received: [0; Frame::MAX_FIELDS],
             len: 0,
             echoed: 0,
@@ -131,10 +125,46 @@ impl Transaction {
             refused: None,
             broken: false,
             heard_ns: asked_ns,
-            until_ns: waited_ns.saturating_add(field_ns),
-            latest_ns: waited_ns.saturating_add(fields_ns),
-            end: if line.leaves_time() { None } else { Some((Err(Error::Line), start_ns)) },
-        }
+            until_ns: if ends { $start_ns } else { waited_ns.saturating_add(field_ns) },
+            end: if ends { Some(Err(Error::Line)) } else { None },
+        };
+    };
+}
+
+impl Transaction {
+    /// Nothing was asked and nothing is answered: a place for [`restart`](Self::restart). It counts as one that has ended with
+    /// [`Error::NoResponse`], and its line is free at any time.
+    pub const IDLE: Self = Self {
+        request: Request::ReadAll,
+        frame: Request::ReadAll.emit(),
+        line: Line::new(BitRate::Mbit2_5),
+        fields: 11,
+        start_ns: 0,
+        asked_ns: 0,
+        earliest_ns: 0,
+        received: [0; Frame::MAX_FIELDS],
+        len: 0,
+        echoed: 0,
+        echo_fault: None,
+        refused: None,
+        broken: false,
+        heard_ns: 0,
+        until_ns: 0,
+        end: Some(Err(Error::NoResponse { echo: false })),
+    };
+
+    /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
+    ///
+    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
+    pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
+        let it;
+        begin!(it, request, line, start_ns);
+        it
+    }
+
+    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    pub fn restart(&mut self, request: Request, line: Line, start_ns: u64) {
+        begin!(*self, request, line, start_ns);
     }
 
     /// The fields to send, and when.
@@ -155,25 +185,59 @@ impl Transaction {
     /// A pause in a block shifts what stands before it: hand over separately what a pause as long as the request and four
     /// fields divides, 20 us at 2.5 Mbit/s.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
-        if self.end.is_some() || bytes.is_empty() {
-            return self.progress();
+        self.push(bytes, end_ns);
+        self.progress()
+    }
+
+    /// The same as [`hear`](Self::hear) for an interrupt: it copies no response, and says [how it ended](Self::outcome).
+    pub fn push(&mut self, bytes: &[u8], end_ns: u64) -> Option<&Result<Exchange, Error>> {
+        if self.end.is_none() && !bytes.is_empty() && !self.is_whole(bytes, end_ns) {
+            self.take_all(bytes, end_ns);
         }
-        let (mut rest, mut found) = (bytes, None);
+        self.outcome()
+    }
+
+    /// A block that is the response and nothing else, as a DMA controller hands it over: taken at one go.
+    fn is_whole(&mut self, bytes: &[u8], end_ns: u64) -> bool {
+        let [first, second, ..] = bytes else { return false };
+        let fits = self.len == 0 && bytes.len() == usize::from(self.fields) && !self.contradicts(*first, *second);
+        if !fits || end_ns.saturating_sub(self.fields_ns(bytes.len().saturating_sub(1))) < self.earliest_ns {
+            return false;
+        }
+        let outcome = Response::parse(self.request, bytes);
+        if outcome.is_err() {
+            return false;
+        }
+        self.found(&outcome, end_ns, bytes.len());
+        self.until_ns = end_ns;
+        true
+    }
+
+    fn take_all(&mut self, bytes: &[u8], end_ns: u64) {
+        let mut rest = bytes;
         while let [byte, after @ ..] = rest {
             rest = after;
-            self.take(*byte, end_ns.saturating_sub(self.fields_ns(after.len())), after, &mut found);
+            self.take(*byte, end_ns.saturating_sub(self.fields_ns(after.len())), after);
         }
         self.heard_ns = end_ns;
-        match (found, self.refused) {
-            (Some(outcome), _) => self.finish(outcome),
-            (None, Some(error)) if self.len == 0 => self.finish(Err(error)),
-            (None, _) if self.len > 0 => {
-                let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
-                self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns).max(self.until_ns);
-            }
-            (None, _) => {}
+        if self.end.is_none() && self.len == 0 {
+            self.end = self.refused.map(Err);
         }
-        self.progress()
+        if self.end.is_some() {
+            self.finish();
+        } else if self.len > 0 {
+            self.wait_longer(end_ns);
+        }
+    }
+
+    /// The next field is due, but a line that does not fall silent is listened to no longer than the longest response takes.
+    fn wait_longer(&mut self, end_ns: u64) {
+        let Line { response_timeout_ns, field_timeout_ns, hand_over_ns, .. } = self.line;
+        let fields_ns = u64::from(field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
+        let longest_ns = fields_ns.saturating_add(response_timeout_ns.into()).saturating_add(hand_over_ns.into());
+        let latest_ns = self.asked_ns.saturating_add(longest_ns);
+        let patience = u64::from(field_timeout_ns).saturating_add(hand_over_ns.into());
+        self.until_ns = end_ns.saturating_add(patience).min(latest_ns).max(self.until_ns);
     }
 
     /// The UART reports a framing error for the byte that ended at `end_ns`.
@@ -188,7 +252,8 @@ impl Transaction {
             } else {
                 self.broken = true;
                 if self.len > 0 || end_ns > self.until_ns {
-                    self.finish(Err(Error::Delimiter { field: self.len }));
+                    self.end = Some(Err(Error::Delimiter { field: self.len }));
+                    self.finish();
                 }
             }
         }
@@ -207,9 +272,19 @@ impl Transaction {
     pub const fn progress(&self) -> Progress {
         match self.end {
             None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
-            Some((Ok(value), ready_ns)) => Progress::Done { value, ready_ns },
-            Some((Err(error), ready_ns)) => Progress::Failed { error, ready_ns },
+            Some(Ok(value)) => Progress::Done { value, ready_ns: self.until_ns },
+            Some(Err(error)) => Progress::Failed { error, ready_ns: self.until_ns },
         }
+    }
+
+    /// How it ended; `None` while it is pending.
+    pub const fn outcome(&self) -> Option<&Result<Exchange, Error>> {
+        self.end.as_ref()
+    }
+
+    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    pub const fn until_ns(&self) -> u64 {
+        if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.until_ns }
     }
 
     fn fields_ns(&self, fields: usize) -> u64 {
@@ -217,11 +292,12 @@ impl Transaction {
     }
 
     /// One byte more, which ended at `ended_ns` at the latest; these came after it in the same block.
-    fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
+    fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8]) {
         if ended_ns < self.earliest_ns {
             return self.early(byte);
         }
-        if self.len == 1 && self.contradicts(byte) {
+        let [first, ..] = self.received;
+        if self.len == 1 && self.contradicts(first, byte) {
             self.forget_echo();
         }
         if let Some(place) = self.received.get_mut(usize::from(self.len)) {
@@ -229,7 +305,7 @@ impl Transaction {
             self.len = self.len.saturating_add(1);
         }
         if self.len >= self.expected() {
-            self.judge(ended_ns, after, found);
+            self.judge(ended_ns, after);
         }
     }
 
@@ -250,15 +326,14 @@ impl Transaction {
     }
 
     const fn begins_a_response(&self, byte: u8) -> bool {
-        byte == self.cf || byte == CF3
+        byte == self.frame.first() || byte == CF3
     }
 
-    /// Whether this byte after the first shows that the first was the end of an echo: in place of SF there is a control field,
+    /// Whether the byte after the first shows that the first was the end of an echo: in place of SF there is a control field,
     /// whose low bits are never 0 as the information bits of SF are.
-    const fn contradicts(&self, second: u8) -> bool {
-        let [cf, ..] = self.received;
-        let eeprom = matches!(self.request.data_id(), DataId::ReadEeprom | DataId::WriteEeprom);
-        (cf == CF3 || !eeprom) && self.begins_a_response(second)
+    const fn contradicts(&self, first: u8, second: u8) -> bool {
+        let eeprom = matches!(self.request, Request::ReadEeprom { .. } | Request::WriteEeprom { .. });
+        (first == CF3 || !eeprom) && self.begins_a_response(second)
     }
 
     /// The first byte was the last one of the own request.
@@ -271,40 +346,52 @@ impl Transaction {
     }
 
     /// The bytes are as many as a response has.
-    fn judge(&mut self, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
+    fn judge(&mut self, ended_ns: u64, after: &[u8]) {
         while self.len > 0 && self.len >= self.expected() {
             let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
             // A response to a write repeats it: the first of two is the echo.
-            if heard == self.frame.as_bytes() && is_sound(&Response::parse(self.request, after)) {
+            if heard.iter().eq(self.frame.as_bytes()) && is_sound(&Response::parse(self.request, after)) {
                 self.echoed = self.frame.fields();
                 self.len = 0;
                 return;
             }
-            let fresh = ended_ns.saturating_sub(self.fields_ns(heard.len().saturating_sub(1))) >= self.earliest_ns;
-            match Response::parse(self.request, heard) {
-                outcome if fresh && is_sound(&outcome) => {
-                    let began_ns = ended_ns.saturating_sub(self.fields_ns(heard.len()));
-                    let sampled_ns = self.asked_ns.saturating_add(self.line.sampling_ns.into());
-                    let outcome = outcome.map(|response| Exchange { response, sampled_ns, began_ns });
-                    *found = Some(if found.is_some() { Err(Error::TwoResponses) } else { outcome });
-                    self.len = 0;
-                }
-                outcome => {
-                    self.refused = self.refused.or(outcome.err());
-                    self.drop_first();
-                }
+            let fields = heard.len();
+            let fresh = ended_ns.saturating_sub(self.fields_ns(fields.saturating_sub(1))) >= self.earliest_ns;
+            let outcome = Response::parse(self.request, heard);
+            if fresh && is_sound(&outcome) {
+                self.found(&outcome, ended_ns, fields);
+                return;
             }
+            if let (Err(error), None) = (outcome, self.refused) {
+                self.refused = Some(error);
+            }
+            self.drop_first();
         }
+    }
+
+    /// A sound response of so many fields, a refusal too. Out of line: a block and a byte come here.
+    #[inline(never)]
+    fn found(&mut self, outcome: &Result<Response, Error>, ended_ns: u64, fields: usize) {
+        self.len = 0;
+        self.end = Some(match *outcome {
+            _ if self.end.is_some() => Err(Error::TwoResponses),
+            Ok(response) => Ok(Exchange {
+                response,
+                sampled_ns: self.asked_ns.saturating_add(self.line.sampling_ns.into()),
+                began_ns: ended_ns.saturating_sub(self.fields_ns(fields)),
+            }),
+            Err(error) => Err(error),
+        });
     }
 
     /// Drops the first byte, and all up to the next with which a response may begin.
     #[cold]
     fn drop_first(&mut self) {
-        loop {
-            self.received.rotate_left(1);
+        while self.len > 0 {
+            self.received.copy_within(1.., 0);
             self.len = self.len.saturating_sub(1);
             let [first, second, ..] = self.received;
-            if self.len == 0 || self.begins_a_response(first) && !(self.len > 1 && self.contradicts(second)) {
+            if self.begins_a_response(first) && !(self.len > 1 && self.contradicts(first, second)) {
                 break;
             }
         }
@@ -322,26 +409,28 @@ impl Transaction {
                 Error::EchoMismatch { at: self.echoed, got, want }
             }
             (None, [], _) => Error::NoResponse { echo: self.echoed == self.frame.fields() },
-            (None, heard, _) => match Response::parse(self.request, heard) {
-                Err(error) => error,
-                // Never: there are fewer bytes than a response has.
-                Ok(_) => Error::NoResponse { echo: false },
-            },
+            // There are fewer bytes than a response has.
+            (None, heard, _) => refusal(self.request.data_id(), heard),
         };
-        let mut found = None;
-        while self.len > 0 && found.is_none() {
+        while self.len > 0 && self.end.is_none() {
             self.drop_first();
-            self.judge(self.heard_ns, &[], &mut found);
+            self.judge(self.heard_ns, &[]);
         }
-        self.finish(found.unwrap_or(Err(error)));
+        if self.end.is_none() {
+            self.end = Some(Err(error));
+        }
+        self.finish();
     }
 
-    /// Ends. After an error the line is free when the longest response, begun as late as it may, is over.
-    fn finish(&mut self, outcome: Result<Exchange, Error>) {
-        let over_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
-        let drained_ns = over_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS));
-        let ready_ns = if outcome.is_ok() { self.heard_ns } else { drained_ns.max(self.heard_ns) };
-        self.end = Some((outcome, ready_ns));
+    /// It has ended. After an error the line is free when the longest response, begun as late as it may, is over. Out of line: all
+    /// ends but that of a whole block come here.
+    #[inline(never)]
+    fn finish(&mut self) {
+        self.until_ns = self.heard_ns;
+        if let Some(Err(_)) = self.end {
+            let over_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
+            self.until_ns = over_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS)).max(self.heard_ns);
+        }
     }
 }
 

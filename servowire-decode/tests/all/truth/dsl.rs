@@ -1,275 +1,23 @@
 //! A HIPERFACE DSL link as a colleague who does not trust the decoder would make it: bits from the published tables, and beside
 //! each frame every value that may be said of it. No code of the crates, none of their constants.
 
-use std::collections::VecDeque;
+mod code;
+mod doubt;
+mod link;
+mod talk;
+mod vertical;
 
 use super::line::Wire;
 use super::rng::Rng;
 use super::{Said, Shown};
+use code::{PATTERN, acceleration, bits, coded, parameter};
+use doubt::Sent;
+pub(crate) use link::Link;
+use talk::Talk;
+use vertical::Vertical;
 
 /// 9.375 MBaud.
 pub(crate) const BIT: f64 = 1e12 / 9.375e6;
-
-/// abcdei of D.0 to D.31 in the column of running disparity -, then K28.
-const SIX: &str = "100111 011101 101101 110001 110101 101001 011001 111000 111001 100101 010101 110100 001101 101100 \
-    011100 010111 011011 100011 010011 110010 001011 101010 011010 111010 110011 100110 010110 110110 001110 101110 \
-    011110 101011 001111";
-/// fghj of y in the column -: of data, of K28.
-const FOUR: &str = "1011 1001 0101 1100 1101 1010 0110 1110";
-const FOUR_K28: &str = "1011 0110 1010 1100 1101 0101 1001 0111";
-/// START, LEARN and CHECK are answered with it.
-const PATTERN: &str = "0100110011001000000100010101110111111011001100110100010011001";
-
-/// Resources as they are printed: one with a name, one that no list has.
-const RESOURCES: [(u16, &str); 2] = [(0x081, "081h RESOLUTN"), (0x2a5, "2A5h")];
-
-fn bits(text: &str) -> Vec<bool> {
-    text.bytes().filter(|bit| matches!(bit, b'0' | b'1')).map(|bit| bit == b'1').collect()
-}
-
-fn word(table: &str, at: usize) -> Vec<bool> {
-    bits(table.split_whitespace().nth(at).unwrap())
-}
-
-fn flipped(bits: &[bool]) -> Vec<bool> {
-    bits.iter().map(|bit| !bit).collect()
-}
-
-/// Ones less zeros.
-fn surplus(bits: &[bool]) -> i64 {
-    bits.iter().map(|bit| if *bit { 1 } else { -1 }).sum()
-}
-
-/// 8b/10b with the running disparity `plus`.
-fn coded(byte: u8, control: bool, plus: &mut bool) -> Vec<bool> {
-    let (x, y) = (usize::from(byte & 31), usize::from(byte >> 5));
-    let k28 = control && x == 28;
-    let mut six = word(SIX, if k28 { 32 } else { x });
-    let even = surplus(&six) == 0;
-    if *plus && (!even || x == 7) {
-        six = flipped(&six);
-    }
-    *plus ^= !even;
-    let other_seven = control || matches!((x, *plus), (17 | 18 | 20, false) | (11 | 13 | 14, true));
-    let mut four = match (k28, y, other_seven) {
-        (true, ..) => word(FOUR_K28, y),
-        (_, 7, true) => bits("0111"),
-        _ => word(FOUR, y),
-    };
-    let even = surplus(&four) == 0;
-    if *plus && (!even || y == 3 || k28) {
-        four = flipped(&four);
-    }
-    *plus ^= !even;
-    [six, four].concat()
-}
-
-/// EQUALISATION and the parameter byte; `disparity`: ones less zeros that the master has sent.
-fn parameter(byte: u8, disparity: i64) -> Vec<bool> {
-    let (equal, mut d) = match disparity {
-        -1..=1 => ("0000", disparity),
-        2 | 3 => ("0010", disparity - 2),
-        4.. => ("0000", disparity - 4),
-        -3 | -2 => ("1101", disparity + 2),
-        _ => ("1111", disparity + 4),
-    };
-    let (x, y) = (usize::from(byte & 31), usize::from(byte >> 5));
-    let mut six = word(SIX, if x == 28 { 32 } else { x });
-    if x == 7 {
-        six = bits("000111");
-    }
-    if surplus(&six) != 0 {
-        let more_zeros = if surplus(&six) > 0 { flipped(&six) } else { six };
-        six = if d >= 0 { more_zeros } else { flipped(&more_zeros) };
-    }
-    d += surplus(&six);
-    let mut four = word(FOUR, y);
-    if y == 3 {
-        four = bits("0011");
-    }
-    if surplus(&four) != 0 {
-        let more_zeros = if surplus(&four) > 0 { flipped(&four) } else { four };
-        four = if d >= 0 { more_zeros } else { flipped(&more_zeros) };
-    }
-    [bits(equal), six, four].concat()
-}
-
-/// x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, inverted in its low byte, behind the bytes.
-fn sealed(bytes: &[u8]) -> Vec<u8> {
-    let mut crc = 0_u32;
-    for byte in bytes {
-        for k in (0..8).rev() {
-            let carry = (crc >> 15 ^ u32::from(*byte) >> k) & 1;
-            crc = crc << 1 & 0xffff ^ if carry == 1 { 0x90d9 } else { 0 };
-        }
-    }
-    [bytes, &[(crc >> 8) as u8, crc as u8 ^ 0xff]].concat()
-}
-
-/// Eleven bits and x^5 + x^2 + 1 over them, inverted.
-fn acceleration(value: i64) -> [u8; 2] {
-    let value = (value & 0x7ff) as u16;
-    let mut crc = 0_u16;
-    for k in (0..11).rev() {
-        let carry = (crc >> 4 ^ value >> k) & 1;
-        crc = crc << 1 & 31 ^ if carry == 1 { 5 } else { 0 };
-    }
-    (value << 5 | crc ^ 31).to_be_bytes()
-}
-
-/// What kind of link it is.
-#[derive(Debug, Clone)]
-pub(crate) struct Link {
-    /// H-frames after the start-up.
-    pub(crate) frames: usize,
-    /// Whether the start-up is there, so that the identifier is.
-    pub(crate) start_up: bool,
-    /// Bits of the position, and whether it has a sign.
-    pub(crate) width: u32,
-    pub(crate) signed: bool,
-    /// First position, speed in steps a frame, and how much that changes from frame to frame at most.
-    pub(crate) from: i64,
-    pub(crate) speed: i64,
-    pub(crate) jolt: i64,
-    /// Eighths of a bit of a frame of sync mode beyond the 108 bits and six for each block; none: free running.
-    pub(crate) window: Option<i64>,
-    /// Blocks of stuffing.
-    pub(crate) stuffing: usize,
-    /// From the end of PARA and the bit after it to the answer, in bits.
-    pub(crate) delay: f64,
-    /// TRAILER has five driven zeros instead of four.
-    pub(crate) five_zeros: bool,
-    /// Each answer begins with running disparity - instead of going on.
-    pub(crate) anew: bool,
-    /// Messages on both channels.
-    pub(crate) messages: bool,
-    /// Share of answers with a flipped bit, and of heads.
-    pub(crate) damaged: f64,
-    pub(crate) heads_damaged: f64,
-    /// The master's and encoder's clock, as a share of the nominal one.
-    pub(crate) clock: f64,
-    pub(crate) begins_low: bool,
-}
-
-impl Link {
-    pub(crate) const PLAIN: Self = Self {
-        frames: 88,
-        start_up: false,
-        width: 32,
-        signed: false,
-        from: 3_000_000,
-        speed: 0,
-        jolt: 20,
-        window: None,
-        stuffing: 0,
-        delay: 0.8,
-        five_zeros: false,
-        anew: false,
-        messages: false,
-        damaged: 0.0,
-        heads_damaged: 0.0,
-        clock: 1.0,
-        begins_low: false,
-    };
-}
-
-impl Link {
-    /// A position as a number: with its sign where the identifier says that there is one.
-    fn counts(&self, position: i64) -> i64 {
-        let raw = forty(self, position) as i64;
-        if self.start_up && raw >> 39 == 1 { raw - (1 << 40) } else { raw }
-    }
-}
-
-/// What goes over the parameters channel: each side says one symbol a frame.
-#[derive(Debug, Default)]
-struct Talk {
-    master: VecDeque<(u8, Option<String>)>,
-    encoder: VecDeque<(u8, Option<String>)>,
-    gap: u64,
-}
-
-impl Talk {
-    fn say(queue: &mut VecDeque<(u8, Option<String>)>, bytes: &[u8], text: String) {
-        let bytes = sealed(bytes);
-        let mut text = Some(text);
-        let last = 2 * bytes.len() - 1;
-        for at in 0..=last {
-            let byte = bytes[at / 2];
-            let nibble = if at % 2 == 0 { byte >> 4 } else { byte & 15 };
-            queue.push_back((nibble, if at == last { text.take() } else { None }));
-        }
-        // A symbol that is none ends a message.
-        queue.push_back((0x10, None));
-    }
-
-    /// The same of an encoder, whose answer has no length that is known before it has ended.
-    fn answer(queue: &mut VecDeque<(u8, Option<String>)>, bytes: &[u8], text: String) {
-        Self::say(queue, bytes, String::new());
-        let end = queue.len();
-        queue[end - 2].1 = None;
-        queue[end - 1].1 = Some(text);
-    }
-
-    /// Both are quiet: a long request, and while it waits a short one; the answers in either order.
-    fn begin(&mut self, rng: &mut Rng) {
-        if !self.master.is_empty() || !self.encoder.is_empty() {
-            return;
-        }
-        if self.gap > 0 {
-            self.gap -= 1;
-            return;
-        }
-        self.gap = rng.below(6);
-        let register = rng.below(64) as u8;
-        let data = rng.below(256) as u8;
-        let (address, name) = rng.pick(&RESOURCES);
-        let content: Vec<u8> = (0..8).map(|_| rng.below(256) as u8).collect();
-        let long = [0x80 | 0x40 | 0x0c | (address >> 8) as u8, address as u8];
-        let which = rng.below(4);
-        let read = rng.chance(0.5);
-        let number = 0x40 + register;
-        let (short, short_text, answer, answer_text) = if read {
-            (
-                vec![0x40 | register],
-                format!("read register {number:02X}h"),
-                vec![0x40 | register, data],
-                format!("register {number:02X}h holds {data:02X}h"),
-            )
-        } else {
-            (
-                vec![register, data],
-                format!("write register {number:02X}h = {data:02X}h"),
-                vec![register],
-                format!("register {number:02X}h is written"),
-            )
-        };
-        let hex: Vec<String> = content.iter().map(|byte| format!("{byte:02X}")).collect();
-        let long_answer = [&long[..], &content].concat();
-        let long_text = format!("{name} holds {}", hex.join(" "));
-        if which != 0 {
-            Self::say(&mut self.master, &long, format!("direct read of {name}, 8 bytes"));
-        }
-        if which != 1 {
-            Self::say(&mut self.master, &short, short_text);
-        }
-        // The encoder thinks until both have been asked, and some frames more.
-        let quiet = self.master.len() + 1 + rng.below(5) as usize;
-        self.encoder.extend((0..quiet).map(|_| (0x10, None)));
-        match which {
-            0 => Self::answer(&mut self.encoder, &answer, answer_text),
-            1 => Self::answer(&mut self.encoder, &long_answer, long_text),
-            2 => {
-                Self::answer(&mut self.encoder, &answer, answer_text);
-                Self::answer(&mut self.encoder, &long_answer, long_text);
-            }
-            _ => {
-                Self::answer(&mut self.encoder, &long_answer, long_text);
-                Self::answer(&mut self.encoder, &answer, answer_text);
-            }
-        }
-    }
-}
 
 /// A link on the wire, and all that may be said of it.
 pub(crate) struct Built {
@@ -291,6 +39,7 @@ struct Builder<'a> {
     damaged: bool,
     /// Eighths after the start of the window at which its edge lies.
     edge: i64,
+    sent: Vec<Sent>,
 }
 
 fn symbol(code: u8) -> String {
@@ -372,19 +121,23 @@ impl Builder<'_> {
         }
     }
 
-    /// 61 bits of the encoder.
-    fn answer(&mut self, released: f64, line: &[bool]) -> (f64, bool) {
+    /// 61 bits of the encoder: when they begin, and the one that is flipped.
+    fn answer(&mut self, released: f64, line: &[bool]) -> (f64, Option<u64>) {
         let start = released + (1.0 + self.link.delay) * self.bit;
         let mut line = line.to_vec();
-        let damaged = self.rng.chance(self.link.damaged);
-        if damaged {
-            let at = self.rng.below(61) as usize;
-            line[at] = !line[at];
+        let flip = self.rng.chance(self.link.damaged).then(|| self.rng.below(61));
+        if let Some(at) = flip {
+            line[at as usize] = !line[at as usize];
         }
         let end = self.wire.send(start, self.bit, &line);
         self.wire.drive(end, true);
-        // Without its head nobody can tell what it is.
-        (start, damaged || self.damaged)
+        (start, flip)
+    }
+
+    /// Says an answer. Without its head nobody can tell what it is.
+    fn say(&mut self, kind: &'static str, answer: (f64, Option<u64>), fields: Vec<(&'static str, Shown)>) {
+        let damaged = answer.1.is_some() || self.damaged;
+        self.said.push(Said { kind, start: answer.0, fields, position: None, damaged });
     }
 
     /// A message that ends with the frame said last.
@@ -426,14 +179,12 @@ impl Builder<'_> {
                         let [low, middle, high, _] = id.to_le_bytes();
                         let words = [low, middle, high << 4 | high, middle, low, 0].map(|byte| (byte, false));
                         let line = self.six(words);
-                        let (start, damaged) = self.answer(end, &line);
-                        let fields = vec![("ENC_ID", Shown::Number(id.into()))];
-                        self.said.push(Said { kind: "identifier", start, fields, position: None, damaged });
+                        let answer = self.answer(end, &line);
+                        self.say("identifier", answer, vec![("ENC_ID", Shown::Number(id.into()))]);
                     }
                     _ => {
-                        let (start, damaged) = self.answer(end, &bits(PATTERN));
-                        let fields = vec![self.delay()];
-                        self.said.push(Said { kind: "test pattern", start, fields, position: None, damaged });
+                        let answer = self.answer(end, &bits(PATTERN));
+                        self.say("test pattern", answer, vec![self.delay()]);
                     }
                 }
                 self.tail(end, !matches!(code, 0x1f | 0x19));
@@ -442,21 +193,14 @@ impl Builder<'_> {
     }
 }
 
-/// 40 bits as the encoder sends them.
-fn forty(link: &Link, position: i64) -> u64 {
-    let modulus = 1_i64 << link.width;
-    let within = position.rem_euclid(modulus);
-    let value = if link.signed && within >= modulus / 2 { within - modulus } else { within };
-    value as u64 & 0xff_ffff_ffff
-}
-
 /// Builds a link.
 pub(crate) fn build(link: &Link, seed: u64) -> Built {
     let rng = Rng::new(seed);
     let bit = BIT * link.clock;
     let wire = Wire::new(!link.begins_low);
     let edge = link.window.map_or(0, |window| window.clamp(25, 72));
-    let mut b = Builder { link, rng, wire, said: Vec::new(), now: 40.0 * bit, bit, plus: false, damaged: false, edge };
+    let (said, sent) = (Vec::new(), Vec::new());
+    let mut b = Builder { link, rng, wire, said, now: 40.0 * bit, bit, plus: false, damaged: false, edge, sent };
     b.wire.drive(20.0 * bit, true);
     if link.start_up {
         b.start_up();
@@ -468,13 +212,14 @@ pub(crate) fn build(link: &Link, seed: u64) -> Built {
     // A link that is running, or one that waits for VSYNC with INIT.
     let mut running = !link.start_up;
     let mut vertical = Vertical::new(link, position, false, &mut b.rng);
-    // V-frames so far of which the first answer is there, and whether this one is.
+    // Whether it is known where this V-frame began: VSYNC ended the one before.
     let mut whole = false;
+    let mut v_frame = 0;
     let mut quality = if link.start_up { 8 } else { 15 };
     let mut msync = b.rng.chance(0.5);
     for _ in 0..link.frames {
         if at == 0 {
-            whole = true;
+            v_frame += 1;
             msync = running && !msync;
             vertical = Vertical::new(link, position, !vertical.toggle, &mut b.rng);
         }
@@ -501,8 +246,9 @@ pub(crate) fn build(link: &Link, seed: u64) -> Built {
             (second, at == 0),
         ];
         let line = b.six(words);
-        let (start, damaged) = b.answer(end, &line);
-        let raw = forty(link, position);
+        let answer = b.answer(end, &line);
+        b.sent.push(Sent { said: b.said.len(), v_frame, at, flip: answer.1 });
+        let raw = link.forty(position);
         let fields = vec![
             b.delay(),
             ("VERT", Shown::Number(first.into())),
@@ -514,53 +260,24 @@ pub(crate) fn build(link: &Link, seed: u64) -> Built {
             ("POS", Shown::Number(raw as i64)),
             ("VEL", Shown::Number(speed)),
         ];
-        b.said.push(Said { kind: "answer", start, fields, position: Some(("POS", link.counts(position))), damaged });
+        b.say("answer", answer, fields);
+        if let Some(said) = b.said.last_mut() {
+            said.position = Some(("POS", link.counts(position)));
+            vertical.damaged |= said.damaged;
+        }
         b.message(told);
-        vertical.damaged |= damaged;
         if vsync {
             if whole {
                 quality = (quality + 2).min(15);
                 let quality = if link.damaged > 0.0 { Shown::Any } else { Shown::Number(quality) };
-                b.said.push(vertical.said(start, quality));
+                b.said.push(vertical.said(answer.0, quality));
             }
-            running = true;
+            (whole, running) = (true, true);
         }
         at = (at + 1) % 8;
         b.tail(end, true);
     }
+    doubt::mark(&mut b.said, &b.sent);
     let end = b.now + 30.0 * bit;
     Built { wire: b.wire, said: b.said, end }
-}
-
-/// What goes over the vertical and the secondary channel in eight frames.
-struct Vertical {
-    toggle: bool,
-    blocks: [Vec<u8>; 2],
-    fields: Vec<(&'static str, Shown)>,
-    position: i64,
-    damaged: bool,
-}
-
-impl Vertical {
-    /// `position`: that of the sampling before it.
-    fn new(link: &Link, position: i64, toggle: bool, rng: &mut Rng) -> Self {
-        let summary = rng.pick(&[0, 0, 0x01, 0x40]);
-        let status = 0x1c | u8::from(toggle) << 7;
-        let first = forty(link, position);
-        let second = !first & 0xff_ffff_ffff;
-        let block = |head: u8, value: u64| sealed(&[&[head][..], &value.to_be_bytes()[3..]].concat());
-        let fields = vec![
-            ("SUMMARY", Shown::Number(summary.into())),
-            ("VPOS", Shown::Number(first as i64)),
-            ("STATUS2", Shown::Number(status.into())),
-            ("VPOS2", Shown::Number(second as i64)),
-        ];
-        let blocks = [block(summary, first), block(status, second)];
-        Self { toggle, blocks, fields, position: link.counts(position), damaged: false }
-    }
-
-    fn said(&self, start: f64, quality: Shown) -> Said {
-        let fields = [self.fields.clone(), vec![("QM", quality)]].concat();
-        Said { kind: "V-frame", start, fields, position: Some(("VPOS", self.position)), damaged: self.damaged }
-    }
 }

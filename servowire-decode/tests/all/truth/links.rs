@@ -3,7 +3,7 @@
 use super::dsl::{BIT, Link, build};
 use super::line::{Recording, record};
 use super::rng::Rng;
-use super::{Outcome, Said, captures, decode, judge};
+use super::{Outcome, Said, decode, hold, judge};
 
 /// Draws a link and how it is recorded.
 type Condition = fn(&mut Rng) -> (Link, Recording);
@@ -92,19 +92,25 @@ fn run(name: &str, condition: Condition, seed: u64) -> Outcome {
 
 #[test]
 fn every_value_of_a_link_is_true() {
-    let mut faults = String::new();
-    for (name, condition) in CONDITIONS {
-        let (mut right, mut shown, mut wrong, mut lost) = (0, 0, 0, 0);
-        let count = captures(2, CONDITIONS.len());
-        for seed in 0..count {
-            let outcome = run(name, *condition, seed);
-            right += u64::from(outcome.is_right());
-            (shown, wrong, lost) = (shown + outcome.shown, wrong + outcome.wrong.len(), lost + outcome.lost.len());
-            if !outcome.is_right() && faults.len() < 6000 {
-                faults.push_str(&outcome.told(name, seed));
-            }
-        }
-        println!("{name:<45} {right:>4} of {count} right; {shown:>7} values shown, {wrong} wrong, {lost} frames lost");
+    hold(CONDITIONS, run);
+}
+
+/// Captures of which something was shown that was never said, or refused that was.
+#[test]
+fn what_was_once_wrong_is_right() {
+    let wrong_once = [
+        // A V-frame was taken for counted whose beginning nobody can know.
+        ("start-up", 12),
+        // An encoder that begins each answer anew went on by chance in the first ones.
+        ("messages", 14),
+        // A flipped bit at the front of an answer of such an encoder made another word.
+        ("bits flipped in answers", 16),
+        // One bit was flipped before, another behind a break between two answers.
+        ("bits flipped in answers", 17),
+    ];
+    for (wanted, seed) in wrong_once {
+        let (name, condition) = CONDITIONS.iter().find(|(name, _)| *name == wanted).unwrap();
+        let outcome = run(name, *condition, seed);
+        assert!(outcome.is_right(), "{}", outcome.told(name, seed));
     }
-    assert!(faults.is_empty(), "{faults}");
 }

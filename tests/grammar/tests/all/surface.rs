@@ -15,6 +15,7 @@ const CRATES: &[&str] = &[
     "sorte-proto",
     "step-motion",
     "step-profile",
+    "servowire-decode",
     "servowire-drivers",
 ];
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::address::Address;
+use crate::address::{Address, Adf};
 use crate::doubt::Doubt;
 use crate::response::tests::plain_exchanges;
 use crate::status::StatusField;
@@ -124,6 +124,72 @@ fn times_of_a_transaction() {
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
     let value = Exchange { response, sampled_ns: 14_480, began_ns: 17_000 };
     assert_eq!(done, Progress::Done { value, ready_ns: 41_000 });
+}
+
+/// A block that is the response alone is taken at one go: with the same end as byte by byte, whatever its second byte is, and one
+/// byte of it wrong or too early.
+#[test]
+fn a_whole_block_ends_as_its_bytes_do() {
+    let requests = [
+        Request::ReadSingleTurn,
+        Request::ReadAll,
+        Request::ReadEncoderId,
+        Request::ReadEeprom { adf: Adf::from_bits(3) },
+    ];
+    let (mut done, mut failed) = (0, 0);
+    for (request, second) in requests.into_iter().flat_map(|request| (0..=255).map(move |second| (request, second))) {
+        let id = request.data_id();
+        let mut block = std::vec![0; usize::from(id.response_fields())];
+        (block[0], block[1]) = (id.control_field().get(), second);
+        for wrong in [0, 0x10] {
+            *block.last_mut().unwrap() = crate::crc(&block[..block.len() - 1]) ^ wrong;
+            let asked_ns = 4_000 * u64::from(id.request_fields());
+            // The first is a bit time too early: the earliest start bit is 1.6 us after the request.
+            for begin_ns in [asked_ns + 1_200, asked_ns + 1_600] {
+                let bytes = at(begin_ns, &block);
+                let mut whole = Transaction::start(request, LINE, 0);
+                let _ = whole.push(&block, bytes.last().unwrap().1);
+                let mut single = Transaction::start(request, LINE, 0);
+                for (byte, end_ns) in bytes {
+                    let _ = single.hear(&[byte], end_ns);
+                }
+                assert_eq!(ended(&mut whole), ended(&mut single), "{id} {second:02x} {wrong} {begin_ns}");
+                assert_eq!(whole.until_ns(), single.until_ns());
+                *if whole.outcome().unwrap().is_ok() { &mut done } else { &mut failed } += 1;
+            }
+        }
+    }
+    // In place of SF no CF of the request and no 1A; to ID D its own address, busy or not.
+    assert_eq!((done, failed), (254 + 255 + 254 + 2, 4 * 4 * 256 - 765));
+}
+
+/// In the same place as in a new one, after whatever was before; nothing was asked before the first.
+#[test]
+fn a_transaction_begins_anew_in_its_place() {
+    let mut place = Transaction::IDLE;
+    let free = Progress::Failed { error: Error::NoResponse { echo: false }, ready_ns: 0 };
+    assert_eq!((place.hear(&RESPONSE, 31_000), place.poll(u64::MAX)), (free, free));
+    for (begin_ns, line) in [(0, LINE), (100_000, LINE.with_echo()), (200_000, LINE.with_turn_around_ns(10_001))] {
+        place.restart(Request::ReadSingleTurn, line, begin_ns);
+        let mut new = Transaction::start(Request::ReadSingleTurn, line, begin_ns);
+        assert_eq!(place, new);
+        assert_eq!(
+            (place.outcome().is_none(), place.until_ns()),
+            match place.progress() {
+                Progress::Pending { until_ns } => (true, until_ns),
+                Progress::Done { ready_ns, .. } | Progress::Failed { ready_ns, .. } => (false, ready_ns),
+            }
+        );
+        let heard = place.push(&RESPONSE, begin_ns + 31_000).copied();
+        assert_eq!(
+            heard.map(|outcome| outcome.map(|value| value.response)),
+            Some(ended(&mut {
+                let _ = new.hear(&RESPONSE, begin_ns + 31_000);
+                new
+            }))
+        );
+    }
+    assert_eq!(place.outcome(), Some(&Err(Error::Line)));
 }
 
 proptest! {

@@ -2,6 +2,7 @@
 
 use hdsl::frame::ANSWER_BITS;
 use hdsl::inspect::{Expected, inspect};
+use hdsl::symbol::RunningDisparity;
 use hdsl::{Answer, EncoderByte, Error, Policy, Rule, Sample, VFrame, Window};
 
 use super::super::refused::{Refused, event, position, refusal};
@@ -13,6 +14,8 @@ const TAIL: &str =
     "the next answer does not begin at the running disparity that this one leaves: a bit was flipped at its end";
 const FRONT: &str =
     "it does not begin at the running disparity that the answer before leaves: a bit was flipped at its front";
+const ANEW: &str =
+    "it begins with running disparity +, and all others begin anew with -: a bit was flipped at its front";
 const BETWEEN: &str =
     "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
 const STRAY: &str = "VSYNC is due in each eighth answer, and only there";
@@ -107,19 +110,23 @@ impl Decoder {
 
     /// Whether an answer goes on from the one before.
     fn join(&mut self, next: Neighbour) {
+        let begins_with_plus = next.chain.before() == Some(RunningDisparity::Plus);
+        if next.sound && begins_with_plus && self.beginnings.are_anew() {
+            self.said.refuse(next.number, ("disparity", ANEW.to_owned()));
+        }
         let Some(before) = self.chain.replace(next) else { return };
         let Some(goes_on) = before.chain.goes_on_in(next.chain) else { return };
         let (ends, begins) = (before.number, next.number);
         if !before.sound || !next.sound {
             // A damaged one of which the words do not tell where may be damaged just here.
             let tells = |it: Neighbour| it.sound || !it.chain.holds();
-            if !goes_on && self.carried.is_rule() && tells(before) && tells(next) {
+            if !goes_on && self.beginnings.are_carried() && tells(before) && tells(next) {
                 self.said.refuse(ends, ("disparity", TAIL.to_owned()));
                 self.said.refuse(begins, ("disparity", FRONT.to_owned()));
             }
             return;
         }
-        if !goes_on && self.carried.is_rule() {
+        if !goes_on && self.beginnings.are_carried() {
             let first_failed = if self.at == Some(0) { self.failed.map(|[_, second]| second) } else { None };
             self.breaks.push(Break { ends, begins, first_failed });
             let told = match self.at {
@@ -131,17 +138,17 @@ impl Decoder {
                 self.settle(None);
             }
         }
-        self.carried.note(goes_on);
+        self.beginnings.note(before.chain, next.chain);
     }
 
     /// With the checks of the V-frame it is known on which side of a break a bit was flipped: the last word of an answer
     /// is of channel 2, the first of the next of channel 1.
     pub(super) fn settle(&mut self, failed: Option<[bool; 2]>) {
         for Break { ends, begins, first_failed } in std::mem::take(&mut self.breaks) {
-            let sides = failed.map(|[first, second]| (first_failed.unwrap_or(second), first));
+            let sides = (first_failed.or(failed.map(|[_, second]| second)), failed.map(|[first, _]| first));
             let (tail, front, what) = match sides {
-                Some((true, false)) => (true, false, TAIL),
-                Some((false, _)) => (false, true, FRONT),
+                (Some(false), _) => (false, true, FRONT),
+                (_, Some(false)) => (true, false, TAIL),
                 _ => (true, true, BETWEEN),
             };
             for (_, number) in [(tail, ends), (front, begins)].into_iter().filter(|side| side.0) {

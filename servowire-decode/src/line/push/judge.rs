@@ -1,0 +1,232 @@
+//! What the channels are that nobody has judged yet: a survey of their first edges, and what becomes of each.
+
+use std::io;
+
+use super::{ENOUGH, Found, Kept, MOST_KEPT, PushDecoder, Running, State, edges_of};
+use crate::capture::Change;
+use crate::line::lane::{Tap, Wires};
+use crate::line::survey::{Candidates, FEWEST, SAMPLE, Speech};
+use crate::output::Output;
+use crate::output::printer::Lane;
+use crate::recognition::Note;
+use crate::settings::{Options, Settings};
+
+/// Changes looked at before decoding begins.
+const PREVIEW: usize = 1 << 16;
+/// The same of a single channel.
+const PREVIEW_OF_ONE: usize = 1 << 12;
+/// What the last chance of a line asks for: a request whose answer came.
+const LEAST: i64 = 4;
+/// Channels that are tried in one survey, the busiest first.
+const MOST_TRIED: usize = 4096;
+/// A channel in which nothing was found is looked at again after this many times the edges it was judged by.
+const PATIENCE: u64 = 8;
+
+impl PushDecoder {
+    /// Whether it is time for a survey.
+    pub(super) fn is_due(&self) -> bool {
+        match &self.held {
+            // Of each channel only the first edges are looked at.
+            Some(held) => held.len() >= PREVIEW.min(self.names.len() * PREVIEW_OF_ONE),
+            None => self.due || self.kept >= MOST_KEPT,
+        }
+    }
+
+    /// What was held back may already do: judges it if it is twice as much as the last time, and goes on holding it back
+    /// if no line is certain.
+    pub(super) fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
+        let held = self.held.as_ref().map_or(0, Vec::len);
+        if held < FEWEST || held < 2 * self.tried {
+            return Ok(());
+        }
+        self.tried = held;
+        self.judge(false, true, out)
+    }
+
+    /// Judges the open channels; at the `end` also those that have hardly moved. What holds is decoded from its
+    /// first edge on.
+    pub(super) fn judge(&mut self, end: bool, early: bool, out: &mut Output<'_>) -> io::Result<()> {
+        let first = self.held.is_some();
+        let (judged, many) = self.moving();
+        let mut readings = Vec::new();
+        for channel in &judged {
+            let Some(State::Open(edges)) = self.states.get(usize::from(*channel)) else { continue };
+            if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
+                self.busiest = Some((*channel, edges.iter().take(3000).map(|kept| kept.edge()).collect()));
+            }
+            if self.candidates.pair().is_none() {
+                readings.extend(self.candidates.read(*channel, &edges_of(edges)));
+            }
+        }
+        readings.extend(self.said_pair());
+        let states = &self.states;
+        let edges = |channel: u16| match states.get(usize::from(channel)) {
+            Some(State::Open(edges)) => edges_of(edges),
+            _ => Vec::new(),
+        };
+        let all = self.candidates.lines(readings, &judged, &edges);
+        // The last chance of what is not certain, or the only one where the user says that it is a line.
+        let last = !early && self.found.is_empty() && (end || self.only.is_some() && self.candidates.is_asked_for());
+        let (taken, passed) = self.choose(all, last);
+        if early && taken.is_empty() {
+            return Ok(());
+        }
+        if last && many > MOST_TRIED && taken.iter().all(|found| !found.is_certain()) {
+            out.note(&Note::Channels { file: self.file.clone(), moving: many, tried: MOST_TRIED });
+        }
+        // What sounds in a line that is decoded already is no second one.
+        for found in passed {
+            for tap in &found.taps {
+                self.pass(tap.channel, None);
+            }
+        }
+        for mut found in taken {
+            found.whole = end && found.taps.iter().all(|tap| self.edges_of(tap.channel) <= SAMPLE);
+            self.take(found, out)?;
+        }
+        self.let_go(&judged);
+        if first { self.replay(out) } else { Ok(()) }
+    }
+
+    /// The open channels that move enough to be judged, the busiest of them where they are too many; and how many move.
+    fn moving(&self) -> (Vec<u16>, usize) {
+        let mut moving: Vec<(u16, usize)> = Vec::new();
+        for (channel, state) in (0_u16..).zip(&self.states) {
+            if let State::Open(edges) = state {
+                moving.extend((edges.len() >= FEWEST).then_some((channel, edges.len())));
+            }
+        }
+        let many = moving.len();
+        if many > MOST_TRIED {
+            moving.sort_by_key(|(_, edges)| std::cmp::Reverse(*edges));
+            moving.truncate(MOST_TRIED);
+        }
+        (moving.into_iter().map(|(channel, _)| channel).collect(), many)
+    }
+
+    /// Keeps the edges of those channels no longer that are judged by enough, and of none where all together are too many.
+    fn let_go(&mut self, judged: &[u16]) {
+        for &channel in judged {
+            if let Some(State::Open(edges)) = self.states.get(usize::from(channel)) {
+                let enough = edges.len() >= ENOUGH;
+                let after = edges.len() as u64 * PATIENCE;
+                if enough {
+                    self.pass(channel, Some(after));
+                }
+            }
+        }
+        self.due = false;
+        self.kept = self.states.iter().map(|state| if let State::Open(edges) = state { edges.len() } else { 0 }).sum();
+        if self.kept >= MOST_KEPT {
+            for channel in 0..self.states.len() {
+                self.pass(channel as u16, Some(PATIENCE));
+            }
+            self.kept = 0;
+        }
+    }
+
+    /// The pair of channels that the user named.
+    fn said_pair(&self) -> Option<Found> {
+        let channels = self.candidates.pair()?;
+        let edges = |channel: u16| match self.states.get(usize::from(channel)) {
+            Some(State::Open(edges)) => Some(edges_of(edges)),
+            _ => None,
+        };
+        let [requests, answers] = channels;
+        self.candidates.read_pair(channels, [&edges(requests)?, &edges(answers)?])
+    }
+
+    /// Lines that are good enough; the last chance is that of the best one. Behind them the channels that only repeat
+    /// what is decoded.
+    fn choose(&self, all: Vec<Found>, last: bool) -> (Vec<Found>, Vec<Found>) {
+        let bit = |found: &Found| 1_000_000_000_000 / i64::from(found.speech.rate.max(1));
+        let again = |found: &Found| {
+            self.found.iter().any(|known| {
+                known.speech.protocol == found.speech.protocol
+                    && found.evidence.is_part_of(&known.evidence, 3 * bit(known))
+            })
+        };
+        let (passed, fresh): (Vec<Found>, Vec<Found>) = all.into_iter().partition(again);
+        let mut taken: Vec<Found> = fresh.iter().filter(|found| found.is_certain()).cloned().collect();
+        if taken.is_empty() && last {
+            let sure = self.candidates.is_asked_for();
+            taken.extend(fresh.into_iter().next().filter(|best| best.evidence.score >= LEAST || sure));
+        }
+        // The user named one channel: whatever it is, it is one line.
+        if self.only.is_some() {
+            taken.truncate(1);
+        }
+        (taken, passed)
+    }
+
+    /// Edges that are kept of a channel.
+    fn edges_of(&self, channel: u16) -> usize {
+        self.states
+            .get(usize::from(channel))
+            .map_or(0, |state| if let State::Open(edges) = state { edges.len() } else { 0 })
+    }
+
+    fn pass(&mut self, channel: u16, until: Option<u64>) {
+        if let Some(state) = self.states.get_mut(usize::from(channel)) {
+            if matches!(state, State::Open(_)) {
+                *state = State::Passed(until);
+            }
+        }
+    }
+
+    fn names(&self, taps: &[Tap]) -> Vec<String> {
+        taps.iter().map(|tap| self.names.get(usize::from(tap.channel)).cloned().unwrap_or_default()).collect()
+    }
+
+    /// Decodes a line from now on, and what was kept of its channels.
+    fn take(&mut self, found: Found, out: &mut Output<'_>) -> io::Result<()> {
+        let Speech { protocol, rate } = found.speech;
+        let Some(decoder) = protocol.line(rate, &self.candidates.settings) else { return Ok(()) };
+        let index = self.lines.len();
+        let names = self.names(&found.taps);
+        let lane = Lane {
+            channel: names.join(" + "),
+            channels: found.taps.iter().map(|tap| tap.channel).collect(),
+            protocol,
+            rate,
+        };
+        out.note(&Note::Line { file: self.file.clone(), line: found.recognition(names) });
+        if let Some(other) = self.rather(&found) {
+            out.note(&Note::LineRather { file: self.file.clone(), line: other.recognition(self.names(&other.taps)) });
+        }
+        out.begin_lane(lane);
+        self.lines.push(Running { wires: Wires::new(&found.taps), decoder });
+        let mut edges = Vec::new();
+        for tap in &found.taps {
+            if let Some(state) = self.states.get_mut(usize::from(tap.channel)) {
+                if let State::Open(kept) = std::mem::replace(state, State::Taken(index)) {
+                    edges.extend(kept.into_iter().map(Kept::edge).map(|(time, level)| Change {
+                        time,
+                        channel: tap.channel,
+                        level,
+                    }));
+                }
+            }
+        }
+        self.found.push(found);
+        if self.held.is_none() {
+            edges.sort_by_key(|change| change.time);
+            for change in edges {
+                self.give(index, change, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What a line is rather than what the user said it is.
+    fn rather(&self, found: &Found) -> Option<Found> {
+        let [tap] = *found.taps.as_slice() else { return None };
+        let Some(State::Open(edges)) = self.states.get(usize::from(tap.channel)) else { return None };
+        if found.is_certain() || !self.candidates.is_asked_for() {
+            return None;
+        }
+        let settings = Settings { line: Options::default(), ..self.candidates.settings.clone() };
+        let other = Candidates::new(None, settings, None).read(tap.channel, &edges_of(edges))?;
+        (other.is_certain() && other.evidence.score > 2 * found.evidence.score).then_some(other)
+    }
+}

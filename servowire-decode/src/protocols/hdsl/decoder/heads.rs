@@ -1,0 +1,141 @@
+//! Heads of frames: where one is, where one should have been, and what they say.
+
+use std::ops::Range;
+
+use hdsl::frame::{H_FRAME_BITS, Head, ParsedHead, STUFFING_BITS, Stuffing};
+use hdsl::inspect::{BrokenRule, FRONT_BITS, FoundHead, ends_with_stuffing, ends_with_trailer, head_damage};
+use hdsl::{Error, MasterSymbol, Window};
+
+use super::super::bits::{Again, Bits, RESET};
+use super::super::refused::event;
+use super::Decoder;
+use crate::event::{Direction, Field, Span};
+
+const LONE: &str = "a lone nibble between two frames without one is no message: a bit was flipped";
+const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
+const PAUSED: &str = "the line rests here, though frames follow each other for ever";
+/// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of that, and how far a
+/// length may be off where other speakers were in between.
+const SHORTEST: u64 = H_FRAME_BITS as u64;
+const LONGEST: u64 = 273 + 4;
+const STUFFING: u64 = STUFFING_BITS as u64;
+const SLACK: u64 = 8;
+
+impl Decoder {
+    /// A head with its request, and what is `wrong` with it; whether it is one of a running link that was damaged.
+    pub(super) fn head(&mut self, found: FoundHead, wrong: Option<BrokenRule>, bits: &Bits, at: Range<u64>) -> bool {
+        let symbol = found.head.byte.symbol();
+        let trailer = self.head.is_some() && self.heads.is_end_damaged(front(bits, at.start));
+        let place = bits.place(at.clone());
+        let damaged = wrong.is_some() && self.delay.is_some();
+        let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
+        if let Some(number) = self.lone.take().filter(|_| !talks) {
+            self.said.refuse(number, ("lone", LONE.to_owned()));
+        }
+        self.lone = (talks && !self.talks).then(|| self.said.next());
+        self.talks = talks;
+        let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
+        let extra = if found.head.extra_bits > 0 { window_bits(bits, &at) } else { 0 };
+        let event = event(place, Direction::Request, "H-frame", master(found.head, symbol, extra), wrong);
+        // All of it is in the last word, PARA.
+        let mut event = event.locate(|name| {
+            let coded = matches!(name, "SYMBOL" | "FIRST" | "MSYNC") && found.len >= 10;
+            coded.then(|| Span::even(place, found.len, found.len - 10, found.len - 1))
+        });
+        event.fields.extend(trailer.then(|| Field::text("note", TRAILER)));
+        self.said.push(event);
+        self.message_out(symbol, place);
+        damaged
+    }
+
+    /// The head before that at `at`, if it is not far away.
+    pub(super) fn before(&self, at: u64) -> Option<u64> {
+        self.before.filter(|before| at - before < 4 * LONGEST)
+    }
+
+    /// Whether the head at `at`, where one was due or not, has a rule `broken` or something else wrong before it: then the edges are
+    /// looked at again, once.
+    pub(super) fn looks_again(&mut self, bits: &mut Bits, at: u64, broken: bool) -> bool {
+        let Some(last) = self.head.filter(|last| self.is_running() && self.again != Some(*last)) else { return false };
+        let fails = broken || !self.is_one_frame(bits, at - last, at) || !ends_with_trailer(front(bits, at));
+        if bits.paused.is_some() || !fails && self.shaky == 0 {
+            return false;
+        }
+        let beat = bits.beat(last, self.head_len, self.before(last));
+        bits.lay(last, beat, Again::Rest);
+        (self.again, self.next) = (Some(last), self.after);
+        true
+    }
+
+    /// Frames follow each other for ever: says where one should have been before the head at `at`.
+    pub(super) fn missed(&mut self, bits: &mut Bits, at: u64) {
+        self.before = self.head;
+        let Some(last) = self.head.replace(at) else {
+            bits.paused = None;
+            return;
+        };
+        let (apart, usual) = (at - last, self.apart.unwrap_or(SHORTEST));
+        if bits.paused.take_if(|paused| *paused <= at).is_some() {
+            let place = bits.place(last..at);
+            self.lose(1);
+            let refused = Err(("gap", PAUSED.to_owned()));
+            self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), refused));
+        } else if !self.is_one_frame(bits, apart, at) {
+            let missing = ((apart as f64 / usual as f64).round() as u64).saturating_sub(1).max(1);
+            for k in 1..=missing {
+                let due = last + k * apart / (missing + 1);
+                self.lose(1);
+                let damage = head_damage(bits.window(due.saturating_sub(3)));
+                let place = bits.place(due..due + u64::from(Head::BITS));
+                self.said.push(event(
+                    place,
+                    Direction::Request,
+                    "H-frame",
+                    Vec::new(),
+                    Err((damage.name(), damage.to_string())),
+                ));
+            }
+        } else {
+            self.apart = Some(apart);
+        }
+    }
+
+    /// Whether nothing is missing between the last head and that at `at`: frames may have any length, but two of them do not
+    /// fit, or it is that of the frame before, or stuffing fills it.
+    fn is_one_frame(&self, bits: &Bits, apart: u64, at: u64) -> bool {
+        let blocks = (1..=u64::from(Stuffing::MAX.get())).take_while(|k| {
+            let from = at.saturating_sub(STUFFING * k);
+            Window::from_bits(bits.load(from), STUFFING as u32).is_some_and(ends_with_stuffing)
+        });
+        // Without stuffing a frame has so many bits more than its head.
+        let filled = self.head_len + SHORTEST - u64::from(Head::BITS) + STUFFING * blocks.count() as u64;
+        apart <= LONGEST
+            && (apart + SLACK < 2 * SHORTEST
+                || self.apart.is_some_and(|usual| usual.abs_diff(apart) <= 2 * SLACK)
+                || filled.abs_diff(apart) <= SLACK / 2)
+    }
+}
+
+/// What is in front of a head.
+fn front(bits: &Bits, at: u64) -> Window {
+    let from = at.saturating_sub(FRONT_BITS.into());
+    Window::from_bits(bits.load(from), (at - from) as u32).unwrap_or(Window::EMPTY)
+}
+
+/// Bits of the EXTRA window in a head: its edge lies somewhere in the last of them, so the time from SYNC to CYCLE RESET tells.
+fn window_bits(bits: &Bits, head: &Range<u64>) -> u32 {
+    let (sync, reset) = (bits.time(head.start), bits.time(head.end - RESET));
+    let whole = ((reset - sync) as f64 / bits.mean()).round() as u32;
+    whole.saturating_sub(Head::BITS - RESET as u32)
+}
+
+fn master(head: ParsedHead, symbol: Result<MasterSymbol, Error>, extra: u32) -> Vec<Field> {
+    let mut fields = Vec::with_capacity(4);
+    fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
+    fields.push(Field::number("FIRST", head.byte.first()));
+    fields.push(Field::number("MSYNC", head.byte.msync()));
+    if extra > 0 {
+        fields.push(Field::measured("EXTRA", extra, "bit"));
+    }
+    fields
+}
