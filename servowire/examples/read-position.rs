@@ -11,6 +11,7 @@
 
 use core::error::Error;
 use core::time::Duration;
+use std::io::Write;
 use std::time::Instant;
 
 use servowire::talk::encoder::Encoder;
@@ -24,17 +25,25 @@ const PATIENCE: Duration = Duration::from_millis(50);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let name = std::env::args().nth(1).ok_or("say which port: /dev/ttyUSB0")?;
+    read(&name, PATIENCE, &mut std::io::stdout())
+}
+
+/// Ten positions, or why there is none. A call may take as long as `patience`.
+///
+/// # Errors
+/// Of the port, of the encoder or of `out`.
+pub fn read(name: &str, patience: Duration, out: &mut impl Write) -> Result<(), Box<dyn Error>> {
     let resolution = Resolution::new(WIDTHS.0, WIDTHS.1)?;
-    let mut encoder = Encoder::open(port::open(&name, BitRate::Mbit2_5)?, PATIENCE)?;
-    let policy = Policy::new(u64::try_from(PATIENCE.as_nanos())?);
+    let mut encoder = Encoder::open(port::open(name, BitRate::Mbit2_5)?, patience)?;
+    let policy = Policy::new(u64::try_from(patience.as_nanos())?);
     let began = Instant::now();
     let now_ns = || u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
     for _ in 0..10 {
         let (asked, asked_ns) = (Instant::now(), now_ns());
         let evidence = Evidence::of(Response::ReadAll(encoder.read()?), resolution, asked_ns);
         match evidence.at(now_ns(), policy) {
-            Ok(sample) => println!("{sample}, the call took {} us", asked.elapsed().as_micros()),
-            Err(doubt) => println!("no position: {doubt}"),
+            Ok(sample) => writeln!(out, "{sample}, the call took {} us", asked.elapsed().as_micros())?,
+            Err(doubt) => writeln!(out, "no position: {doubt}")?,
         }
     }
     Ok(())

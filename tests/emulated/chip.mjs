@@ -15,6 +15,9 @@ const BOOT2_BYTES = 256;
 /** Where an image's stack begins: the end of its RAM in memory.x. */
 const STACK_TOP = 0x20040000;
 const PT_LOAD = 1;
+const SHT_SYMTAB = 2;
+/** The watchdog's place among the peripherals. */
+const WATCHDOG = 0x40058;
 const DMA_CHAN_ABORT = 0x444;
 const EXEC_STALLED = 0x80000000;
 /** SMx_SHIFTCTRL, from SMx_CLKDIV on, and its bits for joined FIFOs. */
@@ -96,6 +99,23 @@ function load(flash, path) {
   }
 }
 
+/** The address of a symbol in an ELF file. */
+function symbol(path, name) {
+  const file = readFileSync(path);
+  const view = new DataView(file.buffer, file.byteOffset, file.length);
+  const [headers, size, count] = [view.getUint32(32, true), view.getUint16(46, true), view.getUint16(48, true)];
+  const section = (k) => [4, 16, 20, 24].map((field) => view.getUint32(headers + k * size + field, true));
+  for (let k = 0; k < count; k++) {
+    const [type, at, length, link] = section(k);
+    const [, names] = section(link);
+    for (let entry = at; type === SHT_SYMTAB && entry < at + length; entry += 16) {
+      const text = names + view.getUint32(entry, true);
+      if (file.toString('latin1', text, file.indexOf(0, text)) === name) return view.getUint32(entry + 4, true);
+    }
+  }
+  throw new Error(`${path}: no ${name}`);
+}
+
 /** The checksum that the chip's ROM wants to see over the second boot stage. */
 function crc32(bytes) {
   let crc = 0xffffffff;
@@ -107,9 +127,10 @@ function crc32(bytes) {
 }
 
 export class Chip {
-  /** `print` is called with every line on the console. */
-  constructor(name, path, { hz, print = () => {} }) {
+  /** `print` is called with every line on the console. `before`: a chip whose watchdog has begun this one again; RAM stays. */
+  constructor(name, path, { hz, print = () => {}, before = null }) {
     this.name = name;
+    this.path = path;
     this.ns = 1e9 / hz;
     this.instructions = 0;
     this.deepest = STACK_TOP;
@@ -120,6 +141,11 @@ export class Chip {
     const chip = (this.chip = new RP2040());
     chip.logger = new ConsoleLogger(LogLevel.Error, true);
     load(chip.flash, path);
+    if (before) {
+      chip.sram.set(before.chip.sram);
+      this.watchdog.reason = before.watchdog.reason;
+      this.watchdog.scratchData.set(before.watchdog.scratchData);
+    }
     this.boot();
     this.machines = chip.pio.flatMap((pio) => {
       pio.run = () => {};
@@ -148,6 +174,16 @@ export class Chip {
     chip.core.SP = BOOT2_RAM;
     chip.core.LR = 0;
     chip.core.PC = BOOT2_RAM;
+  }
+
+  get watchdog() {
+    return this.chip.peripherals[WATCHDOG];
+  }
+
+  /** Goes on at a function. */
+  jump(name) {
+    this.chip.core.PC = symbol(this.path, name) & ~1;
+    this.busy = 0;
   }
 
   /** Sends a line to the console. */

@@ -122,7 +122,9 @@ export function check(name, { bits, clocks, turn, late, request, length, value }
   const shaft = good.map((exchange) => Number(value(exchange.units).match(/(\d+) counts/)[1]));
   assert.ok(shaft.every((at, k) => k === 0 || at > shaft[k - 1]), 'the shaft turns');
 
-  const printed = lines.filter(({ text }) => POSITION.test(text));
+  // What was said after the last request is of an exchange that the run may have cut.
+  const ended = wire.drives[0].at(-1)[0];
+  const printed = lines.filter(({ t, text }) => t < ended && POSITION.test(text));
   assert.ok(printed.length > 8, said);
   for (const { t, text } of printed) {
     const last = all.findLast((exchange) => exchange.answer && exchange.answer[1] <= t);

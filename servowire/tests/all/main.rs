@@ -37,6 +37,7 @@ mod outputs;
 mod packed;
 #[path = "../random/mod.rs"]
 mod random;
+mod read_position;
 mod recognise;
 mod rtex;
 mod samples;

@@ -23,6 +23,12 @@ impl<const BITS: u32> Counter<BITS> {
         self.look().or_else(|_| self.look()).unwrap_or_default()
     }
 
+    /// Waits for so long.
+    pub fn pause(&self, ns: u64) {
+        let until_ns = self.latest_ns().saturating_add(ns);
+        while self.latest_ns() < until_ns {}
+    }
+
     #[inline]
     fn look(&self) -> Result<u64, ClockError> {
         let mut time = self.time.get();

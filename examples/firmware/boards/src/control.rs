@@ -1,6 +1,9 @@
 //! The interrupt of a current loop: the electrical angle of this instant, or the outputs off.
 
-use servowire_core::{Acceleration, Angle, ClockError, Commutation, Estimate, Policy, Shaft, ShaftReader, Words};
+use servowire_core::{
+    Acceleration, Angle, ClockError, Commutation, Estimate, Policy, Shaft, ShaftReader, ShaftWriter, Words,
+};
+use servowire_drivers::Error;
 
 /// What switches the power to a motor.
 pub trait Outputs {
@@ -56,6 +59,22 @@ impl<'a, F: Shaft + Words<W>, O: Outputs, const W: usize> Control<'a, F, O, W> {
             }
         }
     }
+}
+
+/// Puts what was read into the cell of a control interrupt, if it was read, and judges it as that does. After a failure what is in the
+/// cell gets old.
+///
+/// # Errors
+/// Why there is no position.
+pub fn put<F: Shaft + Words<W>, const W: usize, IO, PIN, P>(
+    writer: &mut ShaftWriter<'_, F, W>,
+    read: Result<F, Error<IO, PIN, P, F::Doubt>>,
+    now_ns: Result<u64, ClockError>,
+    policy: Policy<F::Tolerated>,
+) -> Result<F::Sample, Error<IO, PIN, P, F::Doubt>> {
+    let (evidence, now_ns) = (read?, now_ns?);
+    writer.put(evidence, now_ns, policy);
+    evidence.at(now_ns, policy).map_err(Error::Doubt)
 }
 
 #[cfg(test)]

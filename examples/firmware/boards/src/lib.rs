@@ -1,5 +1,5 @@
 //! What the firmware images share, and what of them runs on a host too: pin tables that are checked at compile time, clock trees made
-//! from the crystal, the first line of the console, and the control interrupt.
+//! from the crystal, the first line of the console, what a master says of its readings, and the control interrupt.
 #![no_std]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects))]
 
@@ -9,15 +9,20 @@ extern crate std;
 mod clock;
 mod control;
 mod first_line;
+mod line_fault;
 mod oscillator;
 mod pins;
 mod pll;
+mod readings;
 mod report;
+mod resolution;
 
 pub use clock::Counter;
-pub use control::{Control, Limits, Outputs};
+pub use control::{Control, Limits, Outputs, put};
 pub use first_line::FirstLine;
-pub use oscillator::{Oscillator, Source, start};
+pub use line_fault::LineFault;
+pub use oscillator::{Source, start, waited};
 pub use pins::{Board, Pin};
 pub use pll::{Pll, PllLimits};
-pub use report::Report;
+pub use readings::Readings;
+pub use resolution::RESOLUTION;

@@ -1,15 +1,5 @@
 //! Starting a crystal that may be missing.
 
-/// Registers of an oscillator.
-pub trait Oscillator {
-    /// Switches the crystal on.
-    fn start(&mut self);
-    /// Whether it runs.
-    fn is_ready(&self) -> bool;
-    /// Switches it off.
-    fn stop(&mut self);
-}
-
 /// From what a core runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
@@ -19,43 +9,26 @@ pub enum Source {
     Internal,
 }
 
-/// Starts the crystal, looks at it `looks` times at the most, and says from what the core can run. A crystal that does not start is
-/// switched off again.
-pub fn start(oscillator: &mut impl Oscillator, looks: u32) -> Source {
-    oscillator.start();
-    if (0..looks).any(|_| oscillator.is_ready()) {
+/// Starts the crystal, looks at it `looks` times at the most, and says from what the core can run. `set` switches it on and off. A
+/// crystal that does not start is switched off again.
+pub fn start(mut set: impl FnMut(bool), is_ready: impl FnMut() -> bool, looks: u32) -> Source {
+    set(true);
+    if waited(is_ready, looks) {
         return Source::Crystal;
     }
-    oscillator.stop();
+    set(false);
     Source::Internal
+}
+
+/// Looks at something `looks` times at the most. Whether it got ready.
+pub fn waited(mut is_ready: impl FnMut() -> bool, looks: u32) -> bool {
+    (0..looks).any(|_| is_ready())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use core::cell::Cell;
-
-    /// A register that is ready at the look with this number, counted from 1.
-    struct Mock {
-        ready_at: u32,
-        looks: Cell<u32>,
-        on: bool,
-    }
-
-    impl Oscillator for Mock {
-        fn start(&mut self) {
-            self.on = true;
-        }
-
-        fn is_ready(&self) -> bool {
-            self.looks.set(self.looks.get() + 1);
-            self.on && self.looks.get() >= self.ready_at
-        }
-
-        fn stop(&mut self) {
-            self.on = false;
-        }
-    }
 
     #[test]
     fn a_crystal_is_waited_for_and_not_for_ever() {
@@ -65,9 +38,14 @@ mod tests {
             (101, Source::Internal, 100),
             (u32::MAX, Source::Internal, 100),
         ] {
-            let mut mock = Mock { ready_at, looks: Cell::new(0), on: false };
-            assert_eq!(start(&mut mock, 100), source);
-            assert_eq!((mock.looks.get(), mock.on), (looks, source == Source::Crystal), "{ready_at}");
+            let (on, seen) = (Cell::new(false), Cell::new(0));
+            // A register that is ready at the look with this number, counted from 1.
+            let is_ready = || {
+                seen.set(seen.get() + 1);
+                on.get() && seen.get() >= ready_at
+            };
+            assert_eq!(start(|set| on.set(set), is_ready, 100), source);
+            assert_eq!((seen.get(), on.get()), (looks, source == Source::Crystal), "{ready_at}");
         }
     }
 }

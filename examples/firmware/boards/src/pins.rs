@@ -26,7 +26,19 @@ pub struct Board {
     pub power_stage: &'static [&'static str],
 }
 
+impl Pin {
+    /// A pin `name` of the processor, which is `at` this place of the board and wired to `signal`.
+    pub const fn new(name: &'static str, signal: &'static str, at: &'static str) -> Self {
+        Self { name, signal, at }
+    }
+}
+
 impl Board {
+    /// A board that has no power stage, nor is mistaken for one that has; [checked](Self::checked).
+    pub const fn plain(name: &'static str, crystal_hz: u32, pins: &'static [Pin]) -> Self {
+        Self { name, crystal_hz, pins, power_stage: &[] }.checked()
+    }
+
     /// This board, if its table may be: in a `const` it does not compile otherwise.
     ///
     /// # Panics

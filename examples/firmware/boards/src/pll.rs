@@ -52,6 +52,21 @@ impl Pll {
     }
 }
 
+impl PllLimits {
+    /// The settings that make exactly `out_hz` of `in_hz`: in a `const` it does not compile otherwise.
+    ///
+    /// # Panics
+    /// If there are none.
+    #[must_use]
+    #[expect(clippy::panic, reason = "at compile time")]
+    pub const fn exact(self, in_hz: u32, out_hz: u32) -> Pll {
+        match Pll::solve(self, in_hz, out_hz) {
+            Some(pll) => pll,
+            None => panic!("no PLL makes the core clock of this crystal"),
+        }
+    }
+}
+
 /// The multiplier with which the oscillator runs at `vco_hz`.
 #[expect(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, reason = "m is not 0; n is within limits")]
 const fn multiplier(limits: PllLimits, in_hz: u32, m: u32, vco_hz: u64) -> Option<u32> {

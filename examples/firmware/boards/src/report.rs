@@ -4,7 +4,7 @@ use core::fmt::{self, Display, Write};
 
 /// Readings so far; some of the positions are said, and all faults.
 #[derive(Debug, Clone, Copy)]
-pub struct Report {
+pub(crate) struct Report {
     every: u32,
     good: u32,
     bad: u32,
@@ -12,7 +12,7 @@ pub struct Report {
 
 impl Report {
     /// One good reading in so many is said, beginning with the first.
-    pub const fn new(every: u32) -> Self {
+    pub(crate) const fn new(every: u32) -> Self {
         Self { every, good: 0, bad: 0 }
     }
 
@@ -20,7 +20,7 @@ impl Report {
     ///
     /// # Errors
     /// Those of the console.
-    pub fn good<S: Display, D: Display>(
+    pub(crate) fn good<S: Display, D: Display>(
         &mut self,
         console: &mut impl Write,
         position: impl FnOnce() -> Result<S, D>,
@@ -40,7 +40,7 @@ impl Report {
     ///
     /// # Errors
     /// Those of the console.
-    pub fn fault(&mut self, console: &mut impl Write, error: impl Display) -> fmt::Result {
+    pub(crate) fn fault(&mut self, console: &mut impl Write, error: impl Display) -> fmt::Result {
         self.bad = self.bad.wrapping_add(1);
         let Self { good, bad, .. } = self;
         writeln!(console, "fault: {error}, {good} good, {bad} bad")

@@ -12,11 +12,11 @@ use esp_hal::time::Duration;
 use esp_hal::timer::systimer::{SystemTimer, Unit};
 use esp_hal::timer::timg::{MwdtStage, TimerGroup};
 use esp_hal::uart::{Config, RxConfig, Uart};
-use servowire_boards::{Board, Counter, FirstLine, Pin, Report, Source};
+use servowire_boards::{Board, Counter, FirstLine, Pin, RESOLUTION, Readings, Source};
 use servowire_core::TickRate;
-use servowire_drivers::{Clock as _, DirectionPin, Error, Worst, tformat::blocking::Driver};
+use servowire_drivers::{Clock as _, DirectionPin, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{BitRate, EvidenceCell, Policy, Resolution};
+use tformat::{BitRate, EvidenceCell};
 
 use crate::console::Console;
 
@@ -28,33 +28,17 @@ const TIMER_HZ: u32 = 16_000_000;
 /// The UART begins with its next bit clock. No interrupt comes; a miss of the flash cache is all that can come between. A tick of the
 /// clock is 62.5 ns.
 const WORST: Worst = Worst { uart_start_ns: 400, wake_ns: 1_000, clock_ns: 63 };
-/// A position that is printed is no older than this.
-const MAX_AGE_NS: u64 = 200_000;
 /// Longer than anything here waits.
 const WATCHDOG_MS: u64 = 1_000;
 /// One position in so many is printed.
 const PRINTED: u32 = 4_096;
 
-/// That of your encoder; one that calls itself another one gives no position.
-const RESOLUTION: Resolution = match Resolution::new(23, 16) {
-    Ok(resolution) => resolution,
-    Err(_) => panic!("possible widths"),
-};
-
 /// The pins; no power stage is near.
-static BOARD: Board = const {
-    Board {
-        name: "ESP32-C3-DevKitM-1",
-        crystal_hz: 40_000_000,
-        pins: &[
-            Pin { name: "GPIO4", signal: "DI", at: "J1" },
-            Pin { name: "GPIO5", signal: "DE and /RE", at: "J1" },
-            Pin { name: "GPIO6", signal: "RO", at: "J3" },
-        ],
-        power_stage: &[],
-    }
-    .checked()
-};
+static BOARD: Board = Board::plain(
+    "ESP32-C3-DevKitM-1",
+    40_000_000,
+    &[Pin::new("GPIO4", "DI", "J1"), Pin::new("GPIO5", "DE and /RE", "J1"), Pin::new("GPIO6", "RO", "J3")],
+);
 
 #[esp_hal::main]
 fn main() -> ! {
@@ -78,16 +62,10 @@ fn main() -> ! {
     let mut clock = &ticks;
     let mut encoder = Driver::new(uart, de, clock, Line::new(RATE)).expect("1.6 us fit four bits");
     let mut cell = EvidenceCell::new();
-    let (mut writer, mut reader) = cell.split();
-    let mut report = Report::new(PRINTED);
+    let mut readings = Readings::new(&mut cell, PRINTED);
     loop {
         watchdog.feed();
-        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
-        let _ = match (read, clock.now_ns()) {
-            (Ok(()), Ok(now_ns)) => report.good(&mut console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
-            (Err(Error::Io(fault)), _) => report.fault(&mut console, fault),
-            (Err(error), _) => report.fault(&mut console, error),
-            (_, Err(error)) => report.fault(&mut console, error),
-        };
+        let read = encoder.read_evidence(RESOLUTION);
+        let _ = readings.take(&mut console, read, clock.now_ns());
     }
 }

@@ -4,26 +4,24 @@ use core::fmt::{self, Display, Write as _};
 
 use nikon_aformat::device::Device;
 use nikon_aformat::master::{GuardedReset, Line, Reset, VerifiedWrite, Write};
-use nikon_aformat::{
-    BitRate, EncoderAddress, EvidenceCell, FRAME_BITS, Operation, Policy, Request, Resolution, UserAddress,
-};
-use servowire_boards::Report;
+use nikon_aformat::{BitRate, EncoderAddress, EvidenceCell, FRAME_BITS, Operation, Request, Resolution, UserAddress};
+use servowire_boards::Readings;
 use servowire_drivers::Clock as _;
 use servowire_drivers::nikon::blocking::Driver;
 
-use crate::board::{Board, Console};
+use crate::answering::Answering;
+use crate::board::Board;
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
+use crate::console::Console;
 use crate::frames::{self, Frames};
-use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
+use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
 
 /// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
 const PAUSE_NS: u64 = 20_000;
 /// One position in so many is printed.
 const PRINTED: u32 = 16;
-/// A position that is printed is no older than this.
-const MAX_AGE_NS: u64 = 200_000;
 /// By how much the end time of a block may be late.
 const LATENCY_NS: u32 = 2_000;
 /// Longest wait for the response: encoders answer after some microseconds, the one below after 30 if it has made no answer ahead.
@@ -79,29 +77,24 @@ fn say(console: &mut Console, what: &str, error: impl Display) -> fmt::Result {
 /// At 16 Mbit/s, or if a clock does not start.
 pub fn master(image: &'static str, rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
-    let mut board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
-    let (mut clock, console) = (&board.clock, &mut board.console);
+    let board = Board::new(image, rate.bits_per_second(), port, frames::BITS);
+    let (mut clock, console) = (&board.clock, &mut Console::new(board.uart, board.usb, board.first, board.before));
     let receiver = RingReceiver::new(board.channel, board.receiver);
     let port = Frames::new(board.transmitter, receiver, clock, rate.bits_ns(FRAME_BITS));
     let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_hand_over_ns(LATENCY_NS);
     let mut encoders = Driver::new(port, clock, Resolution::default(), line);
     let mut cell = EvidenceCell::new();
-    let (mut writer, mut reader) = cell.split();
+    let mut readings = Readings::new(&mut cell, PRINTED);
     let mut typed = Typed::default();
-    let mut report = Report::new(PRINTED);
     loop {
         board.watchdog.feed();
-        let read = encoders.read_evidence(EncoderAddress::ZERO).map(|evidence| writer.put(evidence));
-        let now_ns = clock.latest_ns();
-        let _ = match read {
-            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
-            Err(error) => report.fault(console, error),
-        };
+        console.poll();
+        let read = encoders.read_evidence(EncoderAddress::ZERO);
+        let _ = readings.take(console, read, clock.now_ns());
         if let Some(typed) = typed.take(console) {
             let _ = command(&mut encoders, typed, console);
         }
-        let next_ns = clock.latest_ns() + PAUSE_NS;
-        while clock.now_ns().is_ok_and(|now_ns| now_ns < next_ns) {}
+        clock.pause(PAUSE_NS);
     }
 }
 
@@ -116,11 +109,8 @@ const LATER_NS: u64 = 50_000;
 struct Ahead {
     device: Device<1>,
     position: u32,
-    transmitter: Transmitter,
-    receiver: Receiver,
+    line: Answering,
     wait_cycles: u32,
-    /// The command frame that starts what the transmitter holds.
-    expected: Option<u16>,
 }
 
 impl Ahead {
@@ -131,22 +121,7 @@ impl Ahead {
         let mut copy = self.device;
         let Some(reply) = copy.hear(&[Some(command_frame)], now_ns) else { return };
         let contents = reply.frames.contents().iter().copied();
-        self.transmitter.hold(&frames::prepared(contents, 0, self.wait_cycles));
-        self.expected = Some(command_frame);
-        self.receiver.expect(Some(command_frame));
-    }
-
-    /// A frame came, or a damaged one: what is held is on its way if it is for this one, and gone if not. Whether it is on its way.
-    fn came(&mut self, frame: Option<u16>) -> bool {
-        let Some(expected) = self.expected.take() else { return false };
-        self.receiver.expect(None);
-        if frame == Some(expected) {
-            // The receiver has started it, or was told too late to expect it.
-            self.transmitter.start();
-            return true;
-        }
-        self.transmitter.discard();
-        false
+        self.line.hold(&frames::prepared(contents, 0, self.wait_cycles), command_frame);
     }
 }
 
@@ -163,24 +138,23 @@ pub fn encoder(image: &'static str, rate: BitRate) -> ! {
         Board::new(image, rate.bits_per_second(), port, frames::BITS);
     let device = Device::new(EncoderAddress::ZERO, Resolution::default(), rate);
     let wait_cycles = programs::wait_cycles(port, TURN_NS);
-    let mut ahead = Ahead { device, position: 0x1_2345, transmitter, receiver, wait_cycles, expected: None };
+    let mut ahead = Ahead { device, position: 0x1_2345, line: Answering::new(transmitter, receiver), wait_cycles };
     let read = Request::new(EncoderAddress::ZERO, Operation::Abs40).emit();
     let mut again = read.as_slice().first().map_or(0, |frame| frame.content());
     let (mut first, mut last_ns) = (true, 0);
     loop {
         watchdog.feed();
-        let Some(Unit { content, framed }) = ahead.receiver.take() else {
+        let Some((Unit { content, framed }, started)) = ahead.line.take() else {
             let now_ns = clock.latest_ns();
             if now_ns - last_ns >= FRAME_GAP_NS {
                 first = true;
-                if ahead.expected.is_none() {
+                if !ahead.line.is_ready() {
                     ahead.hold(again, now_ns + LATER_NS);
                 }
             }
             continue;
         };
         let frame = framed.then_some(content);
-        let started = ahead.came(frame);
         last_ns = clock.latest_ns();
         let reply = ahead.device.hear(&[frame], last_ns);
         if reply.is_some() && first {
@@ -189,7 +163,7 @@ pub fn encoder(image: &'static str, rate: BitRate) -> ! {
         first = false;
         if let Some(reply) = reply.filter(|_| !started) {
             let contents = reply.frames.contents().iter().copied();
-            ahead.transmitter.send(&frames::prepared(contents, 0, 0));
+            ahead.line.send(&frames::prepared(contents, 0, 0));
         }
     }
 }

@@ -1,49 +1,49 @@
 //! Clocks, pins and console of a board with a crystal of 12 MHz.
 
-use core::fmt::{self, Write};
-use core::panic::PanicInfo;
+use core::fmt::Write;
 
 use cortex_m::peripheral::Peripherals as Core;
 use rp2040_hal::clocks::{Clock as _, ClockSource, ClocksManager};
 use rp2040_hal::dma::{CH0, Channel, DMAExt};
 use rp2040_hal::fugit::{ExtU32, RateExtU32};
-use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
-use rp2040_hal::gpio::{FunctionPio0, FunctionUart, Pin, Pins, PullDown, PullUp};
-use rp2040_hal::pac::{self, Peripherals, UART0};
+use rp2040_hal::gpio::{FunctionPio0, Pin, Pins, PullUp};
+use rp2040_hal::pac::Peripherals;
 use rp2040_hal::pio::PIOExt;
 use rp2040_hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
-use rp2040_hal::uart::{DataBits, Enabled, StopBits, UartConfig, UartPeripheral};
+use rp2040_hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
+use rp2040_hal::usb::UsbBus;
 use rp2040_hal::xosc::setup_xosc_blocking;
 use rp2040_hal::{Sio, Watchdog};
 use servowire_boards::{FirstLine, Source};
+use usb_device::bus::UsbBusAllocator;
 
 use crate::clock::{self, Clock};
+use crate::console::Uart;
+use crate::last_words::Before;
 use crate::port::{self, Receiver, Transmitter};
 use crate::programs::{Rate, SYSTEM_HZ};
 
-/// The console: GPIO 0 sends, 1,000,000 baud, 8N1.
-pub type Console =
-    UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
-
 /// The pins, of a Raspberry Pi Pico; no power stage is near.
-static PICO: servowire_boards::Board = const {
-    servowire_boards::Board {
-        name: "Raspberry Pi Pico",
-        crystal_hz: CRYSTAL_HZ,
-        pins: &[
-            servowire_boards::Pin { name: "GPIO 2", signal: "DI", at: "pin 4" },
-            servowire_boards::Pin { name: "GPIO 3", signal: "DE and /RE", at: "pin 5" },
-            servowire_boards::Pin { name: "GPIO 4", signal: "RO", at: "pin 6" },
-        ],
-        power_stage: &[],
-    }
-    .checked()
-};
+static PICO: servowire_boards::Board = servowire_boards::Board::plain(
+    "Raspberry Pi Pico",
+    CRYSTAL_HZ,
+    &[
+        servowire_boards::Pin::new("GPIO 2", "DI", "pin 4"),
+        servowire_boards::Pin::new("GPIO 3", "DE and /RE", "pin 5"),
+        servowire_boards::Pin::new("GPIO 4", "RO", "pin 6"),
+    ],
+);
 
 /// All that an image uses.
 pub struct Board {
-    /// Prints.
-    pub console: Console,
+    /// The console at the pins.
+    pub uart: Uart,
+    /// The USB socket.
+    pub usb: UsbBusAllocator<UsbBus>,
+    /// What was said first.
+    pub first: FirstLine,
+    /// Why the run before has ended, if the watchdog ended it.
+    pub before: Option<Before>,
     /// Time.
     pub clock: Clock,
     /// Bits to the line.
@@ -73,6 +73,7 @@ impl Board {
     pub fn new(image: &'static str, bits_per_second: u32, rate: Rate, bits: u8) -> Self {
         let mut p = Peripherals::take().expect("called once");
         let core = Core::take().expect("called once");
+        let before = Before::take(&p.WATCHDOG);
         let mut watchdog = Watchdog::new(p.WATCHDOG);
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
         let crystal = setup_xosc_blocking(p.XOSC, CRYSTAL_HZ.Hz()).expect("crystal");
@@ -82,7 +83,7 @@ impl Board {
         clocks.init_default(&crystal, &system.expect("PLL"), &usb.expect("PLL")).expect("clocks");
 
         let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
-        let mut console =
+        let mut uart =
             UartPeripheral::new(p.UART0, (pins.gpio0.into_function(), pins.gpio1.into_function()), &mut p.RESETS)
                 .enable(
                     UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
@@ -96,7 +97,8 @@ impl Board {
         let (block, sm0, sm1, ..) = p.PIO0.split(&mut p.RESETS);
         let (transmitter, receiver) = port::start(block, sm0, sm1, rate, bits);
         let channel = p.DMA.split(&mut p.RESETS).ch0;
-        let line = FirstLine {
+        let usb = UsbBus::new(p.USBCTRL_REGS, p.USBCTRL_DPRAM, clocks.usb_clock, true, &mut p.RESETS);
+        let first = FirstLine {
             image,
             version: env!("CARGO_PKG_VERSION"),
             board: &PICO,
@@ -104,9 +106,13 @@ impl Board {
             source: Source::Crystal,
             bits_per_second,
         };
-        let _ = writeln!(console, "{line}");
+        let _ = writeln!(uart, "{first}");
+        if let Some(before) = before {
+            let _ = writeln!(uart, "{before}");
+        }
         watchdog.start(WATCHDOG_MS.millis());
-        Self { console, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
+        let usb = UsbBusAllocator::new(usb);
+        Self { uart, usb, first, before, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
     }
 }
 
@@ -114,28 +120,3 @@ impl Board {
 #[unsafe(link_section = ".boot2")]
 #[used]
 pub static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
-
-/// The console, for a panic: whoever had it is gone.
-struct LastWords;
-
-impl Write for LastWords {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        // SAFETY: interrupts are off, and nothing else runs again.
-        let uart = unsafe { &*pac::UART0::ptr() };
-        for byte in text.bytes() {
-            while uart.uartfr().read().txff().bit_is_set() {}
-            uart.uartdr().write(|w| unsafe { w.data().bits(byte) });
-        }
-        Ok(())
-    }
-}
-
-/// Says where; the watchdog begins again.
-#[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
-    let _ = writeln!(LastWords, "\n{info}");
-    loop {
-        cortex_m::asm::nop();
-    }
-}

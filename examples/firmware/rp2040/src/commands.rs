@@ -1,6 +1,6 @@
 //! What is typed at the console of a master.
 
-use crate::board::Console;
+use crate::console::Console;
 
 /// A line that was typed. Numbers are hexadecimal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,12 +35,11 @@ pub struct Typed {
 
 impl Typed {
     /// What was typed, when a line has ended.
-    pub fn take(&mut self, console: &Console) -> Option<Command> {
-        let mut byte = [0];
-        while console.read_raw(&mut byte).is_ok() {
-            if byte != *b"\n" && byte != *b"\r" {
+    pub fn take(&mut self, console: &mut Console) -> Option<Command> {
+        while let Some(byte) = console.read() {
+            if byte != b'\n' && byte != b'\r' {
                 if let Some(place) = self.line.get_mut(self.len) {
-                    *place = byte[0];
+                    *place = byte;
                 }
                 self.len += 1;
                 continue;

@@ -2,10 +2,13 @@
 #![no_std]
 
 pub mod aformat;
+pub mod answering;
 pub mod board;
 pub mod clock;
 pub mod commands;
+pub mod console;
 pub mod frames;
+pub mod last_words;
 pub mod port;
 pub mod programs;
 pub mod tformat;

@@ -2,17 +2,19 @@
 
 use core::fmt::{self, Write};
 
-use servowire_boards::Report;
+use servowire_boards::{RESOLUTION, Readings};
 use servowire_drivers::tformat::blocking::{Driver, Failure};
-use servowire_drivers::{Automatic, Clock as _, Error};
+use servowire_drivers::{Automatic, Clock as _};
 use tformat::device::Device;
 use tformat::master::{Line, MultiTurnZero};
-use tformat::{Abm, Abs, Address, BitRate, DataId, EvidenceCell, Page, Policy, Request, Resolution};
+use tformat::{Abm, Abs, Address, BitRate, DataId, EvidenceCell, Page, Request};
 
-use crate::board::{Board, Console};
+use crate::answering::Answering;
+use crate::board::Board;
 use crate::clock::Clock;
 use crate::commands::{Command, Typed};
-use crate::port::{Receiver, RingReceiver, Transmitter, Unit};
+use crate::console::Console;
+use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
 use crate::uart::{self, Uart};
 
@@ -20,14 +22,6 @@ use crate::uart::{self, Uart};
 const PAUSE_NS: u64 = 20_000;
 /// One position in so many is printed.
 const PRINTED: u32 = 16;
-/// A position that is printed is no older than this.
-const MAX_AGE_NS: u64 = 200_000;
-
-/// That of the encoder below.
-const RESOLUTION: Resolution = match Resolution::new(23, 16) {
-    Ok(resolution) => resolution,
-    Err(_) => panic!("possible widths"),
-};
 
 const fn rate_of(rate: BitRate) -> Rate {
     match rate {
@@ -70,28 +64,22 @@ fn say(console: &mut Console, what: &str, error: Failure<Uart, Automatic>) -> fm
 /// # Panics
 /// If a clock does not start.
 pub fn master(image: &'static str, rate: BitRate) -> ! {
-    let mut board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
-    let (mut clock, console) = (&board.clock, &mut board.console);
+    let board = Board::new(image, rate.bits_per_second(), rate_of(rate), uart::BITS);
+    let (mut clock, console) = (&board.clock, &mut Console::new(board.uart, board.usb, board.first, board.before));
     let uart = Uart::new(board.transmitter, RingReceiver::new(board.channel, board.receiver));
     let mut encoder = Driver::new(uart, Automatic, clock, Line::new(rate)).expect("the PIO switches the driver");
     let mut cell = EvidenceCell::new();
-    let (mut writer, mut reader) = cell.split();
+    let mut readings = Readings::new(&mut cell, PRINTED);
     let mut typed = Typed::default();
-    let mut report = Report::new(PRINTED);
     loop {
         board.watchdog.feed();
-        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
-        let now_ns = clock.latest_ns();
-        let _ = match read {
-            Ok(()) => report.good(console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
-            Err(Error::Io(fault)) => report.fault(console, fault),
-            Err(error) => report.fault(console, error),
-        };
+        console.poll();
+        let read = encoder.read_evidence(RESOLUTION);
+        let _ = readings.take(console, read, clock.now_ns());
         if let Some(typed) = typed.take(console) {
             let _ = command(&mut encoder, typed, console);
         }
-        let next_ns = clock.latest_ns() + PAUSE_NS;
-        while clock.now_ns().is_ok_and(|now_ns| now_ns < next_ns) {}
+        clock.pause(PAUSE_NS);
     }
 }
 
@@ -111,10 +99,7 @@ const LATER_NS: u64 = 50_000;
 /// An encoder, and the answer that it has ready.
 struct Ahead {
     device: Device<1>,
-    transmitter: Transmitter,
-    receiver: Receiver,
-    /// The byte that starts what the transmitter holds.
-    expected: Option<u8>,
+    line: Answering,
 }
 
 impl Ahead {
@@ -127,22 +112,7 @@ impl Ahead {
         };
         let asked = request.emit();
         let Some((reply, last)) = reply.zip(asked.as_bytes().last()) else { return };
-        self.transmitter.hold(&uart::prepared(reply.emit().as_bytes(), wait_cycles));
-        self.expected = Some(*last);
-        self.receiver.expect(Some((*last).into()));
-    }
-
-    /// A byte came, or a damaged one: what is held is on its way if it is for this one, and gone if not. Whether it is on its way.
-    fn came(&mut self, byte: Option<u8>) -> bool {
-        let Some(expected) = self.expected.take() else { return false };
-        self.receiver.expect(None);
-        if byte == Some(expected) {
-            // The receiver has started it, or was told too late to expect it.
-            self.transmitter.start();
-            return true;
-        }
-        self.transmitter.discard();
-        false
+        self.line.hold(&uart::prepared(reply.emit().as_bytes(), wait_cycles), (*last).into());
     }
 
     /// A request is over, or damaged beyond that: answers it if that is not on its way yet.
@@ -153,7 +123,7 @@ impl Ahead {
             None => self.device.hear(bytes, now_ns).map(|reply| reply.frame),
         };
         if let Some(reply) = reply.filter(|_| !started) {
-            self.transmitter.send(&uart::prepared(reply.as_bytes(), 0));
+            self.line.send(&uart::prepared(reply.as_bytes(), 0));
         }
         request
     }
@@ -186,17 +156,17 @@ pub fn encoder(image: &'static str, rate: BitRate) -> ! {
     let mut device = Device::new(ENCODER_ID, rate);
     device.set_position(Abs::truncate(0), TURNS);
     let [wait_cycles, least_cycles] = [TURN_NS, LEAST_TURN_NS].map(|turn_ns| programs::wait_cycles(port, turn_ns));
-    let mut ahead = Ahead { device, transmitter, receiver, expected: None };
+    let mut ahead = Ahead { device, line: Answering::new(transmitter, receiver) };
     let mut position = 0x12_3456;
     let mut again = Request::ReadAll;
     let (mut request, mut len, mut last_ns) = ([0; 4], 0, 0);
     loop {
         watchdog.feed();
-        let Some(Unit { content, framed }) = ahead.receiver.take() else {
+        let Some((Unit { content, framed }, started)) = ahead.line.take() else {
             let now_ns = clock.latest_ns();
             if now_ns - last_ns >= FIELD_GAP_NS {
                 len = 0;
-                if ahead.expected.is_none() {
+                if !ahead.line.is_ready() {
                     position += 1;
                     ahead.device.set_position(Abs::truncate(position), ahead.device.abm());
                     ahead.hold(again, now_ns + LATER_NS, wait_cycles);
@@ -205,7 +175,6 @@ pub fn encoder(image: &'static str, rate: BitRate) -> ! {
             continue;
         };
         let byte = content as u8;
-        let started = ahead.came(framed.then_some(byte));
         last_ns = clock.latest_ns();
         let Some(place) = request.get_mut(len) else { continue };
         *place = byte;

@@ -1,8 +1,9 @@
 //! The port as a UART of 8N1, for the T-Format drivers: the PIO switches the line driver.
 
-use core::{fmt, iter};
+use core::iter;
 
-use embedded_io::{Error, ErrorKind, ErrorType, Read, ReadReady, Write};
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use servowire_boards::LineFault;
 
 use crate::port::{Prepared, RingReceiver, Transmitter, Unit};
 
@@ -29,38 +30,20 @@ impl Uart {
     }
 }
 
-/// A unit whose stop bit is 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Framing;
-
-impl fmt::Display for Framing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a stop bit is 0")
-    }
-}
-
-impl core::error::Error for Framing {}
-
-impl Error for Framing {
-    fn kind(&self) -> ErrorKind {
-        ErrorKind::InvalidData
-    }
-}
-
 impl ErrorType for Uart {
-    type Error = Framing;
+    type Error = LineFault;
 }
 
 impl ReadReady for Uart {
     #[inline]
-    fn read_ready(&mut self) -> Result<bool, Framing> {
+    fn read_ready(&mut self) -> Result<bool, LineFault> {
         Ok(self.peek().is_some())
     }
 }
 
 impl Read for Uart {
     #[inline]
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Framing> {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, LineFault> {
         let Some(first) = bytes.first_mut() else { return Ok(0) };
         let Unit { content, framed } = loop {
             if let Some(unit) = self.peek() {
@@ -69,17 +52,17 @@ impl Read for Uart {
         };
         self.next = None;
         *first = content as u8;
-        if framed { Ok(1) } else { Err(Framing) }
+        if framed { Ok(1) } else { Err(LineFault::Framing) }
     }
 }
 
 impl Write for Uart {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Framing> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, LineFault> {
         self.transmitter.send(&prepared(bytes, 0));
         Ok(bytes.len())
     }
 
-    fn flush(&mut self) -> Result<(), Framing> {
+    fn flush(&mut self) -> Result<(), LineFault> {
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use servowire_boards::{Counter, Oscillator, Pll, PllLimits, Source};
+use servowire_boards::{Counter, Pll, PllLimits, Source, waited};
 use servowire_core::TickRate;
 use stm32_metapac::flash::vals::Latency;
 use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
@@ -22,36 +22,12 @@ const LOOKS: u32 = 100_000;
 /// Of the oscillator in the chip.
 const INTERNAL_HZ: u32 = 16_000_000;
 
-/// The PLL that makes [`CORE_HZ`]: without one this does not compile.
-const fn pll(hz: u32) -> Pll {
-    match Pll::solve(PllLimits::STM32F4, hz, CORE_HZ) {
-        Some(pll) => pll,
-        None => panic!("no PLL makes the core clock of this crystal"),
-    }
-}
-
-const OF_CRYSTAL: Pll = pll(CRYSTAL_HZ);
-const OF_INTERNAL: Pll = pll(INTERNAL_HZ);
-
-struct Crystal;
-
-impl Oscillator for Crystal {
-    fn start(&mut self) {
-        RCC.cr().modify(|w| w.set_hseon(true));
-    }
-
-    fn is_ready(&self) -> bool {
-        RCC.cr().read().hserdy()
-    }
-
-    fn stop(&mut self) {
-        RCC.cr().modify(|w| w.set_hseon(false));
-    }
-}
+const OF_CRYSTAL: Pll = PllLimits::STM32F4.exact(CRYSTAL_HZ, CORE_HZ);
+const OF_INTERNAL: Pll = PllLimits::STM32F4.exact(INTERNAL_HZ, CORE_HZ);
 
 /// 160 MHz, APB1 40 MHz, APB2 80 MHz, and from what; `None` if no PLL gets ready, as in an emulator without a clock tree.
 pub fn start() -> Option<Source> {
-    let source = servowire_boards::start(&mut Crystal, LOOKS);
+    let source = servowire_boards::start(|on| RCC.cr().modify(|w| w.set_hseon(on)), || RCC.cr().read().hserdy(), LOOKS);
     let (input, pll) = match source {
         Source::Crystal => (Pllsrc::HSE, OF_CRYSTAL),
         Source::Internal => (Pllsrc::HSI, OF_INTERNAL),
@@ -63,7 +39,7 @@ pub fn start() -> Option<Source> {
         w.set_pllp(Pllp::from_bits((pll.r / 2 - 1) as u8));
     });
     RCC.cr().modify(|w| w.set_pllon(true));
-    if !ready(|| RCC.cr().read().pllrdy()) {
+    if !waited(|| RCC.cr().read().pllrdy(), LOOKS) {
         return None;
     }
     FLASH.acr().modify(|w| {
@@ -78,11 +54,7 @@ pub fn start() -> Option<Source> {
         w.set_ppre2(Ppre::DIV2);
         w.set_sw(Sw::PLL1_P);
     });
-    ready(|| RCC.cfgr().read().sws() == Sw::PLL1_P).then_some(source)
-}
-
-fn ready(mut look: impl FnMut() -> bool) -> bool {
-    (0..LOOKS).any(|_| look())
+    waited(|| RCC.cfgr().read().sws() == Sw::PLL1_P, LOOKS).then_some(source)
 }
 
 /// Time from the SysTick, which counts 24 bits down with an eighth of the core clock. Somebody has to look at it every 0.4 s.

@@ -9,28 +9,24 @@ mod uart;
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-use servowire_boards::{Board, FirstLine, Pin, Report, Source};
-use servowire_drivers::{Clock as _, DirectionPin, Error, Worst, tformat::blocking::Driver};
+use servowire_boards::{Board, FirstLine, Pin, RESOLUTION, Readings, Source};
+use servowire_drivers::{Clock as _, DirectionPin, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{Address, BitRate, EvidenceCell, Page, Policy, Resolution};
+use tformat::{Address, BitRate, EvidenceCell, Page};
 
 use crate::clock::{CORE_HZ, CRYSTAL_HZ};
 
 /// The pins; where they are is up to the board.
-static BOARD: Board = const {
-    Board {
-        name: "STM32F405RG",
-        crystal_hz: CRYSTAL_HZ,
-        pins: &[
-            Pin { name: "PA9", signal: "DI", at: "USART1" },
-            Pin { name: "PA8", signal: "DE and /RE", at: "GPIO" },
-            Pin { name: "PA10", signal: "RO", at: "USART1" },
-            Pin { name: "PA2", signal: "console", at: "USART2" },
-        ],
-        power_stage: &[],
-    }
-    .checked()
-};
+static BOARD: Board = Board::plain(
+    "STM32F405RG",
+    CRYSTAL_HZ,
+    &[
+        Pin::new("PA9", "DI", "USART1"),
+        Pin::new("PA8", "DE and /RE", "GPIO"),
+        Pin::new("PA10", "RO", "USART1"),
+        Pin::new("PA2", "console", "USART2"),
+    ],
+);
 
 /// The UART begins with its next bit clock; the interrupt of a byte, which may come in between, takes less than 0.9 us; a tick of the
 /// clock is 50 ns.
@@ -45,16 +41,8 @@ fn line() -> Line {
     }
 }
 
-/// That of the encoder.
-const RESOLUTION: Resolution = match Resolution::new(23, 16) {
-    Ok(resolution) => resolution,
-    Err(_) => panic!("possible widths"),
-};
-
 /// One position in so many is printed.
 const PRINTED: u32 = 16;
-/// A position that is printed is no older than this.
-const MAX_AGE_NS: u64 = if cfg!(feature = "emulated") { u64::MAX } else { 200_000 };
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -75,20 +63,15 @@ fn main() -> ! {
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }
     let mut cell = EvidenceCell::new();
-    let (mut writer, mut reader) = cell.split();
-    let mut report = Report::new(PRINTED);
+    let mut readings = Readings::new(&mut cell, PRINTED);
+    if cfg!(feature = "emulated") {
+        readings = readings.with_max_age_ns(u64::MAX);
+    }
     loop {
-        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
-        let policy = Policy::new(MAX_AGE_NS);
-        let _ = match (read, clock.now_ns()) {
-            (Ok(()), Ok(now_ns)) => match report.good(&mut console, || reader.at(now_ns, policy)) {
-                Ok(true) => writeln!(console, "stack {} bytes", stack::used()),
-                said => said.map(drop),
-            },
-            (Err(Error::Io(fault)), _) => report.fault(&mut console, fault),
-            (Err(error), _) => report.fault(&mut console, error),
-            (_, Err(error)) => report.fault(&mut console, error),
-        };
+        let read = encoder.read_evidence(RESOLUTION);
+        if let Ok(true) = readings.take(&mut console, read, clock.now_ns()) {
+            let _ = writeln!(console, "stack {} bytes", stack::used());
+        }
     }
 }
 

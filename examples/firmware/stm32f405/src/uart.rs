@@ -5,7 +5,8 @@ use core::fmt;
 use core::sync::atomic::{AtomicU16, AtomicUsize, Ordering};
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
-use embedded_io::{Error, ErrorKind, ErrorType, Read, ReadReady, Write};
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use servowire_boards::LineFault;
 use stm32_metapac::gpio::vals::{Moder, Ospeedr, Pupdr};
 use stm32_metapac::interrupt;
 use stm32_metapac::usart::Usart;
@@ -77,24 +78,6 @@ fn USART1() {
 /// The encoder's USART.
 pub struct Uart(());
 
-/// A byte with a wrong stop bit, noise, or bytes that were lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LineFault;
-
-impl fmt::Display for LineFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("framing, noise or overrun")
-    }
-}
-
-impl core::error::Error for LineFault {}
-
-impl Error for LineFault {
-    fn kind(&self) -> ErrorKind {
-        ErrorKind::InvalidData
-    }
-}
-
 impl ErrorType for Uart {
     type Error = LineFault;
 }
@@ -118,7 +101,7 @@ impl Read for Uart {
             at = at.wrapping_add(1);
             TAKEN.store(at, Ordering::Release);
             if byte & FAULTY != 0 {
-                return Err(LineFault);
+                return Err(LineFault::Damaged);
             }
             *place = byte as u8;
             count += 1;

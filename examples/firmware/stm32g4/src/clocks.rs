@@ -1,11 +1,10 @@
-//! The clock tree, made from the crystal of the board; time; the watchdog.
+//! The clock tree, made from the crystal of the board; time.
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac::RCC;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::wdg::IndependentWatchdog;
-use servowire_boards::{Oscillator, PllLimits, Source, start};
+use servowire_boards::{PllLimits, Source, start};
 use servowire_core::{ClockError, TickRate, TimeBase};
 use servowire_drivers::Clock;
 
@@ -17,8 +16,6 @@ pub const CORE_HZ: u32 = 160_000_000;
 const INTERNAL_HZ: u32 = 16_000_000;
 /// Looks at the crystal before it is given up: some 50 ms; the data sheet says 2 ms.
 const LOOKS: u32 = 100_000;
-/// Longer than anything here waits.
-const WATCHDOG_US: u32 = 100_000;
 
 /// Time from the cycle counter, which has to be looked at every 13 s. Copies have the same origin.
 #[derive(Clone, Copy)]
@@ -31,27 +28,9 @@ impl Clock for Cycles {
     }
 }
 
-struct Crystal;
-
-impl Oscillator for Crystal {
-    fn start(&mut self) {
-        RCC.cr().modify(|w| w.set_hseon(true));
-    }
-
-    fn is_ready(&self) -> bool {
-        RCC.cr().read().hserdy()
-    }
-
-    fn stop(&mut self) {
-        RCC.cr().modify(|w| w.set_hseon(false));
-    }
-}
-
 /// The PLL that makes [`CORE_HZ`]: without one this does not compile.
 const fn pll(source: PllSource, hz: u32) -> Pll {
-    let Some(pll) = servowire_boards::Pll::solve(PllLimits::STM32G4, hz, CORE_HZ) else {
-        panic!("no PLL makes the core clock of this crystal");
-    };
+    let pll = PllLimits::STM32G4.exact(hz, CORE_HZ);
     let divr = match pll.r {
         2 => PllRDiv::DIV2,
         4 => PllRDiv::DIV4,
@@ -82,7 +61,7 @@ impl Start {
     /// # Panics
     /// If called twice.
     pub fn new() -> Self {
-        let source = start(&mut Crystal, LOOKS);
+        let source = start(|on| RCC.cr().modify(|w| w.set_hseon(on)), || RCC.cr().read().hserdy(), LOOKS);
         let mut config = embassy_stm32::Config::default();
         (config.rcc.hse, config.rcc.pll) = match source {
             Source::Crystal => {
@@ -105,13 +84,4 @@ impl Default for Start {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// The watchdog, running.
-pub fn watchdog(
-    part: embassy_stm32::Peri<'static, embassy_stm32::peripherals::IWDG>,
-) -> IndependentWatchdog<'static, embassy_stm32::peripherals::IWDG> {
-    let mut watchdog = IndependentWatchdog::new(part, WATCHDOG_US);
-    watchdog.unleash();
-    watchdog
 }

@@ -1,8 +1,12 @@
-//! What the console says, once a second.
+//! The rhythm of an image, and what its console says once a second.
 
 use core::fmt::Display;
 
 use defmt::{Display2Format, info, warn};
+use embassy_stm32::Peri;
+use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_time::{Duration, Ticker};
 use servowire_boards::{FirstLine, Source};
 
 use crate::board::BOARD;
@@ -19,21 +23,38 @@ pub fn first_line(image: &'static str, source: Source, bits_per_second: u32) {
     info!("{}", Display2Format(&line));
 }
 
-/// Readings since the last report.
-#[derive(Default)]
+/// Longer than anything here waits.
+const WATCHDOG_US: u32 = 100_000;
+
+/// When to read, and the readings since the last report.
 pub struct Report {
+    ticker: Ticker,
+    watchdog: IndependentWatchdog<'static, IWDG>,
     good: u32,
     bad: u32,
 }
 
 impl Report {
+    /// Starts the watchdog.
+    pub fn new(watchdog: Peri<'static, IWDG>) -> Self {
+        let mut watchdog = IndependentWatchdog::new(watchdog, WATCHDOG_US);
+        watchdog.unleash();
+        Self { ticker: Ticker::every(Duration::from_hz(READ_HZ.into())), watchdog, good: 0, bad: 0 }
+    }
+
+    /// Waits for the instant of the next reading, and feeds the watchdog.
+    pub async fn next(&mut self) {
+        self.ticker.next().await;
+        self.watchdog.pet();
+    }
+
     /// Counts a reading; says every second what came of the last one.
     pub fn reading<S: Display, E: Display>(&mut self, position: &Result<S, E>) {
         match position {
             Ok(_) => self.good += 1,
             Err(_) => self.bad += 1,
         }
-        let Self { good, bad } = *self;
+        let Self { good, bad, .. } = *self;
         if good + bad < READ_HZ {
             return;
         }
@@ -45,6 +66,6 @@ impl Report {
             Some(field) => info!("ENABLE on, field at {} millidegrees", field.millidegrees()),
             None => info!("ENABLE off"),
         }
-        *self = Self::default();
+        (self.good, self.bad) = (0, 0);
     }
 }

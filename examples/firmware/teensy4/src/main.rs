@@ -9,14 +9,14 @@ mod watchdog;
 use core::fmt::Write;
 
 use cortex_m::peripheral::DWT;
-use servowire_boards::{Board, Counter, FirstLine, Pin, Report, Source};
+use servowire_boards::{Board, Counter, FirstLine, Pin, RESOLUTION, Readings, Source};
 use servowire_core::TickRate;
-use servowire_drivers::{Clock as _, DirectionPin, Error, Worst, tformat::blocking::Driver};
+use servowire_drivers::{Clock as _, DirectionPin, Worst, tformat::blocking::Driver};
 use teensy4_bsp::board::{self, ARM_FREQUENCY, T40Resources};
 use teensy4_bsp::hal::ccm::uart_clk;
 use teensy4_bsp::hal::lpuart::{Baud, Direction, Lpuart, Pins};
 use tformat::master::Line;
-use tformat::{BitRate, EvidenceCell, Policy, Resolution};
+use tformat::{BitRate, EvidenceCell};
 
 use crate::console::Console;
 use crate::uart::Uart;
@@ -31,32 +31,20 @@ const _: () = assert!(ENCODER_BAUD.value(UART_HZ) == RATE.bits_per_second(), "ex
 /// The UART begins with its next bit clock. No interrupt comes, and the program is in memory without waits. A tick of the clock is
 /// 1.7 ns.
 const WORST: Worst = Worst { uart_start_ns: 400, wake_ns: 400, clock_ns: 2 };
-/// A position that is printed is no older than this.
-const MAX_AGE_NS: u64 = 200_000;
 /// One position in so many is printed.
 const PRINTED: u32 = 4_096;
 
-/// That of your encoder; one that calls itself another one gives no position.
-const RESOLUTION: Resolution = match Resolution::new(23, 16) {
-    Ok(resolution) => resolution,
-    Err(_) => panic!("possible widths"),
-};
-
 /// The pins; no power stage is near.
-static BOARD: Board = const {
-    Board {
-        name: "Teensy 4.0",
-        crystal_hz: 24_000_000,
-        pins: &[
-            Pin { name: "AD_B0_02", signal: "DI", at: "pin 1" },
-            Pin { name: "EMC_04", signal: "DE and /RE", at: "pin 2" },
-            Pin { name: "AD_B0_03", signal: "RO", at: "pin 0" },
-            Pin { name: "AD_B1_02", signal: "console", at: "pin 14" },
-        ],
-        power_stage: &[],
-    }
-    .checked()
-};
+static BOARD: Board = Board::plain(
+    "Teensy 4.0",
+    24_000_000,
+    &[
+        Pin::new("AD_B0_02", "DI", "pin 1"),
+        Pin::new("EMC_04", "DE and /RE", "pin 2"),
+        Pin::new("AD_B0_03", "RO", "pin 0"),
+        Pin::new("AD_B1_02", "console", "pin 14"),
+    ],
+);
 
 #[teensy4_bsp::rt::entry]
 fn main() -> ! {
@@ -84,18 +72,12 @@ fn main() -> ! {
     let pin = DirectionPin::new(de, WORST);
     let mut encoder = Driver::new(Uart(uart), pin, clock, Line::new(RATE)).expect("0.9 us fit four bits");
     let mut cell = EvidenceCell::new();
-    let (mut writer, mut reader) = cell.split();
-    let mut report = Report::new(PRINTED);
+    let mut readings = Readings::new(&mut cell, PRINTED);
     let mut watchdog = Watchdog::start();
     loop {
         watchdog.feed();
-        let read = encoder.read_evidence(RESOLUTION).map(|evidence| writer.put(evidence));
-        let _ = match (read, clock.now_ns()) {
-            (Ok(()), Ok(now_ns)) => report.good(&mut console, || reader.at(now_ns, Policy::new(MAX_AGE_NS))).map(drop),
-            (Err(Error::Io(fault)), _) => report.fault(&mut console, fault),
-            (Err(error), _) => report.fault(&mut console, error),
-            (_, Err(error)) => report.fault(&mut console, error),
-        };
+        let read = encoder.read_evidence(RESOLUTION);
+        let _ = readings.take(&mut console, read, clock.now_ns());
     }
 }
 

@@ -8,17 +8,18 @@ use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{bind_interrupts, dma, peripherals};
-use embassy_time::{Delay, Duration, Ticker};
+use embassy_time::Delay;
 use nikon_aformat::master::Line;
 use nikon_aformat::{BitRate, EncoderAddress, Evidence, EvidenceShaftCell, Resolution};
+use servowire_boards::put;
 use servowire_drivers::nikon::asynch::Driver;
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiFrames};
-use servowire_drivers::{Clock as _, DirectionPin, Error, WithDelay, Worst};
-use servowire_stm32g4::clocks::{self, Start};
+use servowire_drivers::{Clock as _, DirectionPin, WithDelay, Worst};
+use servowire_stm32g4::clocks::Start;
 use servowire_stm32g4::control::policy;
 use servowire_stm32g4::control_interrupt;
-use servowire_stm32g4::report::{READ_HZ, Report, first_line};
+use servowire_stm32g4::report::{Report, first_line};
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Interrupts {
@@ -71,23 +72,10 @@ async fn main(_spawner: Spawner) {
     let [tx, rx] = BUFFERS.init([[0; BYTES]; 2]);
     let port = SpiFrames::new(bus, de, clock, SAMPLING, tx, rx);
     let mut encoder = Driver::new(port, WithDelay { clock, delay: Delay }, RESOLUTION, Line::new(RATE));
-    let mut watchdog = clocks::watchdog(parts.watchdog);
-    let mut ticker = Ticker::every(Duration::from_hz(READ_HZ.into()));
-    let mut report = Report::default();
+    let mut report = Report::new(parts.watchdog);
     loop {
-        ticker.next().await;
-        watchdog.pet();
-        let position = match encoder.read_evidence(EncoderAddress::ZERO).await {
-            Ok(evidence) => match clock.now_ns() {
-                Ok(now_ns) => {
-                    writer.put(evidence, now_ns, policy());
-                    evidence.at(now_ns, policy()).map_err(Error::Doubt)
-                }
-                Err(error) => Err(Error::Clock(error)),
-            },
-            // What is in the cell gets old.
-            Err(error) => Err(error),
-        };
-        report.reading(&position);
+        report.next().await;
+        let read = encoder.read_evidence(EncoderAddress::ZERO).await;
+        report.reading(&put(&mut writer, read, clock.now_ns(), policy()));
     }
 }

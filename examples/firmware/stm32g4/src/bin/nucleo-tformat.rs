@@ -6,16 +6,17 @@ use embassy_executor::Spawner;
 use embassy_stm32::gpio::Pull;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::{bind_interrupts, peripherals};
-use embassy_time::{Delay, Duration, Ticker};
+use embassy_time::Delay;
+use servowire_boards::{RESOLUTION, put};
 use servowire_drivers::tformat::asynch::Driver;
-use servowire_drivers::{Automatic, Clock as _, Error, WithDelay};
-use servowire_stm32g4::clocks::{self, Start};
+use servowire_drivers::{Automatic, Clock as _, WithDelay};
+use servowire_stm32g4::clocks::Start;
 use servowire_stm32g4::control::policy;
 use servowire_stm32g4::control_interrupt;
-use servowire_stm32g4::report::{READ_HZ, Report, first_line};
+use servowire_stm32g4::report::{Report, first_line};
 use static_cell::StaticCell;
 use tformat::master::Line;
-use tformat::{BitRate, Evidence, EvidenceShaftCell, Resolution};
+use tformat::{BitRate, Evidence, EvidenceShaftCell};
 
 bind_interrupts!(struct Interrupts {
     USART2 => usart::BufferedInterruptHandler<peripherals::USART2>;
@@ -24,11 +25,6 @@ bind_interrupts!(struct Interrupts {
 control_interrupt!(Evidence);
 
 const RATE: BitRate = BitRate::Mbit2_5;
-/// That of your encoder; one that says by its identification that it has another one gives no position.
-const RESOLUTION: Resolution = match Resolution::new(23, 16) {
-    Ok(resolution) => resolution,
-    Err(_) => panic!("possible widths"),
-};
 /// Of the motor.
 const MAX_TURNS_PER_S: u32 = 100;
 /// A byte may be handed over a control interrupt and a wake-up late.
@@ -63,23 +59,10 @@ async fn main(_spawner: Spawner) {
     let line = Line::new(RATE).with_hand_over_ns(HAND_OVER_NS);
     let mut encoder =
         Driver::new(uart, Automatic, WithDelay { clock, delay: Delay }, line).expect("the UART switches the driver");
-    let mut watchdog = clocks::watchdog(parts.watchdog);
-    let mut ticker = Ticker::every(Duration::from_hz(READ_HZ.into()));
-    let mut report = Report::default();
+    let mut report = Report::new(parts.watchdog);
     loop {
-        ticker.next().await;
-        watchdog.pet();
-        let position = match encoder.read_evidence(RESOLUTION).await {
-            Ok(evidence) => match clock.now_ns() {
-                Ok(now_ns) => {
-                    writer.put(evidence, now_ns, policy());
-                    evidence.at(now_ns, policy()).map_err(Error::Doubt)
-                }
-                Err(error) => Err(Error::Clock(error)),
-            },
-            // What is in the cell gets old.
-            Err(error) => Err(error),
-        };
-        report.reading(&position);
+        report.next().await;
+        let read = encoder.read_evidence(RESOLUTION).await;
+        report.reading(&put(&mut writer, read, clock.now_ns(), policy()));
     }
 }

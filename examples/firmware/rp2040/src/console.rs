@@ -1,0 +1,97 @@
+//! The console: GPIO 0 and 1 with 1,000,000 baud, 8N1, and a serial port at the USB socket. Both say the same, and hear.
+
+use core::fmt::{self, Write};
+
+use cortex_m::singleton;
+use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
+use rp2040_hal::gpio::{FunctionUart, Pin, PullDown};
+use rp2040_hal::pac::UART0;
+use rp2040_hal::uart::{Enabled, UartPeripheral};
+use rp2040_hal::usb::UsbBus;
+use servowire_boards::FirstLine;
+use usb_device::bus::UsbBusAllocator;
+use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usbd_serial::{SerialPort, USB_CLASS_CDC};
+
+use crate::last_words::Before;
+
+/// The console at the pins.
+pub type Uart =
+    UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
+
+/// For tests at home; a product has a number of its own.
+const TEST: UsbVidPid = UsbVidPid(0x1209, 0x0001);
+/// Some lines, until the port has taken them.
+const LINES: usize = 1_024;
+
+/// Both consoles.
+pub struct Console {
+    uart: Uart,
+    device: UsbDevice<'static, UsbBus>,
+    port: SerialPort<'static, UsbBus, [u8; 64], [u8; LINES]>,
+    /// Somebody has opened the port.
+    open: bool,
+    first: FirstLine,
+    before: Option<Before>,
+}
+
+impl Console {
+    /// Takes the place of the console at the pins, which has said the first line and why the run before has ended; the port says them
+    /// whenever it is opened.
+    ///
+    /// # Panics
+    /// If called twice.
+    pub fn new(uart: Uart, usb: UsbBusAllocator<UsbBus>, first: FirstLine, before: Option<Before>) -> Self {
+        let bus = singleton!(: UsbBusAllocator<UsbBus> = usb).expect("one console");
+        let port = SerialPort::new_with_store(bus, [0; 64], [0; LINES]);
+        let strings = StringDescriptors::default().manufacturer("servowire").product(first.image);
+        let device = UsbDeviceBuilder::new(bus, TEST)
+            .strings(&[strings])
+            .expect("one language")
+            .max_packet_size_0(64)
+            .expect("a size of full speed")
+            .device_class(USB_CLASS_CDC)
+            .build();
+        Self { uart, device, port, open: false, first, before }
+    }
+
+    /// What the USB host asks for: to be called every few milliseconds.
+    pub fn poll(&mut self) {
+        self.device.poll(&mut [&mut self.port]);
+        let open = self.port.dtr();
+        if open && !self.open {
+            let (first, before) = (self.first, self.before);
+            let _ = writeln!(Port(self), "{first}");
+            if let Some(before) = before {
+                let _ = writeln!(Port(self), "{before}");
+            }
+        }
+        self.open = open;
+    }
+
+    /// What was typed at either.
+    pub fn read(&mut self) -> Option<u8> {
+        let mut byte = [0];
+        let heard = self.uart.read_raw(&mut byte).is_ok() || matches!(self.port.read(&mut byte), Ok(1));
+        heard.then_some(byte[0])
+    }
+}
+
+/// The port alone. What does not fit is lost: nobody takes it.
+struct Port<'a>(&'a mut Console);
+
+impl Write for Port<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        let _ = self.0.port.write(text.as_bytes());
+        Ok(())
+    }
+}
+
+impl Write for Console {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        if self.open {
+            Port(self).write_str(text)?;
+        }
+        self.uart.write_str(text)
+    }
+}
