@@ -216,7 +216,7 @@ impl Timing<'_> {
         (self.payload_len as u32).saturating_add(5).saturating_mul(BYTE_NS)
     }
 
-    /// When device `address` starts to send, in ns of the cycle; see [`Slots::send_ns`]. `None` if the line has no such device.
+    /// When device `address` starts to send, in ns of the cycle. `None` if the line has no such device.
     pub fn send_time_ns(&self, address: DeviceAddress) -> Option<i64> {
         let (_, way) = self.ways().find(|(device, _)| *device == address)?;
         Some(self.slots().send_ns(address, way))

@@ -34,7 +34,7 @@ pub struct Config {
     pub patient_discovery: bool,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
-    /// Frames that a correction of the clock is made from, see [`Clock::averaging`](crate::Clock::averaging).
+    /// Frames that a correction of the clock is made from: a longer average is steadier and follows a drift later.
     pub clock_average: u8,
     /// Cycle starts without a frame that a device in IO exchange bears.
     pub missed_frames: u8,
