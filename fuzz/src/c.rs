@@ -1,4 +1,7 @@
 //! The C interface: it says what the crates say, whatever it is called with.
+//!
+//! The calls are C's: pointers and lengths, and states that the caller owns. So they are `unsafe` here as nowhere else in this crate;
+//! each place says why what it hands over is as large as it claims.
 
 use core::mem::MaybeUninit;
 
