@@ -5,6 +5,7 @@
 
 mod attacks;
 mod both_ends;
+mod chances;
 mod common;
 mod device;
 mod hostile;
