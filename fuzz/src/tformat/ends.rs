@@ -10,8 +10,8 @@ use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Frame, Page, Request, Res
 
 use super::{byte, chosen};
 
-/// A transaction under any blocks, framing errors and pauses: it ends once and for all, in time, and what it gives ends
-/// in the last block that it was given.
+/// A transaction under any blocks, framing errors and pauses: it ends once and for all, in time, and what it gives was on
+/// the line as a whole, after the request.
 ///
 /// ```text
 /// 0..3  request      3  echo hint (bit 0), rate (bit 1)      4..  events: 0 poll, 1 framing error, 2 a byte follows, 3 four
@@ -23,17 +23,20 @@ pub fn master(mut data: &[u8]) {
     let rate = if options & 2 == 0 { BitRate::Mbit2_5 } else { BitRate::Mbit5 };
     let line = if options & 1 == 0 { Line::new(rate) } else { Line::new(rate).with_echo() };
     let mut transaction = Transaction::start(request, line, 0);
-    let (mut now, mut received, mut before) = (0, Vec::new(), 0);
+    let bit_ns = u64::from(rate.bit_ns());
+    // Each byte, and when it ended: what a block holds came one right after the other.
+    let (mut now, mut received) = (0, Vec::new());
     while let (Progress::Pending { until_ns }, false) = (transaction.progress(), data.is_empty()) {
         let event = byte(&mut data);
-        now += u64::from(event >> 2) * u64::from(rate.bit_ns());
+        now += u64::from(event >> 2) * bit_ns;
         match event & 3 {
             0 => assert!(now <= until_ns || !matches!(transaction.poll(now), Progress::Pending { .. })),
             1 => _ = transaction.framing_error(now),
             count => {
                 let block: Vec<u8> = (0..count * count - 3).map(|_| byte(&mut data)).collect();
-                before = received.len();
-                received.extend(&block);
+                let ends = (0..).map(|behind| now.saturating_sub(behind * 10 * bit_ns));
+                let timed: Vec<(u8, u64)> = block.iter().rev().copied().zip(ends).collect();
+                received.extend(timed.into_iter().rev());
                 _ = transaction.hear(&block, now);
             }
         }
@@ -46,15 +49,18 @@ pub fn master(mut data: &[u8]) {
     assert_eq!(transaction.poll(u64::MAX), end);
     match end {
         Progress::Done { value, ready_ns } => {
-            // It ends in the last block, behind which there may be a glitch.
             let response = value.response.emit();
-            let ends = before + 1..=received.len();
-            assert!(ends.into_iter().any(|end| received[..end].ends_with(response.as_bytes())));
-            // Four bits of turn-around and the response itself have passed since the end of the request.
-            let fields = u64::from(request.data_id().request_fields() + request.data_id().response_fields());
-            assert!(ready_ns >= (fields * 10 + 4) * u64::from(rate.bit_ns()));
+            let fields = response.as_bytes().len();
+            // Four bits of turn-around and the first field have passed since the end of the request.
+            let asked = u64::from(request.data_id().request_fields()) * 10;
+            let earliest_ns = (asked + 4 + 10) * bit_ns;
+            let stands =
+                |at: &[(u8, u64)]| at[0].1 >= earliest_ns && at.iter().map(|(byte, _)| byte).eq(response.as_bytes());
+            assert!(received.windows(fields).any(stands), "{response:02x?} in {received:02x?}");
+            // And the response itself.
+            assert!(ready_ns >= (asked + 4 + 10 * fields as u64) * bit_ns);
         }
-        Progress::Failed { ready_ns, .. } => assert!(ready_ns >= 10_000 + 120 * u64::from(rate.bit_ns())),
+        Progress::Failed { ready_ns, .. } => assert!(ready_ns >= 10_000 + 120 * bit_ns),
         Progress::Pending { .. } => panic!("the time-out did not end it"),
     }
 }
