@@ -3,6 +3,7 @@
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     clippy::indexing_slicing,
     clippy::panic,
@@ -15,6 +16,7 @@ mod common;
 mod device_rules;
 mod event_order;
 mod exchange_rules;
+mod hostile;
 mod master_bench;
 mod master_rules;
 mod one_check;
