@@ -103,7 +103,7 @@ impl EchoWatch {
             lag
         });
         self.lag = Some(due);
-        if lag == due || missed > 0 && lag < due && due <= lag.saturating_add(missed) {
+        if lag == due || lag < due && due <= lag.saturating_add(missed) {
             self.seen = 0;
             self.sure = self.sure.saturating_add(1);
             return Arrival::OnTime;
