@@ -16,9 +16,34 @@
 #define SW_NO_TIME UINT64_MAX
 
 /**
+ * Bits of an answer.
+ */
+#define SW_HDSL_ANSWER_BITS 61
+
+/**
+ * H-frames of a V-frame.
+ */
+#define SW_HDSL_V_FRAME 8
+
+/**
+ * Bytes of the longest message.
+ */
+#define SW_HDSL_MESSAGE 14
+
+/**
+ * The offset of a long message that has none.
+ */
+#define SW_HDSL_NO_OFFSET 65535
+
+/**
  * Samples of the window of an answer: bytes, one a bit, eight samples each.
  */
 #define SW_HDSL_WINDOW 72
+
+/**
+ * What an encoder answers in START, LEARN and CHECK: 61 bits, the first of the line in bit 0.
+ */
+#define SW_HDSL_TEST_PATTERN 1378889697208046386
 
 /**
  * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
@@ -369,11 +394,11 @@ enum sw_hdsl_dialect_t
 #endif // __cplusplus
  {
     /**
-     * The manual of the link.
+     * The manual of the link: every word of an answer has to stand in the 8b/10b tables.
      */
     SW_HDSL_SICK = 0,
     /**
-     * The receiver of TI's Motor Control SDK.
+     * The receiver of TI's Motor Control SDK: its reduced tables, its marks, its arithmetic.
      */
     SW_HDSL_TI = 1,
 };
@@ -382,7 +407,32 @@ typedef uint8_t sw_hdsl_dialect_t;
 #endif // __cplusplus
 
 /**
- * Refusals of HIPERFACE DSL that these calls give.
+ * How well a 10-bit word fits the running disparity.
+ */
+enum sw_hdsl_disparity_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * It stands in the column that is due.
+     */
+    SW_HDSL_DISPARITY_OK = 0,
+    /**
+     * It stands in the other column.
+     */
+    SW_HDSL_DISPARITY_WRONG = 1,
+    /**
+     * It stands in neither.
+     */
+    SW_HDSL_DISPARITY_INVALID = 2,
+};
+#ifndef __cplusplus
+typedef int32_t sw_hdsl_disparity_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of HIPERFACE DSL.
  */
 enum sw_hdsl_error_t
 #ifdef __cplusplus
@@ -390,12 +440,255 @@ enum sw_hdsl_error_t
 #endif // __cplusplus
  {
     /**
-     * Fewer samples than the window of an answer.
+     * Fewer bits, samples or bytes than the unit has.
      */
     SW_E_HDSL_TRUNCATED = -769,
+    /**
+     * A 10-bit word stands in neither column of the 8b/10b tables.
+     */
+    SW_E_HDSL_INVALID_WORD = -770,
+    /**
+     * A special character where only data may be, or data where a special character must be.
+     */
+    SW_E_HDSL_WRONG_KIND = -771,
+    /**
+     * The encoder has no value for this frame.
+     */
+    SW_E_HDSL_ENCODER_ERROR = -772,
+    /**
+     * The CRC-5 of the acceleration word is wrong.
+     */
+    SW_E_HDSL_ACCELERATION_CRC = -773,
+    /**
+     * The CRC-16 of a safe position or of a message is wrong.
+     */
+    SW_E_HDSL_CRC = -774,
+    /**
+     * The block is sound, but the encoder cannot deliver a position.
+     */
+    SW_E_HDSL_POSITION_INVALID = -775,
+    /**
+     * The symbol of a parameter byte has no meaning in this direction.
+     */
+    SW_E_HDSL_UNDEFINED_SYMBOL = -776,
+    /**
+     * The line stayed high: nobody answered.
+     */
+    SW_E_HDSL_NO_EDGE = -777,
+    /**
+     * The test pattern of the start-up is at none of the delays.
+     */
+    SW_E_HDSL_PATTERN_NOT_FOUND = -778,
+    /**
+     * The answer is not the test pattern.
+     */
+    SW_E_HDSL_PATTERN = -779,
+    /**
+     * The bits are not the beginning of an H-frame.
+     */
+    SW_E_HDSL_FRAMING = -780,
+    /**
+     * The two copies of the encoder identifier differ.
+     */
+    SW_E_HDSL_ENCODER_ID_MISMATCH = -781,
+    /**
+     * The identifier asks for something that this receiver does not do.
+     */
+    SW_E_HDSL_UNSUPPORTED_ENCODER = -782,
+    /**
+     * The answer to a short message begins like a long one.
+     */
+    SW_E_HDSL_LONG_MESSAGE_START = -783,
+    /**
+     * The answer to a long message begins like a short one.
+     */
+    SW_E_HDSL_SHORT_MESSAGE_START = -784,
+    /**
+     * A sound message speaks of something else.
+     */
+    SW_E_HDSL_HEADER = -785,
+    /**
+     * The encoder answered a long message with an error: its code is in the data.
+     */
+    SW_E_HDSL_RESOURCE = -786,
+    /**
+     * The encoder did not accept the message in any of the tries.
+     */
+    SW_E_HDSL_NOT_ACCEPTED = -787,
+    /**
+     * No sound answer in time in any of the tries.
+     */
+    SW_E_HDSL_NO_ANSWER = -788,
+    /**
+     * The message was dropped by a reset or a restart of the link.
+     */
+    SW_E_HDSL_DROPPED = -789,
+    /**
+     * A message of this kind is under way.
+     */
+    SW_E_HDSL_BUSY = -790,
+    /**
+     * The link is not up.
+     */
+    SW_E_HDSL_NOT_LOCKED = -791,
+    /**
+     * A long message carries 0, 2, 4 or 8 bytes.
+     */
+    SW_E_HDSL_DATA_LENGTH = -792,
+    /**
+     * The period is shorter than the frames that have to fit into it.
+     */
+    SW_E_HDSL_PERIOD_TOO_SHORT = -793,
+    /**
+     * No pulse period is known.
+     */
+    SW_E_HDSL_NO_PULSE = -795,
+    /**
+     * There is no register at this address.
+     */
+    SW_E_HDSL_NO_REGISTER = -796,
+    /**
+     * The EXTRA window is outside its range.
+     */
+    SW_E_HDSL_EXTRA_OUT_OF_RANGE = -797,
 };
 #ifndef __cplusplus
 typedef int32_t sw_hdsl_error_t;
+#endif // __cplusplus
+
+/**
+ * What the quality monitor counts.
+ */
+enum sw_hdsl_quality_event_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * VSYNC in the last frame of a V-frame.
+     */
+    SW_HDSL_VSYNC_OK = 0,
+    /**
+     * No VSYNC there.
+     */
+    SW_HDSL_VSYNC_MISSING = 1,
+    /**
+     * VSYNC in one of the first seven.
+     */
+    SW_HDSL_VSYNC_EARLY = 2,
+    /**
+     * A sound safe channel 1.
+     */
+    SW_HDSL_SAFE1_OK = 3,
+    /**
+     * A damaged safe channel 1.
+     */
+    SW_HDSL_SAFE1_ERROR = 4,
+    /**
+     * A damaged safe channel 2.
+     */
+    SW_HDSL_SAFE2_ERROR = 5,
+    /**
+     * A bad word in the parameters or the pipe channel.
+     */
+    SW_HDSL_PARAMETER_OR_PIPE_WORD = 6,
+    /**
+     * A bad word in the process data channel.
+     */
+    SW_HDSL_ACCELERATION_WORD = 7,
+    /**
+     * A special character that is not known.
+     */
+    SW_HDSL_UNKNOWN_SPECIAL = 8,
+    /**
+     * RSSI below 2.
+     */
+    SW_HDSL_LOW_RSSI = 9,
+    /**
+     * STATUS2 has TEST2 set, which only SW_HDSL_TI counts.
+     */
+    SW_HDSL_TEST2 = 10,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_hdsl_quality_event_t;
+#endif // __cplusplus
+
+/**
+ * Why the link was started anew.
+ */
+enum sw_hdsl_restart_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * It was not.
+     */
+    SW_HDSL_NO_RESTART = 0,
+    /**
+     * It was asked for.
+     */
+    SW_HDSL_RESTART_REQUESTED = 1,
+    /**
+     * A START frame: no encoder, or the test pattern is not there.
+     */
+    SW_HDSL_RESTART_LEARN = 2,
+    /**
+     * The test pattern came with a wrong bit.
+     */
+    SW_HDSL_RESTART_PATTERN = 3,
+    /**
+     * The identifier was damaged, or is of an encoder that is not supported.
+     */
+    SW_HDSL_RESTART_IDENTIFIER = 4,
+    /**
+     * No VSYNC in time.
+     */
+    SW_HDSL_RESTART_NO_VSYNC = 5,
+    /**
+     * The quality monitor has run out.
+     */
+    SW_HDSL_RESTART_QUALITY = 6,
+    /**
+     * Too many acceleration words in a row could not be used.
+     */
+    SW_HDSL_RESTART_ACCELERATION = 7,
+    /**
+     * A reason that has no name here.
+     */
+    SW_HDSL_RESTART_OTHER = 255,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_hdsl_restart_t;
+#endif // __cplusplus
+
+/**
+ * How far a fast position is aligned with the safe one; it advances once a V-frame.
+ */
+enum sw_hdsl_stage_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * The position is not known; the next safe position is taken over.
+     */
+    SW_HDSL_STAGE_POSITION = 0,
+    /**
+     * The next safe position gives the error of the velocity.
+     */
+    SW_HDSL_STAGE_VELOCITY = 1,
+    /**
+     * One V-frame with right values has to pass.
+     */
+    SW_HDSL_STAGE_SETTLE = 2,
+    /**
+     * Aligned; every safe position is compared.
+     */
+    SW_HDSL_STAGE_CHECK = 3,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_hdsl_stage_t;
 #endif // __cplusplus
 
 /**
@@ -1518,11 +1811,135 @@ typedef struct {
 } sw_clock_t;
 
 /**
- * A receiver: start-up, link, newest positions. Its content is private; it may be copied. One context at a time.
+ * A 10-bit word as a receiver reads it.
  */
 typedef struct {
-    uint64_t _private[84];
-} sw_hdsl_t;
+    /**
+     * Its value; of a bad word what the rule makes of it.
+     */
+    uint8_t byte;
+    /**
+     * 1 for a special character.
+     */
+    uint8_t special;
+    /**
+     * 1: the word stands in neither column of the tables.
+     */
+    uint8_t byte_error;
+} sw_hdsl_reading_t;
+
+/**
+ * An answer: its six words, and what they say.
+ */
+typedef struct {
+    /**
+     * Vertical, parameter, pipe, two of the acceleration, secondary.
+     */
+    sw_hdsl_reading_t words[6];
+    /**
+     * SW_OK, or why the acceleration must not be used.
+     */
+    sw_result_t acceleration;
+    /**
+     * The parameter byte, 0..255, with VSYNC in bit 7, or why it cannot be read.
+     */
+    sw_result_t parameter;
+    /**
+     * Change of speed, steps; 0 unless `acceleration` is SW_OK.
+     */
+    int16_t delta_delta;
+    /**
+     * The switch bit is right.
+     */
+    uint8_t switch_ok;
+} sw_hdsl_answer_t;
+
+/**
+ * A character of 8b/10b.
+ */
+typedef struct {
+    /**
+     * Its value.
+     */
+    uint8_t byte;
+    /**
+     * 1 for a special character (K), 0 for data (D).
+     */
+    uint8_t special;
+} sw_hdsl_character_t;
+
+/**
+ * What an answer is made of.
+ */
+typedef struct {
+    /**
+     * Change of speed, -1024..1023 steps.
+     */
+    int16_t delta_delta;
+    /**
+     * 1: the encoder has a value for this frame; 0: K29.7 K29.7 are sent in its place.
+     */
+    uint8_t accelerated;
+    /**
+     * Data byte of the vertical channel.
+     */
+    uint8_t vertical;
+    /**
+     * Parameter byte.
+     */
+    uint8_t parameter;
+    /**
+     * Pipe channel.
+     */
+    sw_hdsl_character_t pipe;
+    /**
+     * Secondary channel.
+     */
+    sw_hdsl_character_t secondary;
+} sw_hdsl_content_t;
+
+/**
+ * A safe position with what came around it: as received, not yet a position.
+ */
+typedef struct {
+    /**
+     * Position, 40 bits.
+     */
+    uint64_t vpos;
+    /**
+     * SW_OK, or why the block must not be used.
+     */
+    sw_result_t result;
+    /**
+     * CRC as received.
+     */
+    uint16_t crc;
+    /**
+     * Status byte.
+     */
+    uint8_t status;
+} sw_hdsl_safe_t;
+
+/**
+ * The two safe positions of a V-frame.
+ */
+typedef struct {
+    /**
+     * Safe channel 1, from the vertical words.
+     */
+    sw_hdsl_safe_t safe1;
+    /**
+     * Safe channel 2, from the secondary words.
+     */
+    sw_hdsl_safe_t safe2;
+} sw_hdsl_v_frame_t;
+
+/**
+ * A modelled encoder. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[54];
+} sw_hdsl_device_t;
 
 /**
  * What is to be sent from the start of an H-frame.
@@ -1547,6 +1964,189 @@ typedef struct {
 } sw_hdsl_transmission_t;
 
 /**
+ * The arithmetic of the fast position. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[14];
+} sw_hdsl_tracker_t;
+
+/**
+ * Registers of the fast position.
+ */
+typedef struct {
+    /**
+     * POS, 40 bits.
+     */
+    uint64_t pos;
+    /**
+     * VEL, steps an H-frame.
+     */
+    int32_t vel;
+    /**
+     * Words in a row that could not be used.
+     */
+    uint32_t acc_err_cnt;
+    /**
+     * The event POS: the fast position is not the safe one.
+     */
+    uint8_t pos_flag;
+    /**
+     * sw_hdsl_stage_t.
+     */
+    uint8_t stage;
+} sw_hdsl_position_registers_t;
+
+/**
+ * A quality monitor. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[2];
+} sw_hdsl_quality_t;
+
+/**
+ * SYNC to PARA.
+ */
+typedef struct {
+    /**
+     * The first bit of the line in bit 0 of byte 0.
+     */
+    uint8_t bits[16];
+    /**
+     * PARA: the parameter byte, coded.
+     */
+    uint16_t para;
+    /**
+     * Bits of the head.
+     */
+    uint8_t len;
+    /**
+     * The four bits that level the line.
+     */
+    uint8_t equalisation;
+    /**
+     * Ones minus zeros of the line behind it, without an answer.
+     */
+    int8_t disparity;
+} sw_hdsl_head_t;
+
+/**
+ * The window and the stuffing of a synchronised frame.
+ */
+typedef struct {
+    /**
+     * TIME_EXTRA_WINDOW in eighths of a bit.
+     */
+    int16_t window;
+    /**
+     * Where the sampling edge stands in the window, 24..72 eighths.
+     */
+    uint8_t edge;
+    /**
+     * NUM_STUFFING: blocks of six bits after the frame before, 0..26.
+     */
+    uint8_t stuffing;
+    /**
+     * EXTRA_EDGE, the register: ones as the edge has them.
+     */
+    uint8_t edge_register;
+} sw_hdsl_extra_t;
+
+/**
+ * A short message: a register of the encoder is read or written.
+ */
+typedef struct {
+    /**
+     * Address, 40h..7Fh.
+     */
+    uint8_t register_address;
+    /**
+     * 1: write, 0: read.
+     */
+    uint8_t write;
+    /**
+     * What is written.
+     */
+    uint8_t value;
+} sw_hdsl_short_t;
+
+/**
+ * A long message: a resource of the encoder is read or written.
+ */
+typedef struct {
+    /**
+     * Address of the resource, 10 bits.
+     */
+    uint16_t address;
+    /**
+     * Offset, 15 bits; SW_HDSL_NO_OFFSET for none.
+     */
+    uint16_t offset;
+    /**
+     * 1: write, 0: read.
+     */
+    uint8_t write;
+    /**
+     * 1: indirect addressing.
+     */
+    uint8_t indirect;
+    /**
+     * Bytes to be read or written: 0, 2, 4 or 8.
+     */
+    uint8_t len;
+    /**
+     * What is written.
+     */
+    uint8_t data[8];
+} sw_hdsl_long_t;
+
+/**
+ * The data of an answer. Of SW_E_HDSL_RESOURCE they are the error code of the encoder: detail, then class.
+ */
+typedef struct {
+    /**
+     * Bytes of it.
+     */
+    uint8_t len;
+    /**
+     * The bytes, 0 behind them.
+     */
+    uint8_t data[8];
+} sw_hdsl_data_t;
+
+/**
+ * A receiver: start-up, link, newest positions. Its content is private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[84];
+} sw_hdsl_t;
+
+/**
+ * How the messages of the last H-frame ended.
+ */
+typedef struct {
+    /**
+     * SW_PENDING: none came to its end; SW_OK, or why it failed.
+     */
+    sw_result_t short_result;
+    /**
+     * The same for the long message.
+     */
+    sw_result_t long_result;
+    /**
+     * What the long one brought.
+     */
+    sw_hdsl_data_t data;
+    /**
+     * The register of the short one.
+     */
+    uint8_t register_address;
+    /**
+     * What was read of it; 0 after a write.
+     */
+    uint8_t value;
+} sw_hdsl_finished_t;
+
+/**
  * A fast position that may be used.
  */
 typedef struct {
@@ -1569,11 +2169,90 @@ typedef struct {
 } sw_hdsl_position_t;
 
 /**
- * A modelled encoder. Its content is private; it may be copied.
+ * How the H-frame that was heard last goes on, and what it brought beside the positions.
  */
 typedef struct {
-    uint64_t _private[54];
-} sw_hdsl_device_t;
+    /**
+     * What is driven behind the answer (TRAILER, then stuffing), the first bit of the line in bit 0 of byte 0.
+     */
+    uint8_t tail[24];
+    /**
+     * Bits of it.
+     */
+    uint8_t tail_bits;
+    /**
+     * Bits of TRAILER in which the line idles before it.
+     */
+    uint8_t tail_idle;
+    /**
+     * sw_hdsl_restart_t: set if the next frame begins a new start-up.
+     */
+    uint8_t restarted;
+    /**
+     * 1: the start-up broke off in a LEARN frame, and only the zeros of TRAILER are driven.
+     */
+    uint8_t cut;
+    /**
+     * Quality monitor, 0..15.
+     */
+    uint8_t quality;
+    /**
+     * RSSI of this answer, 0..12; 255 if it was not measured.
+     */
+    uint8_t rssi;
+    /**
+     * 1: no short message is under way.
+     */
+    uint8_t short_free;
+    /**
+     * 1: no long message is under way.
+     */
+    uint8_t long_free;
+    /**
+     * The word of the pipe channel: its byte; -1 for none (K30.7), -2 for a word in no table.
+     */
+    int16_t pipe;
+    /**
+     * 1: it is a special character.
+     */
+    uint8_t pipe_special;
+    /**
+     * Acceleration words in a row that could not be used.
+     */
+    uint32_t acceleration_errors;
+    /**
+     * Restarts of the link since the start.
+     */
+    uint32_t restarts;
+} sw_hdsl_frame_t;
+
+/**
+ * Registers of a receiver. Its content is private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[64];
+} sw_hdsl_registers_t;
+
+/**
+ * The FIFO of eight bytes that PIPE_S and PIPE_D read. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[5];
+} sw_hdsl_pipe_t;
+
+/**
+ * Where the bits of an answer are sampled.
+ */
+typedef struct {
+    /**
+     * The sample of a bit, 0..7.
+     */
+    uint8_t index;
+    /**
+     * The delay of the cable, 0..11 bits.
+     */
+    uint8_t delay;
+} sw_hdsl_alignment_t;
 
 /**
  * The end of the background. It belongs to its queue: it is not copied.
@@ -2489,8 +3168,232 @@ uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
 
 /**
+ * What an answer says by the rules of a dialect (sw_hdsl_dialect_t): `len` bits of the line, the first in bit 0. Its channels are judged one
+ * by one; refused is only what is no answer at all, SW_E_HDSL_TRUNCATED.
+ */
+sw_result_t sw_hdsl_parse_answer(uint64_t bits,
+                                 uint32_t len,
+                                 uint8_t dialect,
+                                 sw_hdsl_answer_t *answer);
+
+/**
+ * The bits of an answer, the first of the line in bit 0, at a running disparity, -1 or 1, which becomes that behind it.
+ */
+sw_result_t sw_hdsl_build_answer(const sw_hdsl_content_t *content,
+                                 int8_t *rd,
+                                 uint64_t *bits);
+
+/**
+ * The safe positions in the eight answers of a V-frame.
+ */
+sw_result_t sw_hdsl_parse_v_frame(const uint64_t *bits,
+                                  size_t len,
+                                  uint8_t dialect,
+                                  sw_hdsl_v_frame_t *v_frame);
+
+/**
+ * Switches a modelled encoder on, with an encoder identifier.
+ */
+sw_result_t sw_hdsl_device_start(sw_hdsl_device_t *device, uint32_t encoder_id);
+
+/**
+ * Turns its shaft.
+ */
+sw_result_t sw_hdsl_device_set_position(sw_hdsl_device_t *device, uint64_t position);
+
+/**
+ * What it answers to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones where it is silent.
+ */
+sw_result_t sw_hdsl_device_hear(sw_hdsl_device_t *device,
+                                const sw_hdsl_transmission_t *heard,
+                                uint64_t *bits);
+
+/**
+ * A tracker for an encoder with this many position bits, 8..40, by the rules of a dialect (sw_hdsl_dialect_t).
+ */
+sw_result_t sw_hdsl_tracker_start(sw_hdsl_tracker_t *tracker,
+                                  uint8_t position_bits,
+                                  uint8_t dialect);
+
+/**
+ * An H-frame with this change of speed, -1024..1023 steps.
+ */
+sw_result_t sw_hdsl_tracker_step(sw_hdsl_tracker_t *tracker, int16_t delta_delta);
+
+/**
+ * An H-frame whose acceleration must not be used.
+ */
+sw_result_t sw_hdsl_tracker_miss(sw_hdsl_tracker_t *tracker);
+
+/**
+ * The safe position at the end of a V-frame.
+ */
+sw_result_t sw_hdsl_tracker_align(sw_hdsl_tracker_t *tracker, uint64_t vpos);
+
+/**
+ * A V-frame without a safe position.
+ */
+sw_result_t sw_hdsl_tracker_no_safe_position(sw_hdsl_tracker_t *tracker);
+
+/**
+ * The registers.
+ */
+sw_result_t sw_hdsl_tracker_registers(const sw_hdsl_tracker_t *tracker,
+                                      sw_hdsl_position_registers_t *registers);
+
+/**
+ * A monitor at its start, 8, with the penalties of a dialect (sw_hdsl_dialect_t).
+ */
+sw_result_t sw_hdsl_quality_start(sw_hdsl_quality_t *quality, uint8_t dialect);
+
+/**
+ * Counts an event, sw_hdsl_quality_event_t.
+ */
+sw_result_t sw_hdsl_quality_count(sw_hdsl_quality_t *quality, uint8_t event);
+
+/**
+ * The value of the monitor, 0..15, or a refusal.
+ */
+sw_result_t sw_hdsl_quality_value(const sw_hdsl_quality_t *quality);
+
+/**
+ * Whether the link is lost; true for a state that was not started.
+ */
+bool sw_hdsl_quality_is_lost(const sw_hdsl_quality_t *quality);
+
+/**
+ * A head with a parameter byte, behind a line of this disparity. `edge` is where the sampling edge stands in the EXTRA window, in eighths of
+ * a bit, 24..72; 0 for a free-running frame.
+ */
+sw_result_t sw_hdsl_build_head(uint8_t parameter,
+                               uint8_t edge,
+                               int8_t before,
+                               sw_hdsl_head_t *head);
+
+/**
+ * The same as samples, eight a bit, a byte each: SW_E_SHORT_BUFFER below `head.len` bytes.
+ */
+sw_result_t sw_hdsl_head_samples(uint8_t parameter,
+                                 uint8_t edge,
+                                 int8_t before,
+                                 uint8_t *samples,
+                                 size_t size,
+                                 size_t *len);
+
+/**
+ * The parameter byte in a head as an encoder hears it, and the bits of its EXTRA window beyond a free-running one.
+ */
+sw_result_t sw_hdsl_parse_head(const sw_hdsl_head_t *head,
+                               uint8_t *parameter,
+                               uint8_t *extra_bits);
+
+/**
+ * The bits that level a line of this disparity, which becomes that behind them.
+ */
+sw_result_t sw_hdsl_equalisation(int8_t *disparity, uint8_t *bits);
+
+/**
+ * The word of a parameter byte on a line of this disparity, which becomes that behind it.
+ */
+sw_result_t sw_hdsl_build_parameter(uint8_t parameter, int8_t *disparity, uint16_t *word);
+
+/**
+ * The parameter byte of a word. SW_E_NO_VALUE for a word that is none.
+ */
+sw_result_t sw_hdsl_parse_parameter(uint16_t word, uint8_t *parameter);
+
+/**
+ * The window and the stuffing of the next frame, whose edge comes `adjust` eighths later than without. `edge_register` is only written.
+ * SW_E_HDSL_EXTRA_OUT_OF_RANGE: it cannot, and stays as it was.
+ */
+sw_result_t sw_hdsl_extra_step(sw_hdsl_extra_t *state,
+                               int16_t adjust);
+
+/**
+ * EXTRA_EDGE for a sampling edge at 24..72 eighths of a bit: the samples of the last bit. 0 for another edge.
+ */
+uint8_t sw_hdsl_edge_register(uint8_t edge);
+
+/**
+ * The bytes of a short message with their CRC.
+ */
+sw_result_t sw_hdsl_build_short(const sw_hdsl_short_t *it, uint8_t *bytes, size_t size, size_t *len);
+
+/**
+ * A short message as an encoder receives it.
+ */
+sw_result_t sw_hdsl_parse_short(const uint8_t *bytes, size_t len, sw_hdsl_short_t *it);
+
+/**
+ * What the encoder answers to a short message, with the value that was read.
+ */
+sw_result_t sw_hdsl_build_short_answer(const sw_hdsl_short_t *it,
+                                       uint8_t value,
+                                       uint8_t *bytes,
+                                       size_t size,
+                                       size_t *len);
+
+/**
+ * The answer to a short message: the value that was read, 0 after a write.
+ */
+sw_result_t sw_hdsl_parse_short_answer(const sw_hdsl_short_t *it,
+                                       const uint8_t *bytes,
+                                       size_t len,
+                                       uint8_t *value);
+
+/**
+ * The bytes of a long message with their CRC.
+ */
+sw_result_t sw_hdsl_build_long(const sw_hdsl_long_t *it, uint8_t *bytes, size_t size, size_t *len);
+
+/**
+ * A long message as an encoder receives it.
+ */
+sw_result_t sw_hdsl_parse_long(const uint8_t *bytes, size_t len, sw_hdsl_long_t *it);
+
+/**
+ * What the encoder answers to a long message: data, or (`refuses` is 1) its error code, detail and class.
+ */
+sw_result_t sw_hdsl_build_long_answer(const sw_hdsl_long_t *it,
+                                      uint8_t refuses,
+                                      const sw_hdsl_data_t *answer,
+                                      uint8_t *bytes,
+                                      size_t size,
+                                      size_t *len);
+
+/**
+ * The answer to a long message. Of SW_E_HDSL_RESOURCE the code of the encoder is written too.
+ */
+sw_result_t sw_hdsl_parse_long_answer(const sw_hdsl_long_t *it,
+                                      const uint8_t *bytes,
+                                      size_t len,
+                                      sw_hdsl_data_t *answer);
+
+/**
+ * Starts a short message on a running link; its end is in sw_hdsl_finished(). SW_E_HDSL_BUSY, SW_E_HDSL_NOT_LOCKED. What fails may be
+ * sent again up to the limit of tries.
+ */
+sw_result_t sw_hdsl_send_short(sw_hdsl_t *m,
+                               const sw_hdsl_short_t *it);
+
+/**
+ * Starts a long message on a running link, which is sent once.
+ */
+sw_result_t sw_hdsl_send_long(sw_hdsl_t *m, const sw_hdsl_long_t *it);
+
+/**
+ * Drops all messages, and tells the encoder so (MRST).
+ */
+sw_result_t sw_hdsl_reset_messages(sw_hdsl_t *m);
+
+/**
+ * Which messages came to their end in the H-frame that was heard last.
+ */
+sw_result_t sw_hdsl_finished(const sw_hdsl_t *m, sw_hdsl_finished_t *finished);
+
+/**
  * A free-running receiver at the begin of the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
- * known.
+ * known. `dialect` is sw_hdsl_dialect_t.
  */
 sw_result_t sw_hdsl_start(sw_hdsl_t *m,
                           uint8_t dialect,
@@ -2532,21 +3435,191 @@ bool sw_hdsl_position(const sw_hdsl_t *m,
 bool sw_hdsl_safe_position(const sw_hdsl_t *m, uint64_t now_ns, uint64_t max_age_ns, int64_t *position);
 
 /**
- * Switches a modelled encoder on, with an encoder identifier.
+ * The H-frame that was heard last: what has to be driven behind its answer, and what it brought.
  */
-sw_result_t sw_hdsl_device_start(sw_hdsl_device_t *device, uint32_t encoder_id);
+sw_result_t sw_hdsl_frame(const sw_hdsl_t *m, sw_hdsl_frame_t *frame);
 
 /**
- * Turns its shaft.
+ * Where the receiver is in its start-up: sw_hdsl_state_t, or a refusal.
  */
-sw_result_t sw_hdsl_device_set_position(sw_hdsl_device_t *device, uint64_t position);
+sw_result_t sw_hdsl_state(const sw_hdsl_t *m);
 
 /**
- * What it answers to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones where it is silent.
+ * The encoder identifier, 20 bits. SW_E_NO_VALUE before it has come.
  */
-sw_result_t sw_hdsl_device_hear(sw_hdsl_device_t *device,
-                                const sw_hdsl_transmission_t *heard,
-                                uint64_t *bits);
+sw_result_t sw_hdsl_encoder_id(const sw_hdsl_t *m, uint32_t *id);
+
+/**
+ * Starts the link anew at the end of the present frame (PRST).
+ */
+sw_result_t sw_hdsl_restart(sw_hdsl_t *m);
+
+/**
+ * So many H-frames went over the line whose answers will not be heard, before the one that is heard next.
+ */
+sw_result_t sw_hdsl_skip(sw_hdsl_t *m, uint8_t frames);
+
+/**
+ * A receiver that keeps its frames on an external pulse: `period` eighths of a bit (13.333 ns each) from pulse to pulse, and 1..10 frames
+ * for each. Otherwise as sw_hdsl_start(); SW_E_HDSL_PERIOD_TOO_SHORT, SW_E_HDSL_EXTRA_OUT_OF_RANGE.
+ */
+sw_result_t sw_hdsl_start_synchronised(sw_hdsl_t *m,
+                                       uint8_t dialect,
+                                       uint32_t steps_per_turn,
+                                       uint32_t period,
+                                       uint8_t frames_per_pulse);
+
+/**
+ * The frames of a running link are synchronised from the next one on, or free running with 0 frames. The link goes on.
+ */
+sw_result_t sw_hdsl_set_sync(sw_hdsl_t *m,
+                             uint32_t period,
+                             uint8_t frames_per_pulse);
+
+/**
+ * Whether the edge of the present frame belongs to a pulse.
+ */
+bool sw_hdsl_is_on_pulse(const sw_hdsl_t *m);
+
+/**
+ * Whether the last pulses came close to their edges.
+ */
+bool sw_hdsl_is_in_step(const sw_hdsl_t *m);
+
+/**
+ * The pulse of the present frame came this many eighths of a bit after its sampling edge (below 0: before it). To be told before the
+ * answer is heard, in frames that are on a pulse.
+ */
+sw_result_t sw_hdsl_hear_pulse(sw_hdsl_t *m,
+                               int16_t late);
+
+/**
+ * The registers of a receiver of this dialect (sw_hdsl_dialect_t) before its first frame.
+ */
+sw_result_t sw_hdsl_registers_start(sw_hdsl_registers_t *map, uint8_t dialect);
+
+/**
+ * Takes over what the receiver heard last: once behind each sw_hdsl_hear().
+ */
+sw_result_t sw_hdsl_registers_apply(sw_hdsl_registers_t *map, const sw_hdsl_t *m);
+
+/**
+ * Reads a register as an application does: reading PIPE_S takes an entry. SW_E_HDSL_NO_REGISTER.
+ */
+sw_result_t sw_hdsl_registers_read(sw_hdsl_registers_t *map, uint8_t address, uint8_t *value);
+
+/**
+ * Looks at a register: nothing is taken.
+ */
+sw_result_t sw_hdsl_registers_look(const sw_hdsl_registers_t *map, uint8_t address, uint8_t *value);
+
+/**
+ * Writes a register as an application does, which starts what it stands for in the receiver: messages, resets, synchronisation. What is
+ * refused leaves its value.
+ */
+sw_result_t sw_hdsl_registers_write(sw_hdsl_registers_t *map,
+                                    sw_hdsl_t *m,
+                                    uint8_t address,
+                                    uint8_t value);
+
+/**
+ * How far the fast position is aligned with the safe one: sw_hdsl_stage_t, or a refusal.
+ */
+sw_result_t sw_hdsl_registers_stage(const sw_hdsl_registers_t *map);
+
+/**
+ * An empty FIFO.
+ */
+sw_result_t sw_hdsl_pipe_start(sw_hdsl_pipe_t *pipe);
+
+/**
+ * A word of the pipe channel by the rules of a dialect (sw_hdsl_dialect_t): the oldest one goes if there is no room.
+ */
+sw_result_t sw_hdsl_pipe_put(sw_hdsl_pipe_t *pipe,
+                             uint16_t word,
+                             uint8_t dialect);
+
+/**
+ * Takes the oldest entry: PIPE_S and PIPE_D.
+ */
+sw_result_t sw_hdsl_pipe_take(sw_hdsl_pipe_t *pipe, uint8_t *status, uint8_t *data);
+
+/**
+ * Finds the test pattern of the start-up in a window of samples, by the edges that a dialect looks at. SW_E_HDSL_NO_EDGE, or
+ * SW_E_HDSL_PATTERN_NOT_FOUND, which writes `index` as the first edge gave it.
+ */
+sw_result_t sw_hdsl_learn(const uint8_t *samples,
+                          size_t len,
+                          uint8_t dialect,
+                          sw_hdsl_alignment_t *alignment);
+
+/**
+ * The 61 bits of an answer in its window of samples, the first of the line in bit 0, and their RSSI, 0..12 (may be NULL).
+ */
+sw_result_t sw_hdsl_sampled(const sw_hdsl_alignment_t *alignment,
+                            const uint8_t *samples,
+                            size_t len,
+                            uint64_t *bits,
+                            uint8_t *rssi);
+
+/**
+ * The sample, 0..7, that lies in the middle of the bits of a line with a falling (or a rising) edge in these eight samples.
+ */
+uint8_t sw_hdsl_sample_index(uint8_t samples,
+                             bool falling);
+
+/**
+ * Bit n is set if the line changes before sample n of these eight; `previous` is the sample before them.
+ */
+uint8_t sw_hdsl_edges(bool previous, uint8_t samples);
+
+/**
+ * RSSI of the places in a bit at which edges were seen, 0..12.
+ */
+uint8_t sw_hdsl_rssi(uint8_t edges);
+
+/**
+ * The longest part of a bit without edges, 1..8 samples; 0 if no edge was seen.
+ */
+uint8_t sw_hdsl_longest_gap(uint8_t edges);
+
+/**
+ * The word of a character at a running disparity, -1 or 1, which becomes that behind it. The first bit of the line is bit 0.
+ */
+sw_result_t sw_hdsl_build_word(const sw_hdsl_character_t *it,
+                               int8_t *rd,
+                               uint16_t *out);
+
+/**
+ * How a dialect (sw_hdsl_dialect_t) reads a word.
+ */
+sw_result_t sw_hdsl_read_word(uint16_t raw, uint8_t dialect, sw_hdsl_reading_t *reading);
+
+/**
+ * Ones minus zeros of the ten bits of a word.
+ */
+int8_t sw_hdsl_disparity(uint16_t raw);
+
+/**
+ * Whether a word stands in the column of the running disparity `rd` (sw_hdsl_disparity_t), which becomes that behind it.
+ */
+sw_result_t sw_hdsl_check_disparity(uint16_t raw,
+                                    int8_t *rd);
+
+/**
+ * The CRC-16 of safe positions and messages; its high byte is sent first.
+ */
+sw_result_t sw_hdsl_crc16(const uint8_t *bytes, size_t len, uint16_t *crc);
+
+/**
+ * The change of speed in an acceleration word, -1024..1023 steps. SW_E_HDSL_ACCELERATION_CRC.
+ */
+sw_result_t sw_hdsl_parse_acceleration(uint16_t raw, int16_t *delta_delta);
+
+/**
+ * The acceleration word of a change of speed, -1024..1023 steps, with its CRC-5.
+ */
+sw_result_t sw_hdsl_build_acceleration(int16_t delta_delta, uint16_t *out);
 
 /**
  * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a

@@ -2,7 +2,7 @@
  * passed and failed; a run without rows fails. */
 #include "rows.h"
 
-static char answer[65536];
+static char answer[262144];
 static size_t said;
 static void *blocks[64];
 static int held;
@@ -80,7 +80,8 @@ void say_bits(const uint8_t *bytes, size_t bits)
 
 static command_t *find(const char *name)
 {
-    static const entry_t *const tables[] = {tformat_commands, aformat_commands, rtex_commands, sorte_commands};
+    static const entry_t *const tables[] = {tformat_commands, aformat_commands, hdsl_commands, hdsl_link_commands,
+        rtex_commands, sorte_commands};
     size_t k;
     for (k = 0; k < sizeof tables / sizeof *tables; k++) {
         const entry_t *entry;

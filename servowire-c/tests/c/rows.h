@@ -23,7 +23,7 @@ typedef struct {
     command_t *call;
 } entry_t;
 
-extern const entry_t tformat_commands[], aformat_commands[], rtex_commands[], sorte_commands[];
+extern const entry_t tformat_commands[], aformat_commands[], hdsl_commands[], hdsl_link_commands[], rtex_commands[], sorte_commands[];
 
 void say(const char *format, ...);
 uint64_t number(const char *text);       /* decimal, or hexadecimal behind 0x; - is 0 */
@@ -35,5 +35,7 @@ block_t hex(const char *text);           /* bytes; - for none */
 block_t packed(const char *text);        /* 0 and 1, the first of the line in bit 0 */
 void say_hex(const uint8_t *bytes, size_t len);
 void say_bits(const uint8_t *bytes, size_t bits);
+uint64_t line_bits(const char *text);    /* 0 and 1, the first of the line in bit 0 */
+void say_line(uint64_t bits, unsigned len);
 
 #endif
