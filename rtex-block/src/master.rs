@@ -37,7 +37,7 @@ pub use led::{Led, Pattern, led, pattern};
 pub use phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 pub use profile_move::{CommandEnded, MoveStage, ProfileMove};
 pub use progress::{Failure, Progress};
-pub use ring::{Ring, RingFailure, SameMacId};
+pub use ring::{Fellows, Ring, RingFailure, SameMacId};
 pub use run::{Ended, Run};
 pub use service::{Master, MasterConfig, SetupError};
 pub use servo_off::{ActiveCode, ServoOff};

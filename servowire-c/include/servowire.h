@@ -46,6 +46,16 @@
 #define SW_HDSL_TEST_PATTERN 1378889697208046386
 
 /**
+ * Bit 1 of byte 9 of a profile response: inside the near window.
+ */
+#define SW_RTEX_NEAR (1 << 1)
+
+/**
+ * Axes of a ring at most.
+ */
+#define SW_RTEX_AXES 32
+
+/**
  * Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
  * frame.
  */
@@ -807,6 +817,97 @@ typedef int32_t sw_motion_work_t;
 #endif // __cplusplus
 
 /**
+ * How a response answers the command before.
+ */
+enum sw_rtex_acknowledgement_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * The drive has taken the command.
+     */
+    SW_RTEX_ACCEPTED = 0,
+    /**
+     * The Update_Counter is not echoed.
+     */
+    SW_RTEX_COUNTER_NOT_ECHOED = 1,
+    /**
+     * The code is not echoed yet.
+     */
+    SW_RTEX_CODE_NOT_YET_ECHOED = 2,
+    /**
+     * CMD_Error.
+     */
+    SW_RTEX_NOT_ACCEPTED = 3,
+};
+#ifndef __cplusplus
+typedef int32_t sw_rtex_acknowledgement_t;
+#endif // __cplusplus
+
+/**
+ * Alarms of a drive that concern the communication: main number * 256 + sub number.
+ */
+enum sw_rtex_alarm_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Err27.4: the step of the command position is too large.
+     */
+    SW_RTEX_ALARM_COMMAND_STEP = ((27 << 8) | 4),
+    /**
+     * Err86.0: the cyclic data are wrong.
+     */
+    SW_RTEX_ALARM_CYCLIC_DATA = (86 << 8),
+    /**
+     * Err86.1: the cyclic code is wrong.
+     */
+    SW_RTEX_ALARM_CYCLIC_CODE = ((86 << 8) | 1),
+    /**
+     * Err86.2: the Update_Counter is wrong.
+     */
+    SW_RTEX_ALARM_UPDATE_COUNTER = ((86 << 8) | 2),
+    /**
+     * Err91.1: the command is wrong.
+     */
+    SW_RTEX_ALARM_COMMAND_WRONG = ((91 << 8) | 1),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_alarm_t;
+#endif // __cplusplus
+
+/**
+ * The state of the communication ASIC.
+ */
+enum sw_rtex_asic_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * INITIAL.
+     */
+    SW_RTEX_ASIC_INITIAL = 0,
+    /**
+     * RING_CONFIG.
+     */
+    SW_RTEX_ASIC_RING_CONFIG = 1,
+    /**
+     * READY.
+     */
+    SW_RTEX_ASIC_READY = 2,
+    /**
+     * RUNNING.
+     */
+    SW_RTEX_ASIC_RUNNING = 3,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_asic_t;
+#endif // __cplusplus
+
+/**
  * Where an axis stands.
  */
 enum sw_rtex_axis_code_t
@@ -905,7 +1006,52 @@ typedef uint16_t sw_rtex_control_t;
 #endif // __cplusplus
 
 /**
- * Refusals of RTEX, in the order of their numbers; the last two are of axes.
+ * Error codes of a drive, with CMD_Error.
+ */
+enum sw_rtex_drive_error_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Another MAC-ID.
+     */
+    SW_RTEX_ERROR_MAC_ID = 17,
+    /**
+     * C/R is that of a response.
+     */
+    SW_RTEX_ERROR_DIRECTION = 18,
+    /**
+     * There is no such cyclic code.
+     */
+    SW_RTEX_ERROR_CYCLIC_CODE = 33,
+    /**
+     * There is no such non-cyclic code.
+     */
+    SW_RTEX_ERROR_NON_CYCLIC_CODE = 34,
+    /**
+     * The cyclic mode is not allowed now.
+     */
+    SW_RTEX_ERROR_CYCLIC_MODE = 46,
+    /**
+     * There is no such Type_Code.
+     */
+    SW_RTEX_ERROR_TYPE_CODE = 49,
+    /**
+     * An argument is out of range.
+     */
+    SW_RTEX_ERROR_ARGUMENT = 50,
+    /**
+     * The feed-forward data are out of range.
+     */
+    SW_RTEX_ERROR_FEED_FORWARD = 52,
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_drive_error_t;
+#endif // __cplusplus
+
+/**
+ * Refusals of RTEX, in the order of their numbers; from -0x4f0 on those of axes and procedures.
  */
 enum sw_rtex_error_t
 #ifdef __cplusplus
@@ -960,9 +1106,133 @@ enum sw_rtex_error_t
      * The step or the rate is beyond the limits of the axis; nothing has changed.
      */
     SW_E_RTEX_TOO_FAR = -1265,
+    /**
+     * ERR: the command was accepted and failed while it was executed.
+     */
+    SW_E_RTEX_EXECUTION = -1266,
+    /**
+     * CMD_Error: the drive did not accept the command; its code is told beside.
+     */
+    SW_E_RTEX_COMMAND_ERROR = -1267,
+    /**
+     * No answer within the limit. Whether the drive has executed the command is not known.
+     */
+    SW_E_RTEX_TIMED_OUT = -1268,
+    /**
+     * The motion did not start within the limit. It may start yet.
+     */
+    SW_E_RTEX_NOT_STARTED = -1269,
+    /**
+     * The procedure was broken off by a stop, by servo off, or by another mode.
+     */
+    SW_E_RTEX_BROKEN_OFF = -1270,
 };
 #ifndef __cplusplus
 typedef int32_t sw_rtex_error_t;
+#endif // __cplusplus
+
+/**
+ * Execution flags of a response.
+ */
+enum sw_rtex_execution_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Still executing.
+     */
+    SW_RTEX_BUSY = (1 << 4),
+    /**
+     * Executed with a restriction.
+     */
+    SW_RTEX_WNG = (1 << 6),
+    /**
+     * Accepted, and failed while it was executed.
+     */
+    SW_RTEX_ERR = (1 << 7),
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_execution_t;
+#endif // __cplusplus
+
+/**
+ * Why the control of a ring has stopped.
+ */
+enum sw_rtex_fault_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * It has not.
+     */
+    SW_RTEX_NO_FAULT = 0,
+    /**
+     * The slaves are others than in the table: until the system is reset.
+     */
+    SW_RTEX_SLAVE_INFO_MISMATCH = 1,
+    /**
+     * The communication has timed out.
+     */
+    SW_RTEX_TIMEOUT = 2,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_fault_t;
+#endif // __cplusplus
+
+/**
+ * Bits 3 to 0 of byte 9 of a homing or profile response.
+ */
+enum sw_rtex_latch_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Latch_Comp1.
+     */
+    SW_RTEX_LATCH_COMP1 = (1 << 0),
+    /**
+     * Homing: Latch_Comp2.
+     */
+    SW_RTEX_LATCH_COMP2 = (1 << 1),
+    /**
+     * Profile: PSL.
+     */
+    SW_RTEX_PSL = (1 << 3),
+    /**
+     * Profile: NSL.
+     */
+    SW_RTEX_NSL = (1 << 2),
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_latch_t;
+#endif // __cplusplus
+
+/**
+ * What the LED of a controller shows.
+ */
+enum sw_rtex_led_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * Dark.
+     */
+    SW_RTEX_LED_OFF = 0,
+    /**
+     * Green.
+     */
+    SW_RTEX_LED_GREEN = 1,
+    /**
+     * Red.
+     */
+    SW_RTEX_LED_RED = 2,
+};
+#ifndef __cplusplus
+typedef int32_t sw_rtex_led_t;
 #endif // __cplusplus
 
 /**
@@ -996,6 +1266,84 @@ enum sw_rtex_mode_t
 };
 #ifndef __cplusplus
 typedef uint8_t sw_rtex_mode_t;
+#endif // __cplusplus
+
+/**
+ * Non-cyclic codes.
+ */
+enum sw_rtex_noncyclic_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * Normal.
+     */
+    SW_RTEX_NORMAL = 0,
+    /**
+     * Reset.
+     */
+    SW_RTEX_RESET = 1,
+    /**
+     * System ID.
+     */
+    SW_RTEX_SYSTEM_ID = 2,
+    /**
+     * Homing.
+     */
+    SW_RTEX_HOMING = 4,
+    /**
+     * Alarm.
+     */
+    SW_RTEX_ALARM_COMMAND = 5,
+    /**
+     * Parameter.
+     */
+    SW_RTEX_PARAMETER = 6,
+    /**
+     * Profile.
+     */
+    SW_RTEX_PROFILE = 7,
+    /**
+     * Monitor.
+     */
+    SW_RTEX_MONITOR = 10,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_noncyclic_t;
+#endif // __cplusplus
+
+/**
+ * Where the control of a ring stands.
+ */
+enum sw_rtex_phase_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * PH_INIT.
+     */
+    SW_RTEX_PH_INIT = 0,
+    /**
+     * PH_WAITING.
+     */
+    SW_RTEX_PH_WAITING = 1,
+    /**
+     * PH_PREPARE.
+     */
+    SW_RTEX_PH_PREPARE = 2,
+    /**
+     * PH_START.
+     */
+    SW_RTEX_PH_START = 3,
+    /**
+     * PH_RUNNING.
+     */
+    SW_RTEX_PH_RUNNING = 4,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_rtex_phase_t;
 #endif // __cplusplus
 
 /**
@@ -1150,6 +1498,95 @@ enum sw_rtex_status_t
 };
 #ifndef __cplusplus
 typedef uint16_t sw_rtex_status_t;
+#endif // __cplusplus
+
+/**
+ * Type codes that public documents give, by the command they belong to.
+ */
+enum sw_rtex_type_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * Reset: software reset; system ID: vendor name; monitor: position deviation.
+     */
+    SW_RTEX_TYPE_1 = 1,
+    /**
+     * Monitor: MPOS.
+     */
+    SW_RTEX_TYPE_MPOS = 4,
+    /**
+     * Monitor: ASPD; system ID: device type.
+     */
+    SW_RTEX_TYPE_5 = 5,
+    /**
+     * Monitor: TRQ.
+     */
+    SW_RTEX_TYPE_TRQ = 6,
+    /**
+     * Monitor: APOS.
+     */
+    SW_RTEX_TYPE_APOS = 7,
+    /**
+     * Monitor: IPOS.
+     */
+    SW_RTEX_TYPE_IPOS = 8,
+    /**
+     * Monitor: LPOS1.
+     */
+    SW_RTEX_TYPE_LPOS1 = 9,
+    /**
+     * Monitor: LPOS2.
+     */
+    SW_RTEX_TYPE_LPOS2 = 10,
+    /**
+     * Monitor: MSPD.
+     */
+    SW_RTEX_TYPE_MSPD = 12,
+    /**
+     * Reset: attribute C; parameter: write; profile: relative positioning; monitor: regenerative load.
+     */
+    SW_RTEX_TYPE_11H = 17,
+    /**
+     * System ID: model; monitor: overload.
+     */
+    SW_RTEX_TYPE_12H = 18,
+    /**
+     * System ID: serial number.
+     */
+    SW_RTEX_TYPE_SERIAL_NUMBER = 19,
+    /**
+     * System ID: software version.
+     */
+    SW_RTEX_TYPE_SOFTWARE_VERSION = 20,
+    /**
+     * System ID: driver type.
+     */
+    SW_RTEX_TYPE_DRIVER_TYPE = 21,
+    /**
+     * Homing: set the actual position.
+     */
+    SW_RTEX_TYPE_SET_ACTUAL_POSITION = 33,
+    /**
+     * Homing: set the command position.
+     */
+    SW_RTEX_TYPE_SET_COMMAND_POSITION = 34,
+    /**
+     * System ID: vendor of the scale.
+     */
+    SW_RTEX_TYPE_SCALE_VENDOR_ID = 49,
+    /**
+     * System ID: model of the scale.
+     */
+    SW_RTEX_TYPE_SCALE_MODEL_ID = 50,
+    /**
+     * Homing: state of the latches.
+     */
+    SW_RTEX_TYPE_LATCH_STATE = 80,
+};
+#ifndef __cplusplus
+typedef uint16_t sw_rtex_type_t;
 #endif // __cplusplus
 
 /**
@@ -2507,6 +2944,215 @@ typedef struct {
 } sw_rtex_command_t;
 
 /**
+ * The sub block of a command, bytes 16 to 31.
+ */
+typedef struct {
+    /**
+     * Sub_Command_Data1.
+     */
+    int32_t data1;
+    /**
+     * Sub_Command_Data2.
+     */
+    int32_t data2;
+    /**
+     * Sub_Command_Data3.
+     */
+    int32_t data3;
+    /**
+     * Sub_Index.
+     */
+    uint16_t index;
+    /**
+     * Sub-command code: 0 normal, 2 system ID, 10 monitor.
+     */
+    uint8_t code;
+    /**
+     * Sub_Type_Code.
+     */
+    uint8_t type_code;
+} sw_rtex_sub_command_t;
+
+/**
+ * The sub block of a response, bytes 16 to 31.
+ */
+typedef struct {
+    /**
+     * Sub_Response_Data1.
+     */
+    int32_t data1;
+    /**
+     * Sub_Response_Data2.
+     */
+    int32_t data2;
+    /**
+     * Sub_Response_Data3.
+     */
+    int32_t data3;
+    /**
+     * Sub_Index_Echo, or Sub_Error_Code with Sub_CMD_Error.
+     */
+    uint16_t index;
+    /**
+     * Sub-command code, 0..15.
+     */
+    uint8_t code;
+    /**
+     * Sub_Type_Code_Echo.
+     */
+    uint8_t type_code;
+    /**
+     * Sub_CMD_Error, 0 or 1.
+     */
+    uint8_t cmd_error;
+    /**
+     * sw_rtex_execution_t, added.
+     */
+    uint8_t execution;
+} sw_rtex_sub_response_t;
+
+/**
+ * The phases of the control. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[2];
+} sw_rtex_phases_t;
+
+/**
+ * What the phases depend on.
+ */
+typedef struct {
+    /**
+     * sw_rtex_asic_t.
+     */
+    uint8_t asic;
+    /**
+     * The slaves that were found are those of the table: 1, they are not: 0; not compared yet: 2.
+     */
+    uint8_t slave_info;
+    /**
+     * 1: the first commands are prepared.
+     */
+    uint8_t tx_ready;
+    /**
+     * 1: the communication has timed out.
+     */
+    uint8_t timeout;
+} sw_rtex_inputs_t;
+
+/**
+ * Periods of the communication.
+ */
+typedef struct {
+    /**
+     * Communication period, ns.
+     */
+    uint32_t com_ns;
+    /**
+     * Update period, ns.
+     */
+    uint32_t update_ns;
+    /**
+     * 1: the internal-timer system may be used.
+     */
+    uint8_t internal_timer;
+} sw_rtex_periods_t;
+
+/**
+ * A modelled drive that obeys commands and moves a simple axis. Its content is private; it may be copied. Type codes that no public document
+ * gives are invented.
+ */
+typedef struct {
+    uint64_t _private[84];
+} sw_rtex_drive_t;
+
+/**
+ * A non-cyclic command under way. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[6];
+} sw_rtex_handshake_t;
+
+/**
+ * How a procedure ended.
+ */
+typedef struct {
+    /**
+     * What was read: Monitor_Data, Response_Data3, Sub_Response_Data1; 0 for none.
+     */
+    int32_t data;
+    /**
+     * Index_Echo, of a profile motion 0. With SW_E_RTEX_COMMAND_ERROR the error code of the drive.
+     */
+    uint16_t index;
+    /**
+     * 1: done, with a restriction (WNG).
+     */
+    uint8_t warning;
+    /**
+     * 1: a profile motion ended in position.
+     */
+    uint8_t in_position;
+} sw_rtex_done_t;
+
+/**
+ * A sub-command under way. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[4];
+} sw_rtex_sub_handshake_t;
+
+/**
+ * A profile motion under way. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[10];
+} sw_rtex_move_t;
+
+/**
+ * What the axes of a ring have in common. Its content is private; it may be copied. One context at a time.
+ */
+typedef struct {
+    uint64_t _private[5];
+} sw_rtex_ring_t;
+
+/**
+ * What a drive finds in a command.
+ */
+typedef struct {
+    /**
+     * Error code of the main half, 0 for none.
+     */
+    uint16_t error;
+    /**
+     * Error code of the sub half, 0 for none.
+     */
+    uint16_t sub_error;
+    /**
+     * Main number of the alarm that repetitions raise, 0 for none.
+     */
+    uint8_t alarm_main;
+    /**
+     * Its sub number.
+     */
+    uint8_t alarm_sub;
+} sw_rtex_verdict_t;
+
+/**
+ * An echo watch. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[4];
+} sw_rtex_echo_t;
+
+/**
+ * The counter of the commands. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[2];
+} sw_rtex_counter_t;
+
+/**
  * A frame from the master: its output lies behind SW_SORTE_DATA_AT.
  */
 typedef struct {
@@ -3790,6 +4436,295 @@ sw_result_t sw_rtex_parse_command(const uint8_t *bytes, size_t len, sw_rtex_comm
  * The block of a command, 16 bytes. Reserved bits are sent as 0.
  */
 sw_result_t sw_rtex_build_command(const sw_rtex_command_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The command in a block of 16 bytes whose reserved bits have to be 0: SW_E_RTEX_RESERVED, SW_E_RTEX_CODE_PAIR.
+ */
+sw_result_t sw_rtex_parse_command_strict(const uint8_t *bytes,
+                                         size_t len,
+                                         sw_rtex_command_t *command);
+
+/**
+ * The command in a block of 32 bytes.
+ */
+sw_result_t sw_rtex_parse_command32(const uint8_t *bytes,
+                                    size_t len,
+                                    sw_rtex_command_t *command,
+                                    sw_rtex_sub_command_t *sub);
+
+/**
+ * The block of a command of the 32-byte mode.
+ */
+sw_result_t sw_rtex_build_command32(const sw_rtex_command_t *it,
+                                    const sw_rtex_sub_command_t *sub,
+                                    uint8_t *bytes,
+                                    size_t size);
+
+/**
+ * The response in a block of 32 bytes.
+ */
+sw_result_t sw_rtex_parse_response32(const uint8_t *bytes,
+                                     size_t len,
+                                     sw_rtex_response_t *response,
+                                     sw_rtex_sub_response_t *sub);
+
+/**
+ * The block of a response, 16 bytes, as a drive sends it.
+ */
+sw_result_t sw_rtex_build_response(const sw_rtex_response_t *it, uint8_t *bytes, size_t size);
+
+/**
+ * The block of a response of the 32-byte mode, as a drive sends it.
+ */
+sw_result_t sw_rtex_build_response32(const sw_rtex_response_t *it,
+                                     const sw_rtex_sub_response_t *sub,
+                                     uint8_t *bytes,
+                                     size_t size);
+
+/**
+ * The control bits that a drive knows, of bytes 2 and 3 (byte 2 is the low one); the others are reserved.
+ */
+uint16_t sw_rtex_known_control(uint16_t control);
+
+/**
+ * A control in PH_INIT.
+ */
+sw_result_t sw_rtex_phases_start(sw_rtex_phases_t *phases);
+
+/**
+ * A step of the control: the phase then (sw_rtex_phase_t), or a refusal.
+ */
+sw_result_t sw_rtex_phases_step(sw_rtex_phases_t *phases, const sw_rtex_inputs_t *inputs);
+
+/**
+ * Why the control has stopped: sw_rtex_fault_t, or a refusal.
+ */
+sw_result_t sw_rtex_phases_fault(const sw_rtex_phases_t *phases);
+
+/**
+ * What the LED shows `t_ms` after the begin of a lit half period: sw_rtex_led_t, or a refusal.
+ */
+sw_result_t sw_rtex_led(uint8_t phase, uint8_t fault, uint64_t t_ms);
+
+/**
+ * The periods for Pr7.20, Pr7.21 and Pr7.91 (ns; below 0: not told) of an A6N drive. SW_E_NO_VALUE for a combination that is not listed.
+ */
+sw_result_t sw_rtex_periods_a6n(int32_t pr7_20,
+                                int32_t pr7_21,
+                                int64_t pr7_91,
+                                sw_rtex_periods_t *periods);
+
+/**
+ * How long a frame for so many axes takes, ns (System Design Guide for Master).
+ */
+uint64_t sw_rtex_frame_ns(uint32_t axes);
+
+/**
+ * How many axes a communication period has room for, by the time on the line.
+ */
+uint32_t sw_rtex_axes_within(uint32_t com_ns);
+
+/**
+ * The reload value of a timer for a period. SW_E_NO_VALUE if it is no whole number of ticks.
+ */
+sw_result_t sw_rtex_timer_reload(uint32_t timer_hz, uint32_t period_ns, uint32_t *reload);
+
+/**
+ * The step from one position to the next, through the end of 32 bits too.
+ */
+int32_t sw_rtex_step(int32_t before, int32_t after);
+
+/**
+ * Whether a step in an update period is within 400 million pulses a second behind the electronic gear: 1 or 0, or a refusal.
+ */
+sw_result_t sw_rtex_is_within_limit(int32_t step,
+                                    uint32_t update_ns,
+                                    uint32_t gear_numerator,
+                                    uint32_t gear_denominator);
+
+/**
+ * The 12-bit type code of the older drives for one of monitor (sw_rtex_noncyclic_t 10) or system ID (2). SW_E_NO_VALUE if there is none.
+ */
+sw_result_t sw_rtex_conventional(uint8_t noncyclic,
+                                 uint16_t code);
+
+/**
+ * The index of parameter Pr `class`.`number` in a parameter command.
+ */
+uint16_t sw_rtex_parameter_index(uint8_t class_, uint8_t number);
+
+/**
+ * Switches a drive on: update period 0.5 ms, one communication an update, gear 1/1.
+ */
+sw_result_t sw_rtex_drive_start(sw_rtex_drive_t *drive, uint8_t mac_id);
+
+/**
+ * An exchange: a command of 16 or 32 bytes comes in, a response of the same length goes out. SW_E_NO_VALUE if the drive is silent.
+ */
+sw_result_t sw_rtex_drive_hear(sw_rtex_drive_t *drive,
+                               const uint8_t *bytes,
+                               size_t len,
+                               uint8_t *response,
+                               size_t size);
+
+/**
+ * Where its motor stands, in command units.
+ */
+sw_result_t sw_rtex_drive_position(const sw_rtex_drive_t *drive, int32_t *position);
+
+/**
+ * Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer has to come within `limit` update periods.
+ * `attributes` 1: of SW_RTEX_ALARM_COMMAND the attributes of the alarm that is being issued. Normal and profile commands are no handshakes:
+ * SW_E_ARGUMENT.
+ */
+sw_result_t sw_rtex_handshake_start(sw_rtex_handshake_t *handshake,
+                                    uint8_t mac_id,
+                                    uint8_t cyclic,
+                                    uint8_t noncyclic,
+                                    const uint8_t *data,
+                                    size_t len,
+                                    uint32_t limit,
+                                    uint8_t attributes);
+
+/**
+ * Bytes 8 to 15 of the command that has to be sent while it is pending.
+ */
+sw_result_t sw_rtex_handshake_data(const sw_rtex_handshake_t *handshake, uint8_t (*data)[8]);
+
+/**
+ * The block of an update period, NULL if there was none; one that is refused counts as none. SW_PENDING; SW_OK with `done`; or SW_E_RTEX_EXECUTION, ..COMMAND_ERROR, ..TIMED_OUT.
+ */
+sw_result_t sw_rtex_handshake_hear(sw_rtex_handshake_t *handshake,
+                                   const uint8_t *bytes,
+                                   size_t len,
+                                   sw_rtex_done_t *done);
+
+/**
+ * Begins a sub-command of the 32-byte mode: 2 system ID, 10 monitor.
+ */
+sw_result_t sw_rtex_sub_start(sw_rtex_sub_handshake_t *handshake,
+                              uint8_t code,
+                              uint8_t type_code,
+                              uint16_t index,
+                              uint32_t limit);
+
+/**
+ * The sub block of an update period, 16 bytes, NULL if there was none; as sw_rtex_handshake_hear().
+ */
+sw_result_t sw_rtex_sub_hear(sw_rtex_sub_handshake_t *handshake,
+                             const uint8_t *bytes,
+                             size_t len,
+                             sw_rtex_done_t *done);
+
+/**
+ * Begins a profile motion: Type_Code as the drive's manual gives it, target and speed in command units, limit in update periods.
+ * `latch_sel1` (0..15) and `monitor_sel` are sent with it.
+ */
+sw_result_t sw_rtex_move_start(sw_rtex_move_t *motion,
+                               uint8_t mac_id,
+                               uint8_t type_code,
+                               int32_t target,
+                               int32_t speed,
+                               uint32_t limit,
+                               uint8_t latch_sel1,
+                               uint8_t monitor_sel);
+
+/**
+ * The non-cyclic code (sw_rtex_noncyclic_t) and bytes 8 to 15 of the next command.
+ */
+sw_result_t sw_rtex_move_data(const sw_rtex_move_t *motion, uint8_t *noncyclic, uint8_t (*data)[8]);
+
+/**
+ * The block of an update period, NULL if there was none; as sw_rtex_handshake_hear(), and SW_E_RTEX_NOT_STARTED.
+ */
+sw_result_t sw_rtex_move_hear(sw_rtex_move_t *motion,
+                              const uint8_t *bytes,
+                              size_t len,
+                              sw_rtex_done_t *done);
+
+/**
+ * A ring that sends `invalid` update periods of invalid data before its first commands, in blocks of 16 or 32 bytes.
+ */
+sw_result_t sw_rtex_ring_start(sw_rtex_ring_t *ring,
+                               uint8_t block_bytes,
+                               uint32_t invalid);
+
+/**
+ * An update period of all axes, which were started and stand in the order of the ring: takes the blocks that came, one after the other, heard
+ * until `end_ns`, and writes those of the next period. As soon as one axis fails the others stop in the same call. `rx` NULL: no frame came.
+ * SW_E_STATE if one of the axes was not started, SW_E_ARGUMENT if two have the same MAC-ID or the memory has another size: nothing was done.
+ */
+sw_result_t sw_rtex_ring_update(sw_rtex_ring_t *ring,
+                                sw_rtex_axis_t *axes,
+                                size_t count,
+                                const uint8_t *rx,
+                                size_t rx_len,
+                                uint8_t *tx,
+                                size_t tx_size,
+                                uint64_t end_ns);
+
+/**
+ * The place of the axis that stopped the ring; SW_E_NO_VALUE if none has.
+ */
+sw_result_t sw_rtex_ring_failed(const sw_rtex_ring_t *ring);
+
+/**
+ * Forgets the failure: then each axis is cleared by sw_rtex_axis_clear().
+ */
+sw_result_t sw_rtex_ring_clear(sw_rtex_ring_t *ring);
+
+/**
+ * Compares a block with what was sent: sw_rtex_acknowledgement_t, or a refusal. `code` is cyclic * 16 + non-cyclic.
+ */
+sw_result_t sw_rtex_check_response(uint8_t block_bytes,
+                                   uint8_t mac_id,
+                                   uint8_t update_counter,
+                                   uint8_t code,
+                                   const uint8_t *bytes,
+                                   size_t len);
+
+/**
+ * What a drive with this MAC-ID finds in a command.
+ */
+sw_result_t sw_rtex_check_command(uint8_t block_bytes,
+                                  uint8_t mac_id,
+                                  const uint8_t *bytes,
+                                  size_t len,
+                                  sw_rtex_verdict_t *verdict);
+
+/**
+ * Watches the Update_Counter_Echo: it trips after `limit` responses without a new one, 1 or more.
+ */
+sw_result_t sw_rtex_echo_start(sw_rtex_echo_t *echo, uint16_t limit);
+
+/**
+ * The echo of a response, 0..3, or 255 for none: 1 if the watch has tripped, 0 if not.
+ */
+sw_result_t sw_rtex_echo_sample(sw_rtex_echo_t *echo, uint8_t update_counter);
+
+/**
+ * A counter that begins behind `invalid` update periods of invalid data.
+ */
+sw_result_t sw_rtex_counter_start(sw_rtex_counter_t *counter, uint32_t invalid);
+
+/**
+ * The Update_Counter of the next command, 0..3; SW_PENDING * 256 (100h) while data are invalid: NOP and counter 0 are sent then.
+ */
+sw_result_t sw_rtex_counter_next(sw_rtex_counter_t *counter);
+
+/**
+ * The block that switches the servo off behind a command, 16 bytes: counter one on, Servo_On cleared, all else kept. SW_E_NO_VALUE if a drive
+ * would not look at Servo_On in it.
+ */
+sw_result_t sw_rtex_servo_off_after(const uint8_t *before,
+                                    size_t len,
+                                    uint8_t *bytes,
+                                    size_t size);
+
+/**
+ * Whether a block switches the servo off for certain: 1 or 0, or a refusal.
+ */
+sw_result_t sw_rtex_is_servo_off(const uint8_t *bytes, size_t len);
 
 /**
  * The frame of a master with this many bytes of output, from its source address to its time stamp, without preamble.

@@ -55,7 +55,7 @@ pub(crate) const fn refused(protocol: Protocol, number: u8) -> sw_result_t {
     ((protocol as i32) << 8 | number as i32).wrapping_neg()
 }
 
-const COMMON: [(sw_result_t, &CStr); 12] = [
+const COMMON: [(sw_result_t, &CStr); 17] = [
     (sw_code_t::SW_OK as sw_result_t, c"ok"),
     (sw_code_t::SW_PENDING as sw_result_t, c"pending"),
     (sw_code_t::SW_SEND as sw_result_t, c"send"),
@@ -68,6 +68,11 @@ const COMMON: [(sw_result_t, &CStr); 12] = [
     (sw_code_t::SW_E_NOT_FREE as sw_result_t, c"not_free"),
     (sw_rtex_error_t::SW_E_RTEX_NOT_NOW as sw_result_t, c"not_now"),
     (sw_rtex_error_t::SW_E_RTEX_TOO_FAR as sw_result_t, c"too_far"),
+    (sw_rtex_error_t::SW_E_RTEX_EXECUTION as sw_result_t, c"execution"),
+    (sw_rtex_error_t::SW_E_RTEX_COMMAND_ERROR as sw_result_t, c"command_error"),
+    (sw_rtex_error_t::SW_E_RTEX_TIMED_OUT as sw_result_t, c"timed_out"),
+    (sw_rtex_error_t::SW_E_RTEX_NOT_STARTED as sw_result_t, c"motion_not_started"),
+    (sw_rtex_error_t::SW_E_RTEX_BROKEN_OFF as sw_result_t, c"broken_off"),
 ];
 
 /// The names of a crate's classes, each with a NUL behind it, in the order of their numbers from 1; a number that is not given

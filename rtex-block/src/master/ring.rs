@@ -17,7 +17,54 @@ pub struct Ring<const N: usize> {
     counter: CommandCounter,
     sent: Turn,
     axes: [Axis; N],
+    fellows: Fellows,
+}
+
+/// What the axes of a ring learn of each other: for rings whose axes stand elsewhere than in a [`Ring`].
+///
+/// In every update period each axis is [looked at](Self::look) after it has heard its block, and then
+/// each is [told](Self::tell), before it transmits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fellows {
     failed: Option<u8>,
+    timed_out: bool,
+}
+
+impl Fellows {
+    /// No axis has failed.
+    pub const fn new() -> Self {
+        Self { failed: None, timed_out: false }
+    }
+
+    /// Begins a round of looking.
+    pub const fn begin(&mut self) {
+        self.timed_out = false;
+    }
+
+    /// Looks at the axis at a place of the ring.
+    pub const fn look(&mut self, place: u8, axis: &Axis) {
+        if self.failed.is_none() && matches!(axis.state(), AxisState::Stopped(_)) {
+            self.failed = Some(place);
+        }
+        self.timed_out |= axis.has_lost_its_drive();
+    }
+
+    /// Tells an axis: what one has failed of, the others do as they were told; all are off if the communication has failed.
+    pub fn tell(&self, axis: &mut Axis) {
+        let Some(place) = self.failed else { return };
+        let reason = StopReason::OtherAxis { place };
+        match axis.config().stop {
+            _ if self.timed_out => axis.fail(reason),
+            Some(category) if !matches!(axis.state(), AxisState::Stopping(_)) => axis.stop_for(reason, category),
+            _ => {}
+        }
+    }
+
+    /// The place of the axis that failed first.
+    pub const fn failed(&self) -> Option<u8> {
+        self.failed
+    }
 }
 
 /// Two axes of a ring have the same address.
@@ -71,7 +118,7 @@ impl<const N: usize> Ring<N> {
             }
             seen |= bit;
         }
-        Ok(Self { counter: CommandCounter::new(invalid), sent: Turn::Invalid, axes, failed: None })
+        Ok(Self { counter: CommandCounter::new(invalid), sent: Turn::Invalid, axes, fellows: Fellows::new() })
     }
 
     /// The axes, in the order they were given.
@@ -91,7 +138,7 @@ impl<const N: usize> Ring<N> {
 
     /// The axis that stopped the ring.
     pub fn failure(&self) -> Option<RingFailure> {
-        let place = self.failed?;
+        let place = self.fellows.failed()?;
         match self.axes.get(usize::from(place))?.state() {
             AxisState::Stopped(reason) => Some(RingFailure { place, reason }),
             _ => None,
@@ -159,7 +206,7 @@ impl<const N: usize> Ring<N> {
 
     /// Leaves the stop: every axis waits for Servo_Ready again, or goes on from [`Held`](AxisState::Held).
     pub fn clear(&mut self) {
-        self.failed = None;
+        self.fellows = Fellows::new();
         self.axes.iter_mut().for_each(Axis::clear);
     }
 
@@ -170,24 +217,17 @@ impl<const N: usize> Ring<N> {
 
     /// Returns whether the communication with an axis has failed, be it stopped for another reason before.
     pub fn is_timed_out(&self) -> bool {
-        let lost = |axis: &Axis| matches!(axis.state(), AxisState::Stopped(reason) if reason.is_communication());
-        self.axes.iter().any(|axis| axis.is_silent() || lost(axis))
+        self.axes.iter().any(Axis::has_lost_its_drive)
     }
 
-    /// What one axis has failed of, the others do as they were told; all are off if the communication has failed.
+    /// What one axis has failed of, the others learn.
     fn share_failures(&mut self) {
-        if self.failed.is_none() {
-            let place = self.axes.iter().position(|axis| matches!(axis.state(), AxisState::Stopped(_)));
-            self.failed = place.and_then(|place| u8::try_from(place).ok());
+        self.fellows.begin();
+        for (place, axis) in (0..).zip(&self.axes) {
+            self.fellows.look(place, axis);
         }
-        let Some(place) = self.failed else { return };
-        let (at_once, reason) = (self.is_timed_out(), StopReason::OtherAxis { place });
         for axis in &mut self.axes {
-            match axis.config().stop {
-                _ if at_once => axis.fail(reason),
-                Some(category) if !matches!(axis.state(), AxisState::Stopping(_)) => axis.stop_for(reason, category),
-                _ => {}
-            }
+            self.fellows.tell(axis);
         }
     }
 }

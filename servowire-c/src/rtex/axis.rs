@@ -26,9 +26,9 @@ state!(sw_rtex_axis_t, Master, b"SWrt");
 
 #[derive(Clone, Copy)]
 pub(crate) struct Master {
-    axis: Axis,
+    pub(super) axis: Axis,
     counter: CommandCounter,
-    turn: Turn,
+    pub(super) turn: Turn,
 }
 
 /// What an axis is set up with. Limits are counted in update periods.

@@ -3,8 +3,7 @@
 use core::mem::MaybeUninit;
 
 use rtex_block::{
-    Command, CommandBlock, ControlBits, CyclicCode, Error, LEN, MacId, NonCyclicCode, NonCyclicCommand, Response,
-    ResponseBlock, UpdateCounter,
+    Command, ControlBits, CyclicCode, Error, LEN, MacId, NonCyclicCode, NonCyclicCommand, Response, UpdateCounter,
 };
 
 use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
@@ -59,6 +58,37 @@ pub(super) fn error(error: Error) -> sw_result_t {
     refused(Protocol::Rtex, error.class().number())
 }
 
+pub(super) fn written_response(it: &Response) -> sw_rtex_response_t {
+    let mut data = [0; 8];
+    let words = [it.response_data2.to_le_bytes(), it.response_data3.to_le_bytes()];
+    for (to, from) in data.iter_mut().zip(words.as_flattened()) {
+        *to = *from;
+    }
+    sw_rtex_response_t {
+        response_data1: it.response_data1,
+        status: u16::from_le_bytes(it.status.to_bytes()),
+        data,
+        mac_id: it.mac_id.get(),
+        update_counter_echo: it.update_counter_echo.get(),
+        cmd_error: it.cmd_error.into(),
+        cyclic: it.code.cyclic_bits(),
+        noncyclic: it.code.noncyclic_bits(),
+    }
+}
+
+pub(super) fn written_command(it: &Command) -> sw_rtex_command_t {
+    sw_rtex_command_t {
+        command_data1: it.command_data1,
+        control: u16::from_le_bytes(it.control.to_bytes()),
+        data: it.noncyclic.emit(),
+        mac_id: it.mac_id.get(),
+        update_counter: it.update_counter.get(),
+        tmg_cnt: it.tmg_cnt.into(),
+        cyclic: it.cyclic as u8,
+        noncyclic: it.noncyclic.code() as u8,
+    }
+}
+
 /// The response in a block of 16 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_parse_response(
@@ -70,19 +100,7 @@ pub unsafe extern "C" fn sw_rtex_parse_response(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let response = there(response)?;
-        let block = ResponseBlock::new(bytes).map_err(error)?;
-        // What a block says is what it says whole: the same checks as of the owned form.
-        let _ = Response::parse(bytes).map_err(error)?;
-        response.write(sw_rtex_response_t {
-            response_data1: block.response_data1(),
-            status: u16::from_le_bytes(block.status().to_bytes()),
-            data: block.noncyclic_bytes(),
-            mac_id: block.mac_id().get(),
-            update_counter_echo: block.update_counter_echo().get(),
-            cmd_error: block.cmd_error().into(),
-            cyclic: block.code().cyclic_bits(),
-            noncyclic: block.code().noncyclic_bits(),
-        });
+        response.write(written_response(&Response::parse(bytes).map_err(error)?));
         OK
     })
 }
@@ -98,23 +116,12 @@ pub unsafe extern "C" fn sw_rtex_parse_command(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let command = there(command)?;
-        let block = CommandBlock::new(bytes).map_err(error)?;
-        let whole = block.to_owned().map_err(error)?;
-        command.write(sw_rtex_command_t {
-            command_data1: whole.command_data1,
-            control: u16::from_le_bytes(whole.control.to_bytes()),
-            data: block.noncyclic_bytes(),
-            mac_id: whole.mac_id.get(),
-            update_counter: whole.update_counter.get(),
-            tmg_cnt: whole.tmg_cnt.into(),
-            cyclic: block.code().cyclic_bits(),
-            noncyclic: block.code().noncyclic_bits(),
-        });
+        command.write(written_command(&Command::parse(bytes).map_err(error)?));
         OK
     })
 }
 
-fn command(it: &sw_rtex_command_t) -> Result<Command, Refused> {
+pub(super) fn command(it: &sw_rtex_command_t) -> Result<Command, Refused> {
     let noncyclic = in_range(NonCyclicCode::from_code(it.noncyclic))?;
     Ok(Command {
         mac_id: in_range(MacId::new(it.mac_id))?,

@@ -32,6 +32,11 @@ impl Axis {
         self.watch.is_tripped()
     }
 
+    /// Whether the communication with its drive has failed, be it stopped for another reason before.
+    pub(in crate::master) const fn has_lost_its_drive(&self) -> bool {
+        self.is_silent() || matches!(self.state(), AxisState::Stopped(reason) if reason.is_communication())
+    }
+
     /// Why no block comes on time.
     fn silence(&self) -> StopReason {
         match self.last_refusal {
