@@ -10,6 +10,11 @@
 #include <stddef.h>
 
 /**
+ * Frames of a response at most.
+ */
+#define SW_AFORMAT_FRAMES 6
+
+/**
  * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
  * on, so that some time less or more than it is refused too.
  */
@@ -80,6 +85,83 @@
  * The release of this header as one number, 8 bits each: a later one is greater.
  */
 #define SERVOWIRE_VERSION (((SERVOWIRE_VERSION_MAJOR << 16) | (SERVOWIRE_VERSION_MINOR << 8)) | SERVOWIRE_VERSION_PATCH)
+
+/**
+ * Alarms of ALM, bit by bit as the specification names them; which of them a version has says sw_aformat_known_alarms().
+ */
+enum sw_aformat_alm_t
+#ifdef __cplusplus
+  : uint16_t
+#endif // __cplusplus
+ {
+    /**
+     * BATT.
+     */
+    SW_AFORMAT_ALM_BATT = (1 << 0),
+    /**
+     * MTERR.
+     */
+    SW_AFORMAT_ALM_MT_ERR = (1 << 1),
+    /**
+     * OVFLOW.
+     */
+    SW_AFORMAT_ALM_OV_FLOW = (1 << 2),
+    /**
+     * OVSPD.
+     */
+    SW_AFORMAT_ALM_OV_SPD = (1 << 3),
+    /**
+     * MEMERR.
+     */
+    SW_AFORMAT_ALM_MEM_ERR = (1 << 4),
+    /**
+     * STERR.
+     */
+    SW_AFORMAT_ALM_ST_ERR = (1 << 5),
+    /**
+     * PSERR.
+     */
+    SW_AFORMAT_ALM_PS_ERR = (1 << 6),
+    /**
+     * BUSY.
+     */
+    SW_AFORMAT_ALM_BUSY_ALARM = (1 << 7),
+    /**
+     * MEMBUSY.
+     */
+    SW_AFORMAT_ALM_MEM_BUSY = (1 << 8),
+    /**
+     * OVTEMP.
+     */
+    SW_AFORMAT_ALM_OV_TEMP = (1 << 9),
+    /**
+     * INCERR.
+     */
+    SW_AFORMAT_ALM_INC_ERR = (1 << 10),
+    /**
+     * OVSPD_S.
+     */
+    SW_AFORMAT_ALM_OV_SPD_S = (1 << 11),
+    /**
+     * STERR_S.
+     */
+    SW_AFORMAT_ALM_ST_ERR_S = (1 << 12),
+    /**
+     * PSERR_S.
+     */
+    SW_AFORMAT_ALM_PS_ERR_S = (1 << 13),
+    /**
+     * BUSY_S.
+     */
+    SW_AFORMAT_ALM_BUSY_S = (1 << 14),
+    /**
+     * INCERR_S.
+     */
+    SW_AFORMAT_ALM_INC_ERR_S = (1 << 15),
+};
+#ifndef __cplusplus
+typedef uint16_t sw_aformat_alm_t;
+#endif // __cplusplus
 
 /**
  * Refusals of A-format, in the order of their numbers.
@@ -2207,12 +2289,105 @@ typedef struct {
 } sw_aformat_answer_t;
 
 /**
+ * A frame of a request, of a command or of a byte of memory: only its place in the request tells which.
+ */
+typedef struct {
+    /**
+     * Frame code.
+     */
+    uint8_t fc;
+    /**
+     * 1: `byte` is sent, a byte of memory; 0: `ea` and `command` are.
+     */
+    uint8_t memory;
+    /**
+     * EA, of a command.
+     */
+    uint8_t ea;
+    /**
+     * CC, of a command.
+     */
+    uint8_t command;
+    /**
+     * The byte, of a memory frame. Of a frame that was heard all are filled in.
+     */
+    uint8_t byte;
+} sw_aformat_frame_t;
+
+/**
+ * A receiver of one response after the other from a line. Its content is private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[16];
+} sw_aformat_receiver_t;
+
+/**
+ * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
+ * private; it may be copied.
+ */
+typedef struct {
+    uint64_t _private[36];
+} sw_aformat_bus_t;
+
+/**
  * A procedure of several exchanges with one encoder: it says what to send, takes what is heard, and decides what to repeat. Its
  * content is private. While it runs the line is its own.
  */
 typedef struct {
     uint64_t _private[80];
 } sw_aformat_procedure_t;
+
+/**
+ * What the type word of the EEPROM says.
+ */
+typedef struct {
+    /**
+     * Bits of the single turn; 255 for a code that is not defined.
+     */
+    uint8_t st_bits;
+    /**
+     * Bits of the turns; 255 for a code that is not defined.
+     */
+    uint8_t mt_bits;
+    /**
+     * Battery: 0 none, 1 separate, 2 common; 255 for a code that is not defined.
+     */
+    uint8_t battery;
+    /**
+     * The code of the resolution.
+     */
+    uint8_t resolution_code;
+} sw_aformat_type_t;
+
+/**
+ * How long a request and its responses take on the line, ns, without the time that an encoder takes to turn around.
+ */
+typedef struct {
+    /**
+     * A frame.
+     */
+    uint32_t frame_ns;
+    /**
+     * A response.
+     */
+    uint32_t response_ns;
+    /**
+     * A request and one response.
+     */
+    uint32_t one_ns;
+    /**
+     * A request of one frame and the responses of all who are asked.
+     */
+    uint32_t all_ns;
+    /**
+     * The gap between responses.
+     */
+    uint32_t gap_ns;
+    /**
+     * A bit, ps.
+     */
+    uint32_t bit_ps;
+} sw_aformat_times_t;
 
 /**
  * The response with the whole position.
@@ -2231,14 +2406,6 @@ typedef struct {
      */
     uint8_t es;
 } sw_aformat_abs40_t;
-
-/**
- * The responses to one request, without times. For control use sw_aformat_t, which knows how old a response is. Its content is
- * private; it may be copied.
- */
-typedef struct {
-    uint64_t _private[36];
-} sw_aformat_bus_t;
 
 /**
  * Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
@@ -3635,6 +3802,73 @@ sw_result_t sw_aformat_device_hear(sw_aformat_device_t *device,
                                    sw_aformat_answer_t *answer);
 
 /**
+ * A frame on the line: 18 bits with start bit and delimiter, the first of the line in bit 0.
+ */
+sw_result_t sw_aformat_build_frame(const sw_aformat_frame_t *it, uint32_t *bits);
+
+/**
+ * The word of 32 bits that TI's example shifts out: the frame behind idle line.
+ */
+sw_result_t sw_aformat_build_word32(const sw_aformat_frame_t *it, uint32_t *word);
+
+/**
+ * A frame as an encoder hears it: `len` bits of the line, the first in bit 0.
+ */
+sw_result_t sw_aformat_parse_frame(uint32_t bits, uint32_t len, sw_aformat_frame_t *it);
+
+/**
+ * Whether an encoder takes a request: its version (sw_aformat_option_t), and all arguments.
+ */
+sw_result_t sw_aformat_check(const sw_aformat_request_t *asked, const sw_aformat_encoder_t *encoder);
+
+/**
+ * The CRC-8 of responses over `count` bits, which are in (count + 7) / 8 bytes.
+ */
+sw_result_t sw_aformat_crc8(const uint8_t *bytes, size_t count, uint8_t order, uint8_t *crc);
+
+/**
+ * The CRC-3 of requests over `count` bits.
+ */
+sw_result_t sw_aformat_crc3(const uint8_t *bytes, size_t count, uint8_t order, uint8_t *crc);
+
+/**
+ * Prepares a receiver of responses of this layout (sw_aformat_layout_t): samples a bit, 1 for a line of bits. `idle` 1: frames of a response
+ * may have idle line between them.
+ */
+sw_result_t sw_aformat_receiver_start(sw_aformat_receiver_t *receiver,
+                                      uint8_t layout,
+                                      uint32_t samples_per_bit,
+                                      bool idle);
+
+/**
+ * One sample of the line, 0 or 1. SW_OK with the frames of a response as words, the first bit of the line in bit 15 (SW_MSB_FIRST), at most SW_AFORMAT_FRAMES;
+ * SW_PENDING without; or why there was none.
+ */
+sw_result_t sw_aformat_receiver_push(sw_aformat_receiver_t *receiver,
+                                     uint8_t level,
+                                     uint16_t *words,
+                                     size_t size,
+                                     size_t *count);
+
+/**
+ * One sample of a line on which several encoders answer: as sw_aformat_receiver_push(), and what sw_aformat_bus_push() says of the response.
+ */
+sw_result_t sw_aformat_bus_sample(sw_aformat_bus_t *bus,
+                                  sw_aformat_receiver_t *receiver,
+                                  uint8_t level,
+                                  sw_aformat_response_t *response);
+
+/**
+ * The line is at its end: SW_OK, or why a response that had begun is none.
+ */
+sw_result_t sw_aformat_bus_line_ends(sw_aformat_bus_t *bus, sw_aformat_receiver_t *receiver);
+
+/**
+ * Who was asked and has not even begun to answer: how many, or a refusal.
+ */
+sw_result_t sw_aformat_bus_not_started(const sw_aformat_bus_t *bus);
+
+/**
  * A reset: command 8 (clears the status), 9 (the turns), 10 (both), 11 (gives the only encoder on the line the address `ea`) or 12
  * (**makes this position the zero of the turn and shifts the commutation angle**), eight times, and the status 30 ms later: its ALM is
  * the value. With `careful` 1 the encoder is made to begin its count anew before, and a failure tells whether it was done
@@ -3744,6 +3978,61 @@ sw_result_t sw_aformat_detected(const sw_aformat_procedure_t *p,
                                 uint8_t *ea,
                                 uint8_t *st_bits,
                                 uint8_t *mt_bits);
+
+/**
+ * ES as an encoder with these alarms shows it.
+ */
+uint8_t sw_aformat_es_of_alarms(uint16_t alm);
+
+/**
+ * The alarms that a version has: `version_3` false for 2.1, true for 3.0.
+ */
+uint16_t sw_aformat_known_alarms(bool version_3);
+
+/**
+ * A temperature, 10 bits, in 0.001 °C, as the specification counts it.
+ */
+sw_result_t sw_aformat_milli_celsius(uint16_t raw, uint32_t *milli_celsius);
+
+/**
+ * The same if the bits are a two's complement, which no document says.
+ */
+sw_result_t sw_aformat_signed_milli_celsius(uint16_t raw, int32_t *milli_celsius);
+
+/**
+ * A type word.
+ */
+sw_result_t sw_aformat_parse_type(uint16_t word, sw_aformat_type_t *it);
+
+/**
+ * The angle of a single-turn position, 0.001 degrees, rounded down.
+ */
+sw_result_t sw_aformat_milli_degrees(const sw_aformat_encoder_t *encoder,
+                                     uint32_t single_turn,
+                                     uint32_t *milli_degrees);
+
+/**
+ * The 40 bits of a position, of turn and turns.
+ */
+sw_result_t sw_aformat_compose(const sw_aformat_encoder_t *encoder,
+                               uint32_t single_turn,
+                               uint32_t turns,
+                               uint64_t *abs);
+
+/**
+ * The 40 bits of a position from its halves of 24 bits, which overlap by eight (ABS24 and ABS24H). SW_E_NO_VALUE if those differ.
+ */
+sw_result_t sw_aformat_join(uint32_t low24,
+                            uint32_t high24,
+                            uint64_t *abs);
+
+/**
+ * How long responses of a layout (sw_aformat_layout_t) take at a rate of the specification, in bit/s, when 1..8 encoders are asked.
+ */
+sw_result_t sw_aformat_times(uint32_t bits_per_second,
+                             uint8_t layout,
+                             uint8_t encoders,
+                             sw_aformat_times_t *times);
 
 /**
  * The response of layout ABS40 to command 0 or 4 from its four frames, a 16-bit word each, with all checks; `ea` 255 is any.

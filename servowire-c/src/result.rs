@@ -2,7 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 
-use crate::rtex::sw_rtex_error_t;
+use crate::rtex::names::sw_rtex_error_t;
 
 /// What a call came to: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the `sw_..._error_t` of the
 /// protocols; `sw_text()` has a text for each.

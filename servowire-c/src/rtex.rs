@@ -5,7 +5,7 @@ mod block;
 mod block32;
 mod control;
 mod drive;
-mod names;
+pub(crate) mod names;
 mod procedure;
 mod ring;
 

@@ -246,9 +246,13 @@ pub unsafe extern "C" fn sw_aformat_parse(
     unsafe { of_words(words, count, order, parse) }
 }
 
+/// A layout by its number, sw_aformat_layout_t.
+pub(super) fn layout_of(number: u8) -> Result<Layout, Refused> {
+    Ok(*in_range(Layout::ALL.get(usize::from(number)))?)
+}
+
 pub(super) fn expected(command: u8, layout: u8, ea: u8) -> Result<Expected, Refused> {
-    let layout = *in_range(Layout::ALL.get(usize::from(layout)))?;
-    let expected = Expected::new(layout, in_range(Command::from_code(command))?);
+    let expected = Expected::new(layout_of(layout)?, in_range(Command::from_code(command))?);
     Ok(if ea == 255 { expected } else { expected.from_address(in_range(EncoderAddress::new(ea))?) })
 }
 

@@ -117,3 +117,41 @@ pub enum sw_aformat_error_t {
     /// The settings of the line leave no time for a response.
     SW_E_AFORMAT_LINE = -0x21b,
 }
+
+/// Alarms of ALM, bit by bit as the specification names them; which of them a version has says sw_aformat_known_alarms().
+#[repr(u16)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum sw_aformat_alm_t {
+    /// BATT.
+    SW_AFORMAT_ALM_BATT = 1 << 0,
+    /// MTERR.
+    SW_AFORMAT_ALM_MT_ERR = 1 << 1,
+    /// OVFLOW.
+    SW_AFORMAT_ALM_OV_FLOW = 1 << 2,
+    /// OVSPD.
+    SW_AFORMAT_ALM_OV_SPD = 1 << 3,
+    /// MEMERR.
+    SW_AFORMAT_ALM_MEM_ERR = 1 << 4,
+    /// STERR.
+    SW_AFORMAT_ALM_ST_ERR = 1 << 5,
+    /// PSERR.
+    SW_AFORMAT_ALM_PS_ERR = 1 << 6,
+    /// BUSY.
+    SW_AFORMAT_ALM_BUSY_ALARM = 1 << 7,
+    /// MEMBUSY.
+    SW_AFORMAT_ALM_MEM_BUSY = 1 << 8,
+    /// OVTEMP.
+    SW_AFORMAT_ALM_OV_TEMP = 1 << 9,
+    /// INCERR.
+    SW_AFORMAT_ALM_INC_ERR = 1 << 10,
+    /// OVSPD_S.
+    SW_AFORMAT_ALM_OV_SPD_S = 1 << 11,
+    /// STERR_S.
+    SW_AFORMAT_ALM_ST_ERR_S = 1 << 12,
+    /// PSERR_S.
+    SW_AFORMAT_ALM_PS_ERR_S = 1 << 13,
+    /// BUSY_S.
+    SW_AFORMAT_ALM_BUSY_S = 1 << 14,
+    /// INCERR_S.
+    SW_AFORMAT_ALM_INC_ERR_S = 1 << 15,
+}

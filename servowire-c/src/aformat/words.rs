@@ -109,7 +109,7 @@ pub unsafe extern "C" fn sw_aformat_bus_push_abs40(
     unsafe { of_words(words, count, order, push) }
 }
 
-fn judged(verdict: Verdict) -> Result<sw_result_t, Refused> {
+pub(super) fn judged(verdict: Verdict) -> Result<sw_result_t, Refused> {
     match verdict {
         Verdict { duplicate: true, .. } => Err(sw_aformat_error_t::SW_E_AFORMAT_TWO_RESPONSES as sw_result_t),
         Verdict { extra: true, .. } => Err(sw_aformat_error_t::SW_E_AFORMAT_ADDRESS_MISMATCH as sw_result_t),

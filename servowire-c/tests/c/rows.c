@@ -80,7 +80,7 @@ void say_bits(const uint8_t *bytes, size_t bits)
 
 static command_t *find(const char *name)
 {
-    static const entry_t *const tables[] = {tformat_commands, aformat_commands, hdsl_commands, hdsl_link_commands,
+    static const entry_t *const tables[] = {tformat_commands, aformat_commands, aformat_more_commands, hdsl_commands, hdsl_link_commands,
         rtex_commands, rtex_more_commands, sorte_commands};
     size_t k;
     for (k = 0; k < sizeof tables / sizeof *tables; k++) {

@@ -23,8 +23,8 @@ typedef struct {
     command_t *call;
 } entry_t;
 
-extern const entry_t tformat_commands[], aformat_commands[], hdsl_commands[], hdsl_link_commands[], rtex_commands[],
-    rtex_more_commands[], sorte_commands[];
+extern const entry_t tformat_commands[], aformat_commands[], aformat_more_commands[], hdsl_commands[], hdsl_link_commands[],
+    rtex_commands[], rtex_more_commands[], sorte_commands[];
 
 void say(const char *format, ...);
 uint64_t number(const char *text);       /* decimal, or hexadecimal behind 0x; - is 0 */
