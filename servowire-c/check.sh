@@ -2,7 +2,7 @@
 # The C side of this crate: `.ci/run c` runs all of it.
 #
 #   servowire-c/check.sh           all steps
-#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host, rows, targets, flash, emulated, archive
+#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host, rows, hostile, targets, flash, emulated, archive
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -49,6 +49,8 @@ host() {
     g++ -std=c++11 "${strict[@]}" -fsyntax-only -x c++ include/servowire.h
     gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/border.c "$out/libservowire_c.a" -o "$out/border"
     "$out/border"
+    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/both_ends.c "$out/libservowire_c.a" -o "$out/both_ends"
+    "$out/both_ends"
     g++ -std=c++11 "${strict[@]}" -x c++ tests/c/border.c -x none "$out/libservowire_c.a" -o "$out/border++"
     "$out/border++"
 }
@@ -58,6 +60,19 @@ rows() {
     [ -e "$out/libservowire_c.a" ] || library
     gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/rows.c tests/c/rows_*.c "$out/libservowire_c.a" -o "$out/rows"
     python3 tests/rows.py "$out/rows" ../tests/vectors
+}
+
+# Every function as nobody should call it: tests/hostile.py. The library too is built with the sanitizer, and its arithmetic is checked: a sum
+# that overflows ends the program.
+hostile() {
+    local host seed
+    host=$(rustc -vV | sed -n 's/^host: //p')
+    python3 tests/hostile.py include/servowire.h >"$out/hostile.c"
+    CARGO_PROFILE_RELEASE_LTO=false RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=yes -Coverflow-checks=yes" cargo +nightly rustc --quiet --release \
+        --lib --crate-type staticlib --features std --target "$host" --target-dir "$built/sanitized"
+    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" "$out/hostile.c" "$built/sanitized/$host/release/libservowire_c.a" -lm \
+        -o "$out/hostile"
+    for seed in 1 2 3; do "$out/hostile" "${HOSTILE_ROUNDS:-1000}" "$seed"; done
 }
 
 targets=(thumbv6m-none-eabi thumbv7em-none-eabihf thumbv8m.main-none-eabihf riscv32imac-unknown-none-elf)
@@ -153,5 +168,5 @@ archive() {
     ls -sh "$out/servowire-c-$version.tar.gz"
 }
 
-[ "$#" -gt 0 ] || set -- stale host rows targets flash emulated archive
+[ "$#" -gt 0 ] || set -- stale host rows hostile targets flash emulated archive
 for step; do "$step"; done

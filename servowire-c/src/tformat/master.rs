@@ -87,16 +87,22 @@ pub struct sw_position_t {
 }
 
 impl Master {
+    /// The last exchange is over by then, its late answer too.
+    #[inline(always)]
+    pub(super) fn free(&self, start_ns: u64) -> Result<(), Refused> {
+        if self.transaction.outcome().is_none() || start_ns < self.transaction.until_ns() {
+            return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
+        }
+        Ok(())
+    }
+
     pub(super) fn begin(
         &mut self,
         request: Request,
         start_ns: u64,
         to_send: &mut MaybeUninit<sw_tformat_transmission_t>,
     ) -> Result<sw_result_t, Refused> {
-        // The last exchange is over by then, its late answer too.
-        if self.transaction.outcome().is_none() || start_ns < self.transaction.until_ns() {
-            return Err(sw_code_t::SW_E_NOT_FREE as sw_result_t);
-        }
+        self.free(start_ns)?;
         if matches!(request, Request::SetSingleTurnZero | Request::ResetTurnsAndErrors) {
             // What was heard before counts from another zero.
             self.evidence = Evidence::NEVER;

@@ -173,10 +173,13 @@ pub extern "C" fn sw_tformat_next(
         }
         match p.next {
             Step::Send { request, not_before_ns } => {
+                let start_ns = not_before_ns.max(now_ns);
+                // A refusal changes nothing, the rate neither.
+                m.free(start_ns)?;
                 if let Kind::Detection(detection) = &p.kind {
                     m.line = detection.line();
                 }
-                let sent = m.begin(request, not_before_ns.max(now_ns), to_send)?;
+                let sent = m.begin(request, start_ns, to_send)?;
                 p.asked = true;
                 Ok(sent)
             }

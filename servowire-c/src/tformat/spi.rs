@@ -5,8 +5,11 @@ use core::mem::MaybeUninit;
 use tformat::spi::{parse_spi10, parse_spi16, spi10_words, spi16_words};
 
 use super::codec::{answer, request, sw_tformat_request_t, sw_tformat_response_t};
-use crate::border::{OK, Refused, border, room, there};
-use crate::result::{sw_code_t, sw_result_t};
+use crate::border::{OK, Refused, border, fill, room, there};
+use crate::result::sw_result_t;
+
+/// Room for the words of a transaction: a request of four fields and a response of eleven are 150 bits.
+const WORDS: usize = 16;
 
 fn give(
     words: impl Iterator<Item = u16>,
@@ -14,11 +17,13 @@ fn give(
     count: Option<&mut MaybeUninit<usize>>,
 ) -> Result<sw_result_t, Refused> {
     let count = there(count)?;
-    let mut written = 0_usize;
-    for word in words {
-        to.get_mut(written).ok_or(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t)?.write(word);
+    let (mut all, mut written) = ([0; WORDS], 0_usize);
+    for (to, word) in all.iter_mut().zip(words) {
+        *to = word;
         written = written.saturating_add(1);
     }
+    // All of them or none.
+    fill(to, all.get(..written).unwrap_or_default())?;
     count.write(written);
     OK
 }
