@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use servowire_world::{Kind, Rates, Tally, Verdict, wanted_events};
+use servowire_world::{Kind, Rates, Seed, Tally, Verdict, first_seed, wanted_events};
 
 /// Faults that every driver has to survive, whatever the environment says.
 pub const FAULTS: u64 = 100_000;
@@ -32,8 +32,10 @@ pub struct Calls {
 /// Scenario after scenario, until there was enough of everything: `play` plays the one of a seed and gives what happened in it.
 pub fn live_through(mut play: impl FnMut(&mut Calls, u64) -> Tally) -> Calls {
     let mut calls = Calls::default();
-    for seed in 0.. {
+    for seed in first_seed().. {
+        let said = Seed(seed);
         let happened = play(&mut calls, seed);
+        drop(said);
         calls.tally.add(&happened);
         if !calls.go_on() {
             break;

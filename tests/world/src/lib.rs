@@ -28,5 +28,5 @@ pub use scenario::Scenario;
 pub use scenario::strategy::{faults, scenarios};
 pub use tally::Tally;
 pub use truth::{Act, Handed, Id, Origin, Speaker, Transmission, Truth, Verdict};
-pub use wanted::wanted_events;
+pub use wanted::{Seed, first_seed, wanted_events};
 pub use world::{Block, Event, Unit, Wire, World};

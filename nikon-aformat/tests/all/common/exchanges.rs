@@ -7,9 +7,9 @@ use nikon_aformat::{
     Alm, BitRate, Doubt, EncoderAddress, EncoderStatus, Error, Evidence, Operation, Policy, Request, Resolution,
     Response, Sample, Tolerated, Version,
 };
-use servowire_world::{Id, Scenario, Speaker, Tally, Transmission, Verdict};
+use servowire_world::{Id, Scenario, Seed, Speaker, Tally, Transmission, Verdict, first_seed};
 
-use super::line::{Bench, Spoken, between_ns, events, first_seed, frame_ns, host_within, idle_ns, rates, value_of};
+use super::line::{Bench, Spoken, between_ns, events, frame_ns, host_within, idle_ns, rates, value_of};
 use super::switches::{Mix, Switches};
 
 /// What a run depends on.
@@ -45,7 +45,9 @@ pub fn seeds<S: Default>(
 ) -> S {
     let mut shown = S::default();
     for seed in first_seed().. {
+        let said = Seed(seed);
         run(&setup(seed), &mut shown);
+        drop(said);
         if tally(&shown).events() > events() {
             break;
         }

@@ -26,11 +26,6 @@ pub fn events() -> u64 {
     servowire_world::wanted_events(USUAL_EVENTS)
 }
 
-/// The first seed: 0, or what the environment says.
-pub fn first_seed() -> u64 {
-    std::env::var("SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
-}
-
 /// The encoders of a line, and what carries their words.
 #[derive(Debug)]
 pub struct Bench<const N: usize> {

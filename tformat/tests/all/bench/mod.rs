@@ -2,6 +2,7 @@
 
 use core::convert::Infallible;
 use core::fmt;
+use std::collections::BTreeSet;
 
 use servowire_core::{Ended, Procedure};
 use servowire_world::{
@@ -322,6 +323,15 @@ impl Bench {
                 let own = of.is_some_and(|of| of.answers == Some(id));
                 // Where its first field came twice, and the second time after the request, all that was taken began after it.
                 let late = of.is_some_and(|of| of.again_ns >= sent.end_ns);
+                // Of what is handed over at once the times follow from its end: one that was held up in itself seems to have begun by
+                // that much later than it has.
+                let at_once = truth.handed_since(id).filter(|h| Some(h.origin.transmission) == of.map(|of| of.id));
+                let at_once = at_once.map(|h| h.at_ns).collect::<BTreeSet<_>>().len() == 1;
+                let left_ns = sent.asked_ns + sent.units as u64 * field_ns(self.line.rate);
+                let held_up = of.is_some_and(|of| {
+                    at_once && of.end_ns.saturating_sub(of.units as u64 * field_ns(self.line.rate)) >= left_ns
+                });
+                let late = late || held_up;
                 self.seen.undetected += u64::from(late);
                 let handed = truth.handed_since(id).collect::<Vec<_>>();
                 assert!(
