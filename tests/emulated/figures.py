@@ -36,6 +36,7 @@ IMAGES = [
     ("teensy4", "thumbv7em-none-eabihf", False),
     ("esp32c3", "riscv32imc-unknown-none-elf", False),
     ("rp2350-hdsl", "thumbv8m.main-none-eabihf", False),
+    ("pico2", "thumbv8m.main-none-eabihf", False),
 ]
 
 

@@ -33,7 +33,7 @@ target thumbv6m-none-eabi
 target thumbv7em-none-eabihf
 target thumbv8m.main-none-eabihf
 target riscv32imc-unknown-none-elf
-for image in rp2040 stm32f405 rp2350-hdsl teensy4 esp32c3; do
+for image in rp2040 stm32f405 rp2350-hdsl pico2 teensy4 esp32c3; do
     build "$image"
 done
 # One board after the other in a folder; the figures in the README are those of the first. The last has a power stage.

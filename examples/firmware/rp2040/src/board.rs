@@ -3,36 +3,26 @@
 use core::fmt::Write;
 
 use cortex_m::peripheral::Peripherals as Core;
-use rp2040_hal::clocks::{Clock as _, ClockSource, ClocksManager};
-use rp2040_hal::dma::{CH0, Channel, DMAExt};
-use rp2040_hal::fugit::{ExtU32, RateExtU32};
-use rp2040_hal::gpio::{FunctionPio0, Pin, Pins, PullUp};
-use rp2040_hal::pac::Peripherals;
-use rp2040_hal::pio::PIOExt;
-use rp2040_hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
-use rp2040_hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
-use rp2040_hal::usb::UsbBus;
-use rp2040_hal::xosc::setup_xosc_blocking;
-use rp2040_hal::{Sio, Watchdog};
 use servowire_boards::{FirstLine, Source};
 use usb_device::bus::UsbBusAllocator;
 
+use crate::chip::{self, CRYSTAL_HZ};
 use crate::clock::{self, Clock};
 use crate::console::Uart;
+use crate::hal::clocks::{Clock as _, ClockSource, ClocksManager};
+use crate::hal::dma::{CH0, Channel, DMAExt};
+use crate::hal::fugit::{ExtU32, RateExtU32};
+use crate::hal::gpio::{FunctionPio0, Pin, Pins, PullUp};
+use crate::hal::pac::Peripherals;
+use crate::hal::pio::PIOExt;
+use crate::hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
+use crate::hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
+use crate::hal::usb::UsbBus;
+use crate::hal::xosc::setup_xosc_blocking;
+use crate::hal::{Sio, Watchdog};
 use crate::last_words::Before;
 use crate::port::{self, Receiver, Transmitter};
 use crate::programs::{Rate, SYSTEM_HZ};
-
-/// The pins, of a Raspberry Pi Pico; no power stage is near.
-static PICO: servowire_boards::Board = servowire_boards::Board::plain(
-    "Raspberry Pi Pico",
-    CRYSTAL_HZ,
-    &[
-        servowire_boards::Pin::new("GPIO 2", "DI", "pin 4"),
-        servowire_boards::Pin::new("GPIO 3", "DE and /RE", "pin 5"),
-        servowire_boards::Pin::new("GPIO 4", "RO", "pin 6"),
-    ],
-);
 
 /// All that an image uses.
 pub struct Board {
@@ -56,14 +46,13 @@ pub struct Board {
     pub watchdog: Watchdog,
 }
 
-const CRYSTAL_HZ: u32 = 12_000_000;
 const CONSOLE_BAUD: u32 = 1_000_000;
 /// Longer than anything here waits.
 const WATCHDOG_MS: u32 = 1_000;
 
 /// 12 MHz x 120 / 6 / 2 = 120 MHz.
 const PLL_120MHZ: PLLConfig =
-    PLLConfig { vco_freq: rp2040_hal::fugit::HertzU32::MHz(1440), refdiv: 1, post_div1: 6, post_div2: 2 };
+    PLLConfig { vco_freq: crate::hal::fugit::HertzU32::MHz(1440), refdiv: 1, post_div1: 6, post_div2: 2 };
 
 impl Board {
     /// Sets everything up for units of `bits` bits between start and stop bit at `rate`, and says the first line.
@@ -75,7 +64,7 @@ impl Board {
         let core = Core::take().expect("called once");
         let before = Before::take(&p.WATCHDOG);
         let mut watchdog = Watchdog::new(p.WATCHDOG);
-        watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
+        watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as _);
         let crystal = setup_xosc_blocking(p.XOSC, CRYSTAL_HZ.Hz()).expect("crystal");
         let mut clocks = ClocksManager::new(p.CLOCKS);
         let system = setup_pll_blocking(p.PLL_SYS, crystal.get_freq(), PLL_120MHZ, &mut clocks, &mut p.RESETS);
@@ -97,11 +86,11 @@ impl Board {
         let (block, sm0, sm1, ..) = p.PIO0.split(&mut p.RESETS);
         let (transmitter, receiver) = port::start(block, sm0, sm1, rate, bits);
         let channel = p.DMA.split(&mut p.RESETS).ch0;
-        let usb = UsbBus::new(p.USBCTRL_REGS, p.USBCTRL_DPRAM, clocks.usb_clock, true, &mut p.RESETS);
+        let usb = chip::usb_bus!(p, clocks.usb_clock);
         let first = FirstLine {
             image,
             version: env!("CARGO_PKG_VERSION"),
-            board: &PICO,
+            board: &chip::BOARD,
             core_hz: SYSTEM_HZ,
             source: Source::Crystal,
             bits_per_second,
@@ -115,8 +104,3 @@ impl Board {
         Self { uart, usb, first, before, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
     }
 }
-
-/// The second stage of the boot: sets the flash up.
-#[unsafe(link_section = ".boot2")]
-#[used]
-pub static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;

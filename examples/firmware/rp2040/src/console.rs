@@ -3,16 +3,16 @@
 use core::fmt::{self, Write};
 
 use cortex_m::singleton;
-use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
-use rp2040_hal::gpio::{FunctionUart, Pin, PullDown};
-use rp2040_hal::pac::UART0;
-use rp2040_hal::uart::{Enabled, UartPeripheral};
-use rp2040_hal::usb::UsbBus;
 use servowire_boards::FirstLine;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
 
+use crate::hal::gpio::bank0::{Gpio0, Gpio1};
+use crate::hal::gpio::{FunctionUart, Pin, PullDown};
+use crate::hal::pac::UART0;
+use crate::hal::uart::{Enabled, UartPeripheral};
+use crate::hal::usb::UsbBus;
 use crate::last_words::Before;
 
 /// The console at the pins.

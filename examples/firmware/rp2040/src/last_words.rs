@@ -5,7 +5,7 @@ use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr;
 
-use rp2040_hal::pac;
+use crate::hal::pac;
 
 /// Of a text in RAM that a reset has left there.
 const MAGIC: u32 = 0x1a57_30d5;

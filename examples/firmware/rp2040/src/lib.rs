@@ -4,6 +4,7 @@
 pub mod aformat;
 pub mod answering;
 pub mod board;
+pub mod chip;
 pub mod clock;
 pub mod commands;
 pub mod console;
@@ -13,3 +14,5 @@ pub mod port;
 pub mod programs;
 pub mod tformat;
 pub mod uart;
+
+pub use chip::hal;

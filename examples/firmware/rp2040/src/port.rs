@@ -3,12 +3,13 @@
 //! Wiring: GPIO 2 to DI, GPIO 3 to DE and /RE (tied), GPIO 4 to RO of an RS-485 transceiver.
 
 use cortex_m::singleton;
-use rp2040_hal::dma::{Channel, SingleChannel};
-use rp2040_hal::pac::{self, PIO0};
-use rp2040_hal::pio::{
+
+use crate::chip;
+use crate::hal::dma::{CH0, Channel, SingleChannel};
+use crate::hal::pac::{self, PIO0};
+use crate::hal::pio::{
     PIO, PIOBuilder, PinDir, PinState, Running, Rx, SM0, SM1, ShiftDirection, StateMachine, Tx, UninitStateMachine,
 };
-
 use crate::programs::{self, Rate};
 
 /// DI of the transceiver.
@@ -180,9 +181,9 @@ impl RingReceiver {
     ///
     /// # Panics
     /// If called twice.
-    pub fn new(_channel: Channel<rp2040_hal::dma::CH0>, receiver: Receiver) -> Self
+    pub fn new(_channel: Channel<CH0>, receiver: Receiver) -> Self
     where
-        Channel<rp2040_hal::dma::CH0>: SingleChannel,
+        Channel<CH0>: SingleChannel,
     {
         let ring = singleton!(: Ring = Ring([0; RING])).expect("one receiver");
         let ring = core::ptr::from_mut(ring).cast::<u32>();
@@ -191,13 +192,13 @@ impl RingReceiver {
         let dma = unsafe { &*pac::DMA::ptr() };
         dma.ch(0).ch_read_addr().write(|w| unsafe { w.bits(fifo.fifo_address() as u32) });
         dma.ch(0).ch_write_addr().write(|w| unsafe { w.bits(ring as u32) });
-        dma.ch(0).ch_al1_ctrl().write(|w| unsafe { w.bits(control(fifo.dreq_value())) });
+        dma.ch(0).ch_al1_ctrl().write(|w| unsafe { w.bits(chip::dma_control(fifo.dreq_value())) });
         let mut new = Self { ring, at: 0, receiver };
         new.keep_running();
         new
     }
 
-    /// The channel stops by itself after 2^32 - 1 units, some hours of a busy line.
+    /// The channel of an RP2040 stops by itself after 2^32 - 1 units, some hours of a busy line.
     fn keep_running(&mut self) {
         // SAFETY: the channel is owned.
         let channel = unsafe { &*pac::DMA::ptr() }.ch(0);
@@ -220,19 +221,6 @@ impl RingReceiver {
         self.at = (self.at + 1) % RING;
         Some(Unit::of(word, self.receiver.bits))
     }
-}
-
-/// CHn_CTRL: enabled, words, the write address runs in a ring of 256 bytes, at the pace of the receiver; chained to itself,
-/// that is to none.
-const fn control(dreq: u8) -> u32 {
-    const ENABLE: u32 = 1;
-    const SIZE_WORD: u32 = 2 << 2;
-    const INCREMENT_WRITE: u32 = 1 << 5;
-    const RING_256: u32 = 8 << 6;
-    const RING_WRITE: u32 = 1 << 10;
-    const TREQ: u32 = 15;
-    const QUIET: u32 = 1 << 21;
-    ENABLE | SIZE_WORD | INCREMENT_WRITE | RING_256 | RING_WRITE | (dreq as u32) << TREQ | QUIET
 }
 
 /// Sets both machines up for units of `bits` bits at `rate` and starts them.

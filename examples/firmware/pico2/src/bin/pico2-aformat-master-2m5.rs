@@ -1,0 +1,10 @@
+//! Reads positions of an A-format encoder at 2.5 Mbit/s and prints them.
+#![no_std]
+#![no_main]
+
+use nikon_aformat::BitRate;
+
+#[rp235x_hal::entry]
+fn main() -> ! {
+    servowire_pico2::aformat::master("pico2-aformat-master-2m5", BitRate::Mbit2_5)
+}
