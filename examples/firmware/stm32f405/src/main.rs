@@ -5,6 +5,7 @@
 mod clock;
 mod stack;
 mod uart;
+mod watchdog;
 
 use core::fmt::Write;
 use core::panic::PanicInfo;
@@ -16,17 +17,20 @@ use tformat::{Address, BitRate, EvidenceCell, Page};
 
 use crate::clock::{CORE_HZ, CRYSTAL_HZ};
 
-/// The pins; where they are is up to the board.
-static BOARD: Board = Board::plain(
-    "STM32F405RG",
-    CRYSTAL_HZ,
-    &[
-        Pin::new("PA9", "DI", "USART1"),
-        Pin::new("PA8", "DE and /RE", "GPIO"),
-        Pin::new("PA10", "RO", "USART1"),
-        Pin::new("PA2", "console", "USART2"),
-    ],
-);
+/// Pins that switch a phase or a brake resistor of the servo drives that have this chip: VESC 4 to 6 and ODrive 3.
+const POWER_STAGES: &[&str] =
+    &["PA7", "PA8", "PA9", "PA10", "PB0", "PB1", "PB10", "PB11", "PB13", "PB14", "PB15", "PC6", "PC7", "PC8"];
+
+/// Where they are is up to the board.
+const PINS: &[Pin] = &[
+    Pin::new("PB6", "DI", "USART1"),
+    Pin::new("PB8", "DE and /RE", "GPIO"),
+    Pin::new("PB7", "RO", "USART1"),
+    Pin::new("PA2", "console", "USART2"),
+];
+
+static BOARD: Board =
+    const { Board { name: "STM32F405RG", crystal_hz: CRYSTAL_HZ, pins: PINS, power_stage: POWER_STAGES }.checked() };
 
 /// The UART begins with its next bit clock; the interrupt of a byte, which may come in between, takes less than 0.9 us; a tick of the
 /// clock is 50 ns.
@@ -67,7 +71,9 @@ fn main() -> ! {
     if cfg!(feature = "emulated") {
         readings = readings.with_max_age_ns(u64::MAX);
     }
+    watchdog::start();
     loop {
+        watchdog::feed();
         let read = encoder.read_evidence(RESOLUTION);
         if let Ok(true) = readings.take(&mut console, read, clock.now_ns()) {
             let _ = writeln!(console, "stack {} bytes", stack::used());
@@ -81,7 +87,7 @@ fn first_line(source: Source) -> FirstLine {
     FirstLine { image: "stm32f405", version, board: &BOARD, core_hz: CORE_HZ, source, bits_per_second }
 }
 
-/// Says where; there is nothing that could go on.
+/// Says where; the watchdog begins again.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

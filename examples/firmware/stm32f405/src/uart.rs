@@ -10,27 +10,33 @@ use servowire_boards::LineFault;
 use stm32_metapac::gpio::vals::{Moder, Ospeedr, Pupdr};
 use stm32_metapac::interrupt;
 use stm32_metapac::usart::Usart;
-use stm32_metapac::{GPIOA, Interrupt, RCC, USART1, USART2};
+use stm32_metapac::{GPIOA, GPIOB, Interrupt, RCC, USART1, USART2};
 
 use crate::clock::{APB1_HZ, APB2_HZ};
 
 const CONSOLE_BAUD: u32 = 1_000_000;
+/// Of port B.
 const DE: usize = 8;
+/// Of port B.
+const RO: usize = 7;
 
-/// Switches everything on: PA9 and PA10 are the encoder's TX and RX, PA8 its DE, PA2 the console's TX.
+/// Switches everything on: PB6 and PB7 are the encoder's TX and RX, PB8 its DE, PA2 the console's TX.
 pub fn start(bits_per_second: u32) -> (Uart, DriverEnable, Console) {
-    RCC.ahb1enr().modify(|w| w.set_gpioaen(true));
+    RCC.ahb1enr().modify(|w| {
+        w.set_gpioaen(true);
+        w.set_gpioben(true);
+    });
     RCC.apb1enr().modify(|w| w.set_usart2en(true));
     RCC.apb2enr().modify(|w| w.set_usart1en(true));
-    for pin in [2, 9, 10] {
-        GPIOA.afr(pin / 8).modify(|w| w.set_afr(pin % 8, 7));
-        GPIOA.ospeedr().modify(|w| w.set_ospeedr(pin, Ospeedr::VERY_HIGH_SPEED));
-        GPIOA.moder().modify(|w| w.set_moder(pin, Moder::ALTERNATE));
+    for (port, pin) in [(GPIOA, 2), (GPIOB, 6), (GPIOB, RO)] {
+        port.afr(pin / 8).modify(|w| w.set_afr(pin % 8, 7));
+        port.ospeedr().modify(|w| w.set_ospeedr(pin, Ospeedr::VERY_HIGH_SPEED));
+        port.moder().modify(|w| w.set_moder(pin, Moder::ALTERNATE));
     }
     // Idle while nobody drives: the transceiver's output floats while its receiver is off.
-    GPIOA.pupdr().modify(|w| w.set_pupdr(10, Pupdr::PULL_UP));
-    GPIOA.bsrr().write(|w| w.set_br(DE, true));
-    GPIOA.moder().modify(|w| w.set_moder(DE, Moder::OUTPUT));
+    GPIOB.pupdr().modify(|w| w.set_pupdr(RO, Pupdr::PULL_UP));
+    GPIOB.bsrr().write(|w| w.set_br(DE, true));
+    GPIOB.moder().modify(|w| w.set_moder(DE, Moder::OUTPUT));
     open(USART1, APB2_HZ, bits_per_second);
     open(USART2, APB1_HZ, CONSOLE_BAUD);
     USART1.cr1().modify(|w| w.set_rxneie(true));
@@ -138,12 +144,12 @@ impl PinErrorType for DriverEnable {
 
 impl OutputPin for DriverEnable {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        GPIOA.bsrr().write(|w| w.set_br(DE, true));
+        GPIOB.bsrr().write(|w| w.set_br(DE, true));
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        GPIOA.bsrr().write(|w| w.set_bs(DE, true));
+        GPIOB.bsrr().write(|w| w.set_bs(DE, true));
         Ok(())
     }
 }

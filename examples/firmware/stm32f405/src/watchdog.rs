@@ -1,0 +1,21 @@
+//! The independent watchdog: it begins the image again if nothing has been read for a second.
+
+use stm32_metapac::IWDG;
+use stm32_metapac::iwdg::vals::{Key, Pr};
+
+/// About a second: 1,000 periods of 32 clocks of an oscillator of 32 kHz, which may have 17 to 47.
+const PERIODS: u16 = 1_000;
+
+/// Starts it; it cannot be stopped.
+pub fn start() {
+    IWDG.kr().write(|w| w.set_key(Key::ENABLE));
+    IWDG.kr().write(|w| w.set_key(Key::START));
+    IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY32));
+    IWDG.rlr().write(|w| w.set_rl(PERIODS));
+    feed();
+}
+
+/// Has to come before the second is over.
+pub fn feed() {
+    IWDG.kr().write(|w| w.set_key(Key::RESET));
+}
