@@ -28,7 +28,8 @@ impl Tolerated {
     /// Nothing: every doubt counts.
     pub const NOTHING: Self = Self { words: 0, acceleration: 0 };
 
-    /// Missing acceleration words, this many at most since the position was exact. `acceleration` is the largest of the shaft, in
+    /// Missing acceleration words, this many at most since the position was exact, in answers of which something could be read (an
+    /// encoder that is silent may not have heard the head, and then it has not sampled). `acceleration` is the largest of the shaft, in
     /// either direction, in steps a frame²; 1024 is all that the link can carry. [`Sample::bound`] holds for that.
     pub const fn missing_words(words: u8, acceleration: u16) -> Self {
         Self { words, acceleration }
@@ -72,7 +73,8 @@ impl Sample {
         self.bound
     }
 
-    /// Number of the H-frame, modulo 2^32: the next one has the next number, also if a frame between them was lost.
+    /// Number of the H-frame, modulo 2^32. Frames that [`Master::skip`](crate::master::Master::skip) told of have numbers too; after some
+    /// of which nobody told, known by the time alone, there are doubts first and numbers that leave them out.
     pub const fn frame(&self) -> u32 {
         self.frame
     }

@@ -34,7 +34,7 @@ enum Known {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Missing {
-    words: u8,
+    words: u16,
     /// Sum of n over these words: frames from each of them to now, its own included.
     frames: u32,
     /// Sum of the sizes of the estimates, in steps a frame².
@@ -281,6 +281,12 @@ impl FastPosition {
         self.followed = false;
     }
 
+    /// There was no answer at all: if the encoder has not heard the head it has not sampled, and its next word is no second difference
+    /// from frame to frame. How far the estimate is off is not known.
+    pub(crate) const fn unanswered(&mut self) {
+        self.followed = false;
+    }
+
     /// Missing words in a row up to now: ACC_ERR_CNT without its limit.
     pub(crate) const fn missing_in_a_row(&self) -> u32 {
         self.in_a_row
@@ -310,7 +316,9 @@ impl FastPosition {
         };
         let followed = self.followed && !matches!(doubt, Some(Doubt::Speed));
         let (words, frames, way) = (self.missing.words, self.missing.frames, self.missing.way);
-        Evidence { doubt, sample, missing: if followed { Some(words) } else { None }, frames, way }
+        // More than can be tolerated are not tolerated.
+        let missing = if followed && words <= u8::MAX as u16 { Some(words as u8) } else { None };
+        Evidence { doubt, sample, missing, frames, way }
     }
 
     /// Whether a register map shows what may be used.

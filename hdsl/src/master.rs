@@ -95,8 +95,9 @@ pub struct Master {
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
-    /// When the window of the last answer was over.
+    /// When the window of the last answer was over, and whether frames after it were told to be lost.
     end_ns: u64,
+    gap: bool,
     /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
     longest_ns: u32,
     /// Blocks of stuffing after a frame of a running link that is free running, and `longest_ns` of it.
@@ -150,6 +151,7 @@ impl Master {
             threshold: 0x1f,
             restart: false,
             end_ns: 0,
+            gap: false,
             longest_ns: u32::MAX,
             stuffing: Stuffing::MIN,
             usual_ns: FREE_RUNNING_NS,
@@ -337,10 +339,26 @@ impl Master {
     /// Another H-frame was heard. If it ended too late one was lost of which nobody told, and with it the position.
     #[inline]
     fn frame_ends(&mut self, end_ns: u64) {
-        if end_ns.saturating_sub(self.end_ns) > self.longest_ns.into() {
-            self.link.interrupt();
-        }
+        self.h_frame.gap = core::mem::take(&mut self.gap);
+        let frame_ns = end_ns.saturating_sub(self.end_ns);
         self.end_ns = end_ns;
+        if frame_ns > self.longest_ns.into() {
+            self.interrupt();
+        }
+    }
+
+    /// Frames went by of which nobody told.
+    #[cold]
+    fn interrupt(&mut self) {
+        self.h_frame.gap = self.state == State::Running;
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
+        let before_ns = self.sampled_ns().saturating_sub(self.frame_ns().into());
+        self.link.interrupt(before_ns);
+    }
+
+    /// From the end of the last window to that of the next one.
+    const fn frame_ns(&self) -> u32 {
+        self.longest_ns.saturating_sub(HALF_FRAME_NS)
     }
 
     /// When the encoder sampled in the last H-frame.

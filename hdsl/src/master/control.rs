@@ -1,6 +1,6 @@
 //! The application's side of the receiver: positions to use, messages, settings.
 
-use super::{FREE_RUNNING_NS, HALF_FRAME_NS, Master, State};
+use super::{FREE_RUNNING_NS, Master, State};
 use crate::doubt::Doubt;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
@@ -45,10 +45,12 @@ impl Master {
     }
 
     /// Blocks of stuffing after each H-frame of a running link that is free running, 0 at first. A frame lasts 11.52 µs and 0.64 µs a
-    /// block: for a processor that needs more time, or another rate of positions. [`ahead`](Self::ahead) goes with it.
+    /// block: for a processor that needs more time, or another rate of positions. [`ahead`](Self::ahead) goes with it. On a link that runs it counts from the
+    /// end of the next frame on.
     pub const fn set_stuffing(&mut self, stuffing: Stuffing) {
         self.stuffing = stuffing;
         self.usual_ns = FREE_RUNNING_NS.wrapping_add((stuffing.get() as u32).wrapping_mul(640));
+        self.detour = true;
     }
 
     /// How long after its edge has left the master an encoder samples: 5 ns a metre of cable, and up to 100 ns of its own (SICK
@@ -59,16 +61,21 @@ impl Master {
 
     /// So many H-frames went over the line whose answers will not be heard, before the one that is heard next: a block of samples was
     /// overwritten, a head was repeated. Their words are missing, their V-frames have no safe position, and the numbers of frames go
-    /// on. Up to 16 are made good like that; of a longer gap the link does not recover.
+    /// on. Some 60 instructions each.
     ///
     /// A frame of which nobody tells is known by its time, if its end is told half a frame too late; then no fast position is given until
-    /// three safe positions have come.
+    /// three safe positions have come, no safe one of that V-frame, and the number of the frame is not known.
     pub fn skip(&mut self, frames: u8) {
         self.counters.frames = self.counters.frames.wrapping_add(frames.into());
-        let frame_ns = self.longest_ns.saturating_sub(HALF_FRAME_NS);
-        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(frame_ns.into()));
-        if self.state == State::Running {
-            (0..frames.min(16)).for_each(|_| self.link.skip());
+        let frame_ns = self.frame_ns();
+        for _ in 0..frames {
+            self.end_ns = self.end_ns.saturating_add(frame_ns.into());
+            if self.state == State::Running {
+                self.gap = true;
+                if self.link.skip() {
+                    self.latch();
+                }
+            }
         }
     }
 

@@ -41,6 +41,8 @@ pub struct HFrame {
     pub state: State,
     /// Set if the next frame begins a new start-up.
     pub restarted: Option<RestartReason>,
+    /// Frames of the running link before this one were not heard: [`Master::skip`](super::Master::skip) told of them, or the time.
+    pub gap: bool,
     /// The encoder identifier, in the frame that brought it.
     pub encoder: Option<EncoderId>,
     /// The line, where it was measured.
@@ -78,6 +80,7 @@ impl HFrame {
         was: State::Reset,
         state: State::Reset,
         restarted: None,
+        gap: false,
         encoder: None,
         signal: None,
         quality: QualityMonitor::START,

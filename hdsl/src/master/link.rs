@@ -78,22 +78,28 @@ impl Link {
         SafeEvidence(self.safe.map(|(raw, summary)| SafeSample { position: id.position(raw), summary, sampled_ns }))
     }
 
-    /// A frame whose answer is not heard: its word is missing, and so is a byte of both safe blocks.
-    pub(super) fn skip(&mut self) {
+    /// A frame whose answer is not heard: its word is missing, and so is a byte of both safe blocks. Returns whether another V-frame
+    /// begins after it.
+    pub(super) fn skip(&mut self) -> bool {
         self.fast.step(None);
         // What comes later in this V-frame is not in order any more.
         self.vframe = VFrame::default();
-        if self.at == 7 {
+        let last = self.at == 7;
+        if last {
             self.fast.align(None);
             self.safe = Err(Doubt::Stale);
             self.msync = !self.msync;
         }
         self.at = self.at.wrapping_add(1) & 7;
+        last
     }
 
-    /// Frames went by unheard.
-    pub(super) const fn interrupt(&mut self) {
+    /// Frames went by unheard, nobody knows how many: what follows need not belong to the V-frame that had begun. The last of them was
+    /// sampled `before_ns`.
+    pub(super) fn interrupt(&mut self, before_ns: u64) {
         self.fast.interrupt();
+        self.vframe = VFrame::default();
+        self.sampled_ns = before_ns;
     }
 }
 
@@ -178,6 +184,9 @@ impl Master {
             }
         }
         self.counters.acceleration = self.counters.acceleration.wrapping_add(1);
+        if answer.is_silence() {
+            self.link.fast.unanswered();
+        }
         None
     }
 
@@ -188,7 +197,10 @@ impl Master {
         let position = safe1.vpos();
         let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
         let sound2 = safe2.is_sound();
-        link.quality.count_blocks(sound1, sound2);
+        // What the host has not heard says nothing about the line.
+        if safe1.is_whole() {
+            link.quality.count_blocks(sound1, sound2);
+        }
         if !sound1 {
             self.counters.safe1 = self.counters.safe1.wrapping_add(1);
         }

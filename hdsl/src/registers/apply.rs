@@ -97,6 +97,9 @@ impl Registers {
         if h_frame.was != State::Running {
             return;
         }
+        if h_frame.gap {
+            self.interrupt();
+        }
         self.tracker.step(h_frame.acceleration);
         // What the alignment changes is shown with the next frame.
         let shown = self.tracker.registers();
@@ -126,6 +129,15 @@ impl Registers {
         match safe {
             Some(position) => self.tracker.align(position),
             None => self.tracker.no_safe_position(),
+        }
+    }
+
+    /// Frames went by unheard: what is shown is not known to be right until it is aligned again.
+    #[cold]
+    fn interrupt(&mut self) {
+        self.tracker.no_safe_position();
+        if let Some(fast) = &mut self.fast {
+            fast.interrupt();
         }
     }
 

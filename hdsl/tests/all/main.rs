@@ -15,6 +15,7 @@ mod golden;
 mod hostile;
 mod instant;
 mod line;
+mod lost_frames;
 mod message_rules;
 mod position_laws;
 mod receiver;
