@@ -187,10 +187,11 @@ impl Registers {
         two = two & !common | d.bits() & common;
         self.put(Register::OnlineStatus1, one.to_be_bytes());
         self.put(Register::OnlineStatus2, two.to_be_bytes());
+        // Messages that a restart has dropped do not come here.
         match &h_frame.finished.long {
             Some(Ok(_)) => d.remove(OnlineD::ANS),
-            Some(Err(Error::Dropped)) | None => {}
             Some(Err(_)) => d.insert(OnlineD::ANS),
+            None => {}
         }
         self.put(Register::OnlineStatusD, d.bits().to_be_bytes());
 
@@ -201,7 +202,7 @@ impl Registers {
         let mut events = Event::from_bits_retain(arisen.bits() & STATUS_EVENTS);
         events.set(Event::MIN, h_frame.init);
         events.set(Event::FREL, d.difference(before).contains(OnlineD::FREL) || h_frame.finished.long.is_some());
-        events.set(Event::ANS, matches!(h_frame.finished.long, Some(Err(error)) if error != Error::Dropped));
+        events.set(Event::ANS, matches!(h_frame.finished.long, Some(Err(_))));
         let mut safe = EventS::empty();
         safe.set(EventS::QMLW, arisen.contains(OnlineD::QMLW));
         safe.set(EventS::MIN, h_frame.init);

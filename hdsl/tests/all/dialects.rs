@@ -135,6 +135,20 @@ fn special_characters_in_the_acceleration() {
     }
 }
 
+/// A bad vertical word: SCE stays as it was in the SDK, and is set by the manual.
+#[test]
+fn a_bad_vertical_word_and_the_safe_flag() {
+    for (dialect, sce) in [(Dialect::TI, false), (Dialect::SICK, true)] {
+        let mut desk = Desk::new(dialect);
+        desk.to(3);
+        let _ = desk.bad_word(0);
+        desk.to(0);
+        let _ = desk.good();
+        assert_eq!(desk.map.online_1().contains(Online1::SCE), sce);
+        assert_eq!(desk.map.event_s().contains(EventS::SCE), sce);
+    }
+}
+
 /// A bad secondary word costs 8 at once; SCE2 stays as it was in the SDK, and is set by the manual.
 #[test]
 fn a_bad_secondary_word() {

@@ -28,6 +28,8 @@ fn lost_frames_that_are_told() {
                     assert_eq!(lost, 255);
                 }
                 link.returns();
+                // What the host has not heard says nothing about the line.
+                assert_eq!(link.master.h_frame().quality, 15);
                 assert_eq!(
                     (link.master.counters().restarts, link.fast().unwrap().frame()),
                     (0, before + u32::from(lost) + 57)
