@@ -128,9 +128,12 @@ impl Answer {
         plain.is_data() && !self.pipe.or(self.secondary).is_byte_error()
     }
 
-    /// Returns whether not one word can be read: an encoder that did not hear the head is silent.
+    /// Returns whether no other word can be read either: an encoder that did not hear the head is silent.
     pub(crate) const fn is_silence(&self) -> bool {
-        self.bad_words().bad == ALL
+        self.parameter.is_byte_error()
+            && self.secondary.is_byte_error()
+            && self.vertical.is_byte_error()
+            && self.pipe.is_byte_error()
     }
 
     /// What is wrong with the words of an answer that is not [plain](Self::is_plain).
@@ -204,7 +207,6 @@ pub(crate) const PARAMETER: u8 = 1 << 1;
 pub(crate) const PIPE: u8 = 1 << 2;
 pub(crate) const ACCELERATION: u8 = 1 << 3 | 1 << 4;
 pub(crate) const SECONDARY: u8 = 1 << 5;
-const ALL: u8 = (1 << 6) - 1;
 
 /// Which words are no good, and which of the others are special characters that have no meaning in their channel. (Those of
 /// pipe and secondary channel all have one.)

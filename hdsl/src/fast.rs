@@ -317,7 +317,10 @@ impl FastPosition {
         let followed = self.followed && !matches!(doubt, Some(Doubt::Speed));
         let (words, frames, way) = (self.missing.words, self.missing.frames, self.missing.way);
         // More than can be tolerated are not tolerated.
-        let missing = if followed && words <= u8::MAX as u16 { Some(words as u8) } else { None };
+        let missing = match words.to_le_bytes() {
+            [words, 0] if followed => Some(words),
+            _ => None,
+        };
         Evidence { doubt, sample, missing, frames, way }
     }
 

@@ -95,7 +95,7 @@ pub struct Master {
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
-    /// When the window of the last answer was over, and whether frames after it were told to be lost.
+    /// When the window of the last answer was over, and whether frames after it were lost.
     end_ns: u64,
     gap: bool,
     /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
@@ -115,7 +115,7 @@ pub struct Master {
     ahead: Option<Transmission>,
     /// Why the link is lost, while the frame after the loss is on the line already.
     lost: Option<RestartReason>,
-    /// The frame does not end in the usual way: sync mode, a restart that was asked for, or one of the two above.
+    /// The frame does not end in the usual way: sync mode, a restart that was asked for, frames lost before it, or one of the two above.
     detour: bool,
 }
 
@@ -339,10 +339,9 @@ impl Master {
     /// Another H-frame was heard. If it ended too late one was lost of which nobody told, and with it the position.
     #[inline]
     fn frame_ends(&mut self, end_ns: u64) {
-        self.h_frame.gap = core::mem::take(&mut self.gap);
-        let frame_ns = end_ns.saturating_sub(self.end_ns);
+        let is_late = end_ns.saturating_sub(self.end_ns) > self.longest_ns.into();
         self.end_ns = end_ns;
-        if frame_ns > self.longest_ns.into() {
+        if is_late {
             self.interrupt();
         }
     }
@@ -350,10 +349,17 @@ impl Master {
     /// Frames went by of which nobody told.
     #[cold]
     fn interrupt(&mut self) {
-        self.h_frame.gap = self.state == State::Running;
+        self.note_gap();
         self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
         let before_ns = self.sampled_ns().saturating_sub(self.frame_ns().into());
         self.link.interrupt(before_ns);
+    }
+
+    /// Frames before the next one are not heard.
+    const fn note_gap(&mut self) {
+        if matches!(self.state, State::Running) {
+            (self.gap, self.detour) = (true, true);
+        }
     }
 
     /// From the end of the last window to that of the next one.
@@ -395,11 +401,13 @@ impl Master {
     }
 
     fn end_with(&mut self, outcome: Result<(), RestartReason>) -> &HFrame {
+        self.h_frame.gap = core::mem::take(&mut self.gap);
         let late = self.late.take();
         let asked = core::mem::take(&mut self.restart).then_some(RestartReason::Requested);
         let restarted = self.lost.take().or(asked).or(outcome.err());
         self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
-        self.detour = self.sync.is_some();
+        // Once more, to say that there is none.
+        self.detour = self.sync.is_some() || self.h_frame.gap;
         if let Some(next) = self.ahead.take() {
             // The next head is out: a restart comes after its frame.
             self.present = next;

@@ -83,11 +83,6 @@ impl SafeBlock {
         u16::from_be_bytes([high, low])
     }
 
-    /// Returns whether all eight words are there.
-    pub(crate) const fn is_whole(&self) -> bool {
-        self.len == 8
-    }
-
     /// Returns whether a word of the block was no good.
     pub(crate) const fn has_byte_error(&self) -> bool {
         self.bad.is_some()
@@ -111,7 +106,7 @@ impl SafeBlock {
     /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
     /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
     pub const fn vpos(&self) -> Result<u64, Error> {
-        if !self.is_whole() {
+        if self.len != 8 {
             return Err(Error::Truncated { got: self.len as u16, want: 8 });
         }
         if let Some(word) = self.bad {

@@ -70,11 +70,9 @@ impl Master {
         let frame_ns = self.frame_ns();
         for _ in 0..frames {
             self.end_ns = self.end_ns.saturating_add(frame_ns.into());
-            if self.state == State::Running {
-                self.gap = true;
-                if self.link.skip() {
-                    self.latch();
-                }
+            self.note_gap();
+            if self.state == State::Running && self.link.skip() {
+                self.latch();
             }
         }
     }

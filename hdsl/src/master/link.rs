@@ -198,7 +198,7 @@ impl Master {
         let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
         let sound2 = safe2.is_sound();
         // What the host has not heard says nothing about the line.
-        if safe1.is_whole() {
+        if !matches!(position, Err(Error::Truncated { .. })) {
             link.quality.count_blocks(sound1, sound2);
         }
         if !sound1 {

@@ -52,7 +52,7 @@ impl Master {
     /// ```
     pub fn ahead(&mut self) -> Option<Transmission> {
         if self.ahead.is_none() {
-            if self.state != State::Running || self.detour {
+            if self.state != State::Running || self.detour && self.waits_for_answer() {
                 return None;
             }
             // What the end of this frame will change: after RX7 another V-frame begins.
@@ -62,6 +62,12 @@ impl Master {
             (self.ahead, self.detour) = (Some(next), true);
         }
         self.ahead
+    }
+
+    /// Whether the next head depends on the answer of a running link.
+    #[cold]
+    const fn waits_for_answer(&self) -> bool {
+        self.sync.is_some() || self.restart || self.lost.is_some()
     }
 
     /// The head after a frame of a running link that is free running.

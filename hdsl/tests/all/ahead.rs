@@ -167,3 +167,18 @@ fn not_in_sync_mode() {
     let _ = both.frame();
     assert!(both.master.transmission().head.extra().is_none() && both.master.ahead().is_some());
 }
+
+/// Neither frames that were lost nor other stuffing make the next head wait.
+#[test]
+fn not_held_up() {
+    let mut both = Early::lock(Dialect::SICK);
+    both.master.skip(3);
+    assert!(both.master.ahead().is_some());
+    let gaps = [(); 3].map(|()| both.frame().gap);
+    assert_eq!(gaps, [true, false, false]);
+    both.master.set_stuffing(hdsl::frame::Stuffing::MAX);
+    assert!(both.master.ahead().is_some());
+    assert_eq!(both.frame().tail.stuffing, hdsl::frame::Stuffing::MAX);
+    both.master.request_restart();
+    assert!(both.master.ahead().is_none());
+}

@@ -90,10 +90,29 @@ fn nothing_on<S, I, O>(_: &mut S, _: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()
 }
 
-/// Instructions of one call of `call`, to within a tick, with those of reading the timer.
+/// Instructions of one call of `call`, to within a look at the timer, some five of them, with those of reading it: from a tick
+/// to the first one after the call, less what was left to that one.
 #[cfg(feature = "hdsl")]
 pub(crate) fn once(call: impl FnOnce()) -> u32 {
-    let begin = SYST::get_current();
+    next_tick();
+    let (begin, all) = next_tick();
     call();
-    (begin.wrapping_sub(SYST::get_current()) & RELOAD) * INSTRUCTIONS_PER_TICK as u32
+    let (end, left) = next_tick();
+    let per_tick = INSTRUCTIONS_PER_TICK as u32;
+    (begin.wrapping_sub(end) & RELOAD) * per_tick - left * per_tick / all
+}
+
+/// Waits for the next tick of the timer: what it shows then, and how many looks that took.
+#[cfg(feature = "hdsl")]
+#[inline(never)]
+fn next_tick() -> (u32, u32) {
+    let before = SYST::get_current();
+    let mut looks = 0;
+    loop {
+        looks += 1;
+        let now = SYST::get_current();
+        if now != before {
+            return (now, looks);
+        }
+    }
 }

@@ -273,6 +273,9 @@ named! {
     hdsl_frame_bits_worst = hdsl_frame_bits;
     hdsl_frame_bits_damaged = hdsl_frame_bits;
     hdsl_frame_ahead_worst = hdsl_frame_ahead;
+    hdsl_frame_words_damaged = hdsl_frame_words;
+    hdsl_frame_registers_damaged = registers;
+    hdsl_frame_registers_worst = registers;
 }
 
 pub(crate) const KERNELS: &[Kernel] = &[
@@ -282,6 +285,7 @@ pub(crate) const KERNELS: &[Kernel] = &[
     // The edges are where bit times meet: with jitter two fall into one, and the RSSI has to be looked up.
     Kernel { name: "hdsl_frame_border", tenths: || measure(Line::Polite, 16, hdsl_frame_border).0 },
     Kernel { name: "hdsl_frame_words", tenths: || mean(hdsl_frame_words) },
+    Kernel { name: "hdsl_frame_words_damaged", tenths: || measure(Line::Damaged, 14, hdsl_frame_words_damaged).0 },
     Kernel { name: "hdsl_frame_words_worst", tenths: || worst(hdsl_frame_words_worst) },
     Kernel { name: "hdsl_frame_bits", tenths: || mean(hdsl_frame_bits) },
     Kernel { name: "hdsl_frame_bits_damaged", tenths: || measure(Line::Damaged, 14, hdsl_frame_bits_damaged).0 },
@@ -292,4 +296,12 @@ pub(crate) const KERNELS: &[Kernel] = &[
         tenths: || measure_part(Line::Damaged, hdsl_frame_ahead_worst, true).1 * 10,
     },
     Kernel { name: "hdsl_frame_registers", tenths: || measure_part(Line::Polite, registers, false).0 },
+    Kernel {
+        name: "hdsl_frame_registers_damaged",
+        tenths: || measure_part(Line::Damaged, hdsl_frame_registers_damaged, false).0,
+    },
+    Kernel {
+        name: "hdsl_frame_registers_worst",
+        tenths: || measure_part(Line::Damaged, hdsl_frame_registers_worst, false).1 * 10,
+    },
 ];
