@@ -68,7 +68,8 @@ impl Sample {
     }
 
     /// How far the position may be off in either direction, in steps: 0 unless acceleration words are missing and the policy
-    /// tolerates that.
+    /// tolerates that. It does not know of a word that was wrong and passed its checks; where others are missing at the same time that
+    /// is found out after 24 frames or more, not after 16.
     pub const fn bound(&self) -> u32 {
         self.bound
     }
