@@ -318,6 +318,24 @@ mod tests {
         assert_eq!(line.first_ns(&mut || 17_000_030_000), Ok(17_000_030_000));
     }
 
+    /// What is sat out is as long as was said, and with a clock that was set back meanwhile as long as it can be.
+    #[cfg(feature = "tformat")]
+    #[test]
+    fn sitting_out_takes_as_long_as_it_has_to() {
+        let sat_out_ns = |set_back_at| {
+            let (mut line, mut looks) = (Line::new(8_000), 0);
+            let mut clock = || {
+                looks += 1;
+                10 * looks + if looks < set_back_at { 1_000 } else { 0 }
+            };
+            line.begin(90_000);
+            line.sit_out(&mut clock, 1_500, 10_000);
+            10 * looks
+        };
+        assert!((500..600).contains(&sat_out_ns(u64::MAX)), "{}", sat_out_ns(u64::MAX));
+        assert!((10_000..10_500).contains(&sat_out_ns(20)), "{}", sat_out_ns(20));
+    }
+
     #[cfg(feature = "async")]
     #[test]
     fn a_wait_is_no_jump() {

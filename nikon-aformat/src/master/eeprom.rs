@@ -240,6 +240,18 @@ mod tests {
         assert_eq!(trusting.receive(Ok(word(0, 8)), 3), Step::Done { value: 8, ready_ns: 3 });
     }
 
+    /// Where ES0 tells a first response, it is told after a missing one too: nothing has to be read in between.
+    #[test]
+    fn a_trusted_encoder_is_asked_for_the_same_address_again() {
+        let request = Request::new(EA, Operation::EepromRead { address: 9 });
+        let mut trusting =
+            EepromRead::new(EA, 9).knowing_that_none_was_broken_off().trusting_es0_of_the_first_response();
+        let _ = trusting.start(0);
+        let again = Step::Send { request, not_before_ns: 300_000 };
+        assert_eq!(trusting.receive(Err(Error::NoResponse), 0), again);
+        assert_eq!(trusting.receive(Ok(word(0, 8)), 3), Step::Done { value: 8, ready_ns: 3 });
+    }
+
     /// After a missing response nobody knows whether the next one is a first one: another address is read in between.
     #[test]
     fn an_error_does_not_count_as_the_first_response() {

@@ -151,6 +151,25 @@ mod tests {
         assert!(matches!(run(700, 0, None).0, Step::Failed { error: Error::EffectUnknown { .. }, .. }));
     }
 
+    /// Three times 31 us after the rest of the idle line: nobody is storing then, so there is nothing to wait for.
+    #[test]
+    fn turns_that_cannot_be_read_are_read_again_at_once() {
+        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 3 * 31_000;
+        let error = Error::EffectUnknown { because: ErrorClass::NoResponse };
+        assert_eq!(run(700, 0, None), (Step::Failed { error, ready_ns }, 10));
+    }
+
+    #[test]
+    fn an_end_is_an_end() {
+        let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(Resolution::new(17, 16).unwrap(), 1);
+        let _ = zero.start(0);
+        let _ = zero.receive(LOST, 7);
+        let _ = zero.receive(LOST, 7);
+        let end = Step::Failed { error: Error::NoResponse { echo: false }, ready_ns: 7 };
+        assert_eq!(zero.receive(LOST, 7), end);
+        assert_eq!(zero.receive(Ok(Response::ReadMultiTurn(multi(0))), 99), end);
+    }
+
     /// Bits above the width are no count: read again, and given up.
     #[test]
     fn a_count_that_is_too_wide_says_nothing() {

@@ -169,6 +169,16 @@ fn a_write_is_not_repeated_beyond_the_tries() {
 }
 
 /// What was tried for the page does not count against the byte.
+/// What was lost until the memory has taken the byte is not counted against the memory that is busy then.
+#[test]
+fn what_is_written_has_its_own_tries() {
+    let (busy, done) = (read(true, 0), read(false, 0x5a));
+    let outcomes = [page(2), LOST, read(false, 0), page(2), wrote(false, 0x5a), busy, busy, done, page(2)];
+    let (sent, end) = play(writing(3), &outcomes);
+    assert_eq!(sent, [CHECK, WRITE, READ, CHECK, WRITE, READ, READ, READ, CHECK]);
+    assert_eq!(end, Step::Done { value: 0x5a, ready_ns: 0 });
+}
+
 #[test]
 fn the_page_has_its_own_tries() {
     let outcomes = [page(0), LOST, page(2), LOST, LOST, read(false, 7), page(2)];

@@ -97,6 +97,9 @@ fn an_echo_leaves_the_time_out_as_it_is() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
     assert_eq!(transaction.hear(&[0x02], 4_000), Progress::Pending { until_ns: 23_600 });
     assert_eq!(transaction.poll(23_599), Progress::Pending { until_ns: 23_600 });
+    // Nor does a line on which fields may be far apart lengthen it.
+    let mut patient = Transaction::start(Request::ReadSingleTurn, LINE.with_field_timeout_ns(100_000), 0);
+    assert_eq!(patient.hear(&[0x02], 4_000), Progress::Pending { until_ns: 23_600 });
 }
 
 /// The request of 4 us begins at 10 us. Its driver is on 1 us before, and off before the encoder answers.
@@ -354,6 +357,64 @@ fn framing_errors_of_the_uart() {
     let mut late = Transaction::start(Request::ReadSingleTurn, LINE, 0);
     let want = Progress::Failed { error: Error::Delimiter { field: 0 }, ready_ns: 99_000 };
     assert_eq!(late.framing_error(99_000), want);
+}
+
+/// A response cannot end its first field before 9.6 us: what was damaged then was the echo. Later, the response may still come; it is
+/// waited for to the end, 23.599 us.
+#[test]
+fn a_framing_error_before_a_response_is_remembered() {
+    let heard = |end_ns| {
+        let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+        (transaction.framing_error(end_ns), ended(&mut transaction))
+    };
+    let pending = Progress::Pending { until_ns: 23_600 };
+    let (none, delimiter) = (Error::NoResponse { echo: false }, Error::Delimiter { field: 0 });
+    assert_eq!(heard(9_599), (pending, Err(none)));
+    assert_eq!(heard(9_600), (pending, Err(delimiter)));
+    assert_eq!(heard(23_599), (pending, Err(delimiter)));
+    assert_eq!(heard(23_600).0, Progress::Failed { error: delimiter, ready_ns: 58_000 });
+    let mut good = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let _ = good.framing_error(9_600);
+    let _ = good.hear(&RESPONSE, 36_000);
+    assert_eq!(ended(&mut good), Response::parse(Request::ReadSingleTurn, &RESPONSE));
+}
+
+/// A response that is wrong is refused when it is there, not when its time is over.
+#[test]
+fn a_wrong_response_is_refused_at_once() {
+    let [cf, sf, rest @ ..] = RESPONSE;
+    let wrong = [&[cf, sf ^ 0x40][..], &rest].concat();
+    let refused = Progress::Failed { error: Error::Crc { got: 0x37, want: 0x77 }, ready_ns: 58_000 };
+    let mut block = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    assert_eq!(block.hear(&wrong, 31_000), refused);
+    let mut single = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let mut last = single.progress();
+    for (byte, end_ns) in at(7_000, &wrong) {
+        assert!(matches!(last, Progress::Pending { .. }), "{last:?}");
+        last = single.hear(&[byte], end_ns);
+    }
+    assert_eq!(last, refused);
+}
+
+/// Glitches that look like the begin of all data (ID 3), which has 11 fields: the response behind them has its first field in the last of
+/// these, or is shorter than they let expect.
+#[test]
+fn a_response_is_found_behind_the_begin_of_a_longer_one() {
+    for glitches in [&[0x1a, 0x55][..], &[0x1a, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55]] {
+        let bytes = at(5_700, &[glitches, &RESPONSE[..]].concat());
+        let outcome = run(Request::ReadSingleTurn, LINE, &bytes);
+        assert_eq!(outcome, Response::parse(Request::ReadSingleTurn, &RESPONSE), "{glitches:02x?}");
+    }
+}
+
+/// Its first byte was on the line before a response can be: what came before it was not the begin of one either.
+#[test]
+fn a_block_that_reaches_far_back_begins_anew() {
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let _ = transaction.hear(&[0x1a], 9_700);
+    let block = [&[0x55], &RESPONSE[..]].concat();
+    let progress = transaction.hear(&block, 33_599);
+    assert!(matches!(progress, Progress::Done { .. }), "{progress:?}");
 }
 
 /// More bytes than any request and response have: the last ones count.

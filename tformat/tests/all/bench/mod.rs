@@ -55,6 +55,8 @@ pub struct Bench {
     pub seen: Seen,
     /// Requests that the encoder believed and nobody sent like that: damage that it cannot see, or another speaker.
     pub forged_requests: u32,
+    /// The three fields that the encoder heard last: of which transmission, and where in it.
+    fields: [Option<(Id, u16)>; 3],
     /// Bytes that the encoder heard and that the host did not send like that or not then: its count of resets may have begun
     /// again.
     pub misheard: u32,
@@ -98,6 +100,7 @@ impl Bench {
             ready_ns: 100_000,
             seen: Seen::default(),
             forged_requests: 0,
+            fields: [None; 3],
             misheard: 0,
             misread: 0,
             moves: true,
@@ -256,6 +259,13 @@ impl Bench {
                     self.forged_requests += u32::from([0xba, 0xc2, 0x62, 0x32].contains(&byte));
                     self.forged_requests += u32::from(sent.is_some() && byte & 7 != 2);
                 }
+                // Fields that came twice make other requests to the memory: 32 32 7F 7F of 32 7F.
+                let place = (unit.origin.transmission, unit.origin.index);
+                let to_memory =
+                    |sent: &tformat::device::Transmission| matches!(sent.frame.as_bytes(), [0x32 | 0xea, ..]);
+                self.forged_requests += u32::from(sent.as_ref().is_some_and(to_memory) && twice(&self.fields, place));
+                self.fields.rotate_left(1);
+                self.fields[2] = Some(place);
                 if let Some(sent) = sent {
                     let message = Message::bytes(sent.frame.as_bytes()).tagged(tag(sent.frame.as_bytes()));
                     let _ = self.world.answer(0, unit.origin.transmission, &message, sent.start_ns);
@@ -410,6 +420,14 @@ fn tag(frame: &[u8]) -> u64 {
         .iter()
         .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     frame.iter().take(2).rev().fold(sum, |tag, byte| tag << 8 | u64::from(*byte))
+}
+
+/// Whether one of the fields was heard twice, with this one behind them.
+fn twice(before: &[Option<(Id, u16)>; 3], last: (Id, u16)) -> bool {
+    let [one, two, three] = *before;
+    [one, two, three].contains(&Some(last))
+        || three.is_some() && (three == one || three == two)
+        || two.is_some() && two == one
 }
 
 /// Whether the host was given every field of a transmission since this request.
