@@ -67,6 +67,11 @@
 #define SW_SORTE_DATA_AT 2
 
 /**
+ * Bytes of a DISCOVERY frame, from its destination to its check sequence.
+ */
+#define SW_SORTE_DISCOVERY 1030
+
+/**
  * The release of this header, before the first dot.
  */
 #define SERVOWIRE_VERSION_MAJOR 0
@@ -1688,6 +1693,14 @@ enum sw_sorte_error_t
      */
     SW_E_SORTE_BAD_FCS = -1282,
     /**
+     * The destination is not that of all.
+     */
+    SW_E_SORTE_WRONG_DESTINATION = -1283,
+    /**
+     * There is no such type, or no layout of it is published.
+     */
+    SW_E_SORTE_UNKNOWN_TYPE = -1284,
+    /**
      * The type is not the one that is due.
      */
     SW_E_SORTE_UNEXPECTED_TYPE = -1285,
@@ -1703,6 +1716,18 @@ enum sw_sorte_error_t
      * Another source than the one that is due.
      */
     SW_E_SORTE_WRONG_SOURCE = -1288,
+    /**
+     * The preamble is wrong.
+     */
+    SW_E_SORTE_BAD_PREAMBLE = -1289,
+    /**
+     * More devices than there are addresses.
+     */
+    SW_E_SORTE_TOO_MANY_DEVICES = -1290,
+    /**
+     * The table does not agree with its totals.
+     */
+    SW_E_SORTE_TABLE_MISMATCH = -1291,
     /**
      * The buffer is too small.
      */
@@ -1743,6 +1768,39 @@ enum sw_sorte_pto_kind_t
 };
 #ifndef __cplusplus
 typedef uint8_t sw_sorte_pto_kind_t;
+#endif // __cplusplus
+
+/**
+ * Types of the frames with a long header.
+ */
+enum sw_sorte_type_t
+#ifdef __cplusplus
+  : uint8_t
+#endif // __cplusplus
+ {
+    /**
+     * DISCOVERY.
+     */
+    SW_SORTE_DISCOVERY_FRAME = 1,
+    /**
+     * PARAM.
+     */
+    SW_SORTE_PARAM_FRAME = 2,
+    /**
+     * DELAY_REQ.
+     */
+    SW_SORTE_DELAY_REQ_FRAME = 3,
+    /**
+     * DELAY_RESP.
+     */
+    SW_SORTE_DELAY_RESP_FRAME = 4,
+    /**
+     * SYNC.
+     */
+    SW_SORTE_SYNC_FRAME = 5,
+};
+#ifndef __cplusplus
+typedef uint8_t sw_sorte_type_t;
 #endif // __cplusplus
 
 /**
@@ -3364,6 +3422,142 @@ typedef struct {
      */
     uint8_t direction;
 } sw_sorte_pto_t;
+
+/**
+ * The header of a frame of the start-up; its payload begins at byte 4.
+ */
+typedef struct {
+    /**
+     * SA.
+     */
+    uint8_t source;
+    /**
+     * sw_sorte_type_t.
+     */
+    uint8_t frame_type;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+    /**
+     * Bytes of the payload.
+     */
+    uint16_t payload_len;
+} sw_sorte_header_t;
+
+/**
+ * What a PARAM frame tells all devices.
+ */
+typedef struct {
+    /**
+     * Cycle time, ns.
+     */
+    uint32_t cycle_time_ns;
+    /**
+     * SYNC_CYCLE.
+     */
+    uint32_t sync_cycle;
+    /**
+     * DELAY_FWD_TIME, ns.
+     */
+    uint32_t delay_fwd_time_ns;
+    /**
+     * IPG, 5 ns.
+     */
+    uint32_t ipg_5ns;
+    /**
+     * T_IN, ns.
+     */
+    uint32_t t_in_ns;
+    /**
+     * T_OUT, ns.
+     */
+    uint32_t t_out_ns;
+    /**
+     * DELAY_PERIOD, ms.
+     */
+    uint16_t delay_period_ms;
+    /**
+     * DELAY_BURST.
+     */
+    uint8_t delay_burst;
+    /**
+     * DELAY_GAP, ms.
+     */
+    uint8_t delay_gap_ms;
+    /**
+     * TOPOLOGY.
+     */
+    uint8_t topology;
+    /**
+     * DIAGNOSTICS.
+     */
+    uint8_t diagnostics;
+    /**
+     * ALARM.
+     */
+    uint8_t alarm;
+    /**
+     * CRC_MODE: low nibble output, high nibble input.
+     */
+    uint8_t crc_mode;
+    /**
+     * SA, of the frame.
+     */
+    uint8_t source;
+    /**
+     * STATUS, of the frame.
+     */
+    uint8_t status;
+} sw_sorte_param_t;
+
+/**
+ * A SYNC frame.
+ */
+typedef struct {
+    /**
+     * Master time at which its start is expected at the receiver, ns.
+     */
+    uint32_t time_stamp_ns;
+    /**
+     * Delay from the master to the receiver, ns.
+     */
+    uint16_t delay_ns;
+    /**
+     * SA.
+     */
+    uint8_t source;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+} sw_sorte_sync_t;
+
+/**
+ * A DISCOVERY frame, but for its table.
+ */
+typedef struct {
+    /**
+     * Devices that have passed it on.
+     */
+    uint16_t count;
+    /**
+     * Bytes from all devices.
+     */
+    uint16_t input_total;
+    /**
+     * Bytes to all devices.
+     */
+    uint16_t output_total;
+    /**
+     * SA.
+     */
+    uint8_t source;
+    /**
+     * STATUS.
+     */
+    uint8_t status;
+} sw_sorte_discovery_t;
 
 /**
  * When a step comes.
@@ -5058,6 +5252,67 @@ sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *
  * What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
  */
 sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
+
+/**
+ * The CRC-8 of the IO exchange over more bytes, behind those that gave `crc`; 0 at the begin.
+ */
+sw_result_t sw_sorte_crc8(const uint8_t *bytes, size_t len, uint8_t *crc);
+
+/**
+ * Where the frame begins behind its preamble, which ends with D5h.
+ */
+sw_result_t sw_sorte_strip_preamble(const uint8_t *bytes, size_t len, size_t *at);
+
+/**
+ * A frame of the start-up, with all checks: destination, type, length, check sequence.
+ */
+sw_result_t sw_sorte_parse_header(const uint8_t *bytes, size_t len, sw_sorte_header_t *header);
+
+/**
+ * A PARAM frame.
+ */
+sw_result_t sw_sorte_parse_param(const uint8_t *bytes, size_t len, sw_sorte_param_t *param);
+
+/**
+ * The bytes of a PARAM frame, 40.
+ */
+sw_result_t sw_sorte_build_param(const sw_sorte_param_t *param, uint8_t *bytes, size_t size);
+
+/**
+ * A DELAY_REQ frame has nothing but its header: this makes its 8 bytes.
+ */
+sw_result_t sw_sorte_build_delay_req(uint8_t source, uint8_t status, uint8_t *bytes, size_t size);
+
+/**
+ * A SYNC frame.
+ */
+sw_result_t sw_sorte_parse_sync(const uint8_t *bytes, size_t len, sw_sorte_sync_t *sync);
+
+/**
+ * The bytes of a SYNC frame, 14.
+ */
+sw_result_t sw_sorte_build_sync(const sw_sorte_sync_t *sync, uint8_t *bytes, size_t size);
+
+/**
+ * A DISCOVERY frame, whose table lies behind it: sw_sorte_discovered().
+ */
+sw_result_t sw_sorte_parse_discovery(const uint8_t *bytes, size_t len, sw_sorte_discovery_t *discovery);
+
+/**
+ * The bytes from and to the device at an address, in a DISCOVERY frame. SW_E_NO_VALUE if it has no entry.
+ */
+sw_result_t sw_sorte_discovered(const uint8_t *bytes,
+                                size_t len,
+                                uint8_t address,
+                                uint16_t *input,
+                                uint16_t *output);
+
+/**
+ * The DISCOVERY frame that a master sends, SW_SORTE_DISCOVERY bytes; `last` true for the last one of its phase, with which the devices go on.
+ */
+sw_result_t sw_sorte_build_discovery(bool last,
+                                     uint8_t *bytes,
+                                     size_t size);
 
 /**
  * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.

@@ -1,4 +1,6 @@
-//! TI SORTE: frames of the IO exchange and PTO words.
+//! TI SORTE: frames of the start-up and of the IO exchange, and PTO words.
+
+mod startup;
 
 use core::mem::MaybeUninit;
 
@@ -8,6 +10,8 @@ use sorte_proto::{
 
 use crate::border::{OK, Refused, border, cleared, in_range, read, there};
 use crate::result::{Protocol, refused, sw_result_t};
+
+pub use startup::*;
 
 /// Where the data of a frame begin, from its first byte, the source address: the output of a master frame, the payload of a device
 /// frame.
@@ -21,6 +25,10 @@ pub enum sw_sorte_error_t {
     SW_E_SORTE_TRUNCATED = -0x501,
     /// The frame check sequence is wrong.
     SW_E_SORTE_BAD_FCS = -0x502,
+    /// The destination is not that of all.
+    SW_E_SORTE_WRONG_DESTINATION = -0x503,
+    /// There is no such type, or no layout of it is published.
+    SW_E_SORTE_UNKNOWN_TYPE = -0x504,
     /// The type is not the one that is due.
     SW_E_SORTE_UNEXPECTED_TYPE = -0x505,
     /// The frame is too long.
@@ -29,6 +37,12 @@ pub enum sw_sorte_error_t {
     SW_E_SORTE_BAD_CRC8 = -0x507,
     /// Another source than the one that is due.
     SW_E_SORTE_WRONG_SOURCE = -0x508,
+    /// The preamble is wrong.
+    SW_E_SORTE_BAD_PREAMBLE = -0x509,
+    /// More devices than there are addresses.
+    SW_E_SORTE_TOO_MANY_DEVICES = -0x50a,
+    /// The table does not agree with its totals.
+    SW_E_SORTE_TABLE_MISMATCH = -0x50b,
     /// The buffer is too small.
     SW_E_SORTE_BUFFER_TOO_SMALL = -0x50e,
     /// A PTO word that is reserved.

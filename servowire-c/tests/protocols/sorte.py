@@ -2,14 +2,11 @@
 
 MACHINE = "the master and the device with their start-up are not in the C interface"
 NOT_IN_C = {
-    "crc8": "checks are made by the parsers",
     "device_state": MACHINE,
     "discovery_chain": MACHINE,
     "drv8711": "the stepper driver is not in the C interface",
     "line_delay": MACHINE,
     "master_startup": MACHINE,
-    "negative": "frames of the start-up are not in the C interface",
-    "param": "frames of the start-up are not in the C interface",
     "sync0_closed_loop": "the SYNC0 generator is not in the C interface",
     "sync0_figures": "the SYNC0 generator is not in the C interface",
     "sync0_fsm": "the SYNC0 generator is not in the C interface",
@@ -71,3 +68,52 @@ def process_data_slice(row):
     start = row.get("start_ns", row.get("raw_time", 0)) or 0
     row.ignore("raw_time")
     return [(f"sorte_pto {raw:04x}", f"{result} {KINDS[kind]} start {start} direction {row.get('direction') or 0}")]
+
+
+def crc8(row):
+    kind = row["kind"]
+    if kind == "lut":
+        return [("sorte_lut", row["lut"])]
+    if kind == "crc":
+        return [(f"sorte_crc8 {row['data'] or '-'}", row["crc8"])]
+    if kind == "stream":
+        return [(f"sorte_crc8 {row['part1'] or '-'} {row['part2'] or '-'}", f"{row['crc_after_part1']} {row['crc8']}")]
+    assert kind == "params" and row["width"] == 8
+    row.ignore("refin", "refout")
+    check = row["check_123456789"]
+    # Of a 1 it is the polynomial; of nothing the start value, of zeros again; behind its own value the residue.
+    return [("sorte_crc8 01", row["poly"]), ("sorte_crc8 -", row["init"]), ("sorte_crc8 00000000", row["xorout"]),
+            (f"sorte_crc8 313233343536373839 {check}", f"{check} {row['residue']}")]
+
+
+def param(row):
+    # What a device is then is a matter of the machines.
+    row.ignore("origin", "state_after")
+    fields, frame = row["fields"], row["frame"]
+    keys = ("cycle_time_ns", "sync_cycle", "delay_period_ms", "delay_burst", "delay_gap_ms", "delay_fwd_time_ns", "ipg_5ns", "t_in_ns",
+            "t_out_ns", "topology", "diagnostics", "alarm", "crc_mode")
+    assert set(fields) == set(keys) and row["device_stores_payload"] == frame[8:-8]
+    text = " ".join(str(fields[key]) for key in keys)
+    return [(f"sorte_param {frame}", f"ok {text} status {row['status']} ok {frame}")]
+
+
+LONG_CLASSES = {"BadFcs": ("bad_fcs",), "WrongDestination": ("wrong_destination",), "UnknownType": ("unknown_type",),
+                "Truncated": ("truncated",), "LengthMismatch": ("too_long", "truncated"), "BadPreamble": ("bad_preamble",)}
+LENGTHS = {"DISCOVERY": 1030, "PARAM": 40, "DELAY_REQ": 8, "SYNC": 14}
+
+
+def negative(row):
+    row.ignore("origin", "base")
+    kind, expect = row["type"], row["expect"]
+    if (wire := row.get("wire")) is not None:
+        begin = row["preamble"]
+        assert wire.startswith(begin)
+        if expect != "Ok":
+            return [(f"sorte_preamble {wire}", LONG_CLASSES[expect][0])]
+        return [(f"sorte_preamble {wire}", f"ok {len(begin) // 2}"), (f"sorte_startup {kind} {wire[len(begin):]}", "ok same 1")]
+    frame = row["frame"]
+    if expect == "Ok":
+        return [(f"sorte_startup {kind} {frame}", "ok same 1")]
+    classes = LONG_CLASSES[expect]
+    text = classes[len(classes) > 1 and len(frame) // 2 < LENGTHS[kind]]
+    return [(f"sorte_startup {kind} {frame or '-'}", text)]
