@@ -51,6 +51,12 @@ host() {
     "$out/border"
     gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/both_ends.c "$out/libservowire_c.a" -o "$out/both_ends"
     "$out/both_ends"
+    # What the README promises to somebody who has nothing but it, the header and the library.
+    python3 tests/readme.py README.md >"$out/readme.c"
+    gcc -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude "$out/readme.c" "$out/libservowire_c.a" -Wl,--gc-sections -o "$out/readme"
+    "$out/readme"
+    g++ -std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude -x c++ "$out/readme.c" -x none "$out/libservowire_c.a" -o "$out/readme"
+    "$out/readme"
     g++ -std=c++11 "${strict[@]}" -x c++ tests/c/border.c -x none "$out/libservowire_c.a" -o "$out/border++"
     "$out/border++"
 }
