@@ -8,7 +8,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 
 built=$(cargo metadata --no-deps --format-version 1 | python3 -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')
 out=$built/c
-mkdir -p "$out"
+# Programs that are made stand where no header of another step is.
+mkdir -p "$out/made"
 
 strict=(-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Werror -Iinclude)
 sanitized=(-g -O1 -fsanitize=address,undefined -fno-sanitize-recover=all)
@@ -52,10 +53,10 @@ host() {
     gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/both_ends.c "$out/libservowire_c.a" -o "$out/both_ends"
     "$out/both_ends"
     # What the README promises to somebody who has nothing but it, the header and the library.
-    python3 tests/readme.py README.md >"$out/readme.c"
-    gcc -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude "$out/readme.c" "$out/libservowire_c.a" -Wl,--gc-sections -o "$out/readme"
+    python3 tests/readme.py README.md >"$out/made/readme.c"
+    gcc -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude "$out/made/readme.c" "$out/libservowire_c.a" -Wl,--gc-sections -o "$out/readme"
     "$out/readme"
-    g++ -std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude -x c++ "$out/readme.c" -x none "$out/libservowire_c.a" -o "$out/readme"
+    g++ -std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude -x c++ "$out/made/readme.c" -x none "$out/libservowire_c.a" -o "$out/readme"
     "$out/readme"
     g++ -std=c++11 "${strict[@]}" -x c++ tests/c/border.c -x none "$out/libservowire_c.a" -o "$out/border++"
     "$out/border++"
@@ -73,10 +74,10 @@ rows() {
 hostile() {
     local host seed
     host=$(rustc -vV | sed -n 's/^host: //p')
-    python3 tests/hostile.py include/servowire.h >"$out/hostile.c"
+    python3 tests/hostile.py include/servowire.h >"$out/made/hostile.c"
     CARGO_PROFILE_RELEASE_LTO=false RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=yes -Coverflow-checks=yes" cargo +nightly rustc --quiet --release \
         --lib --crate-type staticlib --features std --target "$host" --target-dir "$built/sanitized"
-    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" "$out/hostile.c" "$built/sanitized/$host/release/libservowire_c.a" -lm \
+    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" "$out/made/hostile.c" "$built/sanitized/$host/release/libservowire_c.a" -lm \
         -o "$out/hostile"
     for seed in 1 2 3; do "$out/hostile" "${HOSTILE_ROUNDS:-1000}" "$seed"; done
 }

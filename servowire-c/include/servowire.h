@@ -72,6 +72,11 @@
 #define SW_SORTE_DISCOVERY 1030
 
 /**
+ * The last step with which sw_step_steps() begins.
+ */
+#define SW_STEP_FIRST (1 << 20)
+
+/**
  * The release of this header, before the first dot.
  */
 #define SERVOWIRE_VERSION_MAJOR 0
@@ -3574,6 +3579,80 @@ typedef struct {
 } sw_step_time_t;
 
 /**
+ * A move with a ramp.
+ */
+typedef struct {
+    /**
+     * Steps of the move.
+     */
+    uint32_t steps;
+    /**
+     * Speed constant: sw_step_speed().
+     */
+    uint32_t speed;
+    /**
+     * Steps an entry.
+     */
+    uint32_t k;
+    /**
+     * Where the first step comes in its cycle, ns.
+     */
+    uint32_t init_sync;
+    /**
+     * 1: as the PRU computes it, its errors included; 0: without them.
+     */
+    uint8_t as_pru;
+} sw_step_move_t;
+
+/**
+ * How a move goes.
+ */
+typedef struct {
+    /**
+     * How long it takes, ns.
+     */
+    uint64_t duration_ns;
+    /**
+     * Steps of the ramp up.
+     */
+    uint32_t accelerating;
+    /**
+     * Steps at full speed.
+     */
+    uint32_t constant;
+    /**
+     * Steps of the ramp down.
+     */
+    uint32_t decelerating;
+    /**
+     * 1: the PRU computes it without error.
+     */
+    uint8_t pru_is_exact;
+} sw_step_shape_t;
+
+/**
+ * A step of a move with a ramp.
+ */
+typedef struct {
+    /**
+     * Cycle of 4 us in which it comes, from the first of the move.
+     */
+    uint64_t cycle;
+    /**
+     * Time since the step before, ns.
+     */
+    uint32_t t_step;
+    /**
+     * Time in its cycle, ns.
+     */
+    uint32_t sync_time;
+    /**
+     * Entry of the ramp.
+     */
+    uint8_t entry;
+} sw_step_step_t;
+
+/**
  * What a master sends.
  */
 typedef struct {
@@ -5352,6 +5431,26 @@ sw_result_t sw_step_check(uint32_t speed,
  * How long a move of `steps` with the published ramp takes, ns.
  */
 sw_result_t sw_step_duration_ns(uint32_t speed, uint32_t k, uint32_t init_sync, uint32_t steps, uint64_t *ns);
+
+/**
+ * How a move goes, with a ramp of one's own of 32 entries, or with the published one for NULL.
+ */
+sw_result_t sw_step_shape(const uint32_t *table,
+                          size_t len,
+                          const sw_step_move_t *it,
+                          sw_step_shape_t *shape);
+
+/**
+ * The steps of a move from step `first` on, as many as there is room for: `count` is 0 behind the last one. All before `first` are computed
+ * once more, so it is SW_STEP_FIRST at most.
+ */
+sw_result_t sw_step_steps(const uint32_t *table,
+                          size_t len,
+                          const sw_step_move_t *it,
+                          uint32_t first,
+                          sw_step_step_t *steps,
+                          size_t size,
+                          size_t *count);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.

@@ -2,9 +2,11 @@
 
 use core::mem::MaybeUninit;
 
-use step_profile::{Error, Parameters, Profile, RampTable, Speed, corrected, pru_exact, step_time_ns};
+use step_profile::{
+    Arithmetic, Error, Parameters, Profile, RampStep, RampTable, Speed, corrected, pru_exact, step_time_ns,
+};
 
-use crate::border::{OK, Refused, border, there};
+use crate::border::{OK, Refused, border, in_range, read, room, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
 /// Refusals of step-profile, in the order of their numbers.
@@ -119,6 +121,138 @@ pub extern "C" fn sw_step_duration_ns(
         ns.write(Profile::new(parameters).map_err(error)?.duration_ns(steps));
         OK
     })
+}
+
+/// A step of a move with a ramp.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_step_step_t {
+    /// Cycle of 4 us in which it comes, from the first of the move.
+    pub cycle: u64,
+    /// Time since the step before, ns.
+    pub t_step: u32,
+    /// Time in its cycle, ns.
+    pub sync_time: u32,
+    /// Entry of the ramp.
+    pub entry: u8,
+}
+
+/// A move with a ramp.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_step_move_t {
+    /// Steps of the move.
+    pub steps: u32,
+    /// Speed constant: sw_step_speed().
+    pub speed: u32,
+    /// Steps an entry.
+    pub k: u32,
+    /// Where the first step comes in its cycle, ns.
+    pub init_sync: u32,
+    /// 1: as the PRU computes it, its errors included; 0: without them.
+    pub as_pru: u8,
+}
+
+/// The last step with which sw_step_steps() begins.
+pub const SW_STEP_FIRST: u32 = 1 << 20;
+
+/// How a move goes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_step_shape_t {
+    /// How long it takes, ns.
+    pub duration_ns: u64,
+    /// Steps of the ramp up.
+    pub accelerating: u32,
+    /// Steps at full speed.
+    pub constant: u32,
+    /// Steps of the ramp down.
+    pub decelerating: u32,
+    /// 1: the PRU computes it without error.
+    pub pru_is_exact: u8,
+}
+
+/// Acts on a move with a ramp of 32 entries, or with the published one for NULL.
+///
+/// # Safety
+/// As for [`read`].
+unsafe fn with_profile(
+    table: *const u32,
+    len: usize,
+    it: Option<&sw_step_move_t>,
+    act: impl FnOnce(Profile<'_>, u32) -> Result<sw_result_t, Refused>,
+) -> sw_result_t {
+    border(|| {
+        let own;
+        let it = there(it)?;
+        let arithmetic = in_range((it.as_pru < 2).then_some(it.as_pru == 1))?;
+        let arithmetic = if arithmetic { Arithmetic::PruExact } else { Arithmetic::Corrected };
+        let parameters =
+            Parameters::at(Speed::from_raw(it.speed)).with_steps_per_entry(it.k).with_init_sync(it.init_sync);
+        let parameters = parameters.with_arithmetic(arithmetic);
+        let profile = if table.is_null() {
+            Profile::new(parameters)
+        } else {
+            // SAFETY: the caller vouches for it.
+            let entries: [u32; RampTable::LEN] = in_range(unsafe { read(table, len)? }.try_into().ok())?;
+            own = RampTable::new(entries).map_err(error)?;
+            Profile::new(parameters.with_table(&own))
+        };
+        act(profile.map_err(error)?, it.steps)
+    })
+}
+
+/// How a move goes, with a ramp of one's own of 32 entries, or with the published one for NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_step_shape(
+    table: *const u32,
+    len: usize,
+    it: Option<&sw_step_move_t>,
+    shape: Option<&mut MaybeUninit<sw_step_shape_t>>,
+) -> sw_result_t {
+    let act = |profile: Profile<'_>, steps| {
+        let (out, shape) = (there(shape)?, profile.shape(steps));
+        out.write(sw_step_shape_t {
+            duration_ns: profile.duration_ns(steps),
+            accelerating: shape.accelerating,
+            constant: shape.constant,
+            decelerating: shape.decelerating,
+            pru_is_exact: profile.pru_is_exact().into(),
+        });
+        OK
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { with_profile(table, len, it, act) }
+}
+
+/// The steps of a move from step `first` on, as many as there is room for: `count` is 0 behind the last one. All before `first` are computed
+/// once more, so it is SW_STEP_FIRST at most.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_step_steps(
+    table: *const u32,
+    len: usize,
+    it: Option<&sw_step_move_t>,
+    first: u32,
+    steps: *mut sw_step_step_t,
+    size: usize,
+    count: Option<&mut MaybeUninit<usize>>,
+) -> sw_result_t {
+    let act = |profile: Profile<'_>, all| {
+        in_range((first <= SW_STEP_FIRST).then_some(()))?;
+        // SAFETY: the caller of the C function vouches for his memory.
+        let (room, count) = (unsafe { room(steps, size)? }, there(count)?);
+        let mut written = 0_usize;
+        let first = usize::try_from(first).unwrap_or(usize::MAX);
+        for (to, step) in room.iter_mut().zip(profile.steps(all).skip(first)) {
+            let RampStep { entry, t_step, cycle, sync_time, .. } = step;
+            to.write(sw_step_step_t { cycle, t_step, sync_time, entry });
+            written = written.saturating_add(1);
+        }
+        count.write(written);
+        OK
+    };
+    // SAFETY: as above.
+    unsafe { with_profile(table, len, it, act) }
 }
 
 /// A ramp has as many entries as the functions above say.

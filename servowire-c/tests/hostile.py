@@ -34,7 +34,7 @@ STATES_IN_A_ROW = {("sw_rtex_ring_update", "axes")}
 # May be NULL.
 OPTIONAL = {("sw_hdsl_sampled", "rssi"), ("sw_step_check", "pru_is_exact"), ("sw_tformat_value", "ready_ns"),
             ("sw_aformat_value", "ready_ns"), ("sw_rtex_axis_hear", "bytes"), ("sw_rtex_handshake_hear", "bytes"), ("sw_rtex_sub_hear", "bytes"),
-            ("sw_rtex_move_hear", "bytes"), ("sw_rtex_ring_update", "rx")}
+            ("sw_rtex_move_hear", "bytes"), ("sw_rtex_ring_update", "rx"), ("sw_step_shape", "table"), ("sw_step_steps", "table")}
 
 
 def parameters(text):

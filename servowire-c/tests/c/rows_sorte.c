@@ -80,6 +80,158 @@ static void speed(char **a, int n)
     say(" %u %s", it, sw_text(sw_step_check(it, 1, 0, NULL)));
 }
 
+static uint64_t fnv1a64(uint64_t hash, uint64_t value, int bytes)
+{
+    while (bytes-- > 0) {
+        hash = (hash ^ (value & 0xff)) * 0x100000001b3u;
+        value >>= 8;
+    }
+    return hash;
+}
+
+static sw_step_move_t move_of(char **a)
+{
+    sw_step_move_t it;
+    it.steps = U32(a[0]);
+    it.speed = U32(a[1]);
+    it.k = U32(a[2]);
+    it.init_sync = U32(a[3]);
+    it.as_pru = U8(a[4]);
+    return it;
+}
+
+/* All steps of a move, in blocks of an odd size. */
+static sw_step_step_t *steps_of(const uint32_t *table, const sw_step_move_t *it)
+{
+    sw_step_step_t *all = malloc(((size_t)it->steps + 1) * sizeof *all);
+    size_t count = 1, at = 0;
+    while (all != NULL && count > 0) {
+        size_t room = it->steps + 1 - at;
+        if (sw_step_steps(table, 32, it, (uint32_t)at, all + at, room < 100003 ? room : 100003, &count) != SW_OK) {
+            break;
+        }
+        at += count;
+    }
+    if (all == NULL || at != it->steps) {
+        say("no steps");
+        exit(2);
+    }
+    return all;
+}
+
+static uint64_t hash_of(const sw_step_step_t *all, uint32_t steps)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    uint32_t k;
+    for (k = 0; k < steps; k++) {
+        hash = fnv1a64(hash, all[k].cycle & 0xffffffffu, 4);
+        hash = fnv1a64(hash, all[k].sync_time & 0xffffu, 2);
+    }
+    return hash;
+}
+
+static void say_steps(const sw_step_step_t *all, uint32_t from, uint32_t to)
+{
+    for (; from < to; from++) {
+        say(" %u,%u,%llu,%u", all[from].entry, all[from].t_step, (unsigned long long)all[from].cycle, all[from].sync_time);
+    }
+}
+
+static void say_last(const sw_step_step_t *all, uint32_t steps)
+{
+    if (steps > 0) {
+        say(" last %llu,%u", (unsigned long long)all[steps - 1].cycle, all[steps - 1].sync_time);
+    }
+}
+
+/* STEPS SPEED K SYNC AS_PRU HEAD TAIL */
+static void whole_move(char **a, int n)
+{
+    sw_step_move_t it = move_of(a);
+    sw_step_shape_t shape;
+    uint32_t tail = U32(a[6]), k, zero = 0, above = 0;
+    sw_step_step_t *all;
+    (void)n;
+    say("%s", sw_text(sw_step_shape(NULL, 0, &it, &shape)));
+    say(" %u %u %u total %llu head", shape.accelerating, shape.constant, shape.decelerating, (unsigned long long)shape.duration_ns);
+    all = steps_of(NULL, &it);
+    for (k = 0; k < it.steps; k++) {
+        zero += all[k].sync_time == 0;
+        above += all[k].sync_time > 3990;
+    }
+    say_steps(all, 0, U32(a[5]) < it.steps ? U32(a[5]) : it.steps);
+    say(" tail");
+    say_steps(all, it.steps > tail ? it.steps - tail : 0, it.steps);
+    say_last(all, it.steps);
+    say(" zero %u above %u hash %016llx", zero, above, (unsigned long long)hash_of(all, it.steps));
+    free(all);
+}
+
+/* STEPS SPEED K SYNC AS_PRU HEAD and the 32 entries of a ramp */
+static void own_ramp(char **a, int n)
+{
+    sw_step_move_t it = move_of(a);
+    sw_step_shape_t shape;
+    sw_step_step_t *all;
+    uint32_t own[32], k;
+    (void)n;
+    for (k = 0; k < 32; k++) {
+        own[k] = U32(a[6 + k]);
+    }
+    if (sw_step_shape(own, 32, &it, &shape) != SW_OK) {
+        say("refused");
+        return;
+    }
+    all = steps_of(own, &it);
+    say("%llu", (unsigned long long)shape.duration_ns);
+    say_steps(all, 0, U32(a[5]));
+    say_last(all, it.steps);
+    say(" %016llx", (unsigned long long)hash_of(all, it.steps));
+    free(all);
+}
+
+/* STEPS SPEED K SYNC AS_PRU COUNT: every step. */
+static void listed(char **a, int n)
+{
+    sw_step_move_t it = move_of(a);
+    sw_step_step_t *all = steps_of(NULL, &it);
+    (void)n;
+    say_steps(all, 0, U32(a[5]));
+    free(all);
+}
+
+/* STEPS SPEED K SYNC AS_PRU DIRECTION CYCLES GUARD: the words of all cycles. */
+static void stream(char **a, int n)
+{
+    sw_step_move_t it = move_of(a);
+    uint8_t direction = U8(a[5]);
+    uint64_t cycles = number(a[6]), cycle, hash = 0xcbf29ce484222325u;
+    uint16_t idle = (uint16_t)(direction << 15), word;
+    sw_step_step_t *all = steps_of(NULL, &it);
+    uint32_t k = 0;
+    sw_sorte_pto_t pto = {0, 0, 0};
+    (void)n;
+    say("%04x", idle);
+    say(" %s", sw_text(sw_sorte_parse_pto(idle, &pto)));
+    say(" %d", pto.kind == SW_SORTE_NO_PULSE && pto.direction == direction);
+    for (cycle = 0; cycle < cycles; cycle++) {
+        word = idle;
+        if (k < it.steps && all[k].cycle == cycle) {
+            word = (uint16_t)(idle | all[k].sync_time);
+            if (U8(a[7])) {
+                (void)sw_sorte_pto_of_step(all[k].sync_time, direction, &word);
+            }
+            k++;
+        }
+        if (word != idle) {
+            say(" %llu:%04x", (unsigned long long)cycle, word);
+        }
+        hash = fnv1a64(hash, word, 2);
+    }
+    say(" hash %016llx", (unsigned long long)hash);
+    free(all);
+}
+
 static void params(char **a, int n)
 {
     bool exact = false;
@@ -187,5 +339,6 @@ static void param(char **a, int n)
 const entry_t sorte_commands[] = {
     {"sorte_crc8", crc8}, {"sorte_lut", lut}, {"sorte_startup", startup}, {"sorte_preamble", preamble}, {"sorte_param", param},
     {"sorte_master", master}, {"sorte_device", device}, {"sorte_pto", pto}, {"sorte_pto_of_step", pto_of_step}, {"step_next", step},
-    {"step_ramp", ramp}, {"step_speed", speed}, {"step_params", params}, {"step_duration", duration}, {NULL, NULL},
+    {"step_ramp", ramp}, {"step_speed", speed}, {"step_params", params}, {"step_duration", duration}, {"step_move", whole_move}, {"step_own_ramp", own_ramp}, {"step_listed", listed},
+    {"step_stream", stream}, {NULL, NULL},
 };

@@ -2,13 +2,9 @@
 
 import re
 
-STREAM = "a step after another is not in the C interface"
 NOT_IN_C = {
-    "cycle_stream": STREAM,
     "microstep": "the stepper driver is not in the C interface",
     "payload": "four words a device are the program's",
-    "profile_alt_table": "other ramps are not in the C interface",
-    "profile_inexact": STREAM,
     "pru_step_core_words": "machine code of the PRU",
     "tones": "names of tones are not in the C interface",
 }
@@ -45,13 +41,49 @@ def params(row):
     return [(f"step_params {row['speed']} {row['k']} {row['init_sync']}", text)]
 
 
+def lines(steps):
+    return "".join(f" {entry},{t_step},{cycle},{sync}" for entry, t_step, cycle, sync in steps)
+
+
 def profile(row):
-    # The whole move step by step is held by the crate's own rows; in C there is how long it takes.
-    row.ignore("accel_steps", "const_steps", "decel_steps", "last", "zero_sync", "above_3990", "head", "tail", "sha256", "fnv1a64")
-    if not row["exact"]:
-        row.ignore("n", "k", "speed", "init_sync", "total_ns")
-        return []
-    return [(f"step_duration {row['speed']} {row['k']} {row['init_sync']} {row['n']}", f"ok {row['total_ns']}")]
+    # The same hash twice: FNV is enough.
+    row.ignore("sha256")
+    n, head, tail, last = row["n"], row["head"], row["tail"], row["last"]
+    move = f"{n} {row['speed']} {row['k']} {row['init_sync']}"
+    text = f"ok {row['accel_steps']} {row['const_steps']} {row['decel_steps']} total {row['total_ns']} head{lines(head)} tail{lines(tail)}"
+    text += (f" last {last[0]},{last[1]}" if last else "") + f" zero {row['zero_sync']} above {row['above_3990']} hash {row['fnv1a64']}"
+    commands = [(f"step_move {move} 1 {len(head)} {len(tail)}", text)]
+    if row["exact"]:
+        commands += [(f"step_move {move} 0 {len(head)} {len(tail)}", text),
+                     (f"step_duration {row['speed']} {row['k']} {row['init_sync']} {n}", f"ok {row['total_ns']}")]
+    return commands
+
+
+def profile_alt_table(row):
+    row.ignore("sha256", "table_name")
+    n, head, last = row["n"], row["head"], row["last"]
+    table = " ".join(map(str, row["table"]))
+    end = (f" last {last[0]},{last[1]}" if last else "")
+    return [(f"step_own_ramp {n} {row['speed']} {row['k']} {row['init_sync']} 1 {len(head)} {table}",
+             f"{row['total_ns']}{lines(head)}{end} {row['fnv1a64']}")]
+
+
+def profile_inexact(row):
+    n = row["n"]
+    move = f"{n} {row['speed']} {row['k']} {row['init_sync']}"
+    return [(f"step_listed {move} {as_pru} {n}", lines(row[key])) for as_pru, key in ((1, "pru"), (0, "corrected"))]
+
+
+def cycle_stream(row):
+    row.ignore("sha256")
+    n, pulses, cycles, dir_ = row["n"], row["pulses"], row["cycles"], row["dir"]
+    first = bytes.fromhex(row["first_64_words_le"])
+    words = dict(pulses)
+    idle = row["idle_word"]
+    for at in range(min(64, cycles)):
+        assert int.from_bytes(first[2 * at:2 * at + 2], "little") == int(words.get(at, idle), 16)
+    text = f"{idle} ok 1" + "".join(f" {cycle}:{word}" for cycle, word in pulses) + f" hash {row['fnv1a64']}"
+    return [(f"step_stream {n} {row['speed']} {row['k']} {row['init_sync']} 1 {dir_} {cycles} {int(row['guard'])}", text)]
 
 
 def pto_word(row):
