@@ -2,7 +2,7 @@
 //! lossless step generator against what was asked of it.
 
 use nom::Parser;
-use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
+use sorte_proto::cut_through::{Passed, Rewriter};
 use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, Reaction, State, Trigger};
 use sorte_proto::iep::Channel;
 use sorte_proto::sync0::{CMP7_NS, MAX_LATENCY_NS, PULSE_NS, Variant};
@@ -69,26 +69,31 @@ pub fn cut_through(mut data: &[u8]) {
         *trailer = fcs(body).to_le_bytes();
     }
     let lengths = Entry { input: number.into(), output: u16::from(number) << 8 | 1 };
-    let mut rewriter = DiscoveryRewriter::new(lengths, adds);
-    let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
+    let mut passed = frame.clone();
+    let told = Rewriter::discovery(lengths, adds).pass(&mut passed);
     if let Ok(mut buffered) = Discovery::parse(&frame) {
+        let status = buffered.status;
         let assignment = buffered.pass(lengths, adds);
         // A device says nothing about SA.
-        assert_eq!(rewriter.finish().map(|passed| passed.assignment), assignment);
+        assert_eq!(told, assignment.map(|assignment| Passed::Discovery { status, assignment }));
         assert_eq!(passed, buffered.emit());
     } else {
-        assert!(rewriter.finish().is_err() && Discovery::parse(&passed).is_err());
+        assert!(!matches!(told, Ok(Passed::Discovery { .. })) && Discovery::parse(&passed).is_err());
     }
 
-    let mut rewriter = SyncRewriter::new(number.into(), adds);
-    let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
+    let mut passed = frame.clone();
+    let told = Rewriter::sync(number.into(), adds).pass(&mut passed);
     if let Ok(mut buffered) = Sync::parse(&frame) {
-        assert_eq!(rewriter.finish(), Ok(buffered));
+        assert_eq!(told, Ok(Passed::Sync(buffered)));
         buffered.pass(number.into(), adds);
         assert_eq!(passed, buffered.emit());
     } else {
-        assert!(rewriter.finish().is_err() && Sync::parse(&passed).is_err());
+        assert!(!matches!(told, Ok(Passed::Sync(_))) && Sync::parse(&passed).is_err());
     }
+
+    let mut passed = frame.clone();
+    assert_eq!(Rewriter::unchanged().pass(&mut passed).is_ok(), LongFrame::parse(&frame).is_ok());
+    assert_eq!(passed, frame);
 }
 
 /// A device and a series of frames and times.

@@ -94,12 +94,4 @@ impl Transit {
         let want = if self.is_whole() { self.trailer } else { self.received.before(self.trailer) };
         check(self.at.into(), self.head, self.trailer, want)
     }
-
-    /// The same for a frame that must be of this type.
-    pub(crate) fn check_type(&self, want: FrameType) -> Result<(), Error> {
-        match self.check()? {
-            got if got == want => Ok(()),
-            got => Err(Error::UnexpectedType { got: got.code(), want: want.code() }),
-        }
-    }
 }

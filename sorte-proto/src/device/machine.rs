@@ -2,11 +2,11 @@
 
 use super::config::{Config, Counters};
 use super::heard::{FrameTimes, HeardSync, Path, PortId, Reaction};
-use super::passage::{Kind, Learnt, Passage, Plain};
+use super::passage::Passage;
 use super::port::{Port, PortFlags, State, Trigger};
 use super::raster::Raster;
 use crate::clock::{Clock, Correction};
-use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
+use crate::cut_through::{Passed, Rewriter};
 use crate::delay_req::DelayReq;
 use crate::discovery::Assignment;
 use crate::error::Error;
@@ -204,14 +204,15 @@ impl Device {
         let handler = self.port(port);
         let master = handler.flags.contains(PortFlags::MASTER_PORT);
         let idle_last = handler.state == State::Idle && handler.flags.contains(PortFlags::LAST_DEVICE);
-        let kind = match (handler.state, self.line_delay_next_ns()) {
-            _ if idle_last => Kind::Discovery(self.discovery()),
-            (State::Discovery, _) if master => Kind::Discovery(self.discovery()),
-            (State::Param, _) if master && self.is_patient() => Kind::Either(self.discovery(), Plain::NEW),
-            (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.adds())),
-            _ => Kind::Plain(Plain::NEW),
+        let rewriter = match (handler.state, self.line_delay_next_ns()) {
+            _ if idle_last => self.discovery(),
+            (State::Discovery, _) if master => self.discovery(),
+            // It may be sent again.
+            (State::Param, _) if master && self.is_patient() => self.discovery(),
+            (State::Sync, Ok(line)) if master => Rewriter::sync(line, self.adds()),
+            _ => Rewriter::unchanged(),
         };
-        Passage::new(kind, self.path(port), handler.state, idle_last)
+        Passage::new(rewriter, self.path(port), handler.state, idle_last)
     }
 
     /// What it sets in a STATUS byte that it writes now.
@@ -224,16 +225,16 @@ impl Device {
         self.config.patient_discovery && self.parameters.is_none()
     }
 
-    const fn discovery(&self) -> DiscoveryRewriter {
-        DiscoveryRewriter::new(self.config.lengths, self.adds())
+    const fn discovery(&self) -> Rewriter {
+        Rewriter::discovery(self.config.lengths, self.adds())
     }
 
     /// A start-up frame whose bytes went through a [`passage`](Self::passage) has ended at `port`.
     pub fn hear_passed(&mut self, port: PortId, passage: Passage, times: FrameTimes) -> Reaction {
         let state = self.port(port).state;
-        let path = passage.path().unwrap_or(Path::Absorb);
+        let (path, rewriter) = (passage.path().unwrap_or(Path::Absorb), passage.rewriter);
         let mut reaction = Reaction { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
-        if state != passage.began_in() {
+        if state != passage.began_in {
             // The device has started again meanwhile.
             reaction.result = Err(Error::WrongState);
             return reaction;
@@ -242,12 +243,12 @@ impl Device {
             return reaction;
         }
         // A STATUS byte has been written, so the error has been reported.
-        self.error &= !passage.has_written_status();
-        let learnt = passage.learnt();
+        self.error &= !rewriter.has_written_status();
+        let learnt = rewriter.finish();
         reaction.result = learnt.map(|_| ());
         self.count(port, reaction.result);
         let Ok(learnt) = learnt else { return reaction };
-        let head = passage.transit().head();
+        let head = rewriter.transit().head();
         reaction.trigger = self.port_mut(port).head(head).trigger;
         if self.port(port.other()).flags.contains(PortFlags::MASTER_PORT) {
             // What a neighbour sends back without LAST.
@@ -259,27 +260,27 @@ impl Device {
             self.alive_ns = times.now_ns;
         }
         match learnt {
-            Learnt::Place(assignment) => self.assignment = Some(assignment),
-            Learnt::Sync(sync) => {
+            Passed::Discovery { assignment, .. } => self.assignment = Some(assignment),
+            Passed::Sync(sync) => {
                 self.last_sync = Some(HeardSync { sync, sof_ns: times.sof_ns });
                 self.way_ns = self.delay_ns();
                 reaction.correction = self.clock.frame(sync.time_stamp_ns, times.sof_ns, times.counter_ns);
             }
-            Learnt::Parameters(bytes) if master && state == State::Param => {
+            Passed::Param(bytes) if master && state == State::Param => {
                 self.parameters = Some(bytes);
                 self.line = LineDelay::new(self.config.delay_model);
             }
-            Learnt::Parameters(_) | Learnt::Nothing => {}
+            Passed::Param(_) | Passed::Unchanged(_) => {}
         }
-        if self.is_last() || passage.transit().status().contains(Status::LAST) {
-            self.output_total = passage.output_total().or(self.output_total);
+        if self.is_last() || rewriter.transit().status().contains(Status::LAST) {
+            self.output_total = rewriter.output_total().or(self.output_total);
         }
         self.port_mut(port).end_of_frame();
         if master && state == State::Sync && self.port(port).state == State::Exchange {
             self.enter_exchange();
         }
         // A device that cannot rewrite SYNC must not take part: its line delay was never measured.
-        let unmeasured = master && state == State::Sync && passage.transit().is_for_all(FrameType::Sync);
+        let unmeasured = master && state == State::Sync && rewriter.transit().is_for_all(FrameType::Sync);
         if let (true, Err(error)) = (unmeasured, self.line_delay_next_ns()) {
             reaction.result = Err(error);
             self.restart();

@@ -7,6 +7,9 @@ mod device;
 mod network;
 
 use servowire_world::Draw;
+use sorte_proto::Error;
+use sorte_proto::master::Config;
+use sorte_proto::timing::{Limit, Slots, Timing};
 
 /// Numbers of devices, each with a cycle that carries them, in ns.
 const LINES: [(usize, u64); 4] = [(4, 4_000), (16, 16_000), (64, 60_000), (254, 224_000)];
@@ -128,4 +131,70 @@ fn hostile_a_device_takes_no_stale_value_and_counts_every_loss() {
             );
         }
     }
+}
+
+/// Which device does not fit, and why: by arithmetic on the published times.
+fn misfit(cables: &[u64], published: bool, cycle_ns: u64) -> Option<(u8, Limit)> {
+    let (mut way, mut free) = (0, None);
+    let output = (4 * cables.len() as u64).max(16);
+    for (k, cable) in (0_u64..).zip(cables) {
+        way += cable + if k == 0 { 0 } else { HOP };
+        let send = match k {
+            _ if !published => 500 + cables[0] as i64 + 880 * k as i64 - way as i64,
+            0 => 500,
+            1 => 900,
+            2 => 1_360,
+            _ => 1_800,
+        };
+        let (start, device) = (send + way as i64, k as u8 + 1);
+        // Six sigma of two frames that pass k ports with 5 ns / sqrt(12) each.
+        let least = (6.0 * 1.443 * (2.0 * k as f64).sqrt()).ceil() as i64;
+        let (out, back) = (500 + 80 * (7 + output) + way, start + 640);
+        let limit = match free {
+            _ if send < 0 => Limit::SendTime,
+            Some(free) if start - free < least => Limit::Gap,
+            _ if out as i64 > back && out > cycle_ns => Limit::MasterFrame,
+            _ if back > cycle_ns as i64 => Limit::DeviceFrames,
+            _ => {
+                free = Some(back);
+                continue;
+            }
+        };
+        return Some((device, limit));
+    }
+    None
+}
+
+/// Cables by chance: planner and master say the same, and it is what the times of the sources make.
+#[test]
+fn hostile_planner_and_master_refuse_the_same_lines() {
+    let mut draw = Draw::default();
+    let mut seen = [0_u32; 5];
+    for _ in 0..3_000 {
+        let (devices, published) = (1 + draw.below(12) as usize, draw.below(2) == 0);
+        let (longest, cycle_ns) =
+            ([30, 150, 600, 1_800][draw.below(4) as usize], [4_000, 8_000, 12_000][draw.below(3) as usize]);
+        // The first cable and those after it: the master knows the mean of these.
+        let (first, others) = (draw.below(longest + 1), draw.below(longest + 1));
+        let cables: Vec<u64> = (0..devices).map(|k| if k == 0 { first } else { others }).collect();
+        let want = misfit(&cables, published, cycle_ns);
+        let slots = if published { Slots::Published } else { Slots::rule(first as u16) };
+        let delays: Vec<u16> = cables.iter().map(|cable| *cable as u16).collect();
+        let output = (4 * devices as u16).max(16);
+        let line = Timing::new(&delays, devices as u8).with_output_len(output).with_slots(Some(slots));
+        let planned = line.misfit(cycle_ns as u32).map(|misfit| (misfit.device, misfit.limit));
+        let place = format!("{devices} devices, {first} and {others} ns, {slots}, {cycle_ns} ns");
+        assert_eq!(planned, want, "{place}");
+        let refusal = network::refusal(Config::new().with_cycle_ns(cycle_ns as u32).with_slots(slots), &cables);
+        let refused = refusal.map(|error| match error {
+            Error::CycleTooShort { device, .. } => (device, [Limit::MasterFrame, Limit::DeviceFrames]),
+            Error::GapTooShort { device, .. } => (device, [Limit::Gap; 2]),
+            Error::SendBeforeCycle { device, .. } => (device, [Limit::SendTime; 2]),
+            other => panic!("{place}: {other}"),
+        });
+        assert_eq!(refused.map(|(device, _)| device), want.map(|(device, _)| device), "{place}: {refusal:?}");
+        assert!(refused.is_none_or(|(_, limits)| limits.contains(&want.unwrap().1)), "{place}: {refusal:?}");
+        seen[want.map_or(4, |(_, limit)| limit as usize)] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 20), "{seen:?}");
 }

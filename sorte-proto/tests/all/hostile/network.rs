@@ -7,7 +7,7 @@ use super::{
 use servowire_world::Draw;
 use sorte_proto::master::{Action, Config, Heard, Master};
 use sorte_proto::timing::Slots;
-use sorte_proto::{ErrorClass, Link};
+use sorte_proto::{Error, ErrorClass, Link};
 
 /// A frame on its way to the master: when it is handed over, the capture of its start, and which it is.
 #[derive(Clone, Copy)]
@@ -66,59 +66,11 @@ impl Bench {
             refused: false,
         };
         bench.master.set_link(Link::Up);
-        bench.start(draw, &cables);
-        bench
-    }
-
-    /// The start-up, up to the first cycle.
-    fn start(&mut self, draw: &mut Draw, cables: &[u64]) {
-        let devices = cables.len();
-        let way = cables.iter().sum::<u64>() + HOP * (devices as u64 - 1);
         // The measurement of a cable loses up to 7 ns.
-        let hops: u64 = cables[1..].iter().map(|cable| cable + HOP - draw.below(8)).sum::<u64>() + HOP;
-        loop {
-            let (at, frame) = match self.master.poll(self.now) {
-                Action::Wait { until_ns } => {
-                    self.now = until_ns;
-                    continue;
-                }
-                Action::Send { at_ns, frame } => (at_ns, frame),
-                Action::Exchange { at_ns, time_stamp, cycle, .. } => {
-                    self.first = at_ns;
-                    self.begin(draw, at_ns, time_stamp, cycle);
-                    return;
-                }
-                Action::Restart { error } => panic!("{error}"),
-            };
-            let mut buffer = [0; 1030];
-            let len = frame.emit_into(&mut buffer).unwrap();
-            let mut bytes = buffer[..len].to_vec();
-            let again = bytes.clone();
-            set_fcs(&mut bytes);
-            assert_eq!((bytes == again, &bytes[..2]), (true, &[0xff, 0][..]));
-            let (there_and_back, capture) = match (bytes[2], len) {
-                (1, 1030) => {
-                    bytes[3] |= 1;
-                    for (at, number) in [(4, devices), (6, 4 * devices), (8, 4 * devices)] {
-                        bytes[at..at + 2].copy_from_slice(&(number as u16).to_le_bytes());
-                    }
-                    (10..10 + 4 * devices).for_each(|at| bytes[at] = if at % 2 == 0 { 4 } else { 0 });
-                    (2 * way + REFLECTION, CAPTURE_8)
-                }
-                (2, 40) => (2 * way + REFLECTION, CAPTURE_8),
-                (3, 8) => (2 * cables[0] + REFLECTION, CAPTURE_8),
-                (5, 14) => {
-                    bytes[3] |= 1;
-                    let (stamp, delay) = (u32_at(&bytes, 4), u16_at(&bytes, 8));
-                    bytes[4..8].copy_from_slice(&stamp.wrapping_add(hops as u32).to_le_bytes());
-                    bytes[8..10].copy_from_slice(&delay.wrapping_add(hops as u16).to_le_bytes());
-                    (2 * way + REFLECTION, CAPTURE_4)
-                }
-                other => panic!("a start-up frame of type and length {other:?}"),
-            };
-            set_fcs(&mut bytes);
-            self.master.hear(&bytes, at + capture + there_and_back).unwrap();
-        }
+        let first = start(&mut bench.master, &mut bench.now, &cables, || draw.below(8)).unwrap();
+        bench.first = first.0;
+        bench.begin(draw, first.0, first.1, first.2);
+        bench
     }
 
     /// The master begins a cycle: its frame is what the sources say, and what is missing so far has been counted.
@@ -260,4 +212,64 @@ impl Bench {
             }
         }
     }
+}
+
+/// The start-up, up to the first cycle: its trigger, time stamp and number. `lost`: what the measurement of each cable loses, in ns.
+fn start(
+    master: &mut Master,
+    now: &mut u64,
+    cables: &[u64],
+    mut lost: impl FnMut() -> u64,
+) -> Result<(u64, u16, u64), Error> {
+    let devices = cables.len();
+    let way = cables.iter().sum::<u64>() + HOP * (devices as u64 - 1);
+    let hops: u64 = cables[1..].iter().map(|cable| cable + HOP - lost()).sum::<u64>() + HOP;
+    loop {
+        let (at, frame) = match master.poll(*now) {
+            Action::Wait { until_ns } => {
+                *now = until_ns;
+                continue;
+            }
+            Action::Send { at_ns, frame } => (at_ns, frame),
+            Action::Exchange { at_ns, time_stamp, cycle, .. } => return Ok((at_ns, time_stamp, cycle)),
+            Action::Restart { error } => return Err(error),
+        };
+        let mut buffer = [0; 1030];
+        let len = frame.emit_into(&mut buffer).unwrap();
+        let mut bytes = buffer[..len].to_vec();
+        let again = bytes.clone();
+        set_fcs(&mut bytes);
+        assert_eq!((bytes == again, &bytes[..2]), (true, &[0xff, 0][..]));
+        let (there_and_back, capture) = match (bytes[2], len) {
+            (1, 1030) => {
+                bytes[3] |= 1;
+                for (at, number) in [(4, devices), (6, 4 * devices), (8, 4 * devices)] {
+                    bytes[at..at + 2].copy_from_slice(&(number as u16).to_le_bytes());
+                }
+                (10..10 + 4 * devices).for_each(|at| bytes[at] = if at % 2 == 0 { 4 } else { 0 });
+                (2 * way + REFLECTION, CAPTURE_8)
+            }
+            (2, 40) => (2 * way + REFLECTION, CAPTURE_8),
+            (3, 8) => (2 * cables[0] + REFLECTION, CAPTURE_8),
+            (5, 14) => {
+                bytes[3] |= 1;
+                let (stamp, delay) = (u32_at(&bytes, 4), u16_at(&bytes, 8));
+                bytes[4..8].copy_from_slice(&stamp.wrapping_add(hops as u32).to_le_bytes());
+                bytes[8..10].copy_from_slice(&delay.wrapping_add(hops as u16).to_le_bytes());
+                (2 * way + REFLECTION, CAPTURE_4)
+            }
+            other => panic!("a start-up frame of type and length {other:?}"),
+        };
+        set_fcs(&mut bytes);
+        // A line that does not fit is refused by its last SYNC; the next call says why.
+        let refused = master.hear(&bytes, at + capture + there_and_back).is_err();
+        assert!(!refused || bytes[2] == 5);
+    }
+}
+
+/// Why the master does not start a line of these cables, all measured exactly.
+pub(super) fn refusal(config: Config, cables: &[u64]) -> Option<Error> {
+    let mut master = Master::new(config.with_sync_frames(2).with_discovery_frames(2).with_param_frames(1));
+    master.set_link(Link::Up);
+    start(&mut master, &mut 0, cables, || 0).err()
 }

@@ -5,7 +5,7 @@ use core::hint::black_box;
 use nom::{IResult, Parser};
 use sorte_proto::Link;
 use sorte_proto::Place;
-use sorte_proto::cut_through::{DiscoveryRewriter, PassedDiscovery, SyncRewriter};
+use sorte_proto::cut_through::{Passed, Rewriter};
 use sorte_proto::device::{self, Device, Forwarding, FrameTimes, Passage, Path, PortId, Reaction};
 use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::iep::{Channel, Edge};
@@ -185,15 +185,15 @@ kernels! {
     } over OUTPUTS;
 
     /// SYNC through a device, byte by byte.
-    fn sorte_sync_rewrite(frame: &[u8; 14]) -> ([u8; 14], Result<Sync, Error>) {
-        let mut rewriter = SyncRewriter::new(76, Status::ERROR);
+    fn sorte_sync_rewrite(frame: &[u8; 14]) -> ([u8; 14], Result<Passed, Error>) {
+        let mut rewriter = Rewriter::sync(76, Status::ERROR);
         let passed = frame.map(|byte| rewriter.byte(byte));
         (passed, rewriter.finish())
     } over [SYNC];
 
     /// 64 bytes of DISCOVERY through a device.
-    fn sorte_discovery_rewrite(frame: &[u8; 64]) -> ([u8; 64], Result<PassedDiscovery, Error>) {
-        let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, Status::LAST);
+    fn sorte_discovery_rewrite(frame: &[u8; 64]) -> ([u8; 64], Result<Passed, Error>) {
+        let mut rewriter = Rewriter::discovery(Entry::STOCK, Status::LAST);
         let passed = frame.map(|byte| rewriter.byte(byte));
         (passed, rewriter.finish())
     } over [[0xff; 64], {

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
-use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
+use sorte_proto::cut_through::{Passed, Rewriter};
 use sorte_proto::{Discovery, Entry, Place, Status, Sync};
 
 use super::Origin;
@@ -82,14 +82,15 @@ fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
 
     let last = row.is_last;
     let adds = adds(last, row.prev_frame_crc_error);
-    let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, adds);
-    let passed: Vec<u8> = before.iter().map(|&byte| rewriter.byte(byte)).collect();
+    let mut passed = before;
+    let told = Rewriter::discovery(Entry::STOCK, adds).pass(&mut passed);
     let assignment = current.frame.pass(Entry::STOCK, adds);
     current.hop = row.number;
     let after = current.frame.emit();
 
-    same("cut through", &after.to_vec(), &passed)?;
-    same("cut through", &assignment, &rewriter.finish().map(|passed| passed.assignment))?;
+    same("cut through", &after.to_vec(), &passed.to_vec())?;
+    let status = Status::from_bits_retain(*status);
+    same("cut through", &assignment.map(|assignment| Passed::Discovery { status, assignment }), &told)?;
     let got = assignment.map(|a| (a.address.get(), a.in_offset, a.out_offset));
     same("device", &Ok((row.device.address, row.device.in_offset, row.device.out_offset)), &got)?;
     same("len", &row.len, &after.len())?;
@@ -138,11 +139,11 @@ pub(super) fn sync(rows: &[Row]) -> Vec<Verdict> {
             same("rx", &hop.rx.0, &wire)?;
             let (line, last) = (hop.line_delay_next, hop.is_last);
             let adds = adds(last, hop.prev_frame_crc_error);
-            let mut rewriter = SyncRewriter::new(line, adds);
-            let passed: Vec<u8> = wire.iter().map(|&byte| rewriter.byte(byte)).collect();
+            let mut passed = wire.clone();
+            let told = Rewriter::sync(line, adds).pass(&mut passed);
             same("tx", &hop.tx.0, &passed)?;
-            let received = rewriter.finish();
-            same("buffered", &received, &Sync::parse(&wire))?;
+            let received = Sync::parse(&wire);
+            same("buffered", &told, &received.map(Passed::Sync))?;
             let buffered = received.map(|mut frame| {
                 frame.pass(line, adds);
                 frame.emit().to_vec()
