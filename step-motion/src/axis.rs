@@ -4,13 +4,14 @@ use core::sync::atomic::Ordering;
 
 use servowire_core::Direction;
 
-use crate::cutter::{Demand, Stretch};
+use crate::cutter::Demand;
 use crate::error::Error;
 use crate::limits::{Clock, Limits};
 use crate::mover::{Cut, Mover};
-use crate::queue::{IDLE, Kind, NONE, Queue, Segment, TICKET};
+use crate::queue::{IDLE, NONE, Queue, TICKET};
 use crate::real::Real;
 use crate::step_timer::StepTimer;
+use crate::writer::{LONGEST, TICK, Writer, tick};
 
 /// What [`Axis::poll`] has left to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,23 +107,9 @@ struct Tail {
     writer: Writer,
 }
 
-/// Where segments are put.
-#[derive(Debug, Clone, Copy)]
-struct Writer {
-    /// The end of what has been cut, in 2^-32 ticks, as the interrupt's sum has it; and DIR there, if that is known.
-    end: i128,
-    dir: Option<Direction>,
-    /// Slots of the block that are filled.
-    len: usize,
-}
-
-/// A tick in times.
-const TICK: i128 = 1 << 32;
 /// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few.
-const COARSE: u32 = 4;
-const COARSEST: u32 = 2;
-/// The longest wait in an event, in ticks.
-const LONGEST: u32 = 1 << 30;
+pub(crate) const COARSE: u32 = 4;
+pub(crate) const COARSEST: u32 = 2;
 
 impl<'q, const N: usize> Axis<'q, N> {
     /// At rest at position 0, with the other end of the queue for the interrupt. A queue has one axis.
@@ -131,18 +118,15 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// [`Error::SpeedAboveClock`] above half the clock.
     pub fn new(queue: &'q Queue<N>, clock: Clock, limits: Limits) -> Result<(Self, StepTimer<'q, N>), Error> {
         let mover = Mover::new(clock, limits)?.cutting();
-        let timer = StepTimer::new(queue).ok_or(Error::QueueFull)?;
-        // Half a tick is what rounding to ticks takes of 3/4, or of 25 ns where that is more.
-        let tick = Real::new(clock.moment(1));
-        let ns = |n: u64| Real::new(clock.moments().into()) * Real::new(n) / Real::new(1_000_000_000);
-        let off = (tick / Real::new(5)).max(ns(23) - tick.half());
+        let timer = StepTimer::new(queue);
+        let off = clock.blur();
         let reach = (clock.hz() / 100).max(4);
         let axis = Self {
             queue,
             mover,
             off,
             reach,
-            writer: Writer { end: 0, dir: None, len: 0 },
+            writer: Writer::new(0, None),
             made: 0,
             block: 0,
             until: 0,
@@ -278,7 +262,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             return self.confirm(ticket);
         }
         let (running, slot) = self.current();
-        if let Some((block, place)) = Self::place(slot) {
+        if let Some((block, place)) = Queue::<N>::place(slot) {
             if self.out.get(block).is_some_and(|out| place >= out.len) {
                 // The interrupt has found nothing but the stop.
                 if running.is_some() {
@@ -308,12 +292,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     fn current(&self) -> (Option<(usize, usize)>, usize) {
         let current = self.queue.current.load(Ordering::Acquire);
         let slot = (current & 0xffff) as usize;
-        (Self::place(slot).filter(|_| current & IDLE == 0), slot)
-    }
-
-    fn place(slot: usize) -> Option<(usize, usize)> {
-        let at = slot.checked_sub(1)?;
-        Some((at.checked_div(Queue::<N>::BLOCK)?, at.checked_rem(Queue::<N>::BLOCK)?))
+        (Queue::<N>::place(slot).filter(|_| current & IDLE == 0), slot)
     }
 
     fn set_busy(&mut self, block: usize, to: bool) {
@@ -352,7 +331,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.halt_at(position, self.now(), was_moving);
         self.made = self.queue.made.load(Ordering::Acquire);
         (self.last, self.busy) = (0, [false; 2]);
-        self.writer = Writer { end: i128::from(self.now()) << 32, dir: None, len: 0 };
+        self.writer = Writer::new(i128::from(self.now()) << 32, None);
         self.queue.halt.store(0, Ordering::Release);
         (self.halt, self.lost) = (None, false);
         Work::More
@@ -361,7 +340,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// From the end of the stop of a block.
     fn recover(&mut self, block: usize, slot: usize) {
         let Some(Out { position, end, dir, .. }) = self.out.get(block).copied() else { return };
-        (self.writer, self.last) = (Writer { end, dir, len: 0 }, slot);
+        (self.writer, self.last) = (Writer::new(end, dir), slot);
         self.made = self.queue.made.load(Ordering::Acquire);
         self.mover.rest_at(position, tick(end));
         (self.block, self.stop, self.lost) = (1_usize.wrapping_sub(block), None, false);
@@ -465,68 +444,4 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.set_busy(self.block, true);
         (self.block, self.writer.len, self.stop) = (1_usize.wrapping_sub(self.block), 0, None);
     }
-}
-
-impl Writer {
-    /// Steps behind what there is; before them DIR, where it changes, and a wait that an event cannot hold.
-    fn put_steps<const N: usize>(&mut self, to: (&Queue<N>, usize), stretch: &Stretch, direction: Direction) {
-        let first = stretch.first.saturating_add(TICK / 2).max(self.end.saturating_add(TICK));
-        if self.dir != Some(direction) {
-            self.dir = Some(direction);
-            let half = (first.saturating_sub(self.end) / 2).max(TICK);
-            self.put_wait(to, self.end.saturating_add(half));
-        }
-        let first = first.max(self.end.saturating_add(TICK));
-        if first.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
-            self.put_wait(to, first.saturating_sub(TICK));
-        }
-        let kind = Kind { step: true, reverse: direction.dir() };
-        let late = first.saturating_sub(stretch.first);
-        self.put(to, (stretch.count, kind), first, stretch.differences);
-        self.end = stretch.last().saturating_add(late);
-    }
-
-    /// Nothing until a time.
-    fn put_wait<const N: usize>(&mut self, to: (&Queue<N>, usize), until: i128) {
-        let kind = Kind { step: false, reverse: self.dir.is_some_and(Direction::dir) };
-        let mut left = until.saturating_sub(self.end);
-        let longest = i128::from(LONGEST) << 32;
-        if left > longest {
-            let times = left.checked_div(longest).unwrap_or(0).min(0xffff);
-            let count = u16::try_from(times).unwrap_or(u16::MAX);
-            let end = self.end.saturating_add(longest);
-            self.put(to, (count, kind), end, [i64::from(LONGEST) << 32, 0, 0]);
-            self.end = self.end.saturating_add(longest.wrapping_mul(times));
-            left = until.saturating_sub(self.end);
-        }
-        if left >= TICK {
-            self.put(to, (1, kind), until, [0; 3]);
-            self.end = until;
-        }
-    }
-
-    /// Events, the first one at a time, and the differences from there on. Where they begin anew is one step before them.
-    fn put<const N: usize>(
-        &mut self,
-        (queue, block): (&Queue<N>, usize),
-        (count, kind): (u16, Kind),
-        first: i128,
-        [interval, add, bend]: [i64; 3],
-    ) {
-        let first = i64::try_from(first.saturating_sub(self.end)).unwrap_or(0);
-        let add = add.wrapping_sub(bend);
-        let interval = interval.wrapping_sub(add);
-        let segment = Segment { count, kind, first, interval, add, bend };
-        let place = self.len;
-        self.len = place.saturating_add(1);
-        if place < Queue::<N>::BLOCK {
-            let slot = |at| Queue::<N>::slot(block, at);
-            queue.put(slot(place), &segment, place.checked_sub(1).map(slot));
-        }
-    }
-}
-
-/// The tick of a time as the interrupt has it, half a tick on.
-fn tick(time: i128) -> u64 {
-    u64::try_from(time >> 32).unwrap_or(0)
 }

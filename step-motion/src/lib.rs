@@ -7,6 +7,8 @@
 extern crate std;
 
 mod arc;
+mod axes;
+mod axes_timer;
 mod axis;
 mod curve;
 mod cutter;
@@ -27,8 +29,11 @@ mod real;
 mod slope;
 mod step_timer;
 mod stepper;
+mod writer;
 
 pub use arc::{Arc, Turning};
+pub use axes::Axes;
+pub use axes_timer::{AxesQueue, AxesTimer, FiredAxes};
 pub use axis::{Axis, Work};
 pub use cycle::{PtoMover, Reload, Reloads};
 pub use error::{Error, ErrorClass};

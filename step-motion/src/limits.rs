@@ -61,6 +61,14 @@ impl Clock {
         Real::ONE / Real::new(self.moments().into())
     }
 
+    /// How far off a step of a segment may be, in moments: half a tick is what rounding to ticks takes of 3/4, or of 25 ns where
+    /// that is more.
+    pub(super) fn blur(self) -> Real {
+        let tick = Real::new(self.moment(1));
+        let ns = |n: u64| Real::new(self.moments().into()) * Real::new(n) / Real::new(1_000_000_000);
+        (tick / Real::new(5)).max(ns(23) - tick.half())
+    }
+
     /// The tick nearest to a moment, half up.
     pub(super) const fn tick(self, moment: u64) -> u64 {
         let shift = self.shift();

@@ -1,6 +1,7 @@
 //! A straight line of several axes, and its steps.
 
 use crate::curve::{Curve, Piece};
+use crate::cutter::{Demand, Stretch};
 use crate::limits::{Bounds, Clock};
 use crate::phases::{self, Frame, P};
 use crate::planner::Motion;
@@ -99,8 +100,18 @@ pub struct LinePulses<const N: usize> {
     end: u64,
 }
 
+/// How the steps of a line are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Steps {
+    /// One by one: it is known when the next one is due.
+    Single,
+    /// In stretches: it is known that there is one, not before its line begins.
+    Stretches,
+}
+
 impl<const N: usize> LinePulses<N> {
-    pub(super) fn new(clock: Clock, curve: &Curve, line: &Line<N>, start: Start<N>) -> Self {
+    pub(super) fn new(clock: Clock, curve: &Curve, line: &Line<N>, start: Start<N>, steps: Steps) -> Self {
         let Start { moment, offset, .. } = start;
         let rest = Frame::rest(clock.shift(), moment, 0);
         let mut axes = line.steps.map(|steps| {
@@ -116,7 +127,11 @@ impl<const N: usize> LinePulses<N> {
         let directions = line.steps.map(|steps| Direction::of(steps.into()));
         let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end };
         for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
-            *due = stepper.next(&new.curve, frame);
+            *due = match steps {
+                Steps::Single => stepper.next(&new.curve, frame),
+                Steps::Stretches if new.curve.pieces().is_empty() => None,
+                Steps::Stretches => (phases::steps(frame.last(&new.curve)) > 0).then_some(0),
+            };
         }
         new
     }
@@ -148,6 +163,25 @@ impl<const N: usize> LinePulses<N> {
         if let (Some((frame, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
             *due = stepper.next(&self.curve, frame);
         }
+    }
+
+    /// The next steps of an axis; `None` after the last one.
+    pub(super) fn stretch(&mut self, at: usize, demand: &Demand) -> Option<Stretch> {
+        let (frame, stepper) = self.axes.get_mut(at)?;
+        stepper.cutter.next(&self.curve, frame, demand)
+    }
+
+    pub(super) fn set_due(&mut self, at: usize, tick: Option<u64>) {
+        if let Some(due) = self.due.get_mut(at) {
+            *due = tick;
+        }
+    }
+
+    /// Returns whether an axis has more of them.
+    pub(super) fn has_more(&self, at: usize) -> bool {
+        let more =
+            |(frame, stepper): &(Frame, Stepper)| stepper.cutter.count() < phases::steps(frame.last(&self.curve));
+        self.axes.get(at).is_some_and(more)
     }
 
     pub(super) fn pulse(&self, (tick, at): (u64, usize)) -> AxisPulse {

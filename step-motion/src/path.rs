@@ -3,7 +3,7 @@
 use crate::curve::Curve;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::line::{Line, LinePulses, Start};
+use crate::line::{Line, LinePulses, Start, Steps};
 use crate::plan::checked;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
@@ -175,7 +175,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let Course { curve, exit, .. } = self.begin(0, self.speed, Some(Real::ONE))?;
         let start = self.start();
         self.finish(&curve, start.moment, start.offset, exit);
-        Some(LinePulses::new(self.clock, &curve, &line, start))
+        Some(LinePulses::new(self.clock, &curve, &line, start, Steps::Single))
     }
 
     /// Steps of each axis from one position to another.
@@ -349,6 +349,21 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
+    /// After a rest, the next line begins no earlier than half a step behind the last one of each axis, by its greatest speed: it
+    /// may have come to rest right behind that step, and the line begins at it. `free`: the ticks after those steps.
+    pub(super) fn not_before_steps(&mut self, free: [u64; N]) {
+        if !self.speed.is_zero() {
+            return;
+        }
+        for (axis, free) in self.axes.iter().zip(free) {
+            let half = self.clock.moments().checked_div(axis.limits.speed()).unwrap_or(0).div_ceil(2);
+            if let Some(last) = free.checked_sub(1) {
+                let begin = self.clock.moment(last).saturating_add(half.into());
+                self.moment = self.moment.max(self.clock.aligned(begin));
+            }
+        }
+    }
+
     /// Line `at` of the queue.
     pub(super) fn line(&self, at: usize) -> Option<Line<N>> {
         if at >= self.len {
@@ -412,30 +427,47 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
     /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits.
+    ///
+    /// Chords of a circle are bounded by its radius, however small they are: with l the shorter line, v² = a l/2 s / sqrt(1 - s²), which
+    /// is a r.
     fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real), a: Real) -> Real {
         let (mut along, mut against) = (Real::ZERO, Real::ZERO);
+        let parts = |axis, before, after| (self.way(axis, before) / long, self.way(axis, after) / length);
         for (axis, (&before, &after)) in from.iter().zip(to).enumerate() {
-            let product = (self.way(axis, before) / long) * (self.way(axis, after) / length);
+            let (part, next) = parts(axis, before, after);
             if (before < 0) == (after < 0) {
-                along = along + product;
+                along = along + part * next;
             } else {
-                against = against + product;
+                against = against + part * next;
             }
         }
         // Twice s², and twice 1 - s².
         let one = Real::new(1);
         let (open, shut) = ((one + along) - against, (one + against) - along);
-        let straight = Real::fixed(1, 20);
-        if shut < straight {
+        if shut < Real::fixed(1, 48) {
             return Real::HUGE;
         }
-        if open < straight {
+        if open < STRAIGHT {
             return Real::ZERO;
         }
-        let s = open.half().sqrt();
-        (a * self.deviation * s * (one + s) / shut.half()).sqrt()
+        // The speed turns along the difference of both directions, which is as long as this; an axis takes its part of that.
+        let whole = shut.scaled(1).sqrt();
+        let mut most = a;
+        for (axis, (setup, (&before, &after))) in self.axes.iter().zip(from.iter().zip(to)).enumerate() {
+            let (part, next) = parts(axis, before, after);
+            let turn = if (before < 0) == (after < 0) { part.distance(next) } else { part + next };
+            let own = setup.limits.bounds(self.clock).a * self.way(axis, 1);
+            most = most.min(own * whole / turn);
+        }
+        let (s, rest) = (open.half().sqrt(), shut.half());
+        let chord = long.min(length).half() * s / rest.sqrt();
+        let bow = if shut < STRAIGHT { Real::HUGE } else { self.deviation * s * (one + s) / rest };
+        (most * bow.min(chord)).sqrt()
     }
 }
+
+/// 1 less the cosine of an angle that is none.
+const STRAIGHT: Real = Real::fixed(1, 20);
 
 /// A step falls into the nearest tick, so it may have been made before the place where it belongs.
 fn at_least<const N: usize>(mut ends: [u32; N], made: [u32; N]) -> [u32; N] {

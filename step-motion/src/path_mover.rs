@@ -1,12 +1,15 @@
 //! A path that can be held, slowed down and left at any time.
 
+use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
 use crate::limits::Clock;
-use crate::line::{AxisPulse, LinePulses, Start};
+use crate::line::{AxisPulse, LinePulses, Start, Steps};
 use crate::path::{Course, Path};
 use crate::plan::Setpoint;
 use crate::planner::Motion;
 use crate::real::Real;
+use crate::stepper::tick;
+use servowire_core::Direction;
 
 /// Runs the lines of a [`Path`] and takes requests at any tick: feed hold, feed override, lines added while it moves, and a
 /// new target.
@@ -54,12 +57,18 @@ pub struct PathMover<const N: usize, const M: usize> {
     origin: [i64; N],
     /// Ticks from which on the next steps may come.
     free: [u64; N],
+    /// Its steps are taken in stretches: what is left of the one of each axis.
+    steps: Steps,
+    left: [Option<Stretch>; N],
     percent: u16,
     held: bool,
     /// A stop is under way: what runs has been cut off.
     stopping: bool,
     halted: bool,
 }
+
+/// Half a tick, in times.
+const HALF: i128 = 1 << 31;
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
     /// At rest at the end of what `path` has run. The lines in it begin with the first request.
@@ -73,6 +82,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             commanded: position,
             origin: position,
             free: [0; N],
+            steps: Steps::Single,
+            left: [None; N],
             percent: 100,
             held: false,
             stopping: false,
@@ -166,10 +177,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.path.push(target, feed)?;
         self.halted = false;
-        let other = |part| self.path.exit(0, part) != self.exit;
-        if self.line.is_none() || self.part().is_some_and(other) {
-            self.replan(now);
-        }
+        self.look_ahead(now);
         Ok(())
     }
 
@@ -196,7 +204,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// rest.
     pub fn stop(&mut self, now: u64) {
         match self.end_of_stop(now) {
-            Some(end) => self.cut(end, now),
+            Some(end) => self.leave_at(end, now),
             None => self.leave(now),
         }
     }
@@ -226,8 +234,82 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.leave(now.max(free));
     }
 
-    const fn clock(&self) -> Clock {
+    pub(super) const fn clock(&self) -> Clock {
         self.path.clock()
+    }
+
+    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
+    pub(super) const fn cutting(self) -> Self {
+        Self { steps: Steps::Stretches, ..self }
+    }
+
+    /// The next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse); `None` if there are none on this line.
+    pub(super) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Option<(Stretch, Direction)> {
+        let line = self.line.as_mut()?;
+        let due = line.due.get_mut(at)?;
+        let left = self.left.get_mut(at)?;
+        let soonest = (*due)?;
+        let Some(stretch) = left.take().or_else(|| line.stretch(at, demand)) else {
+            line.set_due(at, None);
+            return None;
+        };
+        let first = tick(stretch.first).max(soonest);
+        if first >= until {
+            *left = Some(stretch);
+            line.set_due(at, Some(first));
+            return None;
+        }
+        let (stretch, later) = stretch.split((i128::from(until) << 32).saturating_sub(HALF));
+        *left = later;
+        let free = tick(stretch.last()).max(first).saturating_add(1);
+        line.set_due(at, (later.is_some() || line.has_more(at)).then_some(free));
+        let direction = line.directions.get(at).copied()?;
+        if let (Some(made), Some(own), Some(position)) =
+            (self.made.get_mut(at), self.free.get_mut(at), self.commanded.get_mut(at))
+        {
+            (*made, *own) = (made.saturating_add(stretch.count.into()), free);
+            let count = i64::from(stretch.count);
+            *position = position.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
+        }
+        self.settle();
+        Some((stretch, direction))
+    }
+
+    /// The tick at which the plan under way is over.
+    pub(super) fn over(&self) -> u64 {
+        let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
+        over.div_ceil(self.clock().moment(1))
+    }
+
+    /// As [`push`](Self::push); what runs takes no notice of it before it is told to [look ahead](Self::look_ahead).
+    pub(super) fn append(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.path.push(target, feed)?;
+        self.halted = false;
+        if self.line.is_none() {
+            self.replan(now);
+        }
+        Ok(())
+    }
+
+    /// Plans anew if lines have come that let the one that runs end at another speed.
+    pub(super) fn look_ahead(&mut self, now: u64) {
+        let other = |part| self.path.exit(0, part) != self.exit;
+        if self.line.is_none() || self.part().is_some_and(other) {
+            self.replan(now);
+        }
+    }
+
+    /// At rest after a stop that nobody asked for: it goes on from there as another one would.
+    pub(super) fn go_on_as(&mut self, other: &Self, now: u64) {
+        (self.held, self.percent) = (other.held, other.percent);
+        self.replan(now);
+    }
+
+    /// Halted at a position.
+    pub(super) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
+        self.halt(now);
+        (self.commanded, self.halted) = (commanded, was_moving);
+        self.leave(now);
     }
 
     /// Part of the speeds that were asked for; `None` to brake.
@@ -286,7 +368,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         let first = self.path.line(0)?;
         let here = self.here(now);
-        if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) && self.due().is_none() {
+        // Without speed there is no way to rest: a step that is due, as its tick is the nearest one, is not made any more.
+        if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
             return None;
         }
         let course =
@@ -299,7 +382,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Leaves the path at a place, and the first line at a speed.
-    fn cut(&mut self, (end, exit): ((usize, Real), Real), now: u64) {
+    fn leave_at(&mut self, (end, exit): ((usize, Real), Real), now: u64) {
         self.path.cut(end, self.begun(), self.made, exit);
         if !self.stopping {
             self.stopping = true;
@@ -335,9 +418,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn begin(&mut self) {
         (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
         let part = self.part();
-        if self.path.speed().is_zero() && part.is_none() {
+        if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
             return;
         }
+        self.path.not_before_steps(self.free);
         if let Some(course) = self.path.begin(0, self.path.speed(), part) {
             self.adopt(&course, self.path.start());
         }
@@ -347,7 +431,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn adopt(&mut self, course: &Course, start: Start<N>) {
         let Some(first) = self.path.line(0) else { return };
         let start = Start { whole: course.whole, ..start };
-        let mut line = LinePulses::new(self.clock(), &course.curve, &first, start);
+        let mut line = LinePulses::new(self.clock(), &course.curve, &first, start, self.steps);
         if course.whole && line.first().is_none() && self.made != first.ends {
             return;
         }
@@ -356,6 +440,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free).max(begin));
         }
         (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
+        self.left = [None; N];
     }
 
     /// Takes lines out that are over, and begins the next one.

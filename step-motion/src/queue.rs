@@ -30,12 +30,28 @@ pub(crate) struct Kind {
     pub(crate) step: bool,
     /// DIR is high: backwards.
     pub(crate) reverse: bool,
+    /// The axes of a path end a block, or a stop, here.
+    pub(crate) joint: Joint,
+}
+
+/// Where all axes of a path have an event at the same tick, and go on together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Joint {
+    /// Nowhere.
+    No,
+    /// The end of a block: on to the next one, or into the stop.
+    Block,
+    /// The end of a stop: at rest.
+    Rest,
 }
 
 /// The upper half of a segment's head: a step forward or backwards as the number +1 or -1 in the top two bits, then DIR.
 pub(crate) const DELTA: u32 = 30;
 pub(crate) const DIR: u32 = 1 << 29;
 pub(crate) const COUNT: u32 = 0xffff;
+/// A [`Joint`], and one at rest.
+pub(crate) const JOINT: u32 = 1 << 28;
+pub(crate) const REST: u32 = 1 << 27;
 
 impl Segment {
     pub(crate) const fn head(&self) -> u32 {
@@ -44,7 +60,12 @@ impl Segment {
             Kind { reverse: false, .. } => 1 << DELTA,
             Kind { reverse: true, .. } => 3 << DELTA,
         };
-        delta | if self.kind.reverse { DIR } else { 0 } | self.count as u32
+        let joint = match self.kind.joint {
+            Joint::No => 0,
+            Joint::Block => JOINT,
+            Joint::Rest => JOINT | REST,
+        };
+        delta | if self.kind.reverse { DIR } else { 0 } | joint | self.count as u32
     }
 }
 
@@ -67,7 +88,7 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
-    const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         const fn word(n: u32) -> AtomicU32 {
             AtomicU32::new(n)
         }
@@ -152,6 +173,12 @@ impl<const N: usize> Queue<N> {
     /// The slot of a block, by its place there.
     pub(crate) const fn slot(block: usize, at: usize) -> usize {
         1_usize.saturating_add(block.saturating_mul(Self::BLOCK)).saturating_add(at)
+    }
+
+    /// The block of a slot, and its place there.
+    pub(crate) fn place(slot: usize) -> Option<(usize, usize)> {
+        let at = slot.checked_sub(1)?;
+        Some((at.checked_div(Self::BLOCK)?, at.checked_rem(Self::BLOCK)?))
     }
 
     /// Writes a segment into a slot, and links it to the one before it if that is of the same block.

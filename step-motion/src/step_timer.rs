@@ -4,7 +4,7 @@ use core::sync::atomic::{Ordering, fence};
 
 use servowire_core::Direction;
 
-use crate::queue::{COUNT, DELTA, DIR, IDLE, Kind, Queue, Segment, Slot, TICKET};
+use crate::queue::{COUNT, DELTA, DIR, IDLE, JOINT, Joint, Kind, Queue, REST, Segment, Slot, TICKET};
 
 /// What a call of [`StepTimer::fire`] asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +33,11 @@ impl Fired {
         self.wait
     }
 }
+
+/// It stands: an event that is none, behind which something may follow.
+const STANDING: u32 = JOINT | REST | 1;
+/// Of a queue without slots.
+static NOWHERE: Slot = Slot::new();
 
 /// The step interrupt of an axis.
 ///
@@ -71,15 +76,15 @@ pub struct StepTimer<'q, const N: usize> {
 }
 
 impl<'q, const N: usize> StepTimer<'q, N> {
-    pub(crate) fn new(queue: &'q Queue<N>) -> Option<Self> {
-        let slot = queue.slots.first()?;
-        Some(Self { queue, slot, head: 1, fraction: 0, interval: 0, add: 0 })
+    pub(crate) fn new(queue: &'q Queue<N>) -> Self {
+        let slot = queue.slots.first().unwrap_or(&NOWHERE);
+        Self { queue, slot, head: STANDING, fraction: 0, interval: 0, add: 0 }
     }
 
     /// For measurements: segments of so many steps that follow each other for ever, in a queue that nobody else uses.
     #[doc(hidden)]
-    pub fn endless(queue: &'q Queue<N>, count: u16) -> Option<Self> {
-        let kind = Kind { step: true, reverse: false };
+    pub fn endless(queue: &'q Queue<N>, count: u16) -> Self {
+        let kind = Kind { step: true, reverse: false, joint: Joint::No };
         let segment = Segment { count, kind, first: 5 << 32, interval: 5 << 32, add: 1, bend: 1 };
         for (slot, after) in [(1, 0), (2, 1)] {
             queue.put(slot, &segment, Some(after));
@@ -96,6 +101,13 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         if halt != 0 {
             return self.halted(halt);
         }
+        self.event(|slot, _| slot.next.load(Ordering::Relaxed))
+    }
+
+    /// The event that is due; `next` says which slot follows the one that is over, of which it gets the head.
+    #[inline(always)]
+    pub(crate) fn event(&mut self, next: impl FnOnce(&Slot, u32) -> u32) -> Fired {
+        let queue = self.queue;
         let head = self.head;
         // Nobody else writes there.
         #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "-1, 0 or 1 in the top bits")]
@@ -103,7 +115,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         queue.made.store(made, Ordering::Relaxed);
         let left = head.wrapping_sub(1);
         let interval = if left & COUNT == 0 {
-            let next = self.slot.next.load(Ordering::Relaxed);
+            let next = next(self.slot, head);
             // The slot has been written before it was linked, and the one before it is read before its block is free.
             fence(Ordering::AcqRel);
             let Some(slot) = queue.slots.get(next as usize) else { return self.idle(head) };
@@ -129,7 +141,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
     #[cold]
     #[inline(never)]
     fn idle(&mut self, head: u32) -> Fired {
-        self.head = head & DIR | 1;
+        self.head = head & DIR | STANDING;
         let current = &self.queue.current;
         current.store(current.load(Ordering::Relaxed) | IDLE, Ordering::Release);
         Fired { head, wait: 0 }
@@ -138,11 +150,11 @@ impl<'q, const N: usize> StepTimer<'q, N> {
     /// No step, whatever was planned; what follows begins anew.
     #[cold]
     #[inline(never)]
-    fn halted(&mut self, ticket: u32) -> Fired {
+    pub(crate) fn halted(&mut self, ticket: u32) -> Fired {
         if let Some(slot) = self.queue.slots.first() {
             self.slot = slot;
         }
-        (self.head, self.fraction) = (self.head & DIR | 1, 0);
+        (self.head, self.fraction) = (self.head & DIR | STANDING, 0);
         self.queue.current.store(IDLE | ticket << TICKET, Ordering::Release);
         Fired { head: self.head, wait: 0 }
     }

@@ -1,7 +1,7 @@
 //! Lines in several axes: on the line, within the limits of every axis, at rest only where it must be.
 
 use proptest::prelude::*;
-use step_motion::{AxisPulse, AxisSetup, Clock, Direction, Error, Limits, Path, Plan};
+use step_motion::{Arc, AxisPulse, AxisSetup, Clock, Direction, Error, Limits, Path, Plan, Turning};
 
 fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
     let limits = Limits::new(v, a).unwrap();
@@ -173,8 +173,10 @@ fn the_speed_at_a_corner_is_that_of_its_angle() {
         {
             let turn = |[x, y]: [i64; 2]| [sx * x, sy * y];
             let got = speed_at_the_corner(turn([3000, 4000]), turn(second), 100);
-            // Along either line the limit of the axis that makes 4 of 5 parts of it counts: a = 100,000 · 5/4.
-            let (a, s) = (125_000.0, (angle.to_radians() / 2.0).sin());
+            // At 90° the speed turns by (1, -7) of sqrt(50): the second axis has 7 of these parts. Along either line that axis would have
+            // a = 100,000 · 5/4.
+            let a = if (angle - 90.0).abs() < 1.0 { 100_000.0 * 50_f64.sqrt() / 7.0 } else { 125_000.0 };
+            let s = (angle.to_radians() / 2.0).sin();
             let corner = (a * 10.0 * s / (1.0 - s).max(1e-12)).min(2.0 * a * 5000.0);
             // The faster axis has 4/5 of the speed, and brakes with 100,000 over a step; at the middle of the gap.
             let want = (corner * 0.64 + 2.0 * 100_000.0).sqrt();
@@ -219,4 +221,38 @@ fn a_line_after_a_rest_begins_on_the_grid() {
         same += u32::from(ticks.iter().zip(&alone).all(|(tick, alone)| tick - alone == shift));
     }
     assert!(same >= 12, "{same} of 40");
+}
+
+/// A circle of chords at more feed than its radius allows: v² / r is what an axis can take, however small the chords and however large the
+/// deviation.
+#[test]
+fn on_chords_of_a_circle_the_axes_keep_their_acceleration() {
+    // Chords of nine steps turn by more than the circle does, for they end at whole steps.
+    for (radius, error, deviation, least) in
+        [(5000, 2, 20, 1.0), (5000, 20, 500, 1.0), (20_000, 2, 20, 1.0), (1000, 1, 100, 0.5)]
+    {
+        // 100 steps/mm, 2 m/s².
+        let axes = [axis(100_000, 200_000, 0, 100_000); 2];
+        let mut path = Path::<2, 2000>::new(Clock::new(100_000_000).unwrap(), axes, deviation).unwrap();
+        let circle = Arc::new([radius, 0], [radius, 0], [0, 0], Turning::Counterclockwise, error).unwrap();
+        let begin = [i64::from(radius) / 10, 0];
+        for [x, y] in circle {
+            path.push([i64::from(x) / 10 - begin[0], i64::from(y) / 10], 1_000_000).unwrap();
+        }
+        let mut lines = Vec::new();
+        let mut begin = 0;
+        while let Some(line) = path.next_line() {
+            lines.push(line.end() - begin);
+            begin = line.end();
+        }
+        // The middle half of it, without the ramps.
+        let part = lines.len() / 4;
+        let seconds = lines[part..part * 3].iter().sum::<u64>() as f64 / 1e8;
+        let speed = core::f64::consts::PI * f64::from(radius) / 1e6 / seconds;
+        let acceleration = speed * speed / (f64::from(radius) / 1e6);
+        // At the corners; along a chord it gains and loses a part of that.
+        let chord = (8.0 * f64::from(error) / f64::from(radius)).sqrt();
+        let most = 2.0 * (1.02 + chord / 2.0);
+        assert!((least..most).contains(&acceleration), "{acceleration} m/s² of {most} at {radius} um, {error} um");
+    }
 }

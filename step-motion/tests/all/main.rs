@@ -5,6 +5,8 @@
 mod changes;
 mod laws;
 mod lines;
+mod path_laws;
+mod path_queue;
 mod paths;
 mod plans;
 mod queue;

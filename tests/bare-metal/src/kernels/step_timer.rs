@@ -1,6 +1,8 @@
-//! The step interrupt of step-motion in each of its calls, and the background that feeds it.
+//! The step interrupts of step-motion in each of their calls, and the background that feeds them.
 
-use step_motion::{Axis, Clock, Fired, Limits, Queue, StepTimer, Work};
+use step_motion::{
+    Axes, AxesQueue, AxesTimer, Axis, AxisSetup, Clock, Fired, FiredAxes, Limits, Path, Queue, StepTimer, Work,
+};
 
 use super::kernels_on_states;
 use crate::count::{most_tenths, tenths_on};
@@ -11,6 +13,9 @@ static STEPS: Queue<9> = Queue::new();
 static SEGMENTS: Queue<11> = Queue::new();
 static EMPTY: Queue<13> = Queue::new();
 static HALTED: Queue<15> = Queue::new();
+static ONE: AxesQueue<3, 9> = AxesQueue::new();
+static ALL: AxesQueue<3, 11> = AxesQueue::new();
+static LINES: AxesQueue<3, 257> = AxesQueue::new();
 static LONG: Queue<129> = Queue::new();
 static SHORT: Queue<129> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
@@ -46,6 +51,35 @@ impl Shuttle {
     }
 }
 
+/// Three axes that go round a square, a little up and down, with their interrupt.
+struct Square {
+    axes: Axes<'static, 3, 8, 257>,
+    timer: AxesTimer<'static, 3, 257>,
+    corner: usize,
+}
+
+impl Square {
+    /// At 168 MHz, 50 mm at 100 mm/s, 80 steps/mm.
+    fn new() -> Option<Self> {
+        let limits = Limits::new(20_000, 200_000).ok()?.with_jerk(4_000_000).ok()?;
+        let path = Path::new(Clock::new(168_000_000)?, [AxisSetup::new(limits, 80_000); 3], 20).ok()?;
+        let (axes, timer) = Axes::new(&LINES, path);
+        Some(Self { axes, timer, corner: 0 })
+    }
+
+    /// An event, and all that the background has to do then.
+    fn event(&mut self) -> FiredAxes {
+        const CORNERS: [[i64; 3]; 4] = [[4000, 0, 40], [4000, 4000, 0], [0, 4000, 40], [0, 0, 0]];
+        while !self.axes.is_full() {
+            let to = CORNERS.get(self.corner).copied().unwrap_or_default();
+            let _: Result<_, _> = self.axes.push(to, 100_000);
+            self.corner = (self.corner + 1) % CORNERS.len();
+        }
+        while self.axes.poll() == Work::More {}
+        self.timer.fire()
+    }
+}
+
 fn limits() -> Option<Limits> {
     Limits::new(20_000, 100_000).ok()
 }
@@ -55,14 +89,14 @@ kernels_on_states! {
     fn step_timer_step(timer: &mut StepTimer<'static, 9>, _input: &()) -> Fired {
         timer.fire()
     } as {
-        StepTimer::endless(&STEPS, 65_535).map_or(0, |mut timer| tenths_on(&mut timer, step_timer_step, &[()]))
+        tenths_on(&mut StepTimer::endless(&STEPS, 65_535), step_timer_step, &[()])
     }
 
     /// A step that goes on to the next segment.
     fn step_timer_segment(timer: &mut StepTimer<'static, 11>, _input: &()) -> Fired {
         timer.fire()
     } as {
-        StepTimer::endless(&SEGMENTS, 1).map_or(0, |mut timer| tenths_on(&mut timer, step_timer_segment, &[()]))
+        tenths_on(&mut StepTimer::endless(&SEGMENTS, 1), step_timer_segment, &[()])
     }
 
     /// A call that finds nothing to do.
@@ -82,6 +116,27 @@ kernels_on_states! {
         let Ok((mut axis, mut timer)) = Axis::new(&HALTED, Clock::MICROSECONDS, limits) else { return 0 };
         axis.halt();
         tenths_on(&mut timer, step_timer_halt, &[()])
+    }
+
+    /// One of three axes makes a step.
+    fn axes_timer_one(timer: &mut AxesTimer<'static, 3, 9>, _input: &()) -> FiredAxes {
+        timer.fire()
+    } as {
+        tenths_on(&mut AxesTimer::endless(&ONE, 65_535, 1), axes_timer_one, &[()])
+    }
+
+    /// Three axes make a step, and each goes on to its next segment.
+    fn axes_timer_all(timer: &mut AxesTimer<'static, 3, 11>, _input: &()) -> FiredAxes {
+        timer.fire()
+    } as {
+        tenths_on(&mut AxesTimer::endless(&ALL, 1, 0), axes_timer_all, &[()])
+    }
+
+    /// An event of three axes with all of its background, along lines of 4000 steps.
+    fn step_motion_axes_lines(square: &mut Square, _input: &()) -> FiredAxes {
+        square.event()
+    } as {
+        Square::new().map_or(0, |mut own| tenths_on(&mut own, step_motion_axes_lines, &[()]))
     }
 
     /// A step with all of its background, on ramps of 2500 steps of an S-curve.

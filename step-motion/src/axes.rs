@@ -1,0 +1,543 @@
+//! The background's half of a path: it plans along the lines, and hands segments of all axes to the interrupt.
+
+use core::sync::atomic::Ordering;
+
+use servowire_core::Direction;
+
+use crate::axes_timer::{AxesQueue, AxesTimer, TURN, TURNS};
+use crate::axis::{COARSE, COARSEST, Work};
+use crate::cutter::Demand;
+use crate::error::Error;
+use crate::path::Path;
+use crate::path_mover::PathMover;
+use crate::queue::{IDLE, Joint, Queue, REST, TICKET};
+use crate::real::Real;
+use crate::writer::{LONGEST, Writer, tick};
+
+/// The axes of a path, whose steps are made in an interrupt.
+///
+/// It takes the requests of a [`PathMover`] and cuts what is planned into segments, a little ahead of the [`AxesTimer`] that runs them. A
+/// request acts where the blocks that are out end: after twice the [reach](Self::with_reach) at the latest, but for
+/// [`halt`](Self::halt), after which there is no step. Behind each block lies a stop along the path: if [`poll`](Self::poll) is not
+/// called in time the machine comes to rest on its lines, and goes on from there when it is. Each step of that stop is exact to a
+/// sixteenth of an interval, each other step to 3/4 of a tick, or 25 ns where that is more; where a block ends within two ticks of a
+/// step, or DIR changes, a step may be a tick or two late.
+///
+/// Four copies of the [`PathMover`] are in it: it belongs into a `static` or far from a small stack.
+///
+/// ```
+/// use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
+/// static QUEUE: AxesQueue<2, 129> = AxesQueue::new();
+/// let axis = AxisSetup::new(Limits::new(20_000, 200_000)?.with_jerk(4_000_000)?, 80_000);
+/// let path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
+/// let (mut axes, mut timer) = Axes::new(&QUEUE, path);
+/// axes.push([800, 400], 100_000)?; // 10 mm and 5 mm, at 100 mm/s
+/// axes.push([1600, 800], 100_000)?; // straight on: no stop
+/// let mut steps = [0, 0];
+/// loop {
+///     match axes.poll() {
+///         Work::More => continue,
+///         Work::Rest => break,
+///         _ => {}
+///     }
+///     // what the timer does
+///     let fired = timer.fire();
+///     for (axis, steps) in steps.iter_mut().enumerate() {
+///         *steps += fired.steps() >> axis & 1;
+///     }
+/// }
+/// assert_eq!((axes.commanded(), steps), ([1600, 800], [1600, 800]));
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
+    queue: &'q AxesQueue<N, S>,
+    /// How far off a step may be, in moments.
+    off: Real,
+    /// Ticks of motion in a block, and how many times it is halved for want of slots.
+    reach: u32,
+    shorter: u32,
+    /// The path where the blocks that are out end, the tick there, DIR of each axis, and the steps until there as the interrupt
+    /// counts them.
+    path: PathMover<N, M>,
+    end: u64,
+    dirs: [Option<Direction>; N],
+    made: [u32; N],
+    /// What is being made of it, and where.
+    stage: Stage,
+    work: PathMover<N, M>,
+    block: usize,
+    writers: [Writer; N],
+    /// The axis that is cut, and how many before it had nothing.
+    axis: usize,
+    quiet: usize,
+    /// Where the block is to end, and how often that was put off; the writers there.
+    until: u64,
+    put_off: u8,
+    joint: [Writer; N],
+    coarse: u32,
+    /// The stop behind each of both blocks, with all that has been asked for since.
+    stops: [PathMover<N, M>; 2],
+    outs: [Out<N>; 2],
+    /// The interrupt stands, and what follows begins there.
+    standing: bool,
+    /// It has not entered the last block yet.
+    pending: bool,
+    /// What has been planned cannot be run.
+    lost: bool,
+    turn: u32,
+    /// The halt that the interrupt has not confirmed.
+    halt: Option<u32>,
+    ticket: u32,
+}
+
+/// What the background is at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Idle,
+    Block,
+    /// The stop behind it is to be planned.
+    Brake,
+    Stop,
+}
+
+/// What has been made of a block.
+#[derive(Debug, Clone, Copy)]
+struct Out<const N: usize> {
+    /// The interrupt may come to its stop.
+    valid: bool,
+    /// Slots of the first axis before those of the stop.
+    len: usize,
+    /// Where the stop ends.
+    end: u64,
+    dirs: [Option<Direction>; N],
+}
+
+/// How often the end of a block is put off, lest a step is late for it.
+const PUT_OFF: u8 = 8;
+
+impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
+    /// At rest at the end of what `path` has run, with the other end of the queue for the interrupt. A queue has one of them. Lines that
+    /// are in the path begin with the first request.
+    pub fn new(queue: &'q AxesQueue<N, S>, path: Path<N, M>) -> (Self, AxesTimer<'q, N, S>) {
+        let path = PathMover::new(path).cutting();
+        let clock = path.clock();
+        let none = [None; N];
+        let out = Out { valid: false, len: 0, end: 0, dirs: none };
+        let axes = Self {
+            queue,
+            off: clock.blur(),
+            reach: (clock.hz() / 100).max(4),
+            shorter: 0,
+            work: path.clone(),
+            stops: [path.clone(), path.clone()],
+            path,
+            end: 0,
+            dirs: none,
+            made: [0; N],
+            stage: Stage::Idle,
+            block: 0,
+            writers: [Writer::new(0, None); N],
+            axis: 0,
+            quiet: 0,
+            until: 0,
+            put_off: 0,
+            joint: [Writer::new(0, None); N],
+            coarse: COARSE,
+            outs: [out; 2],
+            standing: true,
+            pending: false,
+            lost: false,
+            turn: 0,
+            halt: None,
+            ticket: 0,
+        };
+        (axes, AxesTimer::new(queue))
+    }
+
+    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
+    pub fn with_reach(self, ticks: u32) -> Self {
+        Self { reach: ticks.clamp(4, LONGEST), ..self }
+    }
+
+    /// Steps of each axis made so far, forward less reverse ones.
+    pub fn commanded(&self) -> [i64; N] {
+        let mut commanded = self.path.commanded();
+        for ((at, made), queue) in commanded.iter_mut().zip(self.made).zip(&self.queue.axes) {
+            #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
+            let ahead = made.wrapping_sub(queue.made.load(Ordering::Acquire)) as i32;
+            *at = at.wrapping_sub(ahead.into());
+        }
+        commanded
+    }
+
+    /// Where the last line ends, in steps; after a [`stop`](Self::stop) where that will end.
+    pub const fn target(&self) -> [i64; N] {
+        self.path.target()
+    }
+
+    /// Returns whether no line can be pushed: the queue is full, or would be if the machine came to rest for want of background.
+    pub fn is_full(&self) -> bool {
+        let stops = self.stops.iter().enumerate().any(|(at, stop)| self.may_come_to(at) && stop.is_full());
+        stops || self.path.is_full()
+    }
+
+    /// Returns whether the interrupt stands and nothing is to come (or held).
+    pub fn is_at_rest(&self) -> bool {
+        self.halt.is_none() && self.standing && !self.pending && self.path.due().is_none()
+    }
+
+    /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
+    pub const fn is_halted(&self) -> bool {
+        self.path.is_halted()
+    }
+
+    /// As [`PathMover::push`].
+    ///
+    /// # Errors
+    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.ready()?;
+        if self.is_full() {
+            return Err(Error::QueueFull);
+        }
+        self.path.append(target, feed, self.end)?;
+        if self.stage != Stage::Idle {
+            // The same lines, or some of them: there is room for this one.
+            let _: Result<_, _> = self.work.append(target, feed, self.end);
+        }
+        self.tell_stops(|stop, end| stop.append(target, feed, end));
+        Ok(())
+    }
+
+    /// As [`PathMover::move_to`].
+    ///
+    /// # Errors
+    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.ready()?;
+        self.begin_anew();
+        self.path.move_to(target, feed, self.end)?;
+        self.tell_stops(|stop, end| stop.move_to(target, feed, end));
+        Ok(())
+    }
+
+    /// As [`PathMover::set_override`].
+    pub fn set_override(&mut self, percent: u16) {
+        self.begin_anew();
+        self.path.set_override(percent, self.end);
+    }
+
+    /// As [`PathMover::hold`].
+    pub fn hold(&mut self) {
+        self.begin_anew();
+        self.path.hold(self.end);
+    }
+
+    /// As [`PathMover::resume`].
+    pub fn resume(&mut self) {
+        self.begin_anew();
+        self.path.resume(self.end);
+    }
+
+    /// As [`PathMover::stop`].
+    pub fn stop(&mut self) {
+        self.begin_anew();
+        self.path.stop(self.end);
+        self.tell_stops(|stop, end| {
+            stop.stop(end);
+            Ok(())
+        });
+    }
+
+    /// No further step, from now on: the interrupt sees it without the queue. Until it has been called once more, which
+    /// [`poll`](Self::poll) asks for, lines are refused.
+    pub fn halt(&mut self) {
+        self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
+        self.ticket = self.ticket.max(1);
+        if let Some(queue) = self.queue.axes.first() {
+            queue.halt.store(self.ticket, Ordering::Release);
+        }
+        self.halt = Some(self.ticket);
+        self.begin_anew();
+    }
+
+    /// A slice of the background's work: a segment, a plan, or a look at the interrupt. Call it until it says other than
+    /// [`Work::More`], again after each request, and every half [reach](Self::with_reach).
+    pub fn poll(&mut self) -> Work {
+        if let Some(ticket) = self.halt {
+            return self.confirm(ticket);
+        }
+        let (place, idle) = self.place();
+        if self.pending && self.is_in(1_usize.wrapping_sub(self.block)) {
+            (self.pending, self.standing) = (false, false);
+            if let Some(out) = self.outs.get_mut(self.block) {
+                out.valid = false;
+            }
+        }
+        if let Some((block, place)) = place.filter(|_| !self.standing) {
+            if self.outs.get(block).is_some_and(|out| place >= out.len) {
+                // The interrupt has found nothing but the stop.
+                if idle {
+                    self.recover(block);
+                    return Work::More;
+                }
+                return Work::Later;
+            }
+        }
+        if self.pending {
+            return if idle { Work::Start } else { Work::Later };
+        }
+        match self.stage {
+            Stage::Idle if self.lost || self.path.due().is_none() => {
+                if self.standing {
+                    Work::Rest
+                } else {
+                    Work::Later
+                }
+            }
+            Stage::Idle => self.begin(),
+            Stage::Block => self.cut_block(),
+            Stage::Brake => self.brake(),
+            Stage::Stop => self.cut_stop(),
+        }
+    }
+
+    /// In which place of which block the first axis is, and whether all stand.
+    fn place(&self) -> (Option<(usize, usize)>, bool) {
+        let mut places = self.queue.axes.iter().map(|queue| queue.current.load(Ordering::Acquire));
+        let first = places.next().unwrap_or(IDLE);
+        let idle = first & IDLE != 0 && places.all(|current| current & IDLE != 0);
+        (Queue::<S>::place((first & 0xffff) as usize), idle)
+    }
+
+    /// Returns whether all axes have entered a block.
+    fn is_in(&self, block: usize) -> bool {
+        self.queue.axes.iter().all(|queue| {
+            let slot = (queue.current.load(Ordering::Acquire) & 0xffff) as usize;
+            Queue::<S>::place(slot).is_some_and(|(own, _)| own == block)
+        })
+    }
+
+    /// Returns whether the interrupt may come to the stop of a block, or that is being cut.
+    fn may_come_to(&self, block: usize) -> bool {
+        let cut = self.stage == Stage::Stop && block == self.block;
+        cut || self.outs.get(block).is_some_and(|out| out.valid)
+    }
+
+    /// What the stops are told, too, so that the machine goes on from there as it would have.
+    fn tell_stops(&mut self, ask: impl Fn(&mut PathMover<N, M>, u64) -> Result<(), Error>) {
+        for at in 0..2 {
+            if !self.may_come_to(at) {
+                continue;
+            }
+            if let (Some(stop), Some(out)) = (self.stops.get_mut(at), self.outs.get(at)) {
+                if ask(stop, out.end).is_err() {
+                    stop.stop(out.end);
+                }
+            }
+        }
+    }
+
+    fn ready(&self) -> Result<(), Error> {
+        if self.halt.is_some() { Err(Error::Moving) } else { Ok(()) }
+    }
+
+    /// What has been cut and is not out is forgotten.
+    const fn begin_anew(&mut self) {
+        self.stage = Stage::Idle;
+    }
+
+    /// The interrupt stands for a halt.
+    fn confirm(&mut self, ticket: u32) -> Work {
+        let parked = IDLE | ticket << TICKET;
+        if self.queue.axes.iter().any(|queue| queue.current.load(Ordering::Acquire) != parked) {
+            return Work::Start;
+        }
+        let commanded = self.commanded();
+        let was_moving = commanded != self.path.commanded() || !self.path.is_at_rest(self.end);
+        self.path.halt_at(commanded, self.end, was_moving);
+        self.stand([None; N]);
+        if let Some(queue) = self.queue.axes.first() {
+            queue.halt.store(0, Ordering::Release);
+        }
+        self.halt = None;
+        Work::More
+    }
+
+    /// The interrupt stands at the end of the stop of a block.
+    fn recover(&mut self, block: usize) {
+        let (Some(stop), Some(out)) = (self.stops.get_mut(block), self.outs.get(block).copied()) else { return };
+        stop.go_on_as(&self.path, out.end);
+        self.path.clone_from(stop);
+        self.end = out.end;
+        self.stand(out.dirs);
+        self.block = 1_usize.wrapping_sub(block);
+    }
+
+    fn stand(&mut self, dirs: [Option<Direction>; N]) {
+        self.dirs = dirs;
+        for (made, queue) in self.made.iter_mut().zip(&self.queue.axes) {
+            *made = queue.made.load(Ordering::Acquire);
+        }
+        for out in &mut self.outs {
+            out.valid = false;
+        }
+        (self.stage, self.standing, self.pending, self.lost) = (Stage::Idle, true, false, false);
+    }
+
+    /// A block from where those that are out end.
+    fn begin(&mut self) -> Work {
+        let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
+        if reach < 4 {
+            return self.give_up();
+        }
+        self.work.clone_from(&self.path);
+        self.work.look_ahead(self.end);
+        let end = i128::from(self.end) << 32;
+        for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
+            *writer = Writer::new(end, dir);
+        }
+        (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
+        (self.stage, self.axis, self.quiet, self.coarse) = (Stage::Block, 0, 0, COARSE);
+        Work::More
+    }
+
+    /// On to the next axis, or to the first one; true if none has had anything.
+    fn is_through(&mut self) -> bool {
+        self.quiet = self.quiet.saturating_add(1);
+        self.axis = self.axis.saturating_add(1).checked_rem(N).unwrap_or(0);
+        self.quiet >= N
+    }
+
+    /// A segment of the block.
+    fn cut_block(&mut self) -> Work {
+        let (Some(writer), Some(queue)) = (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis)) else {
+            return Work::Later;
+        };
+        let time = self.until.saturating_sub(tick(writer.end)).saturating_mul(1 << 32);
+        let demand = Demand { off: self.off, coarse: None, time };
+        if let Some((stretch, direction)) = self.work.cut(self.axis, &demand, self.until) {
+            writer.put_steps((queue, self.block), &stretch, direction);
+            self.quiet = 0;
+            if writer.len.saturating_add(4) > Queue::<S>::BLOCK / 3 {
+                self.shorter = self.shorter.saturating_add(1);
+                self.stage = Stage::Idle;
+            }
+        } else if self.is_through() && !self.waits_for_a_step() {
+            self.join();
+        }
+        Work::More
+    }
+
+    /// A step comes in the tick in which the block is to end, or in the next one.
+    fn waits_for_a_step(&mut self) -> bool {
+        let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1) && self.put_off < PUT_OFF);
+        if let Some(due) = next {
+            (self.until, self.quiet) = (due.saturating_add(1), 0);
+            self.put_off = self.put_off.saturating_add(1);
+        }
+        next.is_some()
+    }
+
+    /// The end of the block, the same one for all axes.
+    fn join(&mut self) {
+        self.until = self.put_joint(self.until, Joint::Block);
+        self.joint = self.writers;
+        self.stage = Stage::Brake;
+        if let (Some(out), Some(first)) = (self.outs.get_mut(self.block), self.writers.first()) {
+            out.len = first.len;
+        }
+    }
+
+    /// An event of all axes at one tick, not before another one; at which.
+    fn put_joint(&mut self, at: u64, joint: Joint) -> u64 {
+        let last = self.writers.iter().map(|writer| tick(writer.end).saturating_add(1)).max().unwrap_or(at);
+        let at = at.max(last);
+        for (writer, queue) in self.writers.iter_mut().zip(&self.queue.axes) {
+            writer.put_joint((queue, self.block), i128::from(at) << 32, joint);
+        }
+        at
+    }
+
+    /// Plans the stop from there.
+    fn brake(&mut self) -> Work {
+        if let Some(stop) = self.stops.get_mut(self.block) {
+            stop.clone_from(&self.work);
+            stop.hold(self.until);
+        }
+        self.writers = self.joint;
+        (self.stage, self.axis, self.quiet) = (Stage::Stop, 0, 0);
+        Work::More
+    }
+
+    /// A segment of the stop behind the block.
+    fn cut_stop(&mut self) -> Work {
+        let (Some(writer), Some(queue), Some(stop)) =
+            (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis), self.stops.get_mut(self.block))
+        else {
+            return Work::Later;
+        };
+        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
+        if let Some((stretch, direction)) = stop.cut(self.axis, &demand, u64::MAX) {
+            writer.put_steps((queue, self.block), &stretch, direction);
+            self.quiet = 0;
+        } else if self.is_through() {
+            let over = self.stops.get(self.block).map_or(0, PathMover::over);
+            let end = self.put_joint(over, Joint::Rest);
+            if self.fits() {
+                self.publish(end);
+                return Work::More;
+            }
+        }
+        if self.fits() {
+            return Work::More;
+        }
+        if self.coarse > COARSEST {
+            // Once more with fewer segments.
+            (self.coarse, self.stage) = (self.coarse.saturating_sub(1), Stage::Brake);
+            return Work::More;
+        }
+        self.give_up()
+    }
+
+    fn fits(&self) -> bool {
+        self.writers.iter().all(|writer| writer.len <= Queue::<S>::BLOCK)
+    }
+
+    /// A block cannot be run: the path is left, and the machine comes to rest where the interrupt does.
+    fn give_up(&mut self) -> Work {
+        self.stage = Stage::Idle;
+        self.shorter = 0;
+        if self.standing {
+            self.path.halt_at(self.commanded(), self.end, false);
+        } else {
+            self.stop();
+            self.lost = true;
+        }
+        Work::TooFewSlots
+    }
+
+    /// Lets the interrupt in, after the block before it or from rest.
+    fn publish(&mut self, end: u64) {
+        let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
+        if let Some(out) = self.outs.get_mut(self.block) {
+            *out = Out { valid: true, end, dirs: dirs(self.writers), ..*out };
+        }
+        for ((made, after), before) in self.made.iter_mut().zip(self.work.commanded()).zip(self.path.commanded()) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "modulo 2^32")]
+            let steps = after.wrapping_sub(before) as u32;
+            *made = made.wrapping_add(steps);
+        }
+        self.path.clone_from(&self.work);
+        (self.end, self.dirs) = (self.until, dirs(self.joint));
+        self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
+        let from = if self.standing { REST } else { 0 };
+        let slot = u32::try_from(Queue::<S>::slot(self.block, 0)).unwrap_or(0);
+        self.queue.gate.store(self.turn << TURN | from | slot, Ordering::Release);
+        if self.joint.iter().all(|writer| writer.len < Queue::<S>::BLOCK / 8) {
+            self.shorter = self.shorter.saturating_sub(1);
+        }
+        (self.pending, self.block, self.stage) = (true, 1_usize.wrapping_sub(self.block), Stage::Idle);
+    }
+}

@@ -1,0 +1,171 @@
+//! The interrupt's half of a path: the step timers of all its axes on one clock.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::queue::{JOINT, Queue, REST};
+use crate::step_timer::StepTimer;
+
+/// Segments between [`Axes`](crate::Axes) in the background and an [`AxesTimer`] in an interrupt: a [`Queue`] of `S` slots for each of
+/// `N` axes, 1 to 16.
+///
+/// It lies in a `static`; [`Axes::new`](crate::Axes::new) gives both ends.
+#[derive(Debug)]
+pub struct AxesQueue<const N: usize, const S: usize> {
+    pub(crate) axes: [Queue<S>; N],
+    /// The slot at which the next block begins, in all axes, [`REST`] if it is to follow a stop and not a block, and from
+    /// [`TURN`] on a number that is another one for each block. So one store lets all axes in.
+    pub(crate) gate: AtomicU32,
+}
+
+/// Where the number of a gate begins, and how many there are.
+pub(crate) const TURN: u32 = 16;
+pub(crate) const TURNS: u32 = 1 << 11;
+
+impl<const N: usize, const S: usize> AxesQueue<N, S> {
+    /// Empty.
+    pub const fn new() -> Self {
+        const { assert!(N >= 1 && N <= 16, "1 to 16 axes") };
+        Self { axes: [const { Queue::new() }; N], gate: AtomicU32::new(0) }
+    }
+}
+
+impl<const N: usize, const S: usize> Default for AxesQueue<N, S> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a call of [`AxesTimer::fire`] asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FiredAxes {
+    steps: u16,
+    reverse: u16,
+    wait: u32,
+}
+
+impl FiredAxes {
+    /// The axes that make a step now, a bit each from the lowest one on. DIR of each has been right for the time that its driver needs.
+    #[inline(always)]
+    pub const fn steps(self) -> u16 {
+        self.steps
+    }
+
+    /// The level of DIR of each axis from now on, a bit each, 1 for backwards; it never changes together with a step of the axis.
+    #[inline(always)]
+    pub const fn reverse(self) -> u16 {
+        self.reverse
+    }
+
+    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: there is none, stop the timer.
+    #[inline(always)]
+    pub const fn wait(self) -> u32 {
+        self.wait
+    }
+}
+
+/// The step interrupt of the axes of a path, on one timer.
+///
+/// [`fire`](Self::fire) is called when the compare time is reached. As axes step when their place on the path is there, two of them
+/// may be a tick apart: where the new compare time is over already, call it again at once.
+///
+/// ```
+/// # use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
+/// # static QUEUE: AxesQueue<2, 65> = AxesQueue::new();
+/// # let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
+/// # let (mut axes, mut timer) = Axes::new(&QUEUE, Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?);
+/// # axes.push([80, 40], 100_000)?;
+/// # while axes.poll() == Work::More {}
+/// # let (mut compare, now) = (0_u32, || 0_u32);
+/// // in the handler of the timer
+/// loop {
+///     let fired = timer.fire();
+///     // the DIR pins to fired.reverse(), and a pulse at each pin of
+///     let _pins = fired.steps();
+///     if fired.wait() == 0 {
+///         break; // disable the interrupt until the axes say that there is more
+///     }
+///     compare = compare.wrapping_add(fired.wait());
+///     if now().wrapping_sub(compare) > u32::MAX / 2 {
+///         break; // it is still to come
+///     }
+/// }
+/// # assert!(compare > 0);
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct AxesTimer<'q, const N: usize, const S: usize> {
+    queue: &'q AxesQueue<N, S>,
+    axes: [(StepTimer<'q, S>, u32); N],
+    reverse: u16,
+    /// What the last call has asked to wait.
+    wait: u32,
+    /// The gate that was gone through last.
+    taken: u32,
+}
+
+impl<'q, const N: usize, const S: usize> AxesTimer<'q, N, S> {
+    pub(crate) fn new(queue: &'q AxesQueue<N, S>) -> Self {
+        let axes = queue.axes.each_ref().map(|queue| (StepTimer::new(queue), 0));
+        Self { queue, axes, reverse: 0, wait: 0, taken: 0 }
+    }
+
+    /// For measurements: axes with segments of so many steps that follow each other for ever, the first steps so many ticks apart, in a
+    /// queue that nobody else uses.
+    #[doc(hidden)]
+    pub fn endless(queue: &'q AxesQueue<N, S>, count: u16, apart: u32) -> Self {
+        let mut wait = 0_u32;
+        let axes = queue.axes.each_ref().map(|queue| {
+            wait = wait.wrapping_add(apart);
+            (StepTimer::endless(queue, count), wait.wrapping_sub(apart))
+        });
+        Self { queue, axes, reverse: 0, wait: 0, taken: 0 }
+    }
+
+    /// The events that are due now, and the ticks until the next one. While it stands, a call begins with what has been planned.
+    #[inline]
+    pub fn fire(&mut self) -> FiredAxes {
+        let halt = self.queue.axes.first().map_or(0, |queue| queue.halt.load(Ordering::Relaxed));
+        if halt != 0 {
+            return self.halted(halt);
+        }
+        // The same for all axes that are at a joint now; it is behind what it lets in.
+        let gate = self.queue.gate.load(Ordering::Acquire);
+        let (open, waited) = (gate != self.taken, self.wait);
+        let (mut steps, mut reverse, mut next, mut entered, mut bit) = (0, self.reverse, u32::MAX, false, 1_u16);
+        for (axis, wait) in &mut self.axes {
+            let mut left = wait.wrapping_sub(waited);
+            if left == 0 {
+                let fired = axis.event(|slot, head| {
+                    if head & JOINT != 0 && open && (gate ^ head) & REST == 0 {
+                        entered = true;
+                        return gate & ((1 << TURN) - 1);
+                    }
+                    slot.next.load(Ordering::Relaxed)
+                });
+                steps |= if fired.is_step() { bit } else { 0 };
+                reverse = if fired.direction().dir() { reverse | bit } else { reverse & !bit };
+                left = fired.wait();
+            }
+            (*wait, next) = (left, next.min(left));
+            bit <<= 1;
+        }
+        if entered {
+            self.taken = gate;
+        }
+        (self.reverse, self.wait) = (reverse, next);
+        FiredAxes { steps, reverse, wait: next }
+    }
+
+    /// No step, whatever was planned; what follows begins anew.
+    #[cold]
+    #[inline(never)]
+    fn halted(&mut self, ticket: u32) -> FiredAxes {
+        for (axis, wait) in &mut self.axes {
+            axis.halted(ticket);
+            *wait = 0;
+        }
+        (self.wait, self.taken) = (0, self.queue.gate.load(Ordering::Relaxed));
+        FiredAxes { steps: 0, reverse: self.reverse, wait: 0 }
+    }
+}

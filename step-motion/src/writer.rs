@@ -1,0 +1,109 @@
+//! Segments on their way into the slots of a block.
+
+use servowire_core::Direction;
+
+use crate::cutter::Stretch;
+use crate::queue::{Joint, Kind, Queue, Segment};
+
+/// A tick in times.
+pub(crate) const TICK: i128 = 1 << 32;
+/// The longest wait in an event, in ticks.
+pub(crate) const LONGEST: u32 = 1 << 30;
+
+/// Where segments are put.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Writer {
+    /// The end of what has been cut, in 2^-32 ticks, as the interrupt's sum has it; and DIR there, if that is known.
+    pub(crate) end: i128,
+    pub(crate) dir: Option<Direction>,
+    /// Slots of the block that are filled.
+    pub(crate) len: usize,
+}
+
+impl Writer {
+    /// At the begin of a block.
+    pub(crate) const fn new(end: i128, dir: Option<Direction>) -> Self {
+        Self { end, dir, len: 0 }
+    }
+
+    /// Steps behind what there is; before them DIR, where it changes, and a wait that an event cannot hold.
+    pub(crate) fn put_steps<const N: usize>(
+        &mut self,
+        to: (&Queue<N>, usize),
+        stretch: &Stretch,
+        direction: Direction,
+    ) {
+        let first = stretch.first.saturating_add(TICK / 2).max(self.end.saturating_add(TICK));
+        if self.dir != Some(direction) {
+            self.dir = Some(direction);
+            let half = (first.saturating_sub(self.end) / 2).max(TICK);
+            self.put_wait(to, self.end.saturating_add(half));
+        }
+        let first = first.max(self.end.saturating_add(TICK));
+        if first.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
+            self.put_wait(to, first.saturating_sub(TICK));
+        }
+        let kind = Kind { step: true, reverse: direction.dir(), joint: Joint::No };
+        let late = first.saturating_sub(stretch.first);
+        self.put(to, (stretch.count, kind), first, stretch.differences);
+        self.end = stretch.last().saturating_add(late);
+    }
+
+    /// Nothing until a time.
+    pub(crate) fn put_wait<const N: usize>(&mut self, to: (&Queue<N>, usize), until: i128) {
+        let kind = self.rest(Joint::No);
+        let mut left = until.saturating_sub(self.end);
+        let longest = i128::from(LONGEST) << 32;
+        if left > longest {
+            let times = left.checked_div(longest).unwrap_or(0).min(0xffff);
+            let count = u16::try_from(times).unwrap_or(u16::MAX);
+            let end = self.end.saturating_add(longest);
+            self.put(to, (count, kind), end, [i64::from(LONGEST) << 32, 0, 0]);
+            self.end = self.end.saturating_add(longest.wrapping_mul(times));
+            left = until.saturating_sub(self.end);
+        }
+        if left >= TICK {
+            self.put(to, (1, kind), until, [0; 3]);
+            self.end = until;
+        }
+    }
+
+    /// Where all axes of a path have an event, which is to be after the last one of this axis.
+    pub(crate) fn put_joint<const N: usize>(&mut self, to: (&Queue<N>, usize), at: i128, joint: Joint) {
+        if at.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
+            self.put_wait(to, at.saturating_sub(TICK));
+        }
+        self.put(to, (1, self.rest(joint)), at, [0; 3]);
+        self.end = at;
+    }
+
+    /// An event that is no step.
+    fn rest(&self, joint: Joint) -> Kind {
+        Kind { step: false, reverse: self.dir.is_some_and(Direction::dir), joint }
+    }
+
+    /// Events, the first one at a time, and the differences from there on. Where they begin anew is one step before them.
+    fn put<const N: usize>(
+        &mut self,
+        (queue, block): (&Queue<N>, usize),
+        (count, kind): (u16, Kind),
+        first: i128,
+        [interval, add, bend]: [i64; 3],
+    ) {
+        let first = i64::try_from(first.saturating_sub(self.end)).unwrap_or(0);
+        let add = add.wrapping_sub(bend);
+        let interval = interval.wrapping_sub(add);
+        let segment = Segment { count, kind, first, interval, add, bend };
+        let place = self.len;
+        self.len = place.saturating_add(1);
+        if place < Queue::<N>::BLOCK {
+            let slot = |at| Queue::<N>::slot(block, at);
+            queue.put(slot(place), &segment, place.checked_sub(1).map(slot));
+        }
+    }
+}
+
+/// The tick of a time as the interrupt has it, half a tick on.
+pub(crate) fn tick(time: i128) -> u64 {
+    u64::try_from(time >> 32).unwrap_or(0)
+}

@@ -1,0 +1,251 @@
+//! The laws of a stop over all requests to a path, at any moment, any clock and any limits. What is looked at are the steps.
+
+use proptest::prelude::*;
+use step_motion::{AxisSetup, Clock, Direction, Limits, Path, PathMover};
+
+const N: usize = 2;
+type Machine = PathMover<N, 5>;
+
+#[derive(Debug, Clone, Copy)]
+enum Request {
+    Push([i64; N], u32),
+    MoveTo([i64; N], u32),
+    Override(u16),
+    Hold,
+    Resume,
+    Stop,
+    Halt,
+}
+
+fn place() -> impl Strategy<Value = [i64; N]> {
+    prop_oneof![3 => [-900..900_i64, -900..900_i64], 1 => [-6..6_i64, -6..6_i64], 1 => (-900..900_i64).prop_map(|x| [x, 0])]
+}
+
+fn request() -> impl Strategy<Value = Request> {
+    let feed = || spread(10.0, 3e5).prop_map(|feed| feed as u32);
+    prop_oneof![
+        6 => (place(), feed()).prop_map(|(to, feed)| Request::Push(to, feed)),
+        2 => (place(), feed()).prop_map(|(to, feed)| Request::MoveTo(to, feed)),
+        3 => (0..250_u16).prop_map(Request::Override),
+        3 => Just(Request::Hold),
+        3 => Just(Request::Resume),
+        2 => Just(Request::Stop),
+        1 => Just(Request::Halt),
+    ]
+}
+
+/// Spread over the decades.
+fn spread(low: f64, high: f64) -> impl Strategy<Value = u64> {
+    (low.ln()..high.ln()).prop_map(|x| x.exp() as u64)
+}
+
+fn axis() -> impl Strategy<Value = (u64, u64, u64, u64)> {
+    (spread(50.0, 1e5), spread(1e3, 1e7), prop_oneof![2 => Just(0), 5 => spread(1e4, 1e11)], spread(1e3, 1e6))
+}
+
+/// How the steps that are left end, if nothing else is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Ending {
+    /// Steps to come of each axis, and the first tick at rest.
+    steps: [u64; N],
+    rest: u64,
+}
+
+fn ending(machine: &Machine, now: u64) -> Ending {
+    let mut machine = machine.clone();
+    let (mut steps, mut last) = ([0; N], now);
+    while let Some(pulse) = machine.pulse() {
+        steps[usize::from(pulse.axis)] += 1;
+        assert!(steps[0] + steps[1] < 100_000, "the stop does not end");
+        last = pulse.tick;
+    }
+    let (mut low, mut high) = (last, last.max(1) << 20);
+    while low < high {
+        let middle = low.midpoint(high);
+        if machine.is_at_rest(middle) { high = middle } else { low = middle + 1 }
+    }
+    Ending { steps, rest: low }
+}
+
+impl Ending {
+    /// Not longer and not later, but for what rounding to a step of the path, and to a tick, may cost.
+    fn is_within(self, other: Self, step: u64) -> bool {
+        self.steps.iter().zip(other.steps).all(|(own, other)| *own <= other + step) && self.rest <= other.rest + 2
+    }
+}
+
+struct Watched {
+    machine: Machine,
+    hz: u32,
+    axes: [AxisSetup; N],
+    now: u64,
+    last: [Option<(u64, Direction)>; N],
+    position: [i64; N],
+    stop: Option<Ending>,
+    /// It is held: lines that come do not move it.
+    held: bool,
+    slowed: bool,
+}
+
+impl Watched {
+    fn until(&mut self, time: u64) -> Result<(), TestCaseError> {
+        while self.machine.due().is_some_and(|due| due <= time) {
+            self.step()?;
+        }
+        self.now = self.now.max(time);
+        if self.machine.is_at_rest(self.now) {
+            self.stop = None;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), TestCaseError> {
+        let pulse = self.machine.pulse().unwrap();
+        let i = usize::from(pulse.axis);
+        self.position[i] = pulse.direction.advance(self.position[i]);
+        prop_assert_eq!(self.machine.commanded(), self.position);
+        prop_assert!(pulse.tick >= self.now || self.last.iter().flatten().all(|(last, _)| pulse.tick >= *last));
+        if let Some((last, _)) = self.last[i] {
+            prop_assert!(pulse.tick > last, "two steps in a tick");
+            let least = u64::from(self.hz) / u64::from(self.axes[i].limits.speed());
+            let gap = pulse.tick - last;
+            prop_assert!(gap + 2 >= least, "axis {i}: {gap} ticks, {least} are the fastest");
+        }
+        self.last[i] = Some((pulse.tick, pulse.direction));
+        self.now = self.now.max(pulse.tick);
+        Ok(())
+    }
+
+    fn tell(&mut self, request: Request, skew: i64) -> Result<(), TestCaseError> {
+        let now = self.now.saturating_add_signed(skew);
+        if self.machine.is_at_rest(now) {
+            self.stop = None;
+        }
+        let rest = self.machine.is_at_rest(now);
+        let plain = {
+            let mut plain = self.machine.clone();
+            plain.hold(now);
+            ending(&plain, self.now)
+        };
+        let (mut stops, mut goes_on) = (false, false);
+        match request {
+            Request::Push(to, feed) => goes_on = self.machine.push(to, feed, now).is_ok(),
+            Request::MoveTo(to, feed) => {
+                // A stop, and on from there.
+                let under_way = self.machine.due().is_some();
+                goes_on = self.machine.move_to(to, feed, now).is_ok();
+                if goes_on && under_way && !rest {
+                    let mut alone = self.machine.clone();
+                    alone.hold(now);
+                    // The line to there may have begun, without a step.
+                    let end = Ending { rest: 0, ..ending(&alone, self.now) };
+                    prop_assert!(
+                        end.is_within(plain, 1),
+                        "{end:?} of a stop on the way to {to:?}, {plain:?} of a hold"
+                    );
+                }
+            }
+            Request::Override(percent) => {
+                self.machine.set_override(percent, now);
+                self.slowed = percent == 0;
+                (stops, goes_on) = (percent == 0, percent > 0);
+            }
+            Request::Hold => {
+                self.machine.hold(now);
+                self.held = true;
+                stops = true;
+            }
+            Request::Resume => {
+                self.machine.resume(now);
+                self.held = false;
+                goes_on = true;
+            }
+            Request::Stop => {
+                self.machine.stop(now);
+                let end = ending(&self.machine, self.now);
+                prop_assert!(rest || end.is_within(plain, 1), "{end:?} of a stop, {plain:?} of a hold");
+                stops = true;
+            }
+            Request::Halt => {
+                self.machine.halt(now);
+                prop_assert!(self.machine.due().is_none() && self.machine.is_empty());
+                prop_assert_eq!(self.machine.target(), self.position);
+                (self.stop, self.held) = (None, false);
+            }
+        }
+        let goes_on = goes_on && !self.held && !self.slowed;
+        if let (Some(stop), true, false) = (self.stop, stops, rest) {
+            let end = ending(&self.machine, self.now);
+            prop_assert!(end.is_within(stop, 0), "{request:?}: {end:?} after {stop:?}");
+        }
+        if stops && !rest {
+            self.stop = Some(ending(&self.machine, self.now));
+        } else if goes_on {
+            self.stop = None;
+        }
+        Ok(())
+    }
+}
+
+fn clocks() -> impl Strategy<Value = u32> {
+    prop_oneof![Just(1000_u32), Just(25_000), Just(1_000_000), Just(72_000_000), Just(200_000_000)]
+}
+
+/// How many sequences, and how many in the nightly run.
+fn cases() -> u32 {
+    std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_stop_wins_whatever_is_asked(
+        hz in clocks(), axes in [axis(), axis()], deviation in prop_oneof![Just(0), 1..2000_u32],
+        requests in prop::collection::vec(
+            (request(), spread(1e-6, 0.3e6), prop_oneof![3 => Just(0_i64), 1 => -20_000..20_000_i64]), 1..16),
+        target in place(),
+    ) {
+        let axes = axes.map(|(v, a, j, scale)| {
+            let limits = Limits::new((v as u32).min(hz / 2), a as u32).unwrap();
+            let limits = if j == 0 { limits } else { limits.with_jerk(j).unwrap() };
+            AxisSetup::new(limits, scale as u32)
+        });
+        let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, deviation).unwrap());
+        let mut watched = Watched { machine, hz, axes, now: 0, last: [None; N], position: [0; N], stop: None, held: false, slowed: false };
+        for (request, wait_us, skew) in requests {
+            watched.tell(request, skew)?;
+            // 20 s at most, else a slow path takes for ever.
+            let wait = (wait_us * u64::from(hz) / 1_000_000).min(20 * u64::from(hz));
+            watched.until(watched.now + wait)?;
+        }
+        // Afterwards it can be started again, and goes where it is told.
+        watched.machine.stop(watched.now);
+        let over = 1 << 42;
+        watched.until(over)?;
+        prop_assert!(watched.machine.is_at_rest(over) && watched.machine.is_empty());
+        prop_assert_eq!(watched.machine.target(), watched.position);
+        watched.machine.set_override(100, over);
+        watched.machine.resume(over);
+        watched.machine.push(target, 300_000, over).unwrap();
+        while watched.machine.due().is_some() {
+            watched.step()?;
+        }
+        prop_assert_eq!(watched.position, target);
+    }
+}
+
+/// A step that is due in this tick, at the begin of a ramp: there is no speed to stop from, and the line is not run to its end.
+#[test]
+fn a_stop_without_speed_and_with_a_step_that_is_due() {
+    let [a, b] = [(1860, 2782), (999, 14_826)].map(|(a, scale)| AxisSetup::new(Limits::new(49, a).unwrap(), scale));
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::new(1000).unwrap(), [a, b], 0).unwrap());
+    machine.push([-4, 1], 504, 0).unwrap();
+    machine.set_override(1, 357);
+    machine.hold(0);
+    machine.set_override(1, 358);
+    machine.resume(0);
+    assert_eq!((machine.due(), machine.at(0)[0].speed), (Some(358), 0));
+    machine.stop(0);
+    assert_eq!((machine.due(), machine.is_empty(), machine.target()), (None, true, machine.commanded()));
+}

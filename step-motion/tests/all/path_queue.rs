@@ -1,0 +1,339 @@
+//! A path in two halves: every step at its tick, all axes on the line whatever the background does, no step after a halt.
+
+use proptest::prelude::*;
+use step_motion::{Axes, AxesQueue, AxesTimer, AxisSetup, Clock, Limits, Path, PathMover, Work};
+
+const N: usize = 3;
+const LINES: usize = 8;
+const SLOTS: usize = 257;
+
+type Background = Axes<'static, N, LINES, SLOTS>;
+
+fn limits(speed: u32, acceleration: u32, jerk: u64) -> Limits {
+    let limits = Limits::new(speed, acceleration).unwrap();
+    if jerk == 0 { limits } else { limits.with_jerk(jerk).unwrap() }
+}
+
+fn queue() -> &'static AxesQueue<N, SLOTS> {
+    Box::leak(Box::default())
+}
+
+/// A timer, and what its handler does.
+struct Machine {
+    timer: AxesTimer<'static, N, SLOTS>,
+    now: u64,
+    /// When the compare register is reached.
+    compare: Option<u64>,
+    reverse: u16,
+    /// When DIR changed, and the last step, of each axis.
+    turned: [Option<u64>; N],
+    last: [Option<(u64, bool)>; N],
+    /// The steps: when, which axis, and which way.
+    steps: Vec<(u64, usize, i64)>,
+    position: [i64; N],
+}
+
+impl Machine {
+    fn new(timer: AxesTimer<'static, N, SLOTS>) -> Self {
+        Self {
+            timer,
+            now: 0,
+            compare: None,
+            reverse: 0,
+            turned: [None; N],
+            last: [None; N],
+            steps: Vec::new(),
+            position: [0; N],
+        }
+    }
+
+    fn fire(&mut self) {
+        let fired = self.timer.fire();
+        for axis in 0..N {
+            let (step, back) = (fired.steps() >> axis & 1 != 0, fired.reverse() >> axis & 1 != 0);
+            if back != (self.reverse >> axis & 1 != 0) {
+                assert!(!step, "DIR changes with a step");
+                assert!(self.last[axis].is_none_or(|(last, _)| last < self.now));
+                self.turned[axis] = Some(self.now);
+            }
+            if step {
+                assert!(self.last[axis].is_none_or(|(last, _)| last < self.now), "two steps in a tick");
+                assert!(self.turned[axis].is_none_or(|turned| turned < self.now), "a step in the tick of DIR");
+                self.last[axis] = Some((self.now, back));
+                let by = if back { -1 } else { 1 };
+                self.steps.push((self.now, axis, by));
+                self.position[axis] += by;
+            }
+        }
+        self.reverse = fired.reverse();
+        self.compare = Some(fired.wait()).filter(|wait| *wait > 0).map(|wait| self.now + u64::from(wait));
+    }
+
+    /// Time goes on.
+    fn until(&mut self, time: u64) {
+        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
+            self.now = compare;
+            self.fire();
+        }
+        self.now = self.now.max(time);
+    }
+
+    /// All that is out.
+    fn drain(&mut self) {
+        while let Some(compare) = self.compare {
+            self.until(compare);
+        }
+    }
+}
+
+/// The background in time: called every so many ticks, until the machine is at rest or a time comes.
+fn run(axes: &mut Background, machine: &mut Machine, every: u64, until: u64) -> Work {
+    loop {
+        let mut calls = 0;
+        let work = loop {
+            match axes.poll() {
+                Work::More => calls += 1,
+                Work::Start if machine.compare.is_none() => machine.fire(),
+                other => break other,
+            }
+            assert!(calls < 20_000, "the background does not end");
+        };
+        assert_ne!(work, Work::TooFewSlots);
+        if machine.now >= until || work == Work::Rest {
+            return work;
+        }
+        machine.until((machine.now + every).min(until));
+    }
+}
+
+fn path(hz: u32, axes: [AxisSetup; N], deviation: u32) -> Path<N, LINES> {
+    Path::new(Clock::new(hz).unwrap(), axes, deviation).unwrap()
+}
+
+fn place() -> impl Strategy<Value = [i64; N]> {
+    prop_oneof![
+        3 => [-900..900_i64, -900..900_i64, -300..300_i64],
+        1 => [-6..6_i64, -6..6_i64, -2..2_i64],
+        1 => (-900..900_i64).prop_map(|x| [x, 0, 0]),
+    ]
+}
+
+fn spread(low: f64, high: f64) -> impl Strategy<Value = u64> {
+    (low.ln()..high.ln()).prop_map(|x| x.exp() as u64)
+}
+
+fn clocks() -> impl Strategy<Value = u32> {
+    prop_oneof![Just(25_000_u32), Just(1_000_000), Just(72_000_000), Just(200_000_000)]
+}
+
+fn setup() -> impl Strategy<Value = (u64, u64, u64, u64)> {
+    (spread(200.0, 3e4), spread(1e4, 1e7), prop_oneof![Just(0), spread(1e6, 1e10)], spread(1e4, 2e5))
+}
+
+fn axes(hz: u32, from: [(u64, u64, u64, u64); N]) -> [AxisSetup; N] {
+    from.map(|(v, a, j, scale)| AxisSetup::new(limits((v as u32).min(hz / 4), a as u32, j), scale as u32))
+}
+
+fn cases() -> u32 {
+    std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(200)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    /// Beside the path that is taken step by step, whose steps are in the tick nearest to the exact time.
+    #[test]
+    fn every_step_is_at_its_tick(
+        hz in clocks(), from in [setup(), setup(), setup()], deviation in prop_oneof![Just(0), 1..2000_u32],
+        lines in prop::collection::vec((place(), spread(1e3, 3e5)), 1..LINES),
+    ) {
+        let axes = axes(hz, from);
+        let mut exact = PathMover::new(path(hz, axes, deviation));
+        let (mut background, timer) = Axes::new(queue(), path(hz, axes, deviation));
+        let mut machine = Machine::new(timer);
+        for (to, feed) in &lines {
+            background.push(*to, *feed as u32).unwrap();
+            exact.push(*to, *feed as u32, 0).unwrap();
+        }
+        run(&mut background, &mut machine, u64::from(hz) / 400 + 1, u64::MAX);
+        let target = lines.last().unwrap().0;
+        prop_assert_eq!((machine.position, background.commanded()), (target, target));
+        let mut want: [Vec<u64>; N] = Default::default();
+        while let Some(pulse) = exact.pulse() {
+            want[usize::from(pulse.axis)].push(pulse.tick);
+        }
+        // 3/4 of a tick, or 25 ns, and the half that is rounded there.
+        let most = 1.max((25e-9 * f64::from(hz) + 0.5) as u64);
+        let (mut late, all) = (0, machine.steps.len());
+        let mut at = [0; N];
+        for (tick, axis, _) in &machine.steps {
+            let off = tick.abs_diff(want[*axis][at[*axis]]);
+            prop_assert!(off <= most + 2, "step {} of axis {axis} at {tick}, off by {off}", at[*axis]);
+            late += u32::from(off > most);
+            at[*axis] += 1;
+        }
+        prop_assert!(f64::from(late) <= 2.0 + all as f64 * 0.02, "{late} of {all} steps are late");
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Request {
+    Push([i64; N], u32),
+    MoveTo([i64; N], u32),
+    Override(u16),
+    Hold,
+    Resume,
+    Stop,
+    Halt,
+}
+
+fn request() -> impl Strategy<Value = Request> {
+    let feed = || spread(100.0, 3e5).prop_map(|feed| feed as u32);
+    prop_oneof![
+        7 => (place(), feed()).prop_map(|(to, feed)| Request::Push(to, feed)),
+        2 => (place(), feed()).prop_map(|(to, feed)| Request::MoveTo(to, feed)),
+        3 => (0..200_u16).prop_map(Request::Override),
+        2 => Just(Request::Hold),
+        3 => Just(Request::Resume),
+        1 => Just(Request::Stop),
+        1 => Just(Request::Halt),
+    ]
+}
+
+fn ask(axes: &mut Background, request: Request) {
+    match request {
+        Request::Push(to, feed) => _ = axes.push(to, feed),
+        Request::MoveTo(to, feed) => _ = axes.move_to(to, feed),
+        Request::Override(percent) => axes.set_override(percent),
+        Request::Hold => axes.hold(),
+        Request::Resume => axes.resume(),
+        Request::Stop => axes.stop(),
+        Request::Halt => axes.halt(),
+    }
+}
+
+/// From the last place of a line to the nearest one of it.
+fn away(at: [f64; N], from: [f64; N], to: [f64; N]) -> f64 {
+    let dot = |a: [f64; N], b: [f64; N]| (0..N).map(|i| a[i] * b[i]).sum::<f64>();
+    let minus = |a: [f64; N], b: [f64; N]| -> [f64; N] { core::array::from_fn(|i| a[i] - b[i]) };
+    let (way, here) = (minus(to, from), minus(at, from));
+    let part = (dot(way, here) / dot(way, way).max(1e-9)).clamp(0.0, 1.0);
+    let off = minus(here, way.map(|x| x * part));
+    off.into_iter().fold(0.0, |most, x| f64::max(most, x.abs()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    /// In time, late, or not at all for a while: what is out ends in a stop, no axis is faster than its limit, and it goes on.
+    #[test]
+    fn requests_and_a_background_that_stalls(
+        hz in clocks(), from in [setup(), setup(), setup()], deviation in prop_oneof![Just(0), 1..2000_u32],
+        requests in prop::collection::vec((request(), 0..300_000_u64, 0..400_u32), 1..16), target in place(),
+    ) {
+        let setups = axes(hz, from);
+        let (mut axes, timer) = Axes::new(queue(), path(hz, setups, deviation));
+        let mut machine = Machine::new(timer);
+        let reach = u64::from(hz / 200);
+        for (request, wait_us, polls) in requests {
+            let halted = matches!(request, Request::Halt).then_some(machine.position);
+            ask(&mut axes, request);
+            // A background that is cut off after some slices.
+            for _ in 0..polls {
+                match axes.poll() {
+                    Work::Start if machine.compare.is_none() => machine.fire(),
+                    work => prop_assert_ne!(work, Work::TooFewSlots),
+                }
+            }
+            let until = machine.now + wait_us * u64::from(hz) / 1_000_000;
+            if wait_us % 3 == 0 {
+                machine.until(until);
+            } else {
+                run(&mut axes, &mut machine, reach / 2, until);
+            }
+            if let Some(position) = halted {
+                prop_assert_eq!(machine.position, position, "a step after a halt");
+            }
+            prop_assert_eq!(axes.commanded(), machine.position);
+        }
+        axes.stop();
+        machine.drain();
+        let until = machine.now + 60 * u64::from(hz);
+        run(&mut axes, &mut machine, reach / 2, until);
+        prop_assert!(axes.is_at_rest());
+        prop_assert_eq!(axes.target(), machine.position);
+        axes.set_override(100);
+        axes.resume();
+        axes.push(target, 300_000).unwrap();
+        prop_assert_eq!(run(&mut axes, &mut machine, reach / 2, u64::MAX), Work::Rest);
+        prop_assert_eq!((machine.position, axes.commanded()), (target, target));
+        let mut last = [None; N];
+        for (tick, axis, _) in machine.steps {
+            if let Some(before) = last[axis].replace(tick) {
+                let least = u64::from(hz) / u64::from(setups[axis].limits.speed());
+                prop_assert!(tick - before + 3 + least / 8 >= least, "axis {axis}: {} of {least} ticks", tick - before);
+            }
+        }
+    }
+
+    /// Lines, holds and overrides, and a background that is not there now and then: every place is on a line, in their order.
+    #[test]
+    fn it_stays_on_its_lines_whatever_the_background_does(
+        hz in clocks(), from in [setup(), setup(), setup()], deviation in prop_oneof![Just(0), 1..2000_u32],
+        lines in prop::collection::vec((place(), spread(1e3, 3e5)), 2..20),
+        what in prop::collection::vec((0..100_000_u64, 0..250_u32, 0..5_u8), 1..30),
+    ) {
+        let setups = axes(hz, from);
+        let (mut axes, timer) = Axes::new(queue(), path(hz, setups, deviation));
+        let mut machine = Machine::new(timer);
+        let mut waiting = lines.iter();
+        let mut next = waiting.next();
+        let mut push = |axes: &mut Background| {
+            while let Some((to, feed)) = next {
+                if axes.push(*to, *feed as u32).is_err() {
+                    return false;
+                }
+                next = waiting.next();
+            }
+            true
+        };
+        for (wait_us, polls, request) in what {
+            push(&mut axes);
+            match request {
+                0 => axes.hold(),
+                1 | 2 => axes.resume(),
+                3 => axes.set_override(polls as u16),
+                _ => {}
+            }
+            for _ in 0..polls {
+                match axes.poll() {
+                    Work::Start if machine.compare.is_none() => machine.fire(),
+                    work => prop_assert_ne!(work, Work::TooFewSlots),
+                }
+            }
+            machine.until(machine.now + wait_us * u64::from(hz) / 1_000_000);
+        }
+        axes.set_override(100);
+        axes.resume();
+        let mut rounds = 0;
+        while !push(&mut axes) || !axes.is_at_rest() {
+            let until = machine.now + u64::from(hz / 100);
+            run(&mut axes, &mut machine, u64::from(hz / 400), until);
+            rounds += 1;
+            prop_assert!(rounds < 1_000_000, "it does not end");
+        }
+        prop_assert_eq!(machine.position, lines.last().unwrap().0);
+        let float = |at: [i64; N]| at.map(|x| x as f64);
+        let (mut at, mut line, mut begin) = ([0; N], 0, [0; N]);
+        for (tick, axis, by) in machine.steps {
+            at[axis] += by;
+            // A step of each axis may have a tick more or less; on to the next line where that is nearer.
+            let (middle, to) = (float(at), |line: usize| float(lines[line].0));
+            while away(middle, float(begin), to(line)) > 1.1 && line + 1 < lines.len() {
+                (begin, line) = (lines[line].0, line + 1);
+            }
+            let off = away(middle, float(begin), to(line));
+            prop_assert!(off <= 1.1, "{at:?} at {tick} is {off} steps off the line to {:?}", lines[line].0);
+        }
+    }
+}
