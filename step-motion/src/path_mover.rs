@@ -62,6 +62,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     left: [Option<Stretch>; N],
     percent: u16,
     held: bool,
+    /// What runs slows down to rest.
+    braking: bool,
     /// A stop is under way: what runs has been cut off.
     stopping: bool,
     halted: bool,
@@ -86,6 +88,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             left: [None; N],
             percent: 100,
             held: false,
+            braking: false,
             stopping: false,
             halted: false,
         }
@@ -393,7 +396,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// The way on after a request.
     fn replan(&mut self, now: u64) {
-        if self.stopping {
+        // A stop that is under way is the same one whoever asks for it.
+        if self.stopping || self.line.is_some() && self.braking && self.part().is_none() {
             return;
         }
         if self.line.is_none() {
@@ -440,6 +444,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free).max(begin));
         }
         (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
+        self.braking = self.part().is_none();
         self.left = [None; N];
     }
 
