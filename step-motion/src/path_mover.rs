@@ -208,7 +208,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn stop(&mut self, now: u64) {
         match self.end_of_stop(now) {
             Some(end) => self.leave_at(end, now),
-            None => self.leave(now),
+            None => self.leave(self.tick(now)),
         }
     }
 
