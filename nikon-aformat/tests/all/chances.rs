@@ -77,3 +77,30 @@ fn a_repeated_frame_is_no_part_of_a_response() {
     }
     assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
 }
+
+/// Noise of two frames behind a response, in one block: all that its last frame can be makes some CRC-8 right in which the response
+/// would be the rest of another one. It is that only if a response begins there, and is sound then.
+#[test]
+fn noise_behind_a_response_costs_nothing() {
+    let request = Request::new(ea(3), Operation::Abs40);
+    let expected = request.expected(Resolution::default());
+    let first = u64::from(response(Command::Abs40, 3, 0).emit().contents()[0]);
+    for (position, begins) in [(0x1234, false), (first << 16 | 0x1234, true)] {
+        let sent = response(Command::Abs40, 3, position);
+        let contents = sent.emit().contents().to_vec();
+        assert_eq!(contents[2] == contents[0], begins);
+        let mut chances = 0;
+        for last in 0..=0xffff {
+            let block: Vec<_> = contents.iter().copied().chain([0, last]).collect();
+            if Response::parse_words(&expected, &block[2..], BitOrder::LsbFirst).is_ok() {
+                chances += 1;
+                continue;
+            }
+            let block: Vec<_> = block.into_iter().map(Some).collect();
+            let mut transaction = start(LINE);
+            let _ = transaction.hear_since(&block, 4_500, 200_000);
+            assert_eq!(ended(transaction), Ok(sent), "{position:#x} {last:#x}");
+        }
+        assert_eq!(chances, if begins { 256 } else { 0 });
+    }
+}
