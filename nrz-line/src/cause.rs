@@ -1,6 +1,6 @@
 use crate::Window;
 
-/// What most likely spoilt a message that was refused, as far as the line alone tells.
+/// What most likely damaged a message that was refused, as far as the line alone shows.
 ///
 /// [`Search::find`] gives it; a protocol crate adds the causes that only its protocol knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -35,8 +35,8 @@ servowire_core::one_line!(Cause {
     Self::Shifted { bits } if *bits > 0 => "the response begins {} bit(s) later than it was taken", bits;
     Self::Shifted { bits } => "{} bit(s) at the beginning of the response are missing", bits.unsigned_abs();
     Self::WrongBitOrder => "the bits of each byte are in the other order";
-    Self::OwnEcho => "the own request came back before the response: remove the echo";
-    Self::OnlyEcho => "only the own request came back: no encoder, or A and B are exchanged";
+    Self::OwnEcho => "our own request came back before the response: remove the echo";
+    Self::OnlyEcho => "only our own request came back: no encoder, or A and B are exchanged";
     Self::HalfRate => "the line runs at half the assumed bit rate";
     Self::StuckLow => "the line stays at 0";
     Self::StuckHigh => "the line stays at 1: nobody answers";
@@ -56,7 +56,7 @@ impl Cause {
     }
 }
 
-/// Undoes the usual mistakes one by one, to find the one that makes a refused message sound.
+/// Undoes the usual mistakes one by one, to find the one without which a refused message is valid.
 ///
 /// ```
 /// use nrz_line::{Cause, Search, Window};
@@ -72,7 +72,7 @@ impl Cause {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Search {
-    /// The own request, where it can come back.
+    /// Our own request, if it can come back.
     pub sent: Option<Window>,
     /// Most idle bits that are looked for in front of a message. Default 0.
     pub late_bits: u8,
@@ -88,7 +88,7 @@ pub struct Search {
 pub struct Found<T> {
     /// What is wrong with the line.
     pub cause: Cause,
-    /// The message as it would be without that; `None` if there is none on the line.
+    /// The message as it would be without that fault; `None` if the line carries no message.
     pub message: Option<T>,
 }
 
@@ -105,8 +105,8 @@ impl Search {
         with_complete_to: complete_to, u32;
     }
 
-    /// The first mistake without which `decode` finds the line sound, in the order: inverted, other bit order, own echo, half
-    /// the rate, late, early; and at last an echo that is followed by nothing.
+    /// The first mistake without which `decode` accepts the line, in the order: inverted, other bit order, own echo, half the
+    /// rate, late, early; and finally an echo that is followed by nothing.
     pub fn find<T>(&self, line: Window, decode: impl Fn(Window) -> Option<T>) -> Option<Found<T>> {
         let after_echo = self.after_echo(line);
         let attempts = [

@@ -13,19 +13,19 @@ pub struct Format {
     content_bits: u32,
 }
 
-/// A [`Format`] that the receiver does not take.
+/// A [`Format`] that the receiver does not support.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FormatError {
     /// 2 and 3 samples leave no room to find an edge; above 80 the limits below are not proved.
-    #[error("{got} samples a bit: 1 (a plain bit stream) or 4 to 80 are possible")]
+    #[error("{got} samples per bit: only 1 (a plain bit stream) or 4 to 80 are possible")]
     SamplesPerBit {
         /// What was asked for.
         got: u32,
     },
     /// Fields carry a byte or a 16-bit word.
-    #[error("{got} content bits: 8 or 16 are possible")]
+    #[error("{got} content bits: only 8 or 16 are possible")]
     ContentBits {
         /// What was asked for.
         got: u32,

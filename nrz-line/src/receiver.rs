@@ -78,7 +78,7 @@ impl Receiver {
         self.bits != IDLE
     }
 
-    /// Takes one sample; gives a field when its delimiter was sampled.
+    /// Takes one sample; returns a field when its delimiter was sampled.
     #[inline]
     pub const fn push(&mut self, sample: bool) -> Option<Field> {
         if sample as u32 != self.level {

@@ -28,7 +28,7 @@ impl Samples {
         Self { low: (word & 0xffff_ffff) as u32, high: (word >> 32) as u32, len }
     }
 
-    /// Samples that are left.
+    /// Samples that remain.
     pub const fn len(self) -> u32 {
         self.len
     }

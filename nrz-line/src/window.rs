@@ -119,7 +119,7 @@ impl Window {
         Self { bits, len: self.len.div_ceil(2) }
     }
 
-    /// The window followed by idle line (1) up to `len` bits; as it is if it has as many. `None` if `len` exceeds
+    /// The window followed by idle line (1) up to `len` bits; unchanged if it is already that long. `None` if `len` exceeds
     /// [`Self::MAX_LEN`].
     pub const fn padded(self, len: u32) -> Option<Self> {
         if self.len >= len {

@@ -64,7 +64,7 @@ impl Angle {
         Self(self.0.wrapping_sub(other.0))
     }
 
-    /// The shorter way to this angle from another one, in units of 2^-32 turn: positive if this one is ahead. Half a turn is
+    /// The shorter path to this angle from another one, in units of 2^-32 turn: positive if this one is ahead. Half a turn is
     /// `i32::MIN`.
     pub const fn difference(self, from: Self) -> i32 {
         0_i32.wrapping_add_unsigned(self.0.wrapping_sub(from.0))
@@ -95,6 +95,7 @@ pub enum Sense {
 /// // four pole pairs; with the encoder at 0 the field stands at 30 degrees
 /// let commutation = Commutation::new(4, Angle::from_millidegrees(30_000), Sense::Up).unwrap();
 /// let shaft = Angle::from_millidegrees(100_000);
+/// assert_eq!(commutation.pole_pairs(), 4);
 /// assert_eq!(commutation.electrical(shaft).millidegrees(), 70_000); // 430 degrees
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -95,7 +95,7 @@ pub struct Writer<'a, F, const W: usize> {
 }
 
 impl<F: Feedback + Words<W>, const W: usize> Writer<'_, F, W> {
-    /// Puts the newest evidence, in place of all before.
+    /// Stores the newest evidence, replacing all earlier evidence.
     pub fn put(&mut self, evidence: F) {
         self.slots.put(&(evidence.to_words(), []));
     }
@@ -119,7 +119,7 @@ impl<F: Feedback + Words<W>, const W: usize> Reader<'_, F, W> {
 
     /// The newest evidence, not judged.
     #[inline]
-    pub fn latest(&mut self) -> F {
+    fn latest(&mut self) -> F {
         self.slots.get().map_or(F::NEVER, |(words, [])| F::from_words(words))
     }
 }

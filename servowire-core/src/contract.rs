@@ -3,7 +3,7 @@
 
 use crate::{Progress, Step};
 
-/// One exchange with the other end: what leaves, what is heard of the answer, and how it ends.
+/// One exchange with the other end: what is sent, what is received as the answer, and how it ends.
 ///
 /// A machine does no I/O and reads no clock. It is told what arrived and when that ended, and asked what became of it.
 pub trait Machine {
@@ -118,8 +118,8 @@ macro_rules! procedures {
     };
 }
 
-/// The inherent method `receive` of a procedure with a field `end` and a method `next` that does the work: once it has ended it
-/// stays so, whatever it is told.
+/// The inherent method `receive` of a procedure with a field `end` and a method `next` that does the work: once it has ended, it
+/// stays ended, whatever it is fed.
 ///
 /// `servowire_core::receive! { SingleTurn }`
 #[macro_export]

@@ -1,6 +1,6 @@
 use crate::{Class, Classified};
 
-/// How many transactions went well, and how many failed in which of `N` ways.
+/// How many transactions succeeded, and how many failed in each of `N` ways.
 ///
 /// Each crate names its own: `type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -27,7 +27,7 @@ impl<const N: usize> Counters<N> {
         }
     }
 
-    /// Transactions with a sound answer.
+    /// Transactions with a valid answer.
     pub const fn good(&self) -> u64 {
         self.good
     }

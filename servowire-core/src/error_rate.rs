@@ -32,7 +32,7 @@ impl ErrorRate {
     }
 
     /// Returns whether the limit is exceeded.
-    pub const fn is_exceeded(&self) -> bool {
+    const fn is_exceeded(&self) -> bool {
         self.level > self.limit
     }
 }

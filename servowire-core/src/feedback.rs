@@ -75,7 +75,7 @@ impl<T: Tolerance> Policy<T> {
     }
 }
 
-/// Evidence of a position, speed or torque. It is judged where it is used, not where it was received, for it ages in between.
+/// Evidence of a position, speed or torque. It is judged where it is used, not where it was received, because it ages in between.
 ///
 /// Protocol crates implement it by forwarding to an inherent `const fn at`, so that the text of a control loop is the same
 /// for all of them:

@@ -3,7 +3,7 @@ use core::marker::PhantomData;
 
 use crate::Class;
 
-/// A set of error classes: all that an inspection found wrong with a frame. Up to 64 classes.
+/// A set of error classes: everything that an inspection found wrong with a frame. Up to 64 classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Findings<C> {
     bits: u64,
@@ -126,7 +126,7 @@ macro_rules! report {
                 self.error
             }
 
-            /// Every kind of fault in what was given.
+            /// Every kind of fault in the input.
             pub const fn findings(&self) -> Findings {
                 self.findings
             }

@@ -13,7 +13,7 @@ pub struct Estimate {
     pub bound: Angle,
 }
 
-/// The largest acceleration of a shaft, in either direction, with all that its motor and its load can do to it.
+/// The largest acceleration of a shaft, in either direction, including everything that its motor and its load can do to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -59,7 +59,7 @@ impl Motion {
     pub(crate) const WORDS: usize = 7;
 
     /// Before the first sample, and after a doubtful one.
-    pub const UNKNOWN: Self = Self::standing(Angle::ZERO, 0, 0);
+    pub(crate) const UNKNOWN: Self = Self::standing(Angle::ZERO, 0, 0);
 
     /// A sample without one before it.
     const fn standing(angle: Angle, sampled_ns: u64, count: u32) -> Self {
@@ -130,7 +130,7 @@ const fn low(bits: u64) -> u32 {
     bits as u32
 }
 
-/// Makes [`Motion`] of successive samples. It belongs to the writer, for it divides.
+/// Makes [`Motion`] of successive samples. It belongs to the writer, because it divides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tracker {

@@ -1,4 +1,4 @@
-/// How far a procedure is.
+/// The state of a procedure.
 ///
 /// `T` is what it was made for, `E` why it failed. Both ends say from when on the line is free for the next request:
 /// until then an answer that was given up may still be talking, or the encoder is at work.
@@ -61,7 +61,7 @@ pub enum Step<R, T, E> {
 }
 
 impl<R, T, E> Step<R, T, E> {
-    /// What a procedure wants next that is made of this one: `done` goes on when it has succeeded.
+    /// The next step of a procedure that is built on this one: `done` continues when this one has succeeded.
     pub fn and_then<U>(self, done: impl FnOnce(T, u64) -> Step<R, U, E>) -> Step<R, U, E> {
         match self {
             Self::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
@@ -78,7 +78,7 @@ impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
     }
 }
 
-/// How often something that is busy is asked, and how many times at the most.
+/// How often a busy device is polled, and at most how many times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

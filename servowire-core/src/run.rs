@@ -7,7 +7,7 @@ use crate::{Procedure, Step};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ended<T, E> {
-    /// The answer or the value, or why there is none.
+    /// The answer or the value, or why it is missing.
     pub outcome: Result<T, E>,
     /// The line is free from this time on, in ns.
     pub ready_ns: u64,
@@ -74,7 +74,7 @@ pub fn run<P: Procedure, F>(
     }
 }
 
-/// As [`run`], with an exchange that is awaited.
+/// Like [`run`], with an exchange that is awaited.
 ///
 /// # Errors
 /// That of `exchange`.

@@ -100,7 +100,7 @@ pub struct ShaftWriter<'a, F, const W: usize> {
 }
 
 impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
-    /// Puts the newest evidence, in place of all before.
+    /// Stores the newest evidence, replacing all earlier evidence.
     ///
     /// The policy, that of the reader as a rule, decides which evidence goes into the speed. After a doubt the speed is not
     /// known until there are two good samples again, as at the start.
@@ -142,7 +142,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     }
 
     /// The electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
-    /// stand: where the speed is not known it is half a turn.
+    /// tolerate: where the speed is not known it is half a turn.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -160,7 +160,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 
     /// The newest evidence, not judged.
     #[inline]
-    pub fn latest(&mut self) -> F {
+    fn latest(&mut self) -> F {
         self.newest().0
     }
 
@@ -175,9 +175,9 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 
 /// `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` of a protocol whose encoders count turns.
 ///
-/// All that can speak against a position stands in one word of marks, so that one mask says what is tolerated of it. What the
+/// All reasons against using a position are in one word of marks, so that one mask says which are tolerated. What the
 /// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
-/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names what speaks against a
+/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names the reason against using a
 /// position. The fields are private to the module in which this stands, so nobody else makes a sample. The last word is the name
 /// of the field for the width of the single turn, in files.
 #[macro_export]
@@ -202,7 +202,7 @@ macro_rules! shaft_evidence {
             /// Nothing was heard yet.
             pub const NEVER: Self = Self { sampled_ns: 0, single_turn: 0, turns: 0, marks: NEVER };
 
-            /// The position, if nothing speaks against its use at `now_ns`.
+            /// The position, if it may be used at `now_ns`.
             ///
             /// # Errors
             /// [`Doubt`], in the order in which its variants are declared.
@@ -248,7 +248,7 @@ macro_rules! shaft_evidence {
         /// Carries evidence from where it is received to where it is used, between two priorities or cores.
         pub type EvidenceCell = $crate::Cell<Evidence, 5>;
 
-        /// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+        /// Like [`EvidenceCell`], and also gives the angle at an instant between two samples.
         pub type EvidenceShaftCell = $crate::ShaftCell<Evidence, 5>;
 
         /// For an [`EvidenceCell`]: the instant of sampling, low half first, single turn, turns, marks.

@@ -25,7 +25,7 @@ impl Direction {
         if steps < 0 { Self::Reverse } else { Self::Forward }
     }
 
-    /// `steps` one step on.
+    /// `steps` and one more in this direction.
     pub const fn advance(self, steps: i64) -> i64 {
         match self {
             Self::Forward => steps.wrapping_add(1),
@@ -34,7 +34,7 @@ impl Direction {
     }
 }
 
-/// What a motor is told in one cycle: all that a PTO word says.
+/// The command to a motor for one cycle: everything that a PTO word says.
 ///
 /// | command | PTO word (TIDEP0061, section 2.4.2) |
 /// |---|---|

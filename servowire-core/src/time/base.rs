@@ -1,7 +1,7 @@
 use super::{ClockError, TickRate};
 
 /// Time from a counter that wraps after `BITS` bits: 32 for a cycle counter or a timer of 32 bits, 24 for the SysTick, 16 for a
-/// small timer; 8 to 32 will do.
+/// small timer; 8 to 32 are possible.
 ///
 /// ```
 /// use servowire_core::{ClockError, TickRate, TimeBase};

@@ -28,8 +28,8 @@ pub struct ClockCheck {
 }
 
 impl ClockCheck {
-    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor makes in a
-    /// tick.
+    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor makes
+    /// within one tick.
     pub const fn new(max_looks: u32) -> Self {
         Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
     }
@@ -39,7 +39,7 @@ impl ClockCheck {
         self.last_ns
     }
 
-    /// The reading, if it is sound.
+    /// The reading, if it is plausible.
     ///
     /// # Errors
     /// [`ClockError::Backwards`] if it is before the last one, once: the next one is compared with this one.
@@ -56,7 +56,7 @@ impl ClockCheck {
         }
     }
 
-    /// The reading, if it is sound and at most `most_ns` after the last one; `most_ns` is 2^63 at the most.
+    /// The reading, if it is plausible and at most `most_ns` after the last one; `most_ns` is at most 2^63.
     ///
     /// # Errors
     /// Those of [`check`](Self::check), and [`ClockError::Ahead`] if more has passed, once: the next one is compared with this one.
