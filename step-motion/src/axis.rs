@@ -141,7 +141,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok((axis, timer))
     }
 
-    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
+    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
@@ -165,7 +165,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.commanded().wrapping_sub(ahead.into())
     }
 
-    /// Returns whether the interrupt stands and nothing is to come (or held).
+    /// Returns whether the timer is stopped and no step is to come (or is held back).
     pub fn is_at_rest(&self) -> bool {
         let (current, _) = self.current();
         self.halt.is_none() && self.writer.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())

@@ -15,13 +15,13 @@ pub(super) enum Bend {
     Fading,
 }
 
-/// A piece of constant jerk: its state at its begin.
+/// A piece of constant jerk: its state at its start.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Piece {
     /// Begin, on the curve's time.
     pub(super) time: Real,
-    /// Distance from the begin of the curve.
+    /// Distance from the start of the curve.
     pub(super) p: Real,
     pub(super) v: Real,
     /// Size of the acceleration.
@@ -34,14 +34,14 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// The state `t` after the begin.
+    /// The state `t` after the start.
     pub(super) fn after(&self, t: Real) -> Self {
         let Self { time, a, j, up, bend, .. } = *self;
         let (p, v) = self.way(t);
         Self { time: time + t, p, v, a: a.along(j * t, bend != Bend::Fading), j, up, bend }
     }
 
-    /// Distance and speed `t` after the begin.
+    /// Distance and speed `t` after the start.
     pub(super) fn way(&self, t: Real) -> (Real, Real) {
         let Self { p, v, a, j, up, bend, .. } = *self;
         let growing = bend != Bend::Fading;
@@ -89,7 +89,7 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
-    /// The state at a time of the curve, also before its begin and after its end; `None` without pieces.
+    /// The state at a time of the curve, also before its start and after its end; `None` without pieces.
     pub(super) fn at(&self, time: Real) -> Option<Piece> {
         let pieces = self.pieces();
         let piece = pieces.iter().rev().find(|piece| piece.time <= time).or(pieces.first())?;

@@ -1,6 +1,6 @@
 //! From curves to segments: stretches of steps whose times are a cubic of their number, near enough.
 //!
-//! A segment joins two steps, and has the time and the pace of both. With r = 1 / v, w = a r² and y = j r³ at its begin, the time
+//! A segment joins two steps, and has the time and the pace of both. With r = 1 / v, w = a r² and y = j r³ at its start, the time
 //! at which the position is u steps further is
 //!
 //! ```text
@@ -14,7 +14,8 @@
 //! Within a piece all is in parts of it: times in parts of its time, positions in parts of its way, in words of 64 bits. With t from 0 to 1
 //! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2.
 //!
-//! A step that is a segment of its own, near rest and at the begin of a piece, is searched by Newton's method. Each piece is seen from
+//! A step that is a segment of its own, near rest and at the start of a piece, is searched by Newton's method. Each piece is
+//! seen from
 //! the end at which it is slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
 
 use crate::curve::{Bend, Curve};

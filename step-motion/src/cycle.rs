@@ -8,7 +8,7 @@ use servowire_core::Command;
 /// Length of the cycle in ns.
 const CYCLE_NS: u64 = 4000;
 
-/// A [`Mover`] that is called once in each cycle of 4 µs and gives what a PTO word says.
+/// A [`Mover`] that is called once in each cycle of 4 µs and returns what a PTO word says.
 ///
 /// ```
 /// use step_motion::{Command, Limits, PtoMover};
@@ -27,7 +27,7 @@ pub struct PtoMover {
 }
 
 impl PtoMover {
-    /// The greatest speed: a step a cycle.
+    /// The greatest speed: one step per cycle.
     pub const MAX_SPEED: u32 = 250_000;
 
     /// At rest at position 0.
@@ -41,12 +41,12 @@ impl PtoMover {
         Ok(Self { mover: Mover::new(Clock::NANOSECONDS, limits)?, now: 0 })
     }
 
-    /// The axis, to be told what to do; its ticks are nanoseconds.
+    /// The axis, for commands; its ticks are nanoseconds.
     pub const fn mover(&mut self) -> &mut Mover {
         &mut self.mover
     }
 
-    /// Begin of the next cycle, in ns: the time for a request.
+    /// Start of the next cycle, in ns: the time for a request.
     pub const fn now(&self) -> u64 {
         self.now
     }

@@ -5,7 +5,7 @@ servowire_core::errors! {
         #[error("the axis is still moving")]
         Moving = 1,
         /// Two steps could fall into one tick of the clock.
-        #[error("{speed} steps/s are too many for this clock, at most {limit}")]
+        #[error("{speed} steps/s is too fast for this clock, at most {limit}")]
         SpeedAboveClock = 2 {
             /// Greatest speed in steps/s, as asked for.
             speed: u32,
@@ -24,12 +24,12 @@ servowire_core::errors! {
         #[error("the queue of lines is full")]
         QueueFull = 4,
         /// An axis with 0 steps a metre.
-        #[error("an axis with 0 steps a metre")]
+        #[error("an axis with 0 steps per metre")]
         NoScale = 5,
         /// The ends of an arc are not on one circle, or it is too large.
         #[error("an arc from a radius of {from} to one of {to}")]
         ArcRadius = 6 {
-            /// Radius at its begin, in the caller's unit.
+            /// Radius at its start, in the caller's unit.
             from: u32,
             /// Radius at its end.
             to: u32,

@@ -18,9 +18,9 @@ pub struct HomingConfig {
     pub approach: u32,
     /// How far to go back before it, in steps.
     pub back_off: u32,
-    /// After this many steps without a switch the search is given up.
+    /// After this many steps without a switch the search is abandoned.
     pub range: u32,
-    /// How fast to stop at the switch. The way to rest, v² / 2a, or (v / 2)(v / a + a / j) with a jerk limit, has to fit
+    /// How fast to stop at the switch. The distance to rest, v² / 2a, or (v / 2)(v / a + a / j) with a jerk limit, has to fit
     /// after it.
     pub stop: Limits,
 }
@@ -47,7 +47,7 @@ pub enum Switch {
     Closed,
 }
 
-/// How far a homing is.
+/// The progress of a homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -79,7 +79,7 @@ pub enum HomingState {
 pub struct Homing {
     config: HomingConfig,
     state: HomingState,
-    /// Position at the begin of the state, or of the switch.
+    /// Position at the start of the state, or of the switch.
     mark: i64,
 }
 
@@ -106,7 +106,7 @@ impl Homing {
         self.state
     }
 
-    /// Looks at the switch, and tells the axis what follows from it.
+    /// Looks at the switch and commands the axis accordingly.
     ///
     /// # Errors
     /// Those of the requests to the axis; the homing stays where it is then.

@@ -6,7 +6,7 @@ use servowire_core::OutOfRange;
 
 use crate::real::Real;
 
-/// The clock of a timer: ticks a second, 1000 to 2^30 - 1.
+/// The clock of a timer: ticks per second, 1000 to 2^30 - 1.
 ///
 /// 1 MHz is a common timer; [`NANOSECONDS`](Self::NANOSECONDS) suits the 4 µs cycle of TIDEP0061, whose PTO words are in ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -20,9 +20,9 @@ impl Clock {
     pub const NANOSECONDS: Self = Self(1_000_000_000);
     /// A tick is a microsecond.
     pub const MICROSECONDS: Self = Self(1_000_000);
-    /// The slowest, in ticks a second.
+    /// The slowest, in ticks per second.
     pub const MIN_HZ: u32 = 1000;
-    /// The fastest, in ticks a second: 2^30 - 1.
+    /// The fastest, in ticks per second: 2^30 - 1.
     pub const MAX_HZ: u32 = (1 << 30) - 1;
 
     /// `None` outside 1000..=2^30 - 1.
@@ -221,7 +221,7 @@ impl fmt::Display for Limits {
     }
 }
 
-/// [`Limits`] for a planner: units of length and of time are whatever its caller uses.
+/// [`Limits`] for a planner: in the caller's units of length and time.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Bounds {

@@ -25,7 +25,7 @@ pub(super) struct Line<const N: usize> {
     pub(super) bounds: Bounds,
     /// The speed that was asked for.
     pub(super) feed: Real,
-    /// Greatest speed at its begin, for the corner.
+    /// Greatest speed at its start, for the corner.
     pub(super) corner: Real,
     /// Cut off by a stop.
     pub(super) cut: bool,
@@ -76,7 +76,7 @@ pub struct AxisPulse {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Start<const N: usize> {
-    /// In units from the begin of the line.
+    /// In units from the start of the line.
     pub(super) place: Real,
     /// Steps of the line that have been made.
     pub(super) made: [u32; N],

@@ -133,7 +133,7 @@ impl Mover {
         Self { soft: Some((low, high)), ..self }
     }
 
-    /// The tick of the next step; `None` if there is none to come.
+    /// The tick of the next step; `None` if no step is to come.
     pub const fn due(&self) -> Option<u64> {
         self.due
     }
@@ -156,7 +156,7 @@ impl Mover {
         Some(pulse)
     }
 
-    /// Steps commanded so far, forward less reverse ones. What the motor has made of them is not known here.
+    /// Steps commanded so far, forward less reverse ones. Whether the motor followed is not known here.
     pub const fn commanded(&self) -> i64 {
         self.commanded
     }
@@ -179,7 +179,7 @@ impl Mover {
         state.on_axis(self.origin, self.direction)
     }
 
-    /// Returns whether the axis stands still at a tick, with nothing to come (or held).
+    /// Returns whether the axis stands still at a tick, with no step to come (or held back).
     pub fn is_at_rest(&self, now: u64) -> bool {
         self.due.is_none() && self.clock.moment(now) >= self.phases.end()
     }
@@ -189,7 +189,7 @@ impl Mover {
         self.halted
     }
 
-    /// Moves to a position, from rest or from whatever is under way.
+    /// Moves to a position, from rest or from any motion.
     ///
     /// # Errors
     /// [`Error::SoftLimit`] outside the soft limits, [`Error::Moving`] during a [`quick_stop`](Self::quick_stop),
@@ -225,27 +225,27 @@ impl Mover {
         self.change(now);
     }
 
-    /// Feed hold: slows down to rest and keeps the aim.
+    /// Feed hold: slows down to rest and keeps the target.
     pub fn hold(&mut self, now: u64) {
         self.held = true;
         self.change(now);
     }
 
-    /// Goes on after a [`hold`](Self::hold), also while it still slows down.
+    /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
         self.held = false;
         self.change(now);
     }
 
-    /// Slows down to rest and forgets the aim.
+    /// Slows down to rest and forgets the target.
     pub fn stop(&mut self, now: u64) {
         self.aim = Aim::Rest;
         self.change(now);
     }
 
-    /// Slows down to rest within other limits, higher ones for a limit switch, and forgets the aim. Until it is at rest, moves
-    /// are refused. Where its own limits, or those of a quick stop under way, are higher, those are used: no stop is longer for
-    /// being a quick one.
+    /// Slows down to rest within other limits, higher ones for a limit switch, and forgets the target. Until it is at rest, moves
+    /// are refused. Where its own limits, or those of a quick stop under way, are higher, those are used: a quick stop is never
+    /// longer than a normal one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.aim = Aim::Rest;
         let moment = self.moment(now);
@@ -266,7 +266,7 @@ impl Mover {
         self.rest(moment);
     }
 
-    /// Declares at rest that so many steps lead to where the axis is, 0 at a reference for instance.
+    /// Declares, at rest, the count of steps at which the axis stands, for instance 0 at a reference.
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
@@ -280,7 +280,7 @@ impl Mover {
         Ok(())
     }
 
-    /// Other limits, at rest.
+    /// Sets other limits, at rest.
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest, [`Error::SpeedAboveClock`] above half the clock.

@@ -13,9 +13,9 @@ use crate::real::Real;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct AxisSetup {
-    /// What it can take.
+    /// Its limits.
     pub limits: Limits,
-    /// Steps a metre, at least 1: 80 steps/mm are 80000.
+    /// Steps per metre, at least 1: 80 steps/mm is 80000.
     pub steps_per_m: u32,
 }
 
@@ -87,7 +87,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// At rest at position 0 of all axes. `deviation` at corners in µm; 0 stops at each corner.
     ///
     /// # Errors
-    /// [`Error::SpeedAboveClock`] above half the clock, [`Error::NoScale`] for an axis with 0 steps a metre.
+    /// [`Error::SpeedAboveClock`] above half the clock, [`Error::NoScale`] for an axis with 0 steps per metre.
     pub fn new(clock: Clock, axes: [AxisSetup; N], deviation: u32) -> Result<Self, Error> {
         for axis in &axes {
             checked(clock, axis.limits)?;
@@ -115,7 +115,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(new)
     }
 
-    /// With another deviation at corners in µm, at the begin of lines that are pushed from now on.
+    /// With another deviation at corners in µm, at the start of lines that are pushed from now on.
     pub fn set_deviation(&mut self, deviation: u32) {
         self.deviation = self.unit * Real::new(deviation.into()) / Real::new(1_000_000);
     }
@@ -265,7 +265,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         })
     }
 
-    /// From the begin of line `at`, at a speed. If rounding leaves no way, it goes on at that.
+    /// From the start of line `at`, at a speed. If rounding leaves no way, it goes on at that.
     pub(super) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<Course> {
         let line = self.line(at)?;
         Some(self.course(at, Motion::steady(speed), Real::ZERO, part).unwrap_or_else(|| {
@@ -275,7 +275,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }))
     }
 
-    /// On which line and where on it a stop ends that goes on at a speed at the begin of line `at`.
+    /// On which line, and where on it, a stop ends that runs at a speed at the start of line `at`.
     pub(super) fn end_of_stop(&self, at: usize, mut speed: Real) -> (usize, Real) {
         for at in at..self.len {
             let Some(Course { curve, exit, .. }) = self.begin(at, speed, None) else { break };

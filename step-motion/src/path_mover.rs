@@ -94,7 +94,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
-    /// The tick of the next step; `None` if there is none to come.
+    /// The tick of the next step; `None` if no step is to come.
     pub fn due(&self) -> Option<u64> {
         self.line.as_ref()?.first().map(|(tick, _)| tick)
     }
@@ -121,7 +121,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some(pulse)
     }
 
-    /// Steps commanded so far of each axis, forward less reverse ones. What the motors have made of them is not known here.
+    /// Steps commanded so far of each axis, forward less reverse ones. Whether the motors followed is not known here.
     pub const fn commanded(&self) -> [i64; N] {
         self.commanded
     }
@@ -161,7 +161,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         states
     }
 
-    /// Returns whether all axes stand still at a tick, with nothing to come (or held).
+    /// Returns whether all axes stand still at a tick, with no step to come (or held back).
     pub fn is_at_rest(&self, now: u64) -> bool {
         let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
         self.due().is_none() && self.clock().moment(now) >= over
@@ -172,8 +172,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.halted
     }
 
-    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line that runs does not slow down for its
-    /// end any more than the corner asks for.
+    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A running line then slows down for its end only
+    /// as much as the corner requires.
     ///
     /// # Errors
     /// As [`Path::push`].
@@ -185,7 +185,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Feed override, in percent of the speeds that the lines were pushed with. The axes' limits and the speeds at corners
-    /// stay what they are, so more than 100 is faster only where those allow it. 0 holds.
+    /// stay unchanged, so more than 100 is faster only where those allow it. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
         self.percent = percent;
         self.replan(now);
@@ -197,13 +197,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.replan(now);
     }
 
-    /// Goes on after a [`hold`](Self::hold), also while it still slows down.
+    /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
         self.held = false;
         self.replan(now);
     }
 
-    /// Slows down to rest along the path and forgets the rest of it. What is pushed from now on begins where it comes to
+    /// Slows down to rest along the path and forgets the rest of it. Lines that are pushed from now on begin where it comes to
     /// rest.
     pub fn stop(&mut self, now: u64) {
         match self.end_of_stop(now) {

@@ -97,7 +97,7 @@ impl Plan {
         Setpoint::new(self.clock, self.phases.at(self.clock.moment(tick)))
     }
 
-    /// Begins of the phases of constant jerk, and the end, in ticks.
+    /// Starts of the phases of constant jerk, and the end, in ticks.
     pub fn corners(&self) -> impl Iterator<Item = u64> {
         let Phases { curve, frame } = &self.phases;
         let moment = |time| frame.begin.saturating_add(frame.since(curve, time).to_fixed(0));

@@ -73,7 +73,7 @@ impl Segment {
 pub(crate) const NONE: u32 = u32::MAX;
 /// In what the reader tells: it stands at the end of that slot.
 pub(crate) const IDLE: u32 = 1 << 31;
-/// Above so many bits, and below [`IDLE`]: the ticket of the halt that put it there.
+/// Above this many bits, and below [`IDLE`]: the ticket of the halt that put it there.
 pub(crate) const TICKET: u32 = 16;
 
 /// A segment in words.
@@ -141,7 +141,7 @@ impl Slot {
 }
 
 /// Segments between an [`Axis`](crate::Axis) in the background and a [`StepTimer`](crate::StepTimer) in an interrupt: `N` slots
-/// of 40 bytes, 9 at least. Half of them are a block; two thirds of a block are for the stop behind it.
+/// of 40 bytes, at least 9. Half of them make a block; two thirds of a block are for the stop that follows it.
 ///
 /// It lies in a `static`; [`Axis::new`](crate::Axis::new) gives both ends.
 #[derive(Debug)]

@@ -27,7 +27,7 @@ impl Fired {
         if self.head & DIR == 0 { Direction::Forward } else { Direction::Reverse }
     }
 
-    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: there is none, stop the timer.
+    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: no event follows, stop the timer.
     #[inline(always)]
     pub const fn wait(self) -> u32 {
         self.wait
@@ -81,7 +81,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Self { queue, slot, head: STANDING, fraction: 0, interval: 0, add: 0 }
     }
 
-    /// For measurements: segments of so many steps that follow each other for ever, in a queue that nobody else uses.
+    /// For measurements: segments of this many steps that follow each other without end, in a queue with no other user.
     #[doc(hidden)]
     pub fn endless(queue: &'q Queue<N>, count: u16) -> Self {
         let kind = Kind { step: true, reverse: false, joint: Joint::No };
@@ -93,7 +93,8 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Self::new(queue)
     }
 
-    /// The event that is due now, and the ticks until the next one. While it stands, a call begins with what has been planned.
+    /// The event that is due now, and the ticks until the next one. While the timer is stopped, a call starts what has been
+    /// planned.
     #[inline]
     pub fn fire(&mut self) -> Fired {
         let queue = self.queue;

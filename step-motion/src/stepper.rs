@@ -13,7 +13,7 @@ use crate::real::Real;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
     pub(super) cutter: Cutter,
-    /// Steps left of the segment, the time of the last one that was made, and the differences from there on.
+    /// Steps left of the segment, the time of the last one made, and the differences from there.
     left: u32,
     time: i128,
     differences: [i64; 3],

@@ -70,7 +70,7 @@ impl<'t> Axis<'t> {
         Command::Pulse { direction, sync_time }
     }
 
-    /// Gives up the move, with the ramp down.
+    /// Aborts the move, with the ramp down.
     ///
     /// The step whose interval has begun keeps its time, since the motor may be anywhere in it; the steps after it
     /// slow down ([`RampSteps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
@@ -91,18 +91,18 @@ impl<'t> Axis<'t> {
         self.direction
     }
 
-    /// Steps commanded so far, forward less reverse ones. No shaft is looked at: what the motor has made of them is not known here.
+    /// Steps commanded so far, forward less reverse ones. The shaft is not observed: whether the motor followed is not known here.
     pub const fn commanded(&self) -> i64 {
         self.commanded
     }
 
-    /// Declares that so many steps lead to where the axis is, 0 at a reference for instance.
+    /// Declares the count of steps at which the axis stands, for instance 0 at a reference.
     pub fn set_commanded(&mut self, steps: i64) {
         self.commanded = steps;
     }
 }
 
-/// Four independent axes, one a motor (TIDEP0061, section 2.3.2: four times the calculation of one).
+/// Four independent axes, one per motor (TIDEP0061, section 2.3.2: four times the calculation of one).
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axes<'t>(pub [Axis<'t>; 4]);

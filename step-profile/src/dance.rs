@@ -93,7 +93,7 @@ impl<'t> Dance<'t> {
         self.pause = self.pause.saturating_sub(1);
     }
 
-    /// Gives up the song and the note under way, with the ramp down; see [`Axis::abort`](crate::Axis::abort).
+    /// Aborts the song and the current note, with the ramp down; see [`Axis::abort`](crate::Axis::abort).
     pub fn abort(&mut self) {
         self.group.abort();
         self.song = &[];

@@ -5,10 +5,10 @@ servowire_core::errors! {
     /// speed too high, speed too low, initial sync_time.
     pub enum Error {
         /// A ramp entry has to last one step at least.
-        #[error("0 steps a ramp entry, at least 1 needed")]
+        #[error("0 steps per ramp entry, at least 1 needed")]
         ZeroSegmentLength = 1,
         /// 32 ramp entries of this length do not fit a 32-bit step count.
-        #[error("{steps_per_entry} steps a ramp entry, at most {limit}")]
+        #[error("{steps_per_entry} steps per ramp entry, at most {limit}")]
         SegmentTooLong = 2 {
             /// Steps a ramp entry, as asked for.
             steps_per_entry: u32,

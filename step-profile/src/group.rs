@@ -6,7 +6,7 @@ use crate::profile::Profile;
 use crate::ramp_steps::MoveState;
 
 servowire_core::number! {
-    /// Which of the four motors move, a bit each.
+    /// Which of the four motors move, one bit each.
     ///
     /// The start bits of TI's `sorte_master_cfg.inc`: M1 = 1, M2 = 2, M3 = 4, M4 = 8, all = 0xF, off = 0.
     pub struct Motors(u8, 4);
@@ -95,7 +95,7 @@ impl<'t> Group<'t> {
         self.motors.distribute(command)
     }
 
-    /// Gives up the move, with the ramp down; see [`Axis::abort`].
+    /// Aborts the move, with the ramp down; see [`Axis::abort`].
     pub fn abort(&mut self) {
         self.axis.abort();
     }
@@ -115,7 +115,7 @@ impl<'t> Group<'t> {
         self.commanded
     }
 
-    /// Declares how many steps lead to where the motors are, 0 at a reference for instance.
+    /// Declares the count of steps at which the motors stand, for instance 0 at a reference.
     pub fn set_commanded(&mut self, steps: [i64; 4]) {
         self.commanded = steps;
     }

@@ -3,7 +3,7 @@ use core::fmt;
 /// Length of a SORTE cycle in ns.
 pub const CYCLE_NS: u32 = 4000;
 
-/// Where a pulse lies: in which cycle after the one of the previous pulse, and when in that cycle.
+/// The place of a pulse: in which cycle after the one of the previous pulse, and when in that cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,5 +1,5 @@
 servowire_core::codes! {
-    /// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps a turn, 1/1 to 1/256 step. The code is also the value
+    /// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps per turn, 1/1 to 1/256 step. The code is also the value
     /// of MODE in the DRV8711's CTRL register.
     ///
     /// TIDEP0061, section 2.1; profile codes 0..=8 of TI's `sorte_master_cfg.inc`.
@@ -31,12 +31,12 @@ impl Microstep {
         (self as u16) << 3
     }
 
-    /// Micro-steps a full step: 1, 2, 4, .. 256.
+    /// Micro-steps per full step: 1, 2, 4, .. 256.
     pub const fn microsteps(self) -> u32 {
         1 << self as u32
     }
 
-    /// Steps a turn: 200, 400, .. 51200.
+    /// Steps per turn: 200, 400, .. 51200.
     pub const fn steps_per_turn(self) -> u32 {
         200 << self as u32
     }

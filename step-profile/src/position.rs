@@ -99,7 +99,7 @@ impl<'t> PositionMode<'t> {
         commands
     }
 
-    /// Gives up the turn, with the ramp down and the rest; see [`Axis::abort`](crate::Axis::abort).
+    /// Aborts the turn, with the ramp down and the rest; see [`Axis::abort`](crate::Axis::abort).
     pub fn abort(&mut self) {
         self.group.abort();
     }

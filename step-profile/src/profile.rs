@@ -35,7 +35,7 @@ impl Parameters<'static> {
     /// 5 ns ticks. 0 would be the worst choice; see the crate's front page.
     pub const INIT_SYNC: u32 = 1000;
 
-    /// The defaults at this speed: one step a ramp entry, initial sync_time 1000 ns, the sin² ramp, corrected
+    /// The defaults at this speed: one step per ramp entry, initial sync_time 1000 ns, the sin² ramp, corrected
     /// arithmetic.
     pub const fn at(speed: Speed) -> Self {
         Self {
@@ -55,7 +55,7 @@ impl<'t> Parameters<'t> {
         with_arithmetic: arithmetic, Arithmetic;
     }
 
-    /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps a ramp entry.
+    /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps per ramp entry.
     ///
     /// The acceleration is that from the middle of a ramp entry to the middle of the next. Within it the speed jumps from entry
     /// to entry, and the mean over the ramp is far below it; the crate `step-motion` uses an acceleration fully. Call it
@@ -80,7 +80,7 @@ impl<'t> Parameters<'t> {
         self.with_steps_per_entry(if acceleration == 0 { u32::MAX } else { steps.max(1) })
     }
 
-    /// With a ramp of one's own.
+    /// With a ramp of your own.
     #[must_use]
     pub const fn with_table<'a>(self, table: &'a RampTable) -> Parameters<'a>
     where

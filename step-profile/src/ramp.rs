@@ -19,12 +19,12 @@ impl RampTable {
     pub const LEN: usize = 32;
 
     /// The entry of full speed; no entry may be smaller.
-    pub const FULL_SPEED: u32 = 1000;
+    const FULL_SPEED: u32 = 1000;
 
     /// 1000 / sin²((i + 1) π / 64), rounded to nearest: 415345, 104087, 46447, ... 1002, 1000.
     pub const SIN2: &'static Self = &Self(sin2());
 
-    /// A table of one's own.
+    /// A table of your own.
     ///
     /// # Errors
     /// [`Error::InvalidRampTable`] if an entry is below 1000 or above the one before it.

@@ -116,11 +116,11 @@ impl<'t> RampSteps<'t> {
     }
 
     /// Steps still to come.
-    pub const fn remaining(&self) -> u32 {
+    const fn remaining(&self) -> u32 {
         self.runs.steps().saturating_sub(self.index)
     }
 
-    /// Gives up the rest of the move: the last step taken stands, then comes the ramp down, at the shortest.
+    /// Aborts the rest of the move: the last step taken stays, followed by the shortest ramp down.
     ///
     /// What is left then are the steps between the last one and the standstill: none after the first step of
     /// a move, 32 K - 1 from full speed, and the steps that were left anyway on the way down.

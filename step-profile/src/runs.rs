@@ -35,7 +35,7 @@ pub(crate) struct Run {
 const TOP: u8 = 31;
 
 impl Runs {
-    /// A move of `steps` steps with `per_entry` (1..2^27) steps a ramp entry.
+    /// A move of `steps` steps with `per_entry` (1..2^27) steps per ramp entry.
     pub(crate) const fn new(steps: u32, per_entry: u32) -> Self {
         Self { steps, per_entry, at: 0, entry: 0, falling: false }
     }

@@ -97,7 +97,7 @@ impl Tone {
         Speed::from_raw(self.row().speed)
     }
 
-    /// Steps of 125 ms at full speed. The ramps are not counted in: with one step a ramp entry a move of N steps
+    /// Steps of 125 ms at full speed. The ramps are not counted in: with one step per ramp entry a move of N steps
     /// lasts as long as N + 1302 steps at full speed.
     pub const fn p125(self) -> u32 {
         self.row().p125

@@ -1,5 +1,6 @@
 //! What the crate promises, seen from outside.
-#![cfg(feature = "serde")]
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod bounds;
+#[cfg(feature = "serde")]
 mod serde;
