@@ -51,7 +51,7 @@ impl State {
         matches!(self, Self::TransmitData | Self::ReceiveData)
     }
 
-    /// Output of the state machine, s1 | s0: an operation is going on.
+    /// Output of the state machine, s1 | s0: an operation is in progress.
     pub const fn is_active(self) -> bool {
         self.s1() | self.s0()
     }

@@ -20,14 +20,14 @@ macro_rules! le_bytes {
 }
 
 servowire_core::number! {
-    /// ABS0..ABS2: the single-turn position as it comes, 24 bits. Its width is the encoder's, see
+    /// ABS0..ABS2: the single-turn position as received, 24 bits. Its width is the encoder's, see
     /// [`Resolution`](crate::Resolution).
     pub struct Abs(u32, 24);
 }
 le_bytes!(Abs);
 
 servowire_core::number! {
-    /// ABM0..ABM2: the turns as they come, 24 bits.
+    /// ABM0..ABM2: the turns as received, 24 bits.
     pub struct Abm(u32, 24);
 }
 le_bytes!(Abm);

@@ -41,7 +41,7 @@ use crate::timing::BitRate;
 
 pub use behaviour::{AbsentPage, Behaviour, BusyData, Interval};
 
-/// A fault that the encoder or its line is made to have.
+/// A fault that the encoder or its line can be given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -152,7 +152,7 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// Decides from now on what the documents leave open.
+    /// Sets what the documents leave open, from now on.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
@@ -210,8 +210,8 @@ impl<const PAGES: usize> Device<PAGES> {
         &mut self.eeprom
     }
 
-    /// Bytes were received one after the other without framing error, the delimiter of the last one at `end_ns`. Gives the
-    /// response once a request is complete.
+    /// Takes bytes that were received back to back without a framing error, the delimiter of the last one at `end_ns`. Returns
+    /// the response once a request is complete.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Option<Transmission> {
         let field_ns = u64::from(self.rate.fields_ns(1));
         let (mut reply, mut after) = (None, bytes.len() as u64);
@@ -292,8 +292,8 @@ impl<const PAGES: usize> Device<PAGES> {
         if field.delimiter { self.byte(byte, end_ns) } else { self.framing_error(end_ns) }
     }
 
-    /// What a sound request that ended at `now_ns` does, and the response to it; `None` where the encoder is silent. Of the
-    /// faults, those of the line bits do not show here.
+    /// Executes a valid request that ended at `now_ns` and returns the response; `None` if the encoder is silent. Faults of
+    /// single line bits have no effect here.
     pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
         let response = match self.fault {
             Fault::RejectAll => self.rejection(StatusField::empty()),

@@ -41,7 +41,7 @@ pub enum Doubt {
         abs_bits: u8,
     },
     /// Bits above the width of the encoder are set.
-    #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
+    #[error("data field {value:#08x} has bits set that this encoder keeps at 0: {excess:#08x}")]
     UpperBits {
         /// The 24-bit field.
         value: u32,

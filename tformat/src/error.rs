@@ -77,7 +77,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// An EEPROM response speaks of another address.
-        #[error("the response is for EEPROM address {got:#04x}, asked was {want:#04x}")]
+        #[error("the response is for EEPROM address {got:#04x}, expected {want:#04x}")]
         AddressMismatch = 10 {
             /// Address in the response.
             got: u8,
@@ -85,7 +85,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// The response to an EEPROM write repeats another data byte, or a byte that was written reads back as another.
-        #[error("the EEPROM data is {got:#04x}, written was {want:#04x}")]
+        #[error("the EEPROM data is {got:#04x}, {want:#04x} was written")]
         DataMismatch = 11 {
             /// Data in the response.
             got: u8,
@@ -93,7 +93,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// On a half-duplex line the request did not come back as it was sent.
-        #[error("byte {at} of the echo is {got:#04x}, sent was {want:#04x}")]
+        #[error("byte {at} of the echo is {got:#04x}, {want:#04x} was sent")]
         EchoMismatch = 12 {
             /// Index of the byte in the request.
             at: u8,
@@ -103,7 +103,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// No response within the time-out.
-        #[error("{}", if *.echo { "only the own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
+        #[error("{}", if *.echo { "only our own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
         NoResponse = 13 {
             /// Whether the own request was received: the line works, but nobody answers on it.
             echo: bool,
@@ -123,13 +123,13 @@ servowire_core::errors! {
             because: ErrorClass,
         },
         /// Whether the act was done is not known. Read back what can be read before it is tried again.
-        #[error("whether it was done is not known: {because}")]
+        #[error("it is not known whether it was done: {because}")]
         EffectUnknown = 16 {
             /// How it failed.
             because: ErrorClass,
         },
         /// A data field has bits set above the width of the encoder: the wrong resolution, or a damaged frame.
-        #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
+        #[error("data field {value:#08x} has bits set that this encoder keeps at 0: {excess:#08x}")]
         UpperBits = 17 {
             /// The 24-bit field.
             value: u32,
@@ -149,8 +149,8 @@ servowire_core::errors! {
 }
 
 impl Error {
-    /// The field in which the fault shows, 0 for the control field; none where that is not in one field, or depends on the
-    /// length of the frame: the check field is the last.
+    /// The field in which the fault shows, 0 for the control field; `None` if it is not in one field, or depends on the length
+    /// of the frame: the check field is the last.
     pub const fn field(self) -> Option<u8> {
         match self {
             Self::StartBit { field } | Self::Delimiter { field } => Some(field),
@@ -165,7 +165,7 @@ impl Error {
         }
     }
 
-    /// The first wrong bit of that [`field`](Self::field) in the order of the line, where it can be told: 0 is the start
+    /// The first wrong bit of that [`field`](Self::field) in the order of the line, if it is known: 0 is the start
     /// bit, 1 to 8 are the data bits, 9 is the delimiter.
     pub const fn bit(self) -> Option<u8> {
         match self {

@@ -63,7 +63,7 @@ impl Evidence {
         evidence
     }
 
-    /// Takes the fields over as far as they are sound, and says what is not.
+    /// Takes over the fields that are valid, and marks those that are not.
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
     const fn take_all(&mut self, data: AllData, resolution: Resolution) -> u32 {
         // EA0 and EA1 without the alarm that they stand for: one of the two bytes is wrong.
@@ -86,7 +86,7 @@ impl Evidence {
         marks
     }
 
-    /// Off the hot path: what speaks against it.
+    /// Off the hot path: the reason why it must not be used.
     #[cold]
     #[inline(never)]
     #[expect(clippy::cast_sign_loss, reason = "a field that was stored there")]

@@ -95,7 +95,7 @@ impl Frame {
         self.len
     }
 
-    /// Length on the line in bits, 10 a field.
+    /// Length on the line in bits, 10 per field.
     pub const fn line_bits(self) -> u32 {
         (self.len as u32).wrapping_mul(Self::FIELD_BITS)
     }
@@ -110,7 +110,7 @@ impl Frame {
         }
     }
 
-    /// Reads `fields` fields from the beginning of `line`, a grid of ten bits a field, and checks their framing.
+    /// Reads `fields` fields from the beginning of `line`, a grid of ten bits per field, and checks their framing.
     ///
     /// # Errors
     /// The first of [`Error::StartBit`], [`Error::Delimiter`] and [`Error::Truncated`] in the order of the line.

@@ -60,13 +60,13 @@ servowire_core::one_line!(Cause {
     // The vendor calls a whole response a frame.
     Self::Line(LineCause::Shifted { bits }) if *bits > 0 => "the frame begins {} bit(s) later than it was taken", bits;
     Self::Line(LineCause::Shifted { bits }) => "{} bit(s) at the beginning of the frame are missing", bits.unsigned_abs();
-    Self::Line(LineCause::OwnEcho) => "the own request came back before the answer: remove the echo";
+    Self::Line(LineCause::OwnEcho) => "our own request came back before the answer: remove the echo";
     Self::Line(cause) => "{}", cause;
     Self::OtherDataId { answered } => "this is a sound response to {}", answered;
     Self::RequestRefused => "the encoder found the request damaged and answered with ID 3";
 });
 
-/// What there is to say about a line.
+/// What an inspection found out about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -87,7 +87,7 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    /// The response: as received if nothing is wrong, or as it would be without the cause. For display only.
     pub const fn response(&self) -> Option<Response> {
         self.response
     }
@@ -98,7 +98,7 @@ impl Report {
     }
 }
 
-/// Looks at line bits that should hold the response to `request`.
+/// Inspects line bits that should hold the response to `request`.
 pub fn inspect(request: Request, line: Window) -> Report {
     let outcome = Response::parse_line(request, line);
     let (cause, response) = match outcome {
@@ -111,7 +111,7 @@ pub fn inspect(request: Request, line: Window) -> Report {
     report
 }
 
-/// Looks at UART bytes that should hold the response to `request`.
+/// Inspects UART bytes that should hold the response to `request`.
 pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
     let end = bytes.len().min(Frame::MAX_FIELDS);
     let line = bytes.get(..end).and_then(Frame::new).map_or(Window::EMPTY, Frame::line);

@@ -1,4 +1,4 @@
-//! All that can speak against a position, in one word, so that one mask says what is tolerated of it.
+//! All reasons against using a position, in one word, so that one mask says which are tolerated.
 //!
 //! ```text
 //!  31 ... 27  26 ... 22  21 20  19 18  17 ... 14  13     12          11             10      9           8         7 ... 0
@@ -20,7 +20,7 @@ pub(crate) const UPPER_BITS: u32 = 1 << 12;
 /// There was no response.
 pub(crate) const NEVER: u32 = 1 << 13;
 
-/// All that speaks against a position. EA0 and EA1 do by the alarms that they may stand for.
+/// The reasons against using a position. EA0 and EA1 do by the alarms that they may stand for.
 pub(crate) const OBJECTIONS: u32 = 0x000f_ffff;
 
 pub(crate) const fn of_widths(abs_bits: u8, abm_bits: u8) -> u32 {

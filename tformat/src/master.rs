@@ -58,9 +58,9 @@ servowire_core::procedures!(Request => Response, Error {
     Detection => AllData;
 });
 
-/// How many transactions went well, and how many failed with which [`ErrorClass`].
+/// How many transactions succeeded, and how many failed with each [`ErrorClass`].
 pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;
 
-/// How often a busy EEPROM is asked: every millisecond, 40 times, which is twice the 18 ms that an encoder takes to write
+/// How often a busy EEPROM is polled: every millisecond, 40 times, which is twice the 18 ms that an encoder takes to write
 /// a byte.
 pub const EEPROM_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 40 };

@@ -43,7 +43,7 @@ pub struct Identification {
     pub enid: u8,
 }
 
-/// The response to ID 3: all that an encoder knows, and also what it answers to a damaged request.
+/// The response to ID 3: everything that an encoder knows, and also its answer to a damaged request.
 ///
 /// ```text
 ///  field  0    1    2    3    4    5     6    7    8    9     10
@@ -73,7 +73,7 @@ pub struct AllData {
 pub struct Memory {
     /// ADF: address, and whether the memory was busy.
     pub adf: Adf,
-    /// EDF: the byte read, or the written one repeated. Says nothing while the memory is busy.
+    /// EDF: the byte read, or the written one repeated. Meaningless while the memory is busy.
     pub edf: u8,
 }
 

@@ -70,7 +70,7 @@ impl Request {
         Ok(Self::of(ControlField::parse(cf)?.data_id()?, adf, field(2)))
     }
 
-    /// The request with this data ID; `adf` and `edf` count where it has them.
+    /// The request with this data ID; `adf` and `edf` are used if it has them.
     pub const fn of(id: DataId, adf: Adf, edf: u8) -> Self {
         match id {
             DataId::ReadSingleTurn => Self::ReadSingleTurn,
@@ -110,8 +110,7 @@ impl Request {
         }
     }
 
-    /// What an encoder makes of received fields. It decodes the request at the front; fields after it are left
-    /// alone.
+    /// Decodes received fields as an encoder does: the request at the front; fields after it are left alone.
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],

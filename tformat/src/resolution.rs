@@ -70,6 +70,13 @@ impl Resolution {
 
     /// With another number of EEPROM pages, 1..=8: six in Tamagawa's encoders, eight in a compatible one.
     ///
+    /// ```
+    /// # use tformat::Resolution;
+    /// let compatible = Resolution::new(17, 16)?.with_pages(8)?;
+    /// assert_eq!(compatible.pages(), 8);
+    /// # Ok::<(), tformat::OutOfRange>(())
+    /// ```
+    ///
     /// # Errors
     /// [`OutOfRange`].
     pub const fn with_pages(self, pages: u8) -> Result<Self, OutOfRange> {
@@ -121,11 +128,6 @@ impl Resolution {
         self.signed_turns
     }
 
-    /// Returns whether bits above the widths are refused.
-    pub const fn checks_upper_bits(self) -> bool {
-        self.checks_upper_bits
-    }
-
     /// Pages of the EEPROM, 1..=8.
     pub const fn pages(self) -> u8 {
         self.pages
@@ -169,7 +171,7 @@ impl Resolution {
         }
     }
 
-    /// The shorter way from one single-turn position to another in counts, over the zero point if need be:
+    /// The shorter path from one single-turn position to another in counts, across the zero point if necessary:
     /// -2^(abs_bits-1)..2^(abs_bits-1).
     pub const fn difference(self, from: u32, to: u32) -> i32 {
         sign_extend(to.wrapping_sub(from), self.abs_bits)

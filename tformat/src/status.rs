@@ -43,13 +43,13 @@ bitflags::bitflags! {
 servowire_core::show_flags!(StatusField);
 
 impl StatusField {
-    /// What the encoder says of a damaged request.
+    /// What the encoder reports about a damaged request.
     ///
     /// After a request for ID 3 one of them is the only sign of the damage: the response to a damaged request is an ID 3
     /// frame too.
     pub const REQUEST_DAMAGED: Self = Self::CA0.union(Self::CA1);
 
-    /// Whether EA0 and EA1 say what `almc` says: EA0 = CE, EA1 = OH or ME or BE or BA.
+    /// Returns whether EA0 and EA1 agree with `almc`: EA0 = CE, EA1 = OH or ME or BE or BA.
     ///
     /// A difference is worth a note in a diagnosis, not an error: compatible encoders leave SF at 0.
     pub const fn agrees_with(self, almc: Almc) -> bool {

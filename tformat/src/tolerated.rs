@@ -3,7 +3,7 @@ use servowire_core::Tolerance;
 use crate::marks::{NO_TURNS, OBJECTIONS, WIDE_TURNS, alarms};
 use crate::status::Almc;
 
-/// Up to which age, and in spite of which alarms, a position may be used.
+/// Up to what age, and despite which alarms, a position may be used.
 ///
 /// ```
 /// use tformat::{Almc, Policy, Tolerated};
@@ -13,7 +13,7 @@ use crate::status::Almc;
 /// ```
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// In spite of what a position may be used. How severe an alarm is depends on the drive, see [`Almc`].
+/// Despite what a position may be used. How severe an alarm is depends on the drive, see [`Almc`].
 ///
 /// Where ALMC does not come, in all responses but that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]: it
 /// is tolerated where they all are.
@@ -29,14 +29,14 @@ servowire_core::one_line!(Tolerated {
 impl Tolerated {
     /// Nothing.
     pub const NOTHING: Self = Self(0);
-    /// What one drive tolerates that counts turns: an overflow of the turns is ignored, a low battery is a warning.
+    /// What one drive that counts turns tolerates: an overflow of the turns is ignored, a low battery is a warning.
     pub const MULTI_TURN: Self = Self::NOTHING.alarms(Almc::OF.union(Almc::BA));
-    /// What the same drive tolerates where turns are not used: all that concerns the turns and the battery. The turns are
-    /// not judged then, and the [`Sample`](crate::Sample) does not have them.
+    /// What the same drive tolerates where turns are not used: everything about the turns and the battery. The turns are then
+    /// not judged, and the [`Sample`](crate::Sample) does not have them.
     pub const SINGLE_TURN: Self =
         Self(Self::MULTI_TURN.0 | NO_TURNS | WIDE_TURNS).alarms(Almc::BE.union(Almc::ME).union(Almc::OS));
 
-    /// These alarms too.
+    /// Also tolerates these alarms.
     #[must_use]
     pub const fn alarms(self, alarms: Almc) -> Self {
         Self(self.0 | alarms.bits() as u32)

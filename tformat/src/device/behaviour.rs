@@ -1,4 +1,4 @@
-/// What the time between two reset requests is counted from. No document says which.
+/// From what instant the time between two reset requests is counted. No document says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -11,7 +11,7 @@ pub enum Interval {
     EndToStart,
 }
 
-/// What becomes of a write to the page register with the number of a page that is not there.
+/// The effect of a write to the page register with the number of a page that does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -48,7 +48,7 @@ pub enum BusyData {
 pub struct Behaviour {
     /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged.
     pub response_delay_ns: u32,
-    /// What the 40 us between two resets are counted from.
+    /// From what instant the 40 us between two resets are counted.
     pub reset_interval: Interval,
     /// Whether another request starts the count of resets again.
     pub others_restart_count: bool,
@@ -60,7 +60,7 @@ pub struct Behaviour {
     pub silent_while_storing: bool,
     /// Whether selecting a page keeps the memory busy like any write.
     pub page_select_is_busy: bool,
-    /// Pages that are not there.
+    /// Selecting a page that does not exist.
     pub absent_page: AbsentPage,
     /// Data of reads while the memory is busy.
     pub busy_data: BusyData,
@@ -73,7 +73,7 @@ pub struct Behaviour {
 }
 
 impl Behaviour {
-    /// An encoder as the documents say, and as [`Default`].
+    /// An encoder as the documents describe it; the same as [`Default`].
     pub const fn new() -> Self {
         Self {
             response_delay_ns: 3_000,
@@ -91,8 +91,8 @@ impl Behaviour {
         }
     }
 
-    /// The combination with this number, for tests that walk them all, and around again beyond [`NUMBERED`](Self::NUMBERED):
-    /// each switch with each other, and of the response delay 3.0, 3.2, 1.7 and 9 us.
+    /// The combination with this number, for tests that walk through them all, starting over beyond
+    /// [`NUMBERED`](Self::NUMBERED): every switch with every other, and response delays of 3.0, 3.2, 1.7 and 9 us.
     pub const fn numbered(number: u16) -> Self {
         const fn bit(number: u16, at: u32) -> bool {
             number >> at & 1 == 1

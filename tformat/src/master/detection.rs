@@ -23,14 +23,14 @@ impl Detection {
     /// Time from switching on the supply to the first request.
     pub const POWER_ON_WAIT_NS: u64 = 1_500_000_000;
     /// Requests at each rate.
-    pub const TRIES: u8 = 3;
+    const TRIES: u8 = 3;
 
     /// 5 Mbit/s, then 2.5 Mbit/s, with the defaults of [`Line::new`].
     pub const fn new() -> Self {
         Self::on([Line::new(BitRate::Mbit5), Line::new(BitRate::Mbit2_5)])
     }
 
-    /// These two, the first one first: for a host that hands over in blocks, or whose cable is longer.
+    /// Tries these two lines, in this order: for a host that hands over in blocks, or with a longer cable.
     pub const fn on(lines: [Line; 2]) -> Self {
         Self { lines, second: false, tries: 0 }
     }

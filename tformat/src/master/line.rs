@@ -10,24 +10,24 @@ use crate::timing::BitRate;
 pub struct Line {
     /// Bit rate.
     pub rate: BitRate,
-    /// A hint that the receiver is on while the request is sent. It only names failures better: an echo is known by its
-    /// time and its content, whatever is said here.
+    /// A hint that the receiver is on while the request is sent. It only makes failures more specific: an echo is recognised by
+    /// its time and its content, regardless of this setting.
     pub echo: bool,
     /// Longest wait from the end of the request to the *start bit* of the response, in ns. Default 10 000: the nominal
     /// 3 us, 1 us for 100 m of cable, and margin.
     pub response_timeout_ns: u32,
     /// Longest time from the end of one field to the end of the next, in ns. Default one and a half field times.
     pub field_timeout_ns: u32,
-    /// Shortest time from the end of the request to the start bit of the response, in ns: what begins earlier is no
+    /// Shortest time from the end of the request to the start bit of the response, in ns: anything that begins earlier is not a
     /// response. Default four bits (1.6 or 0.8 us), for which a driver in use keeps the line driven after its request. The
     /// [latency budget](Self::latency_budget_ns) goes with it.
     pub turn_around_ns: u32,
     /// Longest time from the end of a byte on the line to its hand-over to the master, in ns: the latency of the
     /// interrupt, or the size of a DMA block and the time after which an idle line is reported. Default just below the
-    /// turn-around and one field, 5 599 or 2 799: so late an echo is still told by its time.
+    /// turn-around and one field, 5 599 or 2 799: an echo that late is still recognised by its time.
     pub hand_over_ns: u32,
-    /// Time for which the driver is on before the start bit of the request, in ns. Default 1 000, the least that one
-    /// driver asks for; TI's design does with one bit.
+    /// Time for which the driver is on before the start bit of the request, in ns. Default 1 000, the least that one driver asks
+    /// for; TI's design manages with one bit.
     pub driver_lead_ns: u32,
     /// From the end of the request to the instant at which the encoder takes the position, in ns. No document says when
     /// that is; default 480, the instant that one driver assumes.
@@ -60,7 +60,8 @@ impl Line {
         with_sampling_ns: sampling_ns, u32;
     }
 
-    /// Whether a response can come at all: it has to begin after the turn-around and before the time-out, and its fields last
+    /// Returns whether a response is possible at all: it has to begin after the turn-around and before the time-out, and its
+    /// fields last
     /// as long as fields do.
     pub const fn leaves_time(self) -> bool {
         self.turn_around_ns <= self.response_timeout_ns && self.field_timeout_ns >= self.rate.fields_ns(1)

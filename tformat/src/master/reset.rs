@@ -67,7 +67,7 @@ impl Reset {
         self.request.data_id()
     }
 
-    /// Sound responses in a row so far.
+    /// Valid responses in a row so far.
     pub const fn answered(&self) -> u8 {
         self.answered
     }

@@ -57,9 +57,9 @@ pub struct DriverOff {
     pub latest_ns: u64,
 }
 
-/// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
-/// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge that
-/// pauses between fields, wait for a silent line besides.
+/// The state of a transaction. `ready_ns` of a failure is the time at which the longest response to the request is over,
+/// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge
+/// that pauses between fields, also wait for a silent line.
 pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// One request and its response, as a UART receives them: byte by byte, or in blocks.
@@ -90,7 +90,7 @@ pub struct Transaction {
     /// Bytes of the own request that came back, and the first that came back as another.
     echoed: u8,
     echo_fault: Option<u8>,
-    /// Why the first bytes that were as many as a response has were none.
+    /// Why the first bytes of a response's length were not a response.
     refused: Option<Error>,
     /// A framing error came where a response might have begun.
     broken: bool,
@@ -132,7 +132,7 @@ macro_rules! begin {
 }
 
 impl Transaction {
-    /// Nothing was asked and nothing is answered: a place for [`restart`](Self::restart). It counts as one that has ended with
+    /// No request and no response: a place for [`restart`](Self::restart). It counts as a transaction that ended with
     /// [`Error::NoResponse`], and its line is free at any time.
     pub const IDLE: Self = Self {
         request: Request::ReadAll,
@@ -162,7 +162,7 @@ impl Transaction {
         it
     }
 
-    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, line: Line, start_ns: u64) {
         begin!(*self, request, line, start_ns);
     }
@@ -179,8 +179,8 @@ impl Transaction {
         }
     }
 
-    /// Bytes were received one after the other, the delimiter of the last one at `end_ns` or, within the latency
-    /// budget, before.
+    /// Takes bytes that were received back to back, the delimiter of the last one at `end_ns` or, within the latency budget,
+    /// before.
     ///
     /// A pause in a block shifts what stands before it: hand over separately what a pause as long as the request and four
     /// fields divides, 20 us at 2.5 Mbit/s.
@@ -189,7 +189,7 @@ impl Transaction {
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear) for an interrupt: it copies no response, and says [how it ended](Self::outcome).
+    /// The same as [`hear`](Self::hear), for an interrupt: it does not copy the response; ask for the [outcome](Self::outcome).
     pub fn push(&mut self, bytes: &[u8], end_ns: u64) -> Option<&Result<Exchange, Error>> {
         if self.end.is_none() && !bytes.is_empty() && !self.is_whole(bytes, end_ns) {
             self.take_all(bytes, end_ns);
@@ -268,7 +268,7 @@ impl Transaction {
         self.progress()
     }
 
-    /// Where the transaction stands.
+    /// The state of the transaction.
     pub const fn progress(&self) -> Progress {
         match self.end {
             None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
@@ -369,7 +369,7 @@ impl Transaction {
         }
     }
 
-    /// A sound response of so many fields, a refusal too. Out of line: a block and a byte come here.
+    /// The length in fields of a valid response, or of a refusal. Out of line: a block and a byte come here.
     #[inline(never)]
     fn found(&mut self, outcome: &Result<Response, Error>, ended_ns: u64, fields: usize) {
         self.len = 0;
@@ -397,7 +397,7 @@ impl Transaction {
         }
     }
 
-    /// No more will come.
+    /// Nothing more will come.
     #[cold]
     fn give_up(&mut self) {
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
@@ -441,8 +441,8 @@ const fn is_sound(outcome: &Result<Response, Error>) -> bool {
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
-/// Decodes all that a UART received since the request began, with the receiver on all the time: the own request, then
-/// the response. For buffers without times; what follows the response is left alone.
+/// Decodes everything that a UART received since the request began, with the receiver always on: our own request, then the
+/// response. For buffers without times; what follows the response is left alone.
 ///
 /// # Errors
 /// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;

@@ -6,7 +6,7 @@ use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
 
-/// Sets the turns to 0, clears all errors, and sees what became of it: reads the turns by ID 1, sends ID C ten times,
+/// Sets the turns to 0, clears all errors, and verifies the result: reads the turns by ID 1, sends ID C ten times,
 /// waits 18 ms, and reads the turns again. **The multi-turn reference of the machine is lost**, see
 /// [`Reset::clear_turns_and_lose_multi_turn_reference`].
 ///
@@ -34,9 +34,6 @@ pub struct MultiTurnZero {
 }
 
 impl MultiTurnZero {
-    /// Times that the turns are read before it is given up.
-    pub const MAX_READS: u8 = Witness::MAX_READS;
-
     /// `tolerance`: how far from 0, in turns, the count may be afterwards.
     pub const fn set_and_lose_multi_turn_reference(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::clear_turns_and_lose_multi_turn_reference();

@@ -6,7 +6,7 @@ use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
 
-/// Sets the single-turn zero and sees what became of it: reads the position, sends ID 8 ten times, waits 18 ms, and reads
+/// Sets the single-turn zero and verifies the result: reads the position, sends ID 8 ten times, waits 18 ms, and reads
 /// the position again. **This shifts the commutation angle of the motor**, see
 /// [`Reset::set_single_turn_zero_and_shift_commutation_angle`].
 ///
@@ -30,9 +30,6 @@ pub struct SingleTurnZero {
 }
 
 impl SingleTurnZero {
-    /// Times that a position is read before it is given up.
-    pub const MAX_READS: u8 = Witness::MAX_READS;
-
     /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
     pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
