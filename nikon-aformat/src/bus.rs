@@ -31,7 +31,7 @@ use crate::number::EncoderAddress;
 use crate::raw_response::RawResponse;
 use crate::response::Response;
 
-/// A set of encoder addresses. It prints as they are: `0 2 7`, `-` for none.
+/// A set of encoder addresses. It prints as a list: `0 2 7`, `-` for none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -83,7 +83,7 @@ impl Addresses {
         self.0.count_ones() as u8
     }
 
-    /// Returns whether there is none.
+    /// Returns whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -132,7 +132,7 @@ servowire_core::one_line!(Outcome {
     Self::Missing => "missing";
 });
 
-/// What was made of one response.
+/// How one response was judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -190,7 +190,7 @@ impl Bus {
         self.take(Response::parse_words(&self.expected, words, order))
     }
 
-    /// The words of a response that [`Abs40`] decodes, where nothing but positions is asked for: it costs less flash than
+    /// The words of a response that [`Abs40`] decodes, for a bus on which only positions are requested: it costs less flash than
     /// [`push_words`](Self::push_words), which knows all layouts.
     pub fn push_abs40(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         let outcome = Abs40::parse_words(&self.expected, words, order);
@@ -219,7 +219,7 @@ impl Bus {
         Verdict { outcome, duplicate, extra }
     }
 
-    /// The good response of this address was none: frames of two, with a CRC-8 that is right by chance.
+    /// The good response of this address was not one: it was made of frames of two, with a CRC-8 that was right by chance.
     pub(crate) fn withdraw(&mut self, ea: EncoderAddress) {
         if let Some(place) = self.good.get_mut(usize::from(ea.get() & 7)) {
             *place = None;
@@ -257,7 +257,7 @@ impl Bus {
         self.heard
     }
 
-    /// The addresses that were asked and sent nothing good.
+    /// The addresses that were asked and sent no good response.
     pub const fn missing(&self) -> Addresses {
         self.asked.without(self.heard)
     }
@@ -282,7 +282,7 @@ impl Bus {
         self.damaged
     }
 
-    /// How many fewer responses arrived than were asked for, good or not: this many never started.
+    /// How many fewer responses arrived than were requested, good or not: this many never started.
     pub const fn not_started(&self) -> u8 {
         self.asked.len().saturating_sub(self.arrived())
     }

@@ -146,7 +146,7 @@ impl Command {
     }
 
     /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
-    /// no resolution at hand. Twice the same where there is but one.
+    /// no resolution at hand. Both are the same if there is only one.
     pub const fn layouts(self) -> [Layout; 2] {
         let only = match self {
             Self::Abs24Low | Self::Abs24LowMt => return [Layout::Abs24, Layout::Abs40Vel],

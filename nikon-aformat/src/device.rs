@@ -51,7 +51,7 @@ use crate::type_word::TypeWord;
 
 /// A pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
 /// request; early drivers left 10 us.
-pub const MAX_FRAME_GAP_NS: u32 = 20_000;
+const MAX_FRAME_GAP_NS: u32 = 20_000;
 
 /// How long an encoder is busy with a write, an address setting or a reset: the longest time of "Nikon Protocol Design".
 const BUSY_NS: u32 = 30_000_000;
@@ -102,7 +102,7 @@ pub struct Device<const BANKS: usize> {
 }
 
 impl<const BANKS: usize> Device<BANKS> {
-    /// An encoder at position 0 without alarms, 25 degrees warm, with the type word of its resolution.
+    /// An encoder at position 0 without alarms, at 25 degrees Celsius, with the type word of its resolution.
     pub const fn new(ea: EncoderAddress, resolution: Resolution, rate: BitRate) -> Self {
         let mut memory = Memory::new();
         memory.set(0, TypeWord::EEPROM_ADDRESS, TypeWord::of(resolution).0);
@@ -188,7 +188,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.alm = self.alm.difference(alarms.intersection(Alm::BUSY.union(Alm::BUSY_S)));
     }
 
-    /// Decides from now on what the documents leave open.
+    /// Sets what the documents leave open, from now on.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
@@ -224,8 +224,8 @@ impl<const BANKS: usize> Device<BANKS> {
         self.resolution.compose(self.single_turn.wrapping_sub(single_turn), self.turns.wrapping_sub(turns))
     }
 
-    /// Frames were heard one after the other, without pauses, the last delimiter at `end_ns`: content bits, the first of the line
-    /// in bit 0, or `None` for one whose delimiter reads 0. Gives the answer once a request is complete.
+    /// Takes frames that were heard back to back, the last delimiter at `end_ns`: content bits, the first of the line
+    /// in bit 0, or `None` for one whose delimiter reads 0. Returns the answer once a request is complete.
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Transmission> {
         let frame_ns = u64::from(self.rate.bits_ns(FRAME_BITS));
         let (mut answer, mut left) = (None, u64::try_from(frames.len()).unwrap_or(u64::MAX));
@@ -286,7 +286,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.len = 0;
     }
 
-    /// Whether what arrives now belongs to what is not judged.
+    /// Whether what arrives now belongs to a part that is not judged.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
         let pause_ns = now_ns.saturating_sub(self.last_frame_ns);
         self.last_frame_ns = now_ns;
@@ -301,7 +301,7 @@ impl<const BANKS: usize> Device<BANKS> {
         false
     }
 
-    /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood, or with
+    /// Executes a valid request and returns the answer; `None` if it is for another encoder or not understood, or with
     /// [`Fault::Silent`].
     pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
         self.act(request, now_ns).filter(|_| self.fault != Fault::Silent)

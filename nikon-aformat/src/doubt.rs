@@ -39,7 +39,7 @@ servowire_core::one_line!(Doubt {
     Self::Never => "no position was heard yet";
     Self::Old { age_ns } => "the position is {} ns old", age_ns;
     Self::Absent => "the response does not carry the whole position";
-    Self::UpperBits { width } => "the position has bits set above bit {} that this encoder leaves 0", width;
+    Self::UpperBits { width } => "the position has bits set above bit {} that this encoder keeps at 0", width;
     Self::AnyStatus => "the encoder shows that something is wrong";
     Self::Status { es } => "the encoder shows {}", es;
     Self::Alarms { alarms } => "the encoder shows {}", alarms;

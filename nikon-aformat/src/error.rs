@@ -66,7 +66,7 @@ servowire_core::errors! {
         #[error("the fixed bit of the information field is 1")]
         FixedBit = 7,
         /// Another encoder answered.
-        #[error("encoder {got} answered, asked was encoder {want}")]
+        #[error("encoder {got} answered, expected encoder {want}")]
         AddressMismatch = 8 {
             /// Address in the response.
             got: u8,
@@ -74,7 +74,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// The response answers another command.
-        #[error("the response answers command {got}, asked was {want}")]
+        #[error("the response answers command {got}, expected {want}")]
         CommandMismatch = 9 {
             /// Command code in the response.
             got: u8,
@@ -85,7 +85,7 @@ servowire_core::errors! {
         #[error("the encoder reports a wrong EEPROM bank")]
         BankError = 10,
         /// The response repeats another argument than was sent.
-        #[error("the response repeats {field} {got:#x}, sent was {want:#x}")]
+        #[error("the response repeats {field} {got:#x}, {want:#x} was sent")]
         EchoMismatch = 11 {
             /// Which argument.
             field: EchoField,
@@ -95,7 +95,7 @@ servowire_core::errors! {
             want: u32,
         },
         /// A request frame has another frame code than its place in the request demands.
-        #[error("frame {frame} of the request has frame code {got}, due was {want}")]
+        #[error("frame {frame} of the request has frame code {got}, expected {want}")]
         FrameCode = 12 {
             /// Index of the frame.
             frame: u8,
@@ -141,7 +141,7 @@ servowire_core::errors! {
         },
         /// A plain reset was interrupted before the eighth response. Whether it was done is not known: requests that the encoder
         /// had counted before may have made up the eight. The eight have to be sent anew.
-        #[error("no response to the reset after {done} good responses of 8: whether it was done is not known")]
+        #[error("no response to the reset after {done} good responses of 8: it is not known whether it was done")]
         Interrupted = 19 {
             /// Good responses in succession so far.
             done: u8,
@@ -173,8 +173,8 @@ servowire_core::errors! {
 }
 
 impl Error {
-    /// The frame in which the fault shows, 0 for the first; none where that is not in one frame, or depends on the length
-    /// of the response: its CRC-8 is in the last.
+    /// The frame in which the fault shows, 0 for the first; `None` if it is not in one frame, or depends on the length of the
+    /// response: its CRC-8 is in the last.
     pub const fn frame(self) -> Option<u8> {
         match self {
             Self::StartBit { frame } | Self::Delimiter { frame } | Self::FrameCode { frame, .. } => Some(frame),
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn messages_are_sentences_for_a_person() {
         let echo = Error::EchoMismatch { field: EchoField::Id, got: 1, want: 0xab };
-        assert_eq!(echo.to_string(), "the response repeats identification code 0x1, sent was 0xab");
+        assert_eq!(echo.to_string(), "the response repeats identification code 0x1, 0xab was sent");
         assert_eq!(Error::Crc3 { got: 1, want: 6 }.to_string(), "the CRC-3 is 001, computed 110");
         let version = Error::UnsupportedInVersion { command: Command::Abs24Vel, version: Version::V2_1 };
         assert_eq!(version.to_string(), "ABS24_VEL is not in version 2.1");

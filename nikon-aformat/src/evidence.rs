@@ -58,6 +58,16 @@ impl Evidence {
     }
 
     /// The same of a response that [`Abs40`] has decoded.
+    ///
+    /// ```
+    /// use nikon_aformat::{Abs40, EncoderAddress, EncoderStatus, Evidence, Policy, Resolution, U40};
+    /// let abs = U40::new(5 << 20 | 77).unwrap(); // 5 turns of 20 bits
+    /// let response = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::empty(), abs };
+    /// let evidence = Evidence::of_abs40(response, Resolution::new(20, 16)?, 1_000);
+    /// let sample = evidence.at(2_000, Policy::new(62_500)).unwrap();
+    /// assert_eq!((sample.single_turn(), sample.turns()), (77, Some(5)));
+    /// # Ok::<(), servowire_core::OutOfRange>(())
+    /// ```
     pub const fn of_abs40(response: Abs40, resolution: Resolution, sampled_ns: u64) -> Self {
         let evidence = Self { sampled_ns, marks: of_status(response.es), ..Self::NEVER };
         evidence.with_abs(response.abs.get(), 40, resolution)
@@ -83,7 +93,7 @@ impl Evidence {
         self
     }
 
-    /// Off the hot path: what speaks against it.
+    /// Off the hot path: the reason why it must not be used.
     #[cold]
     #[inline(never)]
     const fn doubt(&self, now_ns: u64, policy: Policy) -> Doubt {

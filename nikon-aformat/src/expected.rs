@@ -10,7 +10,7 @@ use crate::raw_response::{Crc, RawResponse};
 /// Value of the sync code that begins a response.
 pub(crate) const SYNC_CODE: u8 = 4;
 
-/// What is known about a response before it comes: its layout, the command, the address, the arguments that it repeats.
+/// What is known about a response before it arrives: its layout, the command, the address, the arguments that it repeats.
 ///
 /// [`Request::expected`](crate::Request::expected) makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -55,7 +55,7 @@ impl RequestFrame {
     /// Value of the sync code that begins a request frame.
     pub const SYNC_CODE: u8 = 2;
 
-    /// A command data frame. Of `code` the five low bits count.
+    /// A command data frame. Only the five low bits of `code` are used.
     pub const fn cdf(frame_code: FrameCode, ea: EncoderAddress, code: u8) -> Self {
         Self::of(frame_code, ea.get() | code << 3)
     }
@@ -193,7 +193,7 @@ pub(crate) const fn pack(content: [u16; MAX_FRAMES as usize]) -> u128 {
         | (c5 as u128) << 91
 }
 
-/// [`Error::Truncated`] of numbers that fit by far.
+/// [`Error::Truncated`] with numbers that easily fit.
 pub(crate) fn truncated(got: u32, want: u32) -> Error {
     let narrow = |bits| u16::try_from(bits).unwrap_or(u16::MAX);
     Error::Truncated { got: narrow(got), want: narrow(want) }

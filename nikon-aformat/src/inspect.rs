@@ -101,7 +101,7 @@ servowire_core::one_line!(Cause {
     Self::OtherLayout { layout } => "this is a sound response in layout {}: the encoder's factory setting differs", layout;
 });
 
-/// What there is to say about a line.
+/// What an inspection found out about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -123,7 +123,7 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    /// The response: as received if nothing is wrong, or as it would be without the cause. For display only.
     pub const fn response(&self) -> Option<Response> {
         self.response
     }
@@ -139,7 +139,7 @@ impl Report {
     }
 }
 
-/// Looks at line bits that should hold the response to `request`.
+/// Inspects line bits that should hold the response to `request`.
 pub fn inspect(request: Request, resolution: Resolution, line: Window) -> Report {
     let expected = request.expected(resolution);
     let outcome = Response::parse_line(&expected, line);

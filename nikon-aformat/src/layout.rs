@@ -118,7 +118,7 @@ impl Layout {
         }
     }
 
-    /// Line bits of the response, 18 a frame.
+    /// Line bits of the response, 18 per frame.
     pub const fn line_bits(self) -> u32 {
         (self.frames() as u32).wrapping_mul(FRAME_BITS)
     }

@@ -1,4 +1,4 @@
-//! All that can speak against a position, in one word, so that one mask says what is tolerated of it.
+//! All reasons against using a position, in one word, so that one mask says which are tolerated.
 //!
 //! ```text
 //!  30      29 ... 24  23     22          21      20        19 ... 16  15 ... 0
@@ -18,7 +18,7 @@ pub(crate) const NEVER: u32 = 1 << 23;
 /// One bit stood for all of the status.
 pub(crate) const SUMMED: u32 = 1 << 30;
 
-/// All that speaks against a position.
+/// The reasons against using a position.
 pub(crate) const OBJECTIONS: u32 = 0x00ff_ffff;
 
 pub(crate) const fn of_status(status: EncoderStatus) -> u32 {

@@ -67,8 +67,8 @@ servowire_core::procedures!(Request => Response, Error {
     Detection => Detected;
 });
 
-/// How far a transaction is.
+/// The state of a transaction.
 pub type Progress<T> = servowire_core::Progress<T, Error>;
 
-/// How many transactions went well, and how many failed with which [`ErrorClass`].
+/// How many transactions succeeded, and how many failed with each [`ErrorClass`].
 pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;

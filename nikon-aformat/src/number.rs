@@ -23,7 +23,7 @@ number! {
 }
 
 number! {
-    /// EA, the address of an encoder on the bus, 0..=7. Vendor tools call them ENC1 to ENC8.
+    /// EA, the address of an encoder on the bus, 0..=7. Vendor tools call these ENC1 to ENC8.
     pub struct EncoderAddress(u8, 3);
 }
 

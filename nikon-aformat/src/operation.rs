@@ -128,7 +128,7 @@ impl Operation {
             )
     }
 
-    /// The name in capitals: that of the command, but for the four of version 3.0 that share a code with another.
+    /// The name in capitals: that of the command, except for the four of version 3.0 that share a code with another.
     pub const fn name(self) -> &'static str {
         match self {
             Self::EepromReadBank { .. } => "EEPROM_READ_BANK",

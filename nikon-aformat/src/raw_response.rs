@@ -24,9 +24,9 @@ pub struct RawResponse {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Crc {
-    /// As it was received.
+    /// As received.
     pub got: u8,
-    /// As it was computed over the content bits before it.
+    /// As computed over the content bits before it.
     pub want: u8,
 }
 
@@ -92,7 +92,7 @@ impl RawResponse {
         })
     }
 
-    /// The line bits, 18 a frame, back to back.
+    /// The line bits, 18 per frame, back to back.
     pub const fn line(&self) -> Window {
         match Window::from_bits(pack(self.contents), (self.frames as u32).wrapping_mul(FRAME_BITS)) {
             Some(line) => line,

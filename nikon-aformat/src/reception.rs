@@ -30,7 +30,7 @@ use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::raw_response::RawResponse;
 
-/// A piece of line that holds responses of one layout, one after the other, as a sampler sees it.
+/// Receives a piece of line that holds responses of one layout in succession, as a sampler sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineReceiver {
@@ -56,7 +56,7 @@ impl LineReceiver {
     /// Idle bits that separate two responses on a bus. The shortest gap that masters allow for is 7.5 bits.
     const BUS_GAP_BITS: u64 = 5;
 
-    /// A receiver of `samples_per_bit` samples a bit, 4 to 80.
+    /// A receiver of `samples_per_bit` samples per bit, 4 to 80.
     ///
     /// The vendor's receivers use 4, 5, 6 or 8.
     ///
@@ -74,7 +74,7 @@ impl LineReceiver {
         Self::of(PLAIN_BITS, layout)
     }
 
-    /// Takes any gap between the frames of a response, for a line on which idle bits stand between them.
+    /// Accepts any gap between the frames of a response, for a line on which idle bits separate them.
     ///
     /// **One wrong bit can then give a wrong position**: where the start bit of a frame is lost, a later edge is taken for it, and
     /// one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame swallows the
@@ -118,7 +118,7 @@ impl LineReceiver {
         self.receiver.position()
     }
 
-    /// Takes one sample; gives a response when the delimiter of its last frame was sampled, or the fault that ended one.
+    /// Takes one sample; returns a response when the delimiter of its last frame was sampled, or the fault that ended one.
     pub fn push(&mut self, sample: bool) -> Option<Result<RawResponse, Error>> {
         let field = self.receiver.push(sample)?;
         self.take(field)

@@ -35,7 +35,7 @@ pub(crate) mod tests;
 pub struct Request {
     /// EA: the encoder; for [`Operation::SetAddress1`] and [`Operation::SetAddress2`] its new address.
     pub ea: EncoderAddress,
-    /// What it shall do.
+    /// What it is to do.
     pub operation: Operation,
 }
 
@@ -80,7 +80,7 @@ impl Request {
         }
     }
 
-    /// How many frames a request has that begins with this command data frame.
+    /// The number of frames in a request that begins with this command data frame.
     ///
     /// # Errors
     /// [`Error::FrameCode`] for a frame code that no request with this command begins with, [`Error::UnknownCommand`].
@@ -98,7 +98,7 @@ impl Request {
         }
     }
 
-    /// What an encoder makes of received frames. Frames after the request are left alone.
+    /// Decodes received frames as an encoder does. Frames after the request are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::FrameCode`], [`Error::UnknownCommand`]; [`Error::AddressRange`] for a write to

@@ -153,7 +153,7 @@ impl Resolution {
         single_turn as f32 / self.counts_per_turn() as f32 * 360.0
     }
 
-    /// The shorter way from one single-turn position to another in counts, over the zero point if need be.
+    /// The shorter path from one single-turn position to another in counts, across the zero point if necessary.
     #[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
     pub const fn difference(self, from: u32, to: u32) -> i32 {
         let unused = 32_u32.saturating_sub(self.st_bits as u32);

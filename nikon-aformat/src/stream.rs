@@ -19,7 +19,7 @@ use crate::raw_response::RawResponse;
 use crate::request::{Frames, Request};
 use crate::response::Response;
 
-/// Takes one request off the front, as an encoder receives it: two bytes a frame.
+/// Takes one request off the front, as an encoder receives it: two bytes per frame.
 ///
 /// # Errors
 /// As [`RequestFrame::from_word`] and [`Request::parse`], with `Incomplete` for missing bytes.
@@ -42,7 +42,7 @@ where
     }
 }
 
-/// Takes an expected response off the front: two bytes a frame, 16 content bits in the given order.
+/// Takes an expected response off the front: two bytes per frame, 16 content bits in the given order.
 ///
 /// ```
 /// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, stream};
@@ -78,7 +78,7 @@ where
 /// A packed line and the bit at which to begin.
 pub type Bits<'a> = (&'a [u8], usize);
 
-/// Passes over idle bits and takes an expected response off the front of a packed line; `Incomplete` counts bits.
+/// Skips idle bits and takes an expected response off the front of a packed line; `Incomplete` counts bits.
 ///
 /// ```
 /// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, RawResponse, stream};

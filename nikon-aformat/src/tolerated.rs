@@ -3,7 +3,7 @@ use servowire_core::Tolerance;
 use crate::marks::{NO_TURNS, OBJECTIONS, alarms, of_alarms, of_status, status};
 use crate::status::{Alm, EncoderStatus};
 
-/// Up to which age, and in spite of what, a position may be used.
+/// Up to what age, and despite what, a position may be used.
 ///
 /// ```
 /// use nikon_aformat::{EncoderStatus, Policy, Tolerated};
@@ -13,7 +13,7 @@ use crate::status::{Alm, EncoderStatus};
 /// ```
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// In spite of what a position may be used: status bits, and alarms where a response carries them.
+/// Despite what a position may be used: status bits, and alarms if a response carries them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
 pub struct Tolerated(u32);
@@ -25,18 +25,19 @@ impl Tolerated {
     #[cfg(test)]
     pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
-    /// As one drive does where turns are not used: an encoder without its battery shows BATT. The turns are not judged then, and
+    /// What one drive tolerates where turns are not used: an encoder without its battery shows BATT. The turns are then not
+    /// judged, and
     /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
     /// is about to fail.
     pub const SINGLE_TURN: Self = Self(NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
 
-    /// These status bits too.
+    /// Also tolerates these status bits.
     #[must_use]
     pub const fn status(self, status: EncoderStatus) -> Self {
         Self(self.0 | of_status(status))
     }
 
-    /// These alarms too.
+    /// Also tolerates these alarms.
     #[must_use]
     pub const fn alarms(self, alarms: Alm) -> Self {
         Self(self.0 | of_alarms(alarms))

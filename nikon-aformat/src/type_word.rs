@@ -1,6 +1,6 @@
 use crate::resolution::Resolution;
 
-/// EEPROM word 0xf6: what kind of encoder it is.
+/// EEPROM word 0xf6: the kind of encoder.
 ///
 /// ```text
 ///  bit  15 ... 7 | 6   5      | 4   3       | 2 1 0

@@ -1,4 +1,4 @@
-/// What the documents leave open, as this encoder has it. The default is the most likely reading.
+/// What this encoder does where the documents leave it open. The default is the most likely reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,8 +16,8 @@ pub struct Behaviour {
     pub reset_shows: Shows,
     /// What EA of a multi-response request means. Default [`Ea::Highest`].
     pub ea: Ea,
-    /// Place among the responses to a multi-response request, 0..=7; `None` is the own address, whoever else is there. Give
-    /// other numbers where the responses close up.
+    /// Place among the responses to a multi-response request, 0..=7; `None` is its own address, regardless of the other
+    /// encoders. Give other numbers if the responses close up.
     pub place: Option<u8>,
     /// Which address the responses to commands 11 and 20 show. Default [`ShownAddress::New`].
     pub shown_address: ShownAddress,

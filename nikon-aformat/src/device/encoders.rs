@@ -8,7 +8,7 @@ pub struct Encoders<const N: usize, const BANKS: usize> {
 }
 
 impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
-    /// Frames were heard by all of them, as by [`Device::hear`]; gives what each answers.
+    /// Lets all of them hear frames, like [`Device::hear`]; returns what each answers.
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> [Option<Transmission>; N] {
         let mut answers = [None; N];
         for (answer, device) in answers.iter_mut().zip(&mut self.all) {

@@ -4,7 +4,7 @@ use crate::layout::FRAME_BITS;
 use crate::raw_response::RawResponse;
 use crate::units::Units;
 
-/// A fault that the encoder or its line is made to have.
+/// A fault that the encoder or its line can be given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,7 +34,7 @@ pub enum Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// The frames as they were meant.
+    /// The frames without the fault.
     pub frames: RawResponse,
     /// The line bits, with the fault.
     pub line: Window,

@@ -91,8 +91,8 @@ impl EepromRead {
         }
     }
 
-    /// With another interval or number of tries; a read takes three requests at the least. After another address was read,
-    /// the memory is left alone for 300 us whatever the interval.
+    /// With another interval or number of tries; a read takes at least three requests. After another address was read,
+    /// the memory is left alone for 300 us regardless of the interval.
     pub const fn with_polling(self, polling: Polling) -> Self {
         Self { polling, ..self }
     }

@@ -23,7 +23,7 @@ pub(super) struct Hunt {
     got: usize,
     /// End of the last one, by its stamp.
     end_ns: u64,
-    /// So many of the first ones belong to a sound response that was given already, which is this encoder's.
+    /// How many of the first frames belong to a valid response of this encoder that was already reported.
     given: usize,
     giver: EncoderAddress,
 }

@@ -15,7 +15,8 @@ pub struct Line {
     pub rate: BitRate,
     /// Idle time between two frames of a request, in ns. Default [`FRAME_GAP_NS`].
     pub frame_gap_ns: u32,
-    /// Least time from the end of the request to the *start bit* of the response, in ns: what begins earlier is no answer.
+    /// Least time from the end of the request to the *start bit* of the response, in ns: anything that begins earlier is not an
+    /// answer.
     /// Default 0, because the turn-around time is not documented.
     pub turn_around_ns: u32,
     /// Longest time from the end of the request to the *start bit* of the response, in ns. Default 1000 bits, as one maker's
@@ -84,7 +85,7 @@ impl Line {
         self.rate.response_ns(layout).saturating_add(self.idle_in_response_ns.saturating_mul(gaps))
     }
 
-    /// From the end of a request to the time when no answer to it can be on the line any more, in ns.
+    /// From the end of a request to the time from which no answer to it can be on the line, in ns.
     ///
     /// The responses to a multi-response request are waited for up to the slot of [`highest`](Self::highest), however many
     /// encoders are asked.

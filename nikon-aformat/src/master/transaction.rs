@@ -75,7 +75,7 @@ pub struct Transaction {
 }
 
 impl Transaction {
-    /// Nothing was asked and nothing is answered: a place for [`restart`](Self::restart). It counts as one that has ended with
+    /// No request and no response: a place for [`restart`](Self::restart). It counts as a transaction that ended with
     /// [`Error::NoResponse`], and its line is free at any time.
     pub const IDLE: Self = Self {
         request: NOTHING,
@@ -99,7 +99,7 @@ impl Transaction {
         Self::begun(request, resolution, line, start_ns)
     }
 
-    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, line: Line, start_ns: u64) {
         *self = Self::begun(request, resolution, line, start_ns);
     }
@@ -128,8 +128,9 @@ impl Transaction {
         Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// Frames were heard one after the other, one alone, a DMA block or what came until the line went idle: the last delimiter
-    /// at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose delimiter reads 0.
+    /// Takes frames that were heard back to back (a single one, a DMA block, or all until the line went idle), the last
+    /// delimiter at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose
+    /// delimiter reads 0.
     ///
     /// Nothing is known of pauses in a block, so the response has to be at its end. With pauses in it there is [`hear_since`](Self::hear_since).
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<Exchange> {
@@ -141,7 +142,7 @@ impl Transaction {
         self.hear(&[None], end_ns)
     }
 
-    /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
+    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`: the time at which the receiver
     /// was switched on. If that is after the request, a response may stand anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() {
@@ -162,13 +163,13 @@ impl Transaction {
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear) for an interrupt, which has no use for a copy of the response: [how it ended](Self::outcome).
+    /// The same as [`hear`](Self::hear), for an interrupt: it does not copy the response; ask for the [outcome](Self::outcome).
     pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<&Result<Exchange, Error>> {
         let _ = self.hear(frames, end_ns);
         self.outcome()
     }
 
-    /// Where the transaction stands at `now_ns`; it fails if no answer can come any more.
+    /// The state of the transaction at `now_ns`; it fails if no answer can arrive any longer.
     pub fn poll(&mut self, now_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() && now_ns > self.until_ns {
             let Self { hunt, expected, refused, .. } = self;
@@ -179,7 +180,7 @@ impl Transaction {
         self.progress()
     }
 
-    /// Where the transaction stands.
+    /// The state of the transaction.
     pub const fn progress(&self) -> Progress<Exchange> {
         match self.end {
             None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
@@ -253,7 +254,7 @@ impl BusTransaction {
         Self::begun(request, resolution, asked, line, start_ns)
     }
 
-    /// Begins the next one in the same place, whatever has become of this one: as [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) {
         *self = Self::begun(request, resolution, asked, line, start_ns);
     }
@@ -289,8 +290,9 @@ impl BusTransaction {
         Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// Frames were heard one after the other, one alone, a DMA block or what came until the line went idle: the last delimiter
-    /// at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose delimiter reads 0.
+    /// Takes frames that were heard back to back (a single one, a DMA block, or all until the line went idle), the last
+    /// delimiter at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose
+    /// delimiter reads 0.
     ///
     /// Nothing is known of pauses in a block, so only a response at its end is taken. With pauses in it there is [`hear_since`](Self::hear_since).
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<()> {
@@ -302,7 +304,7 @@ impl BusTransaction {
         self.hear(&[None], end_ns)
     }
 
-    /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
+    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`: the time at which the receiver
     /// was switched on. If that is after the request, a response may stand anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
         if !self.ended {
@@ -327,13 +329,13 @@ impl BusTransaction {
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear), and it says [how it ended](Self::outcome).
+    /// The same as [`hear`](Self::hear), and returns the [outcome](Self::outcome).
     pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Result<(), Error>> {
         let _ = self.hear(frames, end_ns);
         self.outcome()
     }
 
-    /// Where the transaction stands at `now_ns`; it is over if no answer can come any more.
+    /// The state of the transaction at `now_ns`; it ends if no answer can arrive any longer.
     pub fn poll(&mut self, now_ns: u64) -> Progress<()> {
         if !self.ended && now_ns > self.until_ns {
             let Self { hunt, expected, bus, .. } = self;
@@ -351,7 +353,7 @@ impl BusTransaction {
         self.ready_ns = self.until_ns.saturating_add(self.line.request_gap_ns.into());
     }
 
-    /// Where the transaction stands.
+    /// The state of the transaction.
     pub const fn progress(&self) -> Progress<()> {
         match self.outcome() {
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
@@ -360,7 +362,8 @@ impl BusTransaction {
         }
     }
 
-    /// How it ended; `None` while it is pending. That nobody has answered is no failure: [`bus`](Self::bus) says who has not.
+    /// How it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) tells which encoders did
+    /// not answer.
     pub const fn outcome(&self) -> Option<Result<(), Error>> {
         match (self.refused, self.ended) {
             (Some(error), _) => Some(Err(error)),
