@@ -73,7 +73,7 @@ impl Answer {
 
     /// The word of the parameters channel.
     #[inline]
-    pub const fn parameter_word(self) -> Reading {
+    pub(crate) const fn parameter_word(self) -> Reading {
         Reading::new(self.parameter, word(self.line >> 10))
     }
 
@@ -108,7 +108,7 @@ impl Answer {
         Reading::new(self.secondary, word(self.line >> 51))
     }
 
-    /// Returns whether the switch bit is the inverse of the bit before it. A wrong one is only worth a note.
+    /// Returns whether the switch bit is the inverse of the bit before it. A wrong one is only noted.
     #[inline]
     pub const fn switch_ok(self) -> bool {
         (self.line >> 49 ^ self.line >> 50) & 1 == 1

@@ -32,7 +32,7 @@ servowire_core::show_flags!(Channel2Findings);
 
 /// Watches safe channel 2, V-frame by V-frame.
 ///
-/// It reports what the documents say about the channel and no more. The comparison of both safe positions is the
+/// It reports what the documents say about the channel and nothing else. The comparison of both safe positions is the
 /// application's: scaling and complement of the second one depend on the encoder.
 ///
 /// ```
@@ -51,7 +51,7 @@ pub struct Channel2Monitor {
 }
 
 impl Channel2Monitor {
-    /// At the beginning of a link; to be used again after a restart.
+    /// At the beginning of a link; start again from it after a restart.
     pub const fn new() -> Self {
         Self { toggle: None, age: 0 }
     }

@@ -30,7 +30,7 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     TABLE.checksum(bytes)
 }
 
-/// The CRC-16 as it grows byte by byte, for what arrives one byte an H-frame.
+/// The CRC-16 as it grows byte by byte, for data that arrive at one byte per H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RunningCrc16(u16);

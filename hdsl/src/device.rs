@@ -117,12 +117,12 @@ impl Device {
         }
     }
 
-    /// What it makes of the points that the documents leave open.
+    /// Sets its behaviour in the points that the documents leave open.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
 
-    /// What it does wrong from now on.
+    /// Sets its fault from now on.
     pub const fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
     }
@@ -149,7 +149,7 @@ impl Device {
         self
     }
 
-    /// Takes the head of an H-frame and gives the answer; `None` if there is none.
+    /// Takes the head of an H-frame and returns the answer; `None` if the encoder sends none.
     ///
     /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
     /// symbol of the master that has no meaning is passed over.

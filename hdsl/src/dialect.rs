@@ -29,7 +29,7 @@ pub enum RegisterRule {
     Ti,
 }
 
-/// Where receivers differ, and which way to go.
+/// Where receivers differ, and what to follow.
 ///
 /// [`SICK`](Self::SICK) follows the manual and the code tables; [`TI`](Self::TI) does what the receiver firmware of
 /// the Motor Control SDK (release 09.02) does, so that both can be compared frame by frame.
@@ -60,7 +60,7 @@ pub struct Dialect {
     /// What the register map shows, and when events are raised.
     pub registers: RegisterRule,
     /// A V-frame without a good safe position is aligned with the last good one. Otherwise it makes the position
-    /// unreliable and starts the alignment anew.
+    /// unreliable and restarts the alignment.
     pub stale_position: bool,
     /// The flag POS is set from the lock until the first alignment succeeds. The register list asks for it, the
     /// vendor's receiver does not do it.

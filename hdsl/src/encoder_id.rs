@@ -17,7 +17,7 @@ pub struct EncoderId(u32, 20);
 
 impl EncoderId {
     /// Width of the acceleration value, 8..=23 bits.
-    pub const fn acceleration_bits(self) -> u8 {
+    const fn acceleration_bits(self) -> u8 {
         (self.byte(0) & 15).wrapping_add(8)
     }
 
@@ -28,7 +28,7 @@ impl EncoderId {
         self.acceleration_bits().wrapping_add(more)
     }
 
-    /// A position of this encoder as a number: the unused high bits of `raw` taken away, and with its sign if the positions
+    /// A position of this encoder as a number: without the unused high bits of `raw`, and with its sign if the positions
     /// are signed.
     pub const fn position(self, raw: u64) -> i64 {
         let unused = 64_u8.saturating_sub(self.position_bits()) as u32;
@@ -48,7 +48,7 @@ impl EncoderId {
     }
 
     /// Returns whether the identifier is longer than 20 bits.
-    pub const fn continues(self) -> bool {
+    const fn continues(self) -> bool {
         self.get() >> 19 & 1 == 1
     }
 
@@ -128,7 +128,7 @@ ranged! {
 }
 
 impl PositionBits {
-    /// As many ones.
+    /// A mask with this many ones.
     pub const fn mask(self) -> u64 {
         match 1_u64.checked_shl(self.0 as u32) {
             Some(one) => one.wrapping_sub(1),

@@ -4,7 +4,7 @@ use servowire_core::{Angle, Feedback, Shaft, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
-/// What a position may be used in spite of: up to this many missing acceleration words.
+/// Despite what a position may be used: up to this many missing acceleration words.
 ///
 /// One wrong bit takes an acceleration word away, and with it the exact position for 17 to 24 frames, until a safe position has shown
 /// what was in the word and another one has agreed. In the meantime the position is estimated, with a bound that grows.
@@ -62,7 +62,7 @@ impl Sample {
         self.position
     }
 
-    /// Speed in steps an H-frame.
+    /// Speed in steps per H-frame.
     pub const fn velocity(&self) -> i32 {
         self.velocity
     }
@@ -111,7 +111,7 @@ servowire_core::one_line!(Sample {
         "{} within {} at {} a frame, sampled at {} ns", position, bound, velocity, sampled_ns;
 });
 
-/// What there is to say about the fast position after an H-frame: from [`Master::fast`](crate::master::Master::fast).
+/// What is known about the fast position after an H-frame: from [`Master::fast`](crate::master::Master::fast).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -207,7 +207,7 @@ servowire_core::one_line!(SafeSample {
     Self { position, summary, sampled_ns } => "{}, SUMMARY {:02X}h, sampled at {} ns", position, summary, sampled_ns;
 });
 
-/// What there is to say about the safe position after an H-frame: from [`Master::safe`](crate::master::Master::safe).
+/// What is known about the safe position after an H-frame: from [`Master::safe`](crate::master::Master::safe).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -218,7 +218,7 @@ impl SafeEvidence {
     /// Before the first H-frame.
     pub const NEVER: Self = Self(Err(Doubt::Never));
 
-    /// The safe position, if it may be used at this time: words and CRC good, and no mark that the encoder has none.
+    /// The safe position, if it may be used at this time: words and CRC are good, and the encoder does not mark it as missing.
     ///
     /// # Errors
     /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::NoVFrame`], [`Doubt::Stale`], [`Doubt::Withheld`], then [`Doubt::Old`].
@@ -305,7 +305,7 @@ const fn whole(low: u32, high: u32) -> u64 {
 /// Carries evidence from where it is received to where it is used, between two priorities or cores.
 pub type EvidenceCell = servowire_core::Cell<Evidence, 10>;
 
-/// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+/// Like [`EvidenceCell`], and also gives the angle at an instant between two samples.
 pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 10>;
 
 /// For an [`EvidenceCell`]; the lower half of a number of 64 bits is first.

@@ -275,7 +275,7 @@ impl FastPosition {
         (self.known, self.followed) = (Known::Position, false);
     }
 
-    /// Frames went by of which nothing is known.
+    /// Tells that frames passed of which nothing is known.
     pub const fn interrupt(&mut self) {
         self.known = Known::Nothing;
         self.followed = false;
@@ -343,7 +343,7 @@ impl FastPosition {
 
 /// A way of less than 2^40 divided by 1 to 8 frames; `None` if something remains.
 ///
-/// The inverse of an odd divisor modulo 2^64 makes the quotient at once; where it is too large there is none. (A division of 64 bits
+/// The inverse of an odd divisor modulo 2^64 makes the quotient directly; `None` where it is too large. (A division of 64 bits
 /// takes hundreds of instructions.)
 const fn divide(way: i64, frames: u32) -> Option<i64> {
     let (halvings, inverse) = match frames {

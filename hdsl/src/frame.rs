@@ -19,14 +19,12 @@ use crate::parameter::ParameterByte;
 use crate::ranged::ranged;
 use crate::symbol::Word;
 
-/// Line rate in bits a second.
+/// Line rate in bits per second.
 pub const BIT_RATE: u32 = 9_375_000;
-/// Samples a bit at 75 MHz.
+/// Samples per bit at 75 MHz.
 pub const SAMPLES_PER_BIT: u32 = 8;
 /// Bits of a free-running H-frame.
 pub const H_FRAME_BITS: u32 = 108;
-/// H-frames of a V-frame.
-pub const V_FRAME: u8 = 8;
 /// Bits of the encoder's answer.
 pub const ANSWER_BITS: u32 = 61;
 /// Bits kept free after the answer for the delay of the cable.
@@ -170,7 +168,7 @@ impl Head {
         }
     }
 
-    /// The line at eight samples a bit: a byte each, its first sample in bit 7.
+    /// The line at eight samples per bit: one byte per bit, its first sample in bit 7.
     pub fn samples(self) -> impl Iterator<Item = u8> {
         let bits = self.bits();
         let edge = self.extra.map(|extra| (self.extra_bits().wrapping_add(7), extra.last_bit()));
@@ -229,7 +227,7 @@ const fn low16(len: u32) -> u16 {
     len as u16
 }
 
-/// What the master sends in the place of an answer that nobody gives (frames with RESET and SYNC): a 0 for the
+/// What the master sends instead of an answer in frames that have none (frames with RESET and SYNC): a 0 for the
 /// switch bit, then 1 0 1 0 ... 1 over the 73 bits of the answer and its reserve.
 pub const FILLER: Window = {
     let len = 1 + ANSWER_BITS + DELAY_RESERVE_BITS;

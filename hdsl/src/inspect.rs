@@ -75,7 +75,7 @@ servowire_core::one_line!(Cause {
     Self::TestPattern => "this is the test pattern: the encoder has not heard what it was asked for";
 });
 
-/// What there is to say about an answer.
+/// What an inspection found out about an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -87,24 +87,24 @@ pub struct Report {
 }
 
 servowire_core::report! {
-    Self { disparity, .. } if !disparity.holds() => "all words are good, but not one after the other";
+    Self { disparity, .. } if !disparity.holds() => "all words are valid, but cannot follow one another";
     _ => "sound";
 }
 
 impl Report {
-    /// What the words say of the running disparity. Where no other fault is and this does not hold, bits of at least one word
+    /// What the words say of the running disparity. If there is no other fault and this does not hold, bits of at least one word
     /// were flipped.
     pub const fn disparity(&self) -> Chain {
         self.disparity
     }
 
-    /// The answer, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    /// The answer: as received if nothing is wrong, or as it would be without the cause. For display only.
     pub const fn answer(&self) -> Option<Answer> {
         self.answer
     }
 }
 
-/// Looks at line bits that should begin with such an answer; more of them than its 61 let a late one be found.
+/// Inspects line bits that should begin with such an answer; more of them than its 61 let a late one be found.
 pub fn inspect(expected: Expected, line: Window) -> Report {
     let answer = Answer::parse(Rule::Strict, line);
     let error = answer.map_or_else(Some, |answer| wrong(expected, answer));
@@ -122,7 +122,7 @@ pub fn inspect(expected: Expected, line: Window) -> Report {
 /// Every word, the switch bit, the check of the acceleration and the disparity hold: the best [`score`] but for the test pattern.
 pub const PERFECT: usize = 12;
 
-/// How well an answer stands at the beginning of this line: a point for each good word, more for its checks; most for the test
+/// How well an answer fits at the beginning of this line: a point for each good word, more for its checks; most for the test
 /// pattern. What is perfect is where it is; of a damaged answer some words may hold a bit beside it by chance.
 pub fn score(line: Window) -> usize {
     let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };

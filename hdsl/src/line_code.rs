@@ -149,7 +149,7 @@ const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
 }
 
 impl ParameterByte {
-    /// The byte that a word from [`LineDisparity::encode`] stands for, whatever the disparity was; `None` if a
+    /// The byte that a word from [`LineDisparity::encode`] stands for, regardless of the disparity; `None` if a
     /// sub-block is in no table.
     pub const fn decode(word: Word) -> Option<Self> {
         // The sub-block look-ups disregard polarity, as an encoder has to.

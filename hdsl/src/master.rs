@@ -170,7 +170,7 @@ impl Master {
         self.present
     }
 
-    /// Where the receiver is.
+    /// The state of the receiver.
     pub const fn state(&self) -> State {
         self.state
     }
@@ -213,7 +213,7 @@ impl Master {
         self.sync.is_some_and(|sync| sync.is_in_step())
     }
 
-    /// Takes the samples of the answer, a byte a bit time with the first sample in bit 7, and ends the H-frame.
+    /// Takes the samples of the answer, one byte per bit time with the first sample in bit 7, and ends the H-frame.
     ///
     /// For a frame without an answer the samples are not looked at. `end_ns` is when the [`WINDOW`] bit times were over, on
     /// the clock of the application: [`fast`](Self::fast) and [`safe`](Self::safe) count from it when a position was sampled.
@@ -236,7 +236,7 @@ impl Master {
         })
     }
 
-    /// The same with four bytes of samples a word, the first of them in the low bits: what a DMA leaves in the memory of a
+    /// The same with four bytes of samples per word, the first of them in the low bits: what a DMA leaves in the memory of a
     /// little-endian processor, and fast on one that cannot load words from any address.
     ///
     /// ```
@@ -330,13 +330,13 @@ impl Master {
         self.end(bits, signal)
     }
 
-    /// The external pulse of the present frame came this many eighths of a bit after its sampling edge (negative: before it); to
-    /// be told before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
+    /// The external pulse of the present frame came this many eighths of a bit after its sampling edge (negative: before it);
+    /// call it before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
     pub const fn hear_pulse(&mut self, late: i16) {
         self.late = Some(late);
     }
 
-    /// Another H-frame was heard. If it ended too late one was lost of which nobody told, and with it the position.
+    /// Another H-frame was heard. If it ended too late, a frame was lost that was not reported, and the position with it.
     #[inline]
     fn frame_ends(&mut self, end_ns: u64) {
         let is_late = end_ns.saturating_sub(self.end_ns) > self.longest_ns.into();

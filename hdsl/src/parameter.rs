@@ -110,13 +110,13 @@ impl ParameterByte {
 
     /// With FIRST.
     #[must_use]
-    pub const fn with_first(self) -> Self {
+    pub(crate) const fn with_first(self) -> Self {
         Self(self.0 | Self::FIRST)
     }
 
     /// With MSYNC.
     #[must_use]
-    pub const fn with_msync(self) -> Self {
+    pub(crate) const fn with_msync(self) -> Self {
         Self(self.0 | Self::MSYNC)
     }
 

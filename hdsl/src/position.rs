@@ -30,7 +30,7 @@ pub enum PositionRule {
     Ti,
 }
 
-/// How far the fast position is aligned with the safe position; it advances once a V-frame.
+/// The stage of the alignment of the fast with the safe position; it advances once per V-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -57,9 +57,9 @@ pub enum AlignmentStage {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct PositionRegisters {
     /// POS4..POS0, 40 bits. By [`PositionRule::Ti`] it can have bits above the width of the encoder right after stages 0 and
-    /// 1; the next step takes them away.
+    /// 1; the next step removes them.
     pub pos: u64,
-    /// VEL2..VEL0 with their sign: the velocity in steps an H-frame, 24 bits.
+    /// VEL2..VEL0 with their sign: the velocity in steps per H-frame, 24 bits.
     pub vel: i32,
     /// ACC_ERR_CNT without its limit: unusable words since the last usable one.
     pub acc_err_cnt: u32,
@@ -231,7 +231,7 @@ impl PositionTracker {
         self.relative = 0;
     }
 
-    /// In place of [`align`](Self::align) when the V-frame brought no safe position.
+    /// Instead of [`align`](Self::align), when the V-frame brought no safe position.
     pub const fn no_safe_position(&mut self) {
         self.stage = AlignmentStage::Position;
         self.unreliable = true;
@@ -266,7 +266,7 @@ impl PositionTracker {
         i32::from_le_bytes((self.velocity << 8).to_le_bytes()) >> 8
     }
 
-    /// How far the alignment is.
+    /// The stage of the alignment.
     pub const fn stage(&self) -> AlignmentStage {
         self.stage
     }

@@ -110,7 +110,7 @@ impl QualityMonitor {
         };
     }
 
-    /// Counts what is wrong with the words of an answer, and VSYNC; gives the number of bad words. `at` is the place of the
+    /// Counts what is wrong with the words of an answer, and VSYNC; returns the number of bad words. `at` is the place of the
     /// answer in the V-frame, 0..=7.
     ///
     /// A receiver calls this for every answer and [`count_v_frame`](Self::count_v_frame) after the last one of a V-frame.

@@ -97,7 +97,7 @@ impl Registers {
     pub const CORE_LEN: usize = 0x40;
 
     /// An image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if that was read. The online
-    /// status is no register there. Of its flags POS is set here, since nobody knows whether the fast position is aligned, so
+    /// status is no register there. Of its flags POS is set here, since it is unknown whether the fast position is aligned, so
     /// [`pos`](Self::pos) gives none; all others are clear.
     pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
         let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
@@ -173,7 +173,7 @@ impl Registers {
         self.shown().map(|(pos, _)| pos)
     }
 
-    /// VEL2..VEL0: speed in steps an H-frame, if the position may be used.
+    /// VEL2..VEL0: speed in steps per H-frame, if the position may be used.
     pub fn vel(&self) -> Option<i32> {
         self.shown().map(|(_, vel)| vel)
     }
@@ -187,12 +187,12 @@ impl Registers {
         (claimed && agrees).then_some((pos, vel))
     }
 
-    /// How far POS is aligned with the safe position.
+    /// The stage of the alignment of POS with the safe position.
     pub const fn stage(&self) -> AlignmentStage {
         self.tracker.stage()
     }
 
-    /// VPOS4..VPOS0: safe position 1, 40 bits: the last good one, of whatever age. For one to use there is
+    /// VPOS4..VPOS0: safe position 1, 40 bits: the last good one, of any age. For a position to use see
     /// [`Master::safe`](crate::master::Master::safe).
     pub fn vpos(&self) -> u64 {
         self.get40(Register::VPos)

@@ -55,7 +55,7 @@ impl Word {
         self.entry() & column.flag() != 0
     }
 
-    /// What a receiver makes of the word by `rule`.
+    /// How a receiver reads the word by `rule`.
     #[inline]
     pub const fn read(self, rule: Rule) -> Reading {
         Reading::new(rule.table().entry(self), self)
@@ -282,7 +282,7 @@ impl Entry {
     }
 }
 
-/// What a receiver makes of a word.
+/// How a receiver has read a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Reading {
     entry: Entry,
@@ -300,7 +300,7 @@ impl Reading {
         self.word
     }
 
-    /// Returns whether the word is no good by the rule it was read with.
+    /// Returns whether the word is bad by the rule it was read with.
     #[inline]
     pub const fn is_byte_error(self) -> bool {
         self.entry.is_byte_error()
@@ -392,8 +392,8 @@ impl DisparityCheck {
         self.rd
     }
 
-    /// Judges the next word. After a word of the other column it goes on from that column's result; after a word
-    /// of none the sign of the word's own disparity counts, if it has one.
+    /// Judges the next word. After a word of the other column it continues from that column's result; after a word of neither
+    /// the sign of the word's own disparity counts, if it has one.
     pub fn step(&mut self, word: Word) -> DisparityStatus {
         let other = self.rd.other();
         if word.is_in(self.rd) {

@@ -74,7 +74,7 @@ impl ExtraWindow {
         }
     }
 
-    /// Goes on to the next frame; its edge comes `adjust` eighths later than without.
+    /// Advances to the next frame; its edge comes `adjust` eighths later than without.
     ///
     /// # Errors
     /// [`Error::ExtraOutOfRange`] if one stuffing block does not bring the window into its range, or there is none to
@@ -138,7 +138,7 @@ pub struct Synchroniser {
 
 impl Synchroniser {
     /// Largest correction in one frame, in eighths: as in the vendor's receiver.
-    pub const MAX_CORRECTION: i16 = 6;
+    const MAX_CORRECTION: i16 = 6;
 
     /// In step: a pulse comes this close to its edge, in eighths: 93 ns. The vendor's receiver keeps 100 ns.
     const CLOSE: i16 = 7;
@@ -190,6 +190,14 @@ impl Synchroniser {
     }
 
     /// Eighths from the start of the first frame to its sampling edge: start that long before a pulse.
+    ///
+    /// ```
+    /// use hdsl::sync::{Es, Synchroniser};
+    /// // A control cycle of 40 us, a frame in each: the edge comes 8 bits and 5 of EXTRA's into the first frame.
+    /// let synchroniser = Synchroniser::new(3_000, Es::new(3).unwrap())?;
+    /// assert_eq!((synchroniser.lead() - 64) / 8, 5);
+    /// # Ok::<(), hdsl::Error>(())
+    /// ```
     pub fn lead(&self) -> u32 {
         // SYNC, the two ones of SAMPLE, then the window.
         u32::from(self.state.edge.get()).saturating_add(64)

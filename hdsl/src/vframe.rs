@@ -98,8 +98,7 @@ impl SafeBlock {
         matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
-    /// VPOS or VPOS2, 40 bits, as a number without a sign. For a position to use there is
-    /// [`Master::safe`](crate::master::Master::safe).
+    /// VPOS or VPOS2, 40 bits, as a number without a sign. For a position to use see [`Master::safe`](crate::master::Master::safe).
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
@@ -136,7 +135,7 @@ pub struct VFrame {
 }
 
 impl VFrame {
-    /// Takes the answer of H-frame `at`, 0..=7, in order; 0 begins anew.
+    /// Takes the answer of H-frame `at`, 0..=7, in order; 0 starts over.
     #[inline(always)]
     pub fn put(&mut self, rule: Rule, at: u8, answer: Answer) {
         self.safe1.put(rule, at, answer.vertical(), Control::K29_7);

@@ -13,7 +13,7 @@ pub struct Behaviour {
     pub complement: Complement,
     /// Bits by which the second safe position is coarser, 0..=31.
     pub second_shift: u8,
-    /// Whether the running disparity goes on from answer to answer.
+    /// Whether the running disparity continues from answer to answer.
     pub disparity: Disparity,
     /// Bits 6:5 of the parameter byte, 0..=3.
     pub reserved_bits: u8,
@@ -21,7 +21,7 @@ pub struct Behaviour {
     pub sync_frames: u8,
     /// Place in the V-frame of the first normal answer, 0..=7: VSYNC comes 8 - n frames after the first INIT.
     pub first_place: u8,
-    /// What becomes of a frame whose head it could not read.
+    /// How it treats a frame whose head it could not read.
     pub bad_head: BadHead,
     /// The acknowledgement of a long write.
     pub acknowledgement: Acknowledgement,
@@ -114,7 +114,7 @@ pub enum Disparity {
     EachAnswer(RunningDisparity),
 }
 
-/// What becomes of a frame whose head the encoder could not read.
+/// How the encoder treats a frame whose head it could not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -140,7 +140,7 @@ pub enum Acknowledgement {
     RepeatsLength,
 }
 
-/// What an encoder is made to do wrong.
+/// A fault that an encoder can be given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

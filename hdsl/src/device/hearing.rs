@@ -4,7 +4,7 @@ use nrz_line::Window;
 
 /// SYNC 001011 and the two ones after it, eight samples a bit, the first in bit 63.
 const LOCK: u64 = 0x0000_ff00_ffff_ffff;
-/// So many samples of [`LOCK`] may be different: two for each of its four edges would be eight, and a wrong bit is eight.
+/// How many samples of [`LOCK`] may differ: two for each of its four edges would be eight, and a wrong bit is eight.
 const TOLERANCE: u32 = 7;
 
 /// What an encoder hears of the head of an H-frame on a line with eight samples a bit.
@@ -23,7 +23,8 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// Looks for a head in samples, a byte a bit time of the master, the first of them in bit 7. The line is high before and after
+    /// Looks for a head in samples, one byte per bit time of the master, the first of them in bit 7. The line is high before and
+    /// after
     /// them. `None` if there is no head that can be read.
     pub fn on_line(samples: &[u8]) -> Option<Self> {
         // The shortest head has 26 bits.

@@ -47,7 +47,7 @@ pub fn find_head(line: Window) -> Option<FoundHead> {
     Some(FoundHead { head, len: head.len.wrapping_add(1) })
 }
 
-/// What there is where the head of a frame was due.
+/// What was found where the head of a frame was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum HeadDamage {
@@ -79,7 +79,8 @@ impl HeadDamage {
     }
 }
 
-/// What there is where the head of a frame was due: `line` begins three bits before that place, and it may be three bits off
+/// Finds out what is where the head of a frame was expected: `line` begins three bits before that place, and it may be three
+/// bits off
 /// either way.
 pub fn head_damage(line: Window) -> HeadDamage {
     let wrong = |at: u32| ((line.bits() >> at & 0xfff) ^ WHOLE).count_ones();
@@ -91,7 +92,7 @@ pub fn head_damage(line: Window) -> HeadDamage {
     }
 }
 
-/// What is wrong with a head that stands by itself.
+/// What is wrong with a head on its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum HeadFault {

@@ -10,7 +10,7 @@ use crate::message::{Finished, LongRequest, ShortRequest};
 use crate::sync::{Es, Synchroniser};
 
 impl Master {
-    /// What there is to say about the fast position after the last H-frame, to be judged where it is used.
+    /// What is known about the fast position after the last H-frame, to be judged where it is used.
     pub fn fast(&self) -> Evidence {
         if self.linked().is_none() {
             return Evidence::doubtful(Doubt::NoLink);
@@ -20,7 +20,7 @@ impl Master {
         evidence
     }
 
-    /// What there is to say about the safe position of the last V-frame, to be judged where it is used.
+    /// What is known about the safe position of the last V-frame, to be judged where it is used.
     pub fn safe(&self) -> SafeEvidence {
         self.linked().map_or(SafeEvidence(Err(Doubt::NoLink)), |id| self.link.safe(id))
     }
@@ -39,7 +39,7 @@ impl Master {
         self.counters.frames.wrapping_sub(1) as u32
     }
 
-    /// Steps of a turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
+    /// Steps per turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
     pub const fn set_steps_per_turn(&mut self, steps: u32) {
         self.steps_per_turn = steps;
     }
@@ -53,7 +53,7 @@ impl Master {
         self.detour = true;
     }
 
-    /// How long after its edge has left the master an encoder samples: 5 ns a metre of cable, and up to 100 ns of its own (SICK
+    /// How long after its edge has left the master an encoder samples: 5 ns per metre of cable, and up to 100 ns of its own (SICK
     /// manual, p. 12). It counts in the instants of positions; 0 at first.
     pub const fn set_latency_ns(&mut self, latency_ns: u16) {
         self.latency_ns = latency_ns;
@@ -77,7 +77,7 @@ impl Master {
         }
     }
 
-    /// Starts the link anew at the end of the present frame (PRST).
+    /// Restarts the link at the end of the present frame (PRST).
     pub const fn request_restart(&mut self) {
         (self.restart, self.detour) = (true, true);
     }

@@ -59,7 +59,7 @@ pub struct HFrame {
     pub pipe: Option<Reading>,
     /// The encoder says INIT: it has dropped its messages.
     pub init: bool,
-    /// Messages that came to their end.
+    /// Messages that have ended.
     pub finished: Finished,
     /// No long message is under way.
     pub long_free: bool,
@@ -143,7 +143,7 @@ impl HFrame {
     }
 }
 
-/// What was counted since the machine was made.
+/// What was counted since the machine was created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -10,7 +10,7 @@ use crate::parameter::{MasterSymbol, ParameterByte};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Transmission {
-    /// Zeros before the frame: 16 after a restart, no need of the protocol.
+    /// Zeros before the frame: 16 after a restart, which the protocol does not require.
     pub lead_in: u8,
     /// SYNC to PARA.
     pub head: Head,
@@ -20,8 +20,8 @@ pub struct Transmission {
 }
 
 impl Master {
-    /// The next head before the answer of the present frame is taken in, for a processor that is not done with an answer when the
-    /// next head has to begin: call it while the answer comes in, send the head, and give the samples to
+    /// The next head before the answer of the present frame is taken in, for a processor that has not finished an answer when
+    /// the next head has to begin: call it while the answer is being received, send the head, and give the samples to
     /// [`hear`](Self::hear) while it is on the line.
     ///
     /// What an answer changes comes a frame later on the line. If it is the end of the link, the frame that is out already is

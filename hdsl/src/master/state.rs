@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 
-/// Where the receiver is.
+/// The state of the receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum State {
@@ -49,7 +49,7 @@ impl State {
     }
 }
 
-/// Why the link was started anew.
+/// Why the link was restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

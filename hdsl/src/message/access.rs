@@ -22,8 +22,8 @@ servowire_core::codes! {
 }
 
 impl LongRequest {
-    /// Resets the encoder (RID 100h, SICK manual, p. 114). It saves its lifetime data and does not answer; the link starts
-    /// anew, and a position that is not saved by the encoder is lost.
+    /// Resets the encoder (RID 100h, SICK manual, p. 114). It saves its lifetime data and does not answer; the link restarts,
+    /// and a position that is not saved by the encoder is lost.
     pub const fn reset_encoder() -> Self {
         Self { address: ResourceAddress::RESET, indirect: true, offset: None, access: Access::Write(Data::NONE) }
     }
@@ -51,7 +51,7 @@ impl LongRequest {
         Self { address: ResourceAddress::SETACCESS, indirect: true, offset: None, access }
     }
 
-    /// Changes the key of an access level (RID 105h). **A key that is lost cannot be had back.**
+    /// Changes the key of an access level (RID 105h). **A lost key cannot be recovered.**
     pub fn change_access_key_for_good(level: AccessLevel, new: [u8; 4], old: [u8; 4]) -> Self {
         let ([n0, n1, n2, n3], [o0, o1, o2, o3]) = (new, old);
         Self {
@@ -62,7 +62,8 @@ impl LongRequest {
         }
     }
 
-    /// Whether the encoder loses something by this request, or leaves the link: reset, shut-down, counting direction, access
+    /// Returns whether the encoder loses something through this request, or leaves the link: reset, shut-down, counting
+    /// direction, access
     /// keys, user counter, deletion of files.
     pub fn is_dangerous(&self) -> bool {
         let Access::Write(_) = self.access else { return false };

@@ -58,6 +58,15 @@ servowire_core::one_line!(FileName {
 });
 
 /// Rights and size of the loaded file, as FILESTAT (132h) gives them.
+///
+/// ```
+/// use hdsl::message::{AccessLevel, Data, FileStatus};
+/// // What answers `LongRequest::file_status()`: written by maintenance, read by everybody, 53 bytes long.
+/// let data = Data::new(&[0x20, 0x00, 0x00, 0x35]).unwrap();
+/// let status = FileStatus::parse(&data)?;
+/// assert_eq!((status.write, status.size), (Some(AccessLevel::Maintenance), 53));
+/// # Ok::<(), hdsl::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FileStatus {
@@ -91,7 +100,7 @@ impl LongRequest {
         Self { address, indirect: true, offset: Some(Offset::truncate(offset)), access: Access::Write(data) }
     }
 
-    /// Loads a file: the one that the other file requests mean. Its checksum is verified; one file at a time.
+    /// Loads a file: the other file requests then refer to it. Its checksum is verified; one file at a time.
     pub fn load_file(name: FileName) -> Self {
         Self::write_file_resource(ResourceAddress::LOADFILE, 0x00, Data::eight(name.0))
     }

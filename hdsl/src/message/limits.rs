@@ -1,4 +1,4 @@
-/// How often and how long the requester tries.
+/// How often and for how long the requester tries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -51,14 +51,14 @@ enum Slot<T> {
     },
 }
 
-/// What came to its end in an H-frame.
+/// What ended in an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Finished {
     /// The short message.
     pub short: Option<Result<ShortAnswer, Error>>,
-    /// The long message. An answer by which the encoder refuses is an answer.
+    /// The long message. A refusal by the encoder is an answer, too.
     pub long: Option<Result<LongAnswer, Error>>,
 }
 
@@ -201,7 +201,7 @@ impl Requester {
         }
     }
 
-    /// Takes the symbol of an answer; `None` if it was no good.
+    /// Takes the symbol of an answer; `None` if it was bad.
     pub fn receive(&mut self, symbol: Option<EncoderSymbol>) -> Finished {
         let mut finished = Finished::default();
         self.take(symbol, &mut finished);

@@ -4,7 +4,7 @@ use super::nibbles::{Collector, Sender, request_len};
 use super::short::{ShortAnswer, ShortRequest};
 use crate::parameter::{EncoderSymbol, MasterSymbol};
 
-/// A sound request that an encoder received.
+/// A valid request that an encoder received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Request {

@@ -121,7 +121,7 @@ pub struct RemoteReceiver<B> {
 }
 
 impl<B: RegisterBus> RemoteReceiver<B> {
-    /// Over a bus; the dialect says in which order error codes stand.
+    /// Over a bus; the dialect determines the order of error codes.
     pub const fn new(dialect: Dialect, bus: B) -> Self {
         Self { bus, dialect, under_way: [false; 2] }
     }

@@ -60,7 +60,7 @@ impl PipeFifo {
     pub const POVR: u8 = 8;
     /// The FIFO was empty.
     pub const PEMP: u8 = 4;
-    /// The entry was no code word; its value means nothing.
+    /// The entry was not a code word; its value is meaningless.
     pub const PERR: u8 = 2;
     /// The entry is a special character.
     pub const PSCI: u8 = 1;
@@ -105,7 +105,7 @@ impl PipeFifo {
         PipeReading { status: overflow | entry.flags, data: entry.byte }
     }
 
-    /// Entries that wait.
+    /// Entries waiting.
     pub const fn len(&self) -> u8 {
         self.len
     }
