@@ -134,7 +134,7 @@ impl Code {
         }
     }
 
-    /// Returns whether both codes are defined and go together.
+    /// Returns whether both codes are defined and may be combined.
     ///
     /// Certain: alarm not with NOP, profile with PP only. A working rule for the rest, whose marks in the
     /// vendor's mode tables could not be read: with NOP only 00h, otherwise every defined code.

@@ -28,7 +28,7 @@ impl<'a> CommandBlock<'a> {
         }
     }
 
-    /// As [`new`](Self::new), for a block of the right size.
+    /// Like [`new`](Self::new), for a block of the right size.
     ///
     /// # Errors
     /// [`Error::Direction`] if C/R is 1.
@@ -86,8 +86,8 @@ impl<'a> CommandBlock<'a> {
         !self.control().contains(ControlBits::SERVO_ON) && self.obeys_control()
     }
 
-    /// Whether a drive surely takes Control_Bits from this block: its codes go together
-    /// ([`Code::is_allowed`]), and they are not the NOP command.
+    /// Returns whether a drive certainly takes Control_Bits from this block: its codes may be combined ([`Code::is_allowed`])
+    /// and are not the NOP command.
     pub const fn obeys_control(self) -> bool {
         self.code().is_allowed() && self.code().get() != Code::NOP.get()
     }

@@ -1,4 +1,4 @@
-//! Why an actual position is not one to control with.
+//! Why an actual position must not be used for control.
 
 use crate::error::ErrorClass;
 
@@ -28,7 +28,7 @@ pub enum Doubt {
 }
 
 servowire_core::one_line!(Doubt {
-    Self::Never => "no good block has come yet";
+    Self::Never => "no good block has been received yet";
     Self::Old { age_ns } => "the position is {} ns old", age_ns;
     Self::Refused { class, age_ns } => "the position is {} ns old, the last block was refused: {}", age_ns, class.name();
     Self::Alarm => "the drive reports an alarm";

@@ -59,7 +59,7 @@ servowire_core::errors! {
             code: u8,
         },
         /// Both codes are defined but not for use together (strict decoding only).
-        #[error("cyclic and non-cyclic code of {code:02x}h do not go together")]
+        #[error("cyclic and non-cyclic code of {code:02x}h cannot be combined")]
         CodePair = 9 {
             /// Bits 6-0 of byte 1.
             code: u8,

@@ -28,8 +28,8 @@ impl ErrorCode {
     /// 0034h: feed-forward value out of range; the drive keeps the old one.
     pub const FEED_FORWARD: Self = Self(0x0034);
 
-    /// Whether the drive has thrown the whole block away and goes on with the one before: 0011h, 0012h, 0021h. Nothing in the
-    /// block was refused for what it asks. SX-DSV02310, "Command error".
+    /// Returns whether the drive has discarded the whole block and continues with the one before: 0011h, 0012h, 0021h. No
+    /// request in the block was refused for its content. SX-DSV02310, "Command error".
     pub const fn discards_block(self) -> bool {
         matches!(self, Self::MAC_ID | Self::DIRECTION | Self::CYCLIC_CODE)
     }
@@ -84,7 +84,7 @@ impl Alarm {
     /// Err91.1: cyclic command error other than an undefined code.
     pub const COMMAND: Self = Self { main: 91, sub: 1 };
 
-    /// What it means, where a document that is public confirms it.
+    /// The meaning, if a public document confirms it.
     pub const fn meaning(self) -> Option<&'static str> {
         match self {
             Self::COMMAND_STEP => Some("too large a step of the position command"),

@@ -7,10 +7,10 @@ use crate::error::ErrorClass;
 use crate::response::Response;
 use crate::status::StatusFlags;
 
-/// Up to which age, and in spite of what, a position may be used.
+/// Up to what age, and despite what, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// In spite of which Status_Flags a position may be used. Of them all [`ALARM`](StatusFlags::ALARM) alone makes a doubt.
+/// Despite which Status_Flags a position may be used. Only [`ALARM`](StatusFlags::ALARM) causes a doubt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,7 +21,7 @@ pub struct Tolerated {
 impl Tolerated {
     /// Nothing: an alarm is a doubt.
     pub const NOTHING: Self = Self { status: StatusFlags::empty() };
-    /// An alarm: for showing where an axis stands that has stopped.
+    /// An alarm: for displaying where a stopped axis stands.
     pub const ALARM: Self = Self::NOTHING.status(StatusFlags::ALARM);
 
     /// These flags, in place of those before.
@@ -90,7 +90,7 @@ servowire_core::one_line!(Sample {
     Self { position, rates: None, sampled_ns } => "position {} at {} ns", position, sampled_ns;
 });
 
-/// What is known of the actual position of a drive. It is judged where it is used: in between it grows old.
+/// What is known of the actual position of a drive. It is judged where it is used, because it ages in between.
 ///
 /// ```
 /// use rtex_block::{Doubt, Evidence, Policy, Response};
@@ -133,7 +133,7 @@ impl Evidence {
         self.status
     }
 
-    /// The position whatever its age and the alarm; 0 before the first good block.
+    /// The position, regardless of its age and of alarms; 0 before the first good block.
     pub(crate) const fn last(&self) -> Sample {
         match self.sample {
             Some(sample) => sample,
@@ -217,7 +217,7 @@ impl Words<6> for Evidence {
 servowire_core::one_line!(Evidence {
     Self { sample: Some(sample), status, refused: None } => "{} [{}]", sample, status;
     Self { sample: Some(sample), status, refused: Some(class) } => "{} [{}], then refused: {}", sample, status, class.name();
-    Self { sample: None, .. } => "no good block has come yet";
+    Self { sample: None, .. } => "no good block has been received yet";
 });
 
 #[cfg(test)]
@@ -286,7 +286,7 @@ mod tests {
     fn in_one_line() {
         let evidence = Evidence::of(&response(0x2a, 0x60), 9);
         assert_eq!(evidence.to_string(), "position 77 at 9 ns [SERVO_READY ALARM]");
-        assert_eq!(Evidence::NEVER.to_string(), "no good block has come yet");
+        assert_eq!(Evidence::NEVER.to_string(), "no good block has been received yet");
         let refused = Evidence::of(&response(0x20, 0), 9).refused(Some(ErrorClass::TooLong));
         assert_eq!(refused.to_string(), "position 77, speed 8, torque 9 at 9 ns [-], then refused: too_long");
         let doubt = Doubt::Refused { class: ErrorClass::Direction, age_ns: 3 };

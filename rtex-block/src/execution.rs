@@ -3,7 +3,7 @@
 use crate::flags::flag_set;
 
 flag_set! {
-    /// How far a non-cyclic command has come: bits 7, 6 and 4 of byte 9 of a response.
+    /// The progress of a non-cyclic command: bits 7, 6 and 4 of byte 9 of a response.
     ///
     /// SX-DSV02310, "Response of non-cyclic commands".
     pub struct Execution(u8) {

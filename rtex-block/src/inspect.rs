@@ -58,7 +58,7 @@ servowire_core::one_line!(Cause {
     Self::OtherSize => "the size is neither 16 nor 32 bytes";
 });
 
-/// Something about a sound block that its reader should know.
+/// Something that the reader of a valid block should know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -108,7 +108,7 @@ impl fmt::Display for Message {
 /// The kinds of faults found, as a set.
 pub type Findings = servowire_core::Findings<ErrorClass>;
 
-/// What there is to say about a block.
+/// What an inspection found out about a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -161,7 +161,7 @@ impl Report {
         self.error
     }
 
-    /// Every fault of the block, in the order of the checks: each as if the ones before it were mended.
+    /// Every fault of the block, in the order of the checks: each as if the ones before it were corrected.
     pub fn errors(&self) -> impl Iterator<Item = Error> {
         self.errors.into_iter().flatten()
     }
@@ -243,7 +243,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// Looks at a block of either direction and either size.
+/// Inspects a block of either direction and either size.
 pub fn inspect(bytes: &[u8]) -> Report {
     let (errors, message) = (errors(bytes), lenient(bytes));
     let mut findings = Findings::NONE;

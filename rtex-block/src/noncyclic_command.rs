@@ -77,7 +77,7 @@ pub enum NonCyclicCommand {
 }
 
 impl NonCyclicCommand {
-    /// Nothing is asked and nothing fed forward.
+    /// No request and no feed-forward.
     pub const IDLE: Self = Self::Normal { command_data2: 0, command_data3: 0 };
 
     /// The code that goes into bits 3-0 of byte 1.

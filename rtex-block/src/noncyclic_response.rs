@@ -19,7 +19,7 @@ use crate::type_code::{Nibble, TypeCode};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Results {
-    /// How far the command has come.
+    /// The progress of the command.
     pub execution: Execution,
     /// Echo of the type code.
     pub type_code: TypeCode,
@@ -69,7 +69,7 @@ servowire_core::one_line!(AlarmAndWarning { Self { alarm, warning } => "{} warni
 
 /// The non-cyclic half of a response, bytes 8-15.
 ///
-/// Which layout it has depends on CMD_Error first and on the echo of the non-cyclic code only then.
+/// Its layout depends on CMD_Error first, and only then on the echo of the non-cyclic code.
 /// SX-DSV02310, chapter 6; System Design Guide for Master, "Profile position response".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

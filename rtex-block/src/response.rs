@@ -28,7 +28,7 @@ impl<'a> ResponseBlock<'a> {
         }
     }
 
-    /// As [`new`](Self::new), for a block of the right size.
+    /// Like [`new`](Self::new), for a block of the right size.
     ///
     /// # Errors
     /// [`Error::Direction`] if C/R is 0.

@@ -9,7 +9,7 @@ pub struct Periods {
     pub com_ns: u32,
     /// Update period of the commands, ns: one or two communication periods.
     pub update_ns: u32,
-    /// Whether the pair works with the internal-timer system, which needs one communication period an update.
+    /// Whether the pair works with the internal-timer system, which needs one communication period per update.
     pub internal_timer: bool,
 }
 
@@ -42,7 +42,7 @@ impl Periods {
         }
     }
 
-    /// The parameters of an A6N drive for this pair: -1, the communications an update, and the communication period in ns.
+    /// The parameters of an A6N drive for this pair: -1, the communications per update, and the communication period in ns.
     pub const fn a6n_parameters(&self) -> A6nParameters {
         A6nParameters { pr7_20: -1, pr7_21: self.communications(), pr7_91: self.com_ns }
     }
@@ -99,8 +99,8 @@ pub const A6N: [Periods; 11] = [
     Periods::of(62_500, 2, false),
 ];
 
-/// The pairs that SX-DSV02310 shows for the A5NL family, with Pr7.20 and Pr7.21; periods in whole ns, rounded down. Whether they
-/// work with the internal-timer system is not said: here those with one communication an update do.
+/// The pairs that SX-DSV02310 shows for the A5NL family, with Pr7.20 and Pr7.21; periods in whole ns, rounded down. It does not
+/// say whether they work with the internal-timer system: here those with one communication per update do.
 pub const A5NL: [(i32, i32, Periods); 4] = [
     (3, 2, Periods::of(500_000, 2, false)),
     (3, 1, Periods::of(500_000, 1, true)),
@@ -108,7 +108,7 @@ pub const A5NL: [(i32, i32, Periods); 4] = [
     (0, 2, Periods::of(83_333, 2, false)),
 ];
 
-/// Who gives the rhythm.
+/// What sets the pace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,7 +1,7 @@
 use crate::flags::flag_set;
 
 flag_set! {
-    /// What a modelled drive does that the documents at hand allow, or leave open.
+    /// What a modelled drive does where the available documents allow it or leave it open.
     pub struct Quirks(u16) {
         /// Every request is busy for as long as a parameter write.
         ALWAYS_BUSY = 1 << 0;
@@ -40,7 +40,7 @@ flag_set! {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
-    /// Exchanges by which everything but the counter echo is later than it has to be, 0..=3.
+    /// Exchanges by which everything but the counter echo is later than necessary, 0..=3.
     pub echo_lag: u8,
     /// Update periods from the start of a profile motion to In_Progress = 1; the axis stands as long.
     pub in_progress_late: u16,
@@ -48,17 +48,18 @@ pub struct Behaviour {
     pub servo_off_late: u16,
     /// Answers to a new request that still carry type code and index of the request before it.
     pub stale_answers: u16,
-    /// Exchanges by which each bit of byte 2 of the Status_Flags is shown later than it is so, bit 0 first (In_Position) and bit 7
+    /// Exchanges by which each bit of byte 2 of the Status_Flags is shown later than it becomes true, bit 0 first (In_Position)
+    /// and bit 7
     /// last (Servo_Active), 0..=15 each.
     pub status_late: [u8; 8],
-    /// Exchanges by which Latch_Comp1 and 2 are shown later than they are so, 0..=15.
+    /// Exchanges by which Latch_Comp1 and 2 are shown later than they become true, 0..=15.
     pub latch_late: u8,
     /// What else it does.
     pub quirks: Quirks,
 }
 
 impl Behaviour {
-    /// As soon as it can, and without quirks.
+    /// Acts as soon as it can, and without quirks.
     pub const fn new() -> Self {
         Self {
             echo_lag: 0,

@@ -21,7 +21,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns whether the block is thrown away and the one before it stays in force.
+    /// Returns whether the block is discarded and the one before it stays in force.
     ///
     /// ```
     /// use rtex_block::{BlockSize, MacId, device::check};

@@ -3,7 +3,7 @@ use crate::header::MacId;
 use crate::position::Gear;
 use crate::type_code::TypeCode;
 
-/// Numbers that a drive has and that no document at hand confirms; whoever models a drive must choose them.
+/// Numbers of a drive that no available document confirms; the author of a drive model has to choose them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -30,12 +30,12 @@ pub struct OpenCodes {
     pub latch_arm: u8,
     /// Homing: a motion of the drive to its origin.
     pub homing: u8,
-    /// The alarm when no frame comes any more.
+    /// The alarm when no frame arrives any longer.
     pub communication_lost: Alarm,
 }
 
 impl OpenCodes {
-    /// Numbers of no document, for examples and tests in which both ends are this crate's: a real drive has others.
+    /// Invented numbers, for examples and tests in which both ends are this crate's: a real drive has others.
     pub const INVENTED: Self = Self {
         profile_absolute: 0x10,
         parameter_read: TypeCode::short(0x10),
@@ -58,7 +58,7 @@ impl OpenCodes {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct DriveConfig {
-    /// What its switches say.
+    /// The address set on its switches.
     pub mac_id: MacId,
     /// Update period, ns.
     pub update_ns: u32,
@@ -90,12 +90,12 @@ pub struct DriveConfig {
     pub alarm_attributes: i32,
     /// How far the origin is from where homing starts, command units.
     pub homing_distance: i32,
-    /// What is not confirmed.
+    /// The numbers that are not confirmed.
     pub codes: OpenCodes,
 }
 
 impl DriveConfig {
-    /// A polite drive at 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
+    /// A polite drive at 0.5 ms, one communication per update, gear 1/1 and 2^20 units per revolution.
     pub const fn new(mac_id: MacId, codes: OpenCodes) -> Self {
         Self {
             mac_id,

@@ -25,7 +25,7 @@ use crate::response::Response;
 /// Command units per second.
 const HOMING_SPEED: i64 = 1_000_000;
 
-/// A model of a drive: in every communication period it hears a command block and gives a response block.
+/// A model of a drive: in every communication period it hears a command block and returns a response block.
 ///
 /// The response to command N carries the counter of command N and everything else as it was after command N - 1,
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
@@ -168,7 +168,7 @@ impl Drive {
         self.last.first_chunk().copied()
     }
 
-    /// As [`hear`](Self::hear), with messages in place of bytes.
+    /// Like [`hear`](Self::hear), with messages instead of bytes.
     pub fn answer(&mut self, command: &Command) -> Option<Response> {
         Response::parse(&self.hear(&command.emit())?).ok()
     }
@@ -184,7 +184,7 @@ impl Drive {
         self.tick();
     }
 
-    /// The motor is energised. Servo_Active may say so for longer.
+    /// Returns whether the motor is energised. Servo_Active may stay set for longer.
     pub const fn is_active(&self) -> bool {
         self.motion.is_active()
     }
@@ -214,7 +214,7 @@ impl Drive {
         &self.config
     }
 
-    /// It behaves like this from now on.
+    /// Sets its behaviour from now on.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
         if self.exchanges == 0 {
@@ -222,7 +222,7 @@ impl Drive {
         }
     }
 
-    /// It does this wrong from now on, in place of what it did before.
+    /// Sets its fault from now on, replacing the one before.
     pub fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
         match fault {
@@ -250,12 +250,12 @@ impl Drive {
         self.wrong_counts = 0;
     }
 
-    /// Puts a warning; 0 for none.
+    /// Sets a warning; 0 for none.
     pub const fn set_warning(&mut self, warning: u16) {
         self.warning = warning;
     }
 
-    /// Puts the inputs that byte 3 of a response shows.
+    /// Sets the inputs that byte 3 of a response shows.
     pub const fn set_inputs(&mut self, byte3: u8) {
         self.inputs = byte3;
     }

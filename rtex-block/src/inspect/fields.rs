@@ -67,7 +67,7 @@ pub struct Field {
     pub first: u8,
     /// Its last byte in the block.
     pub last: u8,
-    /// What it says.
+    /// Its value.
     pub value: Value,
 }
 

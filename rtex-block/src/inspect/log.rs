@@ -16,7 +16,7 @@ use crate::response::ResponseBlock;
 use crate::status::StatusFlags;
 use track::{NORMAL, Track};
 
-/// Looks at the blocks of a log one after the other, of all drives and both directions, 16 or 32 bytes each.
+/// Inspects the blocks of a log in order, of all drives and both directions, 16 or 32 bytes each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LogAnalysis {
@@ -35,7 +35,7 @@ impl LogAnalysis {
         Self { max_step, tracks: [Track::NEW; MacId::COUNT] }
     }
 
-    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in at most five findings.
+    /// Takes the next block; of 32 bytes, the main half is inspected. Returns what it shows, in at most five findings.
     pub fn block(&mut self, bytes: &[u8]) -> impl Iterator<Item = LogFinding> + use<> {
         let mut found = [None; 5];
         if let Some(main) = bytes.first_chunk::<LEN>() {
@@ -48,7 +48,7 @@ impl LogAnalysis {
         found.into_iter().flatten()
     }
 
-    /// What the log holds that somebody has to look after, drive by drive.
+    /// What in the log needs attention, drive by drive.
     pub fn troubles(&self) -> impl Iterator<Item = DriveTrouble> {
         let answered = self.tracks.iter().any(|track| track.responses > 0);
         (0..).zip(&self.tracks).flat_map(move |(number, track)| {
@@ -60,7 +60,7 @@ impl LogAnalysis {
         })
     }
 
-    /// At the end of the log: drives that were only on one side of it, and what goes on.
+    /// At the end of the log: drives that were only on one side of it, and what is still in progress.
     pub fn end(&self) -> impl Iterator<Item = LogFinding> {
         let both = self.tracks.iter().any(|t| t.commands > 0) && self.tracks.iter().any(|t| t.responses > 0);
         (0..).zip(&self.tracks).flat_map(move |(number, track)| {

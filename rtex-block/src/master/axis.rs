@@ -157,7 +157,7 @@ impl Axis {
         self.evidence.status()
     }
 
-    /// Blocks of the drive that were sound, and those that were refused, by class.
+    /// Good blocks of the drive, and refused ones, by class.
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
@@ -283,7 +283,7 @@ impl Axis {
     }
 }
 
-/// Whole and begun update periods in this time, three at the most.
+/// Whole and started update periods in this time, at most three.
 #[cold]
 fn periods(over_ns: u32, update_ns: u32) -> u8 {
     let more = over_ns.saturating_sub(1).checked_div(update_ns).unwrap_or(2).min(2);

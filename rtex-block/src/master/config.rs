@@ -14,8 +14,8 @@ use crate::position::Gear;
 pub struct Limits {
     /// Update periods without a block on time that count as a time-out.
     pub echo: NonZeroU16,
-    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed: the main
-    /// power may be switched on whenever somebody likes.
+    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed: the
+    /// main power may be switched on at any time.
     pub ready: Option<u32>,
     /// From Servo_On to Servo_Active.
     pub active: u32,
@@ -31,7 +31,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// `echo` for the echo of the counter and for command errors, `wait` for everything that is waited for. The vendor's
+    /// `echo` for the echo of the counter and for command errors, `wait` for every other wait. The vendor's
     /// times are not known, so there is no default.
     pub const fn new(echo: NonZeroU16, wait: u32) -> Self {
         Self { echo, ready: None, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
@@ -87,8 +87,9 @@ pub struct AxisConfig {
     pub max_speed: Option<u32>,
     /// Largest torque command in CT, 0.1 % of rated; `None` leaves it to the drive.
     pub max_torque: Option<u32>,
-    /// How it stops when another axis fails, `None` if it goes on; category 0 unless changed. Whatever it says, a failure of the
-    /// communication makes every axis servo-off in the same update period, as the System Design Guide for Master asks for, and an
+    /// How it stops when another axis fails, `None` if it goes on; category 0 unless changed. Regardless of this setting, a
+    /// communication failure puts every axis into servo-off in the same update period, as the System Design Guide for Master
+    /// requires, and an
     /// axis that fails itself is switched off at once.
     pub stop: Option<StopCategory>,
     /// Change of the step (CP, command units) or of the speed (CV, unit by Pr7.25) in each update period of a stop of category 1 or

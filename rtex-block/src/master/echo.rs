@@ -65,7 +65,7 @@ impl EchoWatch {
     }
 
     /// Takes a sample where the counter sent is not known; `None` where the update period brought no block of the drive, which
-    /// counts as unchanged. Gives whether the watch is tripped.
+    /// counts as unchanged. Returns whether the watch has tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
         let is_new = echo.is_some() && echo != self.last;
         self.last = echo.or(self.last);
@@ -138,7 +138,8 @@ impl EchoWatch {
         self.last = Some(echo);
     }
 
-    /// The limit runs anew. What lies in the memory from before is not new for that, and the lag is still that of the system.
+    /// Restarts the limit. A block that was already in the memory does not become new by it, and the lag is still that of the
+    /// system.
     pub const fn reset(&mut self) {
         self.updates = 0;
     }

@@ -19,7 +19,7 @@ pub enum Heard {
 }
 
 impl Heard {
-    /// A block as it lies in the memory of the ASIC.
+    /// A block as it is in the memory of the ASIC.
     pub fn parse<W: Word>(size: BlockSize, words: &[W]) -> Self {
         let mut memory = [0; LEN32];
         let len = words.len().saturating_mul(W::BYTES);
@@ -32,7 +32,7 @@ impl Heard {
         }
     }
 
-    /// The main half of a sound block.
+    /// The main half of a good block.
     pub const fn response(&self) -> Option<&Response> {
         match self {
             Self::Main(main) | Self::Both(Response32 { main, .. }) => Some(main),
@@ -40,7 +40,7 @@ impl Heard {
         }
     }
 
-    /// The sub half of a sound block of the 32-byte mode.
+    /// The sub half of a good block of the 32-byte mode.
     pub const fn sub(&self) -> Option<&SubResponse> {
         match self {
             Self::Both(Response32 { sub, .. }) => Some(sub),

@@ -9,7 +9,7 @@ use crate::response::Response;
 use crate::status::StatusFlags;
 use crate::type_code::Nibble;
 
-/// How far a profile motion is while it is pending.
+/// The progress of a profile motion while it is pending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -24,7 +24,7 @@ pub enum MoveStage {
     Ended,
 }
 
-/// The end of a profile motion: In_Progress went from 1 to 0, so the drive generates no position command any more.
+/// The end of a profile motion: In_Progress went from 1 to 0, so the drive no longer generates position commands.
 ///
 /// That is not the arrival of the motor: it may still be on its way to the last command position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,7 +116,7 @@ impl ProfileMove {
         self.progress
     }
 
-    /// How far it is while it is pending.
+    /// Its progress while it is pending.
     pub const fn stage(&self) -> MoveStage {
         self.stage
     }

@@ -4,7 +4,7 @@ use super::state::{AskError, StopReason};
 use crate::error_code::ErrorCode;
 use crate::type_code::Pr;
 
-/// How far a procedure is. Its time is counted in update periods.
+/// The progress of a procedure. Its time is counted in update periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -47,7 +47,7 @@ impl<T> Progress<T> {
         }
     }
 
-    /// Returns whether it goes on.
+    /// Returns whether it continues.
     pub const fn is_pending(&self) -> bool {
         matches!(self, Self::Pending { .. })
     }

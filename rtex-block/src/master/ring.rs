@@ -162,7 +162,8 @@ impl<const N: usize> Ring<N> {
         self.axes.each_mut().map(|axis| axis.transmission(Turn::Invalid))
     }
 
-    /// Whether these blocks are of more than one frame: the echoes of one frame are equal. A drive whose processing stands still
+    /// Returns whether these blocks are of more than one frame: the echoes of one frame are equal. A drive whose processing
+    /// stands still
     /// looks like that too.
     pub fn is_torn(&self, heard: &[Heard; N]) -> bool {
         let mut echoes = self.axes.iter().zip(heard).filter_map(|(axis, heard)| {
@@ -215,7 +216,7 @@ impl<const N: usize> Ring<N> {
         self.axes.iter().all(|axis| axis.state() == state)
     }
 
-    /// Returns whether the communication with an axis has failed, be it stopped for another reason before.
+    /// Returns whether the communication with an axis has failed, even if it was stopped for another reason before.
     pub fn is_timed_out(&self) -> bool {
         self.axes.iter().any(Axis::has_lost_its_drive)
     }

@@ -44,7 +44,7 @@ impl<E: core::fmt::Display> core::fmt::Display for Ended<E> {
             Self::Ring(failure) => write!(f, "{failure}"),
             Self::Alarm { place } => write!(f, "axis {place} reports an alarm"),
             Self::Limit => f.write_str("not within its limit"),
-            Self::Place => f.write_str("the ring has no axis there"),
+            Self::Place => f.write_str("the ring has no such axis"),
             Self::SwitchOn(error) => write!(f, "{error}"),
             Self::Setpoint(error) => write!(f, "{error}"),
             Self::Failed(failure) => write!(f, "{failure}"),
@@ -54,9 +54,9 @@ impl<E: core::fmt::Display> core::fmt::Display for Ended<E> {
 
 impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for Ended<E> {}
 
-/// A ring that somebody keeps in step, and the common jobs on it, one after the other: for a machine's start-up, for tests and for
-/// tools. Each call goes on until its job is done, and the other axes hold their set-points meanwhile; a program that moves axes
-/// beside each other keeps its [procedures](super::procedure) itself and calls [`update`](Self::update).
+/// A ring that is kept in step, and the common jobs on it, one at a time: for a machine's start-up, for tests and for
+/// tools. Each call continues until its job is done, and the other axes hold their set-points meanwhile; a program that moves
+/// several axes at once keeps its [procedures](super::procedure) itself and calls [`update`](Self::update).
 ///
 /// ```
 /// use rtex_block::device::{Drive, DriveConfig, OpenCodes};

@@ -26,7 +26,7 @@ pub struct MasterConfig {
     pub size: BlockSize,
     /// Communication and update period.
     pub periods: Periods,
-    /// Who gives the rhythm.
+    /// What sets the pace.
     pub timer: TimerSystem,
     /// Update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the vendor's
     /// number is not known).
@@ -60,7 +60,7 @@ pub enum SetupError {
     #[error("the periods do not work with the timer system")]
     Timer,
     /// An axis reckons with another update period.
-    #[error("the axis of drive {mac_id} has another update period")]
+    #[error("the axis of drive {mac_id} has a different update period")]
     UpdatePeriod {
         /// The drive of the axis.
         mac_id: MacId,
@@ -131,7 +131,7 @@ impl<const N: usize> Master<N> {
         self.phases.phase()
     }
 
-    /// Whether cyclic communication runs: only now interrupts are let in.
+    /// Returns whether cyclic communication runs: enable interrupts only then.
     pub fn is_running(&self) -> bool {
         self.phases.phase() == ControlPhase::Running
     }
@@ -166,8 +166,8 @@ impl<const N: usize> Master<N> {
         &mut self.ring
     }
 
-    /// From the receive interrupt: a frame has come. Gives whether the handler has to switch the reception bank, which is so
-    /// in the external-timer system.
+    /// From the receive interrupt: a frame has come. Returns whether the handler has to switch the reception bank, as in the
+    /// external-timer system.
     pub const fn frame_received(&mut self) -> bool {
         if let Some(watchdog) = &mut self.watchdog {
             watchdog.frame_received();

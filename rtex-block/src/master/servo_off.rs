@@ -30,7 +30,7 @@ impl ActiveCode {
     }
 }
 
-/// A command that switches a servo off, whatever the drive did before.
+/// A command that switches a servo off, regardless of what the drive did before.
 ///
 /// A block of zeros does not: its code is NOP, with which a drive ignores Servo_On and goes on with the command
 /// before it. A value of this type always has Servo_On = 0 and a code of the drive's modes, so clearing the

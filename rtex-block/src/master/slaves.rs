@@ -27,7 +27,7 @@ pub enum SlaveInfo {
     Mismatch,
 }
 
-/// Compares the slaves found on the ring with the table, which is in the order of the ring: blocks have their place by it.
+/// Compares the slaves found on the ring with the table, which is in the order of the ring: it determines the place of each block.
 pub fn compare(table: &[Slave], found: &[Slave]) -> SlaveInfo {
     let mut seen = 0_u32;
     let unique = found.iter().all(|slave| {

@@ -128,7 +128,7 @@ pub enum SwitchOnError {
 
 servowire_core::one_line!(SwitchOnError {
     Self::State(state) => "the axis is {}", state;
-    Self::OldPosition => "no new position has come in this update period";
+    Self::OldPosition => "no new position was received in this update period";
     Self::Alarm => "the drive reports an alarm";
     Self::NotReady => "the drive is not ready";
     Self::Busy => "a request is under way that needs the servo off";
@@ -136,7 +136,7 @@ servowire_core::one_line!(SwitchOnError {
 
 impl core::error::Error for SwitchOnError {}
 
-/// An axis of a ring that cannot be switched on: so none is.
+/// An axis of a ring that cannot be switched on, so that none is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RingSwitchOnError {
@@ -150,7 +150,7 @@ servowire_core::one_line!(RingSwitchOnError { Self { place, error } => "axis {}:
 
 impl core::error::Error for RingSwitchOnError {}
 
-/// A set-point or a mode that an axis does not take; it keeps the one before.
+/// A set-point or a mode that an axis does not accept; it keeps the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -85,7 +85,7 @@ pub enum LogFinding {
 }
 
 servowire_core::codes! {
-    /// What a drive did that somebody has to look after.
+    /// Something a drive did that needs attention.
     pub enum Trouble: u8 {
         /// It reported an alarm.
         Alarm = 1 => "reported an alarm",
@@ -96,7 +96,7 @@ servowire_core::codes! {
     }
 }
 
-/// A drive that somebody has to look after.
+/// A drive that needs attention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -107,7 +107,7 @@ pub struct DriveTrouble {
     pub trouble: Trouble,
 }
 
-/// What goes on at the end of a log.
+/// What is still in progress at the end of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -10,15 +10,15 @@ use crate::inspect::strict;
 pub struct LogShape {
     /// The size of the blocks.
     pub size: BlockSize,
-    /// How many bytes of each word are turned round: 1 none, 2 or 4.
+    /// How many bytes of each word are in reversed order: 1 for none, 2 or 4.
     pub word: usize,
     /// Bytes before the first whole block: not 0 where the log begins in the middle of one.
     pub skip: usize,
 }
 
 impl LogShape {
-    /// The size, byte order and beginning with which most of the blocks make sense. `None` where nothing does, or where there are less
-    /// than four blocks after the NOPs from before the start: they look alike in every shape, so give more of the log then.
+    /// The size, byte order and beginning with which most of the blocks make sense. `None` if nothing does, or if there are
+    /// fewer than four blocks after the NOPs from before the start: they look alike in every shape, so give more of the log then.
     ///
     /// In a log of 32-byte blocks every second piece of 16 bytes is a sub block: a command's begins with 80h, 82h or 8Ah, which
     /// read as a main block would be a response of drive 0, 2 or 10.
@@ -36,7 +36,7 @@ impl LogShape {
         Self::best(shifted, bytes, 900)
     }
 
-    /// The first of those that score best, and `least` at the least; a larger size only where it explains more.
+    /// The first of those that score best, with a score of at least `least`; a larger size only where it explains more.
     fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
         let mut best: Option<(Self, usize)> = None;
         for shape in shapes {

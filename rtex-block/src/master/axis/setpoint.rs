@@ -149,7 +149,7 @@ impl Axis {
         self.start_move_with_latch(type_code, target, speed, Nibble::ZERO, 0)
     }
 
-    /// As [`start_move`](Self::start_move), with Latch_Sel1 and Monitor_Sel; the answers are in [`profile`](Self::profile).
+    /// Like [`start_move`](Self::start_move), with Latch_Sel1 and Monitor_Sel; the answers are in [`profile`](Self::profile).
     ///
     /// # Errors
     /// [`SetpointError`]; a motion under way goes on then.
@@ -187,12 +187,13 @@ impl Axis {
         Ok(())
     }
 
-    /// The profile motion under way, or ended and not taken yet.
+    /// The profile motion that is under way, or that has ended and was not yet taken.
     pub const fn profile(&self) -> Option<&ProfileMove> {
         self.profile.as_ref()
     }
 
-    /// How far the profile motion is; once it has ended this gives its end and forgets it. It is done when the axis has stayed on
+    /// The progress of the profile motion; once it has ended, this returns its end and forgets it. It is done when the axis has
+    /// stayed on
     /// for a turn of the counter after In_Progress went to 0: the reason why a motion was broken off may be shown later than that.
     pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let progress = self.profile?.progress();

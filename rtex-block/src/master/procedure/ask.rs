@@ -11,7 +11,7 @@ pub trait Procedure {
     /// What it is made for.
     type Value;
 
-    /// Begins anew, after the exchange of an update period.
+    /// Starts over, after the exchange of an update period.
     fn start(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
 
     /// To be called after every later exchange, until it has ended.
@@ -63,14 +63,14 @@ impl Ask {
 macro_rules! procedure {
     ($procedure:ident $(<$life:lifetime>)?, $value:ty) => {
         impl $(<$life>)? $procedure $(<$life>)? {
-            /// Begins anew, after the exchange of an update period.
+            /// Starts over, after the exchange of an update period.
             pub fn start(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
                 self.reset();
                 self.end = None;
                 self.receive(axis)
             }
 
-            /// To be called after the exchange of every later update period. Once done or failed it stays so.
+            /// Call it after the exchange of every later update period. Once done or failed, it stays so.
             pub fn receive(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
                 let progress = match self.end {
                     Some(end) => end,

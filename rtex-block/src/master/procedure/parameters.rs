@@ -63,8 +63,8 @@ const fn request(type_code: TypeCode, pr: Pr, data: i32) -> NonCyclicCommand {
     NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data })
 }
 
-/// Writes a list of parameters, each one read back and compared. Nothing is written twice: where the answer to a write does not
-/// come, what is read back decides.
+/// Writes a list of parameters, each one read back and compared. Nothing is written twice: if the answer to a write is missing,
+/// the value that is read back decides.
 ///
 /// Writing is not storing: what must survive a power cycle is stored with a command of its own, and some parameters are
 /// valid only after a reset. [`Failure::Differs`] names the parameter that did not take its value; after any other failure the
