@@ -33,7 +33,7 @@ impl DeviceAddress {
     }
 
     /// Devices between the master and this one, 0..=253.
-    pub const fn hops_before(self) -> u8 {
+    pub(crate) const fn hops_before(self) -> u8 {
         self.0.saturating_sub(1)
     }
 }

@@ -3,7 +3,7 @@ pub(crate) const WRITE_DELAY_NS: u32 = 135;
 /// Frames that one correction is made from.
 pub(crate) const AVERAGE: u8 = 16;
 
-/// What the device does to its counter. The IEP counter adds 5 each 5 ns tick, so it counts nanoseconds.
+/// What the device does to its counter. The IEP counter adds 5 per 5 ns tick, so it counts nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Correction {
@@ -29,8 +29,8 @@ servowire_core::one_line!(Correction {
     Self::Rate { increment, ticks } => "add {} a tick for {} ticks", increment, ticks;
 });
 
-/// Clock discipline of a device: the first SYNC frame sets the counter, then the mean error of each 16 frames is
-/// taken out with ±1 ns a tick.
+/// Clock discipline of a device: the first SYNC frame sets the counter, then the mean error of each 16 frames is removed with ±1
+/// ns per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Clock {

@@ -115,7 +115,7 @@ servowire_core::errors! {
             raw: u16,
         },
         /// A round trip is shorter than the forwarding time, or too long for the 16-bit sum.
-        #[error("round trip of {rtt_ns} ns cannot be")]
+        #[error("round trip of {rtt_ns} ns is impossible")]
         ImplausibleRoundTrip = 16 {
             /// The round trip, or the mean of 16.
             rtt_ns: u32,
@@ -161,7 +161,7 @@ servowire_core::errors! {
             cycles: u8,
         },
         /// Device frames were damaged in too many cycles one after the other.
-        #[error("damaged device frames in {cycles} cycles one after the other")]
+        #[error("damaged device frames in {cycles} consecutive cycles")]
         TooManyCrcErrors = 24 {
             /// For this many cycles.
             cycles: u8,

@@ -94,6 +94,19 @@ const fn way(steps: i16) -> Direction {
 }
 
 /// The device's end.
+///
+/// ```
+/// use sorte_proto::follow::{Asked, Follower};
+/// use sorte_proto::{Direction, Pto};
+/// let (mut master, mut device) = (Asked::new(), Follower::new(128));
+/// let step = Pto::from_step(1_000, Direction::High).unwrap();
+/// assert_eq!(device.next(Some(master.slice(step))), step);
+/// master.slice(step); // in a frame that is lost
+/// assert_eq!(device.next(None), Pto::NoPulse { direction: Direction::High });
+/// // The next good frame tells that a step is missing, and it is made up for.
+/// device.next(Some(master.slice(Pto::NoPulse { direction: Direction::High })));
+/// assert_eq!((device.lag(), device.is_stopped()), (0, false));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Follower {

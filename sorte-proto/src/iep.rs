@@ -210,8 +210,8 @@ impl Channel {
         }
     }
 
-    /// The same channel on a counter of cycles that begins `cycles` later: what happens from there on has times that are so
-    /// many cycles less. Run it up to there first, with [`next`](Self::next).
+    /// The same channel on a counter of cycles that begins `cycles` later: later events have times that are smaller by that many
+    /// cycles. Run it up to there first, with [`next`](Self::next).
     ///
     /// Channels that will do the same are equal then, whatever they did before, so a bench need not work out again what it
     /// has seen once.

@@ -36,7 +36,7 @@ pub struct Config {
     pub delay_model: DelayModel,
     /// Frames that a correction of the clock is made from: a longer average is steadier and follows a drift later.
     pub clock_average: u8,
-    /// Cycle starts without a frame that a device in IO exchange bears.
+    /// Cycle starts without a frame that a device in IO exchange tolerates.
     pub missed_frames: u8,
     /// How long a start-up state waits for its frame, in ns.
     pub start_up_timeout_ns: u64,
@@ -95,7 +95,7 @@ pub struct Counters {
     pub format_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
-    /// Master frames of the exchange that were not there, not once, or not at their time.
+    /// Master frames of the exchange that were missing, doubled, or not at their time.
     pub master: Tally,
     /// Of these, at [`PortId::A`].
     pub a: PortCounters,

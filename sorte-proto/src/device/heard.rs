@@ -48,11 +48,11 @@ pub struct FrameTimes {
     pub sof_ns: u32,
     /// The device's counter now, in ns.
     pub counter_ns: u32,
-    /// A clock for the time-outs that nobody sets, in ns.
+    /// A free-running clock for the time-outs, in ns.
     pub now_ns: u64,
 }
 
-/// What a device makes of a start-up frame.
+/// How a device reacts to a start-up frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use = "the correction and the delay request are left to the caller"]
@@ -67,7 +67,7 @@ pub struct Reaction {
     pub correction: Correction,
 }
 
-/// What the IO exchange gave a device: of this cycle, or it would not be here.
+/// What the IO exchange gave a device, always of this cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Output<'a> {

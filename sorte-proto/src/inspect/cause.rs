@@ -28,7 +28,7 @@ pub enum Cause {
     FcsMissingAndPadded,
     /// The end is missing.
     Cut {
-        /// So many bytes.
+        /// This many bytes.
         missing: u16,
     },
     /// Every bit is inverted.

@@ -29,7 +29,7 @@ pub enum Kind {
     Master,
     /// A device frame of the IO exchange.
     Device,
-    /// TYPE is not one that is known, or is not there.
+    /// TYPE is unknown or missing.
     Unknown,
 }
 
