@@ -32,7 +32,7 @@ impl<F: FnMut() -> u64> Clock for F {
     }
 }
 
-/// A clock made of a counter of `BITS` bits that wraps, by a [`TimeBase`]: a closure reads it, and another look has to come
+/// A clock made of a counter of `BITS` bits that wraps, by a [`TimeBase`]: a closure reads it, and the next reading has to come
 /// within half of its range.
 ///
 /// ```
@@ -59,7 +59,7 @@ impl<F: FnMut() -> u32, const BITS: u32> CounterClock<F, BITS> {
 }
 
 impl<F, const BITS: u32> CounterClock<F, BITS> {
-    /// The clock has to be looked at again within this many ns; a driver that is not called for longer gives
+    /// The clock has to be read again within this many ns; a driver that is not called for longer returns
     /// [`ClockError::Backwards`].
     pub const fn read_within_ns(&self) -> u64 {
         self.time.read_within_ns()

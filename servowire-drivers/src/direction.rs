@@ -40,7 +40,8 @@ impl Direction for Automatic {
     }
 }
 
-/// How inexactly software switches the line driver, at the worst: numbers of the board, the HAL and the executor, which a library
+/// How inaccurately software switches the line driver, in the worst case: numbers of the board, the HAL and the executor, which
+/// a library
 /// cannot know. None of them has a default.
 ///
 /// The driver has to go off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
@@ -52,18 +53,19 @@ impl Direction for Automatic {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Worst {
     /// From the return of `write` to the start bit on the line, ns: the UART waits for its next bit clock (up to 400 ns at 2.5 Mbit/s),
-    /// a buffered one for its interrupt, one with DMA for its set-up. Add what the request lasts longer at a rate that is
-    /// slow: 1 % of four fields are 160 ns. Understated, requests are cut off.
+    /// a buffered one for its interrupt, one with DMA for its set-up. Add the time by which the request lasts longer at a slow
+    /// rate: 1 % of four fields is 160 ns. If it is understated, requests are cut off.
     pub uart_start_ns: u32,
     /// From the time at which the pin is to be switched until it is, ns: the latency of interrupts that are served meanwhile, of the executor
-    /// and its timer for futures, and of the pin. Understated, the driver goes off while the encoder answers, which is reported.
+    /// and its timer for futures, and of the pin. If it is understated, the driver goes off while the encoder answers, which is
+    /// reported.
     pub wake_ns: u32,
-    /// A tick of the clock, ns: 6 for a cycle counter at 170 MHz, 1 000 for a timer of 1 MHz, which is too long.
-    /// Understated, requests are cut off.
+    /// A tick of the clock, ns: 6 for a cycle counter at 170 MHz, 1 000 for a timer of 1 MHz, which is too long. If it is
+    /// understated, requests are cut off.
     pub clock_ns: u32,
 }
 
-/// The line driver cannot be switched off between the end of a request and the answer for certain.
+/// It is not certain that the line driver can be switched off between the end of a request and the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -105,7 +107,7 @@ pub struct DirectionPin<P> {
 }
 
 impl<P> DirectionPin<P> {
-    /// This pin, switched no worse than this.
+    /// This pin, switched within these worst cases.
     pub const fn new(pin: P, worst: Worst) -> Self {
         Self { pin, worst }
     }

@@ -34,7 +34,7 @@ pub enum Error<IO, PIN, P, D> {
     #[error("the port is closed")]
     Closed,
     /// Somebody talks without a pause; nothing was sent.
-    #[error("the line does not become quiet")]
+    #[error("the line does not go quiet")]
     NeverQuiet,
     /// The clock stands, was set back or has jumped; whether a request that had begun had its effect is not known.
     #[error("{0}")]
@@ -64,7 +64,7 @@ mod tests {
             (Any::Pin(()), "the direction pin reports a fault"),
             (Any::DriverLate { by_ns: 40 }, "the line driver went off up to 40 ns too late"),
             (Any::Closed, "the port is closed"),
-            (Any::NeverQuiet, "the line does not become quiet"),
+            (Any::NeverQuiet, "the line does not go quiet"),
             (Any::Clock(ClockError::Backwards { by_ns: 40 }), "the clock went back by 40 ns"),
             (Any::Protocol("no answer"), "no answer"),
             (Any::Doubt("old"), "old"),
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn errors_can_be_returned_by_main() {
         let error: &dyn core::error::Error = &Error::<(), Infallible, &str, Infallible>::NeverQuiet;
-        assert_eq!(error.to_string(), "the line does not become quiet");
+        assert_eq!(error.to_string(), "the line does not go quiet");
     }
 
     #[cfg(feature = "serde")]

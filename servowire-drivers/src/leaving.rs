@@ -42,8 +42,8 @@ impl Leaving {
         });
     }
 
-    /// The reading at which the driver is to go off: in the middle of the time in which it is neither too early nor too late, and if
-    /// there is none, not too early.
+    /// The reading at which the driver is to go off: in the middle of the time in which it is neither too early nor too late,
+    /// and if there is no such time, not too early.
     pub(crate) fn off_ns(&self) -> Option<u64> {
         let Ends { earliest_ns, latest_ns } = self.ends?;
         let slack_ns = u64::from(self.worst.wake_ns).saturating_add(self.worst.clock_ns.into());

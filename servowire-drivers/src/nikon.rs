@@ -26,8 +26,8 @@ pub struct Frame {
     pub content: u16,
     /// Whether the delimiter was 1.
     pub framed: bool,
-    /// When the delimiter ended, by the clock of the driver. `None` is the time at which the frame is taken: the port has to be
-    /// asked soon enough then.
+    /// When the delimiter ended, by the clock of the driver. `None` stands for the time at which the frame is taken: the port
+    /// then has to be asked soon enough.
     pub end_ns: Option<u64>,
 }
 

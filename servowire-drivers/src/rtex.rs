@@ -52,15 +52,15 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
     transfer().or_else(|_| transfer())
 }
 
-/// What an exchange was like.
+/// How an exchange went.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
-    /// The blocks were not of one frame, each time they were read, or a drive stands still: those that are not on time were not
-    /// taken.
+    /// The blocks were never of one frame, however often they were read, or a drive's echo stands still: those that are not on
+    /// time were not taken.
     pub torn: bool,
 }
 
@@ -139,7 +139,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.led(t_ms)
     }
 
-    /// What is known of the actual position, speed and torque of the axis at `place`; nothing of a place that the ring does not
+    /// What is known of the actual position, speed and torque of the axis at `place`; nothing for a place that the ring does not
     /// have. Its instant is the start of the frame that brought the last block on time, by the driver's clock.
     pub fn evidence(&self, place: usize) -> Evidence {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
@@ -168,7 +168,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         }
     }
 
-    /// [`control`](Self::control) until the communication runs, for `limit_ns` at the most; it gives the phase that was reached.
+    /// [`control`](Self::control) until the communication runs, for at most `limit_ns`; returns the phase that was reached.
     ///
     /// # Errors
     /// As [`control`](Self::control).

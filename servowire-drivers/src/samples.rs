@@ -50,7 +50,7 @@ impl Order {
 
 /// Brings samples from the order of a peripheral into that of the line, sample n in bit n % 8 of byte n / 8, or back: it is the
 /// same either way. Bytes after the last whole word are left as they are.
-pub fn reorder(samples: &mut [u8], order: Order) {
+pub(crate) fn reorder(samples: &mut [u8], order: Order) {
     if !order.is_reversed() {
         return;
     }
@@ -63,8 +63,8 @@ pub fn reorder(samples: &mut [u8], order: Order) {
 }
 
 /// Writes line bits as `per_bit` samples each, for a peripheral of this order. Ones go before them, for a bit and whole bytes,
-/// and at least a byte of them after, up to the end of a word, for what a data line does between transfers is not defined:
-/// switch the line driver on and off inside them. Gives the bytes that were written.
+/// and at least a byte of them after, up to the end of a word, because the state of a data line between transfers is not defined:
+/// switch the line driver on and off inside them. Returns the bytes that were written.
 ///
 /// # Errors
 /// [`TooShort`] if `out` ends earlier; it is undefined then.

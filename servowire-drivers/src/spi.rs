@@ -51,7 +51,7 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// `per_bit`: clocks of the SPI a bit, 4 to 80; 8 is a good number. `content_bits`: 8 for T-Format, 16 for A-format.
+    /// `per_bit`: clocks of the SPI per bit, 4 to 80; 8 is a good choice. `content_bits`: 8 for T-Format, 16 for A-format.
     ///
     /// # Errors
     /// [`FormatError`] for other numbers.
@@ -62,7 +62,7 @@ impl Sampling {
         }
     }
 
-    /// Bytes of memory that hold so much time on the line.
+    /// Bytes of memory that hold this much time on the line.
     pub fn bytes(&self, ns: u32) -> usize {
         let samples = u64::from(ns).saturating_mul(self.samples_per_second()).div_ceil(8_000_000_000);
         usize::try_from(samples).unwrap_or(usize::MAX)
@@ -106,7 +106,7 @@ pub struct ReleasedFrames<S, D, C> {
     pub clock: C,
 }
 
-/// What went wrong at the SPI or in what it has sampled.
+/// What went wrong at the SPI or in the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

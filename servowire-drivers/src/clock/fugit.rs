@@ -28,7 +28,7 @@ impl<F: FnMut() -> Instant<u64, NOM, DENOM>, const NOM: u32, const DENOM: u32> C
     }
 }
 
-/// The same of instants of 32 bits, which wrap: another look has to come within half of their range.
+/// The same of instants of 32 bits, which wrap: the next reading has to come within half of their range.
 ///
 /// ```
 /// use fugit::TimerInstantU32;

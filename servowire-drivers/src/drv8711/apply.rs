@@ -15,8 +15,8 @@ const ORDER: [Register; 7] = [
     Register::Ctrl,
 ];
 
-/// Writes each register and reads it back before the next one. CTRL, which switches the motor on, is written only if
-/// all others are right.
+/// Writes each register and reads it back before the next one. CTRL, which switches the motor on, is written only if all others
+/// read back correctly.
 ///
 /// ```
 /// use servowire_drivers::drv8711::{Apply, Configuration};

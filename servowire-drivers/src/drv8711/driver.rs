@@ -39,7 +39,7 @@ pub struct Driver<S> {
 }
 
 impl<S: SpiDevice> Driver<S> {
-    /// A chip that is as after power-up; nothing is sent.
+    /// A chip in its state after power-up; nothing is sent.
     pub fn new(spi: S) -> Self {
         Self { spi, written: Configuration::default() }
     }
@@ -55,7 +55,7 @@ impl<S: SpiDevice> Driver<S> {
         Ok(bytes)
     }
 
-    /// Writes all registers and reads them back, CTRL with ENBL last: the motor is driven only if all others are right.
+    /// Writes all registers and reads them back, CTRL with ENBL last: the motor is driven only if all others read back correctly.
     ///
     /// # Errors
     /// [`Failure::Io`], or [`Failure::Protocol`] with [`Error::ReadBack`].

@@ -23,7 +23,7 @@ macro_rules! register {
         #[expect(clippy::indexing_slicing, reason = "the indexes are checked when this is compiled")]
         impl $name {
             /// Which register it is.
-            pub const REGISTER: Register = Register::$name;
+            const REGISTER: Register = Register::$name;
 
             /// The value to write.
             pub fn value(self) -> u16 {

@@ -43,7 +43,8 @@ macro_rules! driver {
             }
 
             /// The position of an encoder, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
-            /// judged at once by the rules of [`Evidence::at`]. The answer alone has 72 bits, so it is never younger than those.
+            /// judged at once by the rules of [`Evidence::at`]. The answer alone lasts 72 bits, so the position is never younger
+            /// than that.
             ///
             /// # Errors
             /// [`Error`], [`Error::Doubt`] among them.
@@ -73,8 +74,8 @@ macro_rules! driver {
                 $wait!(self.transact(Request::new(ea, Operation::Abs40)))
             }
 
-            /// A multi-response command: the answers of all encoders to one request. What came of each
-            /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
+            /// A multi-response command: the answers of all encoders to one request. [`BusTransaction::exchange`] gives each of
+            /// them; a missing or damaged one does not affect the others.
             ///
             /// # Errors
             /// [`Error`]. An answer that is missing is no error.

@@ -17,14 +17,14 @@ pub enum Began {
     Clock,
 }
 
-/// A period that was waited for.
+/// A period that was awaited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Period {
     /// How it began.
     pub began: Began,
-    /// What its exchange was like.
+    /// How its exchange went.
     pub exchanged: Exchanged,
 }
 

@@ -25,7 +25,7 @@ impl FrameCount {
         Self { frames: AtomicU32::new(0) }
     }
 
-    /// A frame has come. To be called by the receive interrupt and nothing else, before it switches the bank.
+    /// A frame has come. Call it from the receive interrupt only, before that switches the bank.
     pub fn add(&self) {
         // One writer, so no read-modify-write is needed, which small processors do not have.
         self.frames.store(self.get().wrapping_add(1), Ordering::Release);

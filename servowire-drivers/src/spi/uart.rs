@@ -8,8 +8,8 @@ use embedded_io::{ErrorType, Read, ReadReady, Write};
 use super::{Fault, Heard, Released, Sampler, Sampling, SpiError, line_bits};
 use crate::Direction;
 
-/// A UART made of an SPI, for the T-Format drivers: give them [`Automatic`](crate::Automatic) as direction, for this one switches
-/// the line driver itself.
+/// A UART made of an SPI, for the T-Format drivers: give them [`Automatic`](crate::Automatic) as direction, because this one
+/// switches the line driver itself.
 ///
 /// A write sends its bytes in one transfer and then samples the window, so it lasts as long as the whole exchange; what was heard is
 /// read afterwards. Requests have at most four bytes: with 8 samples a bit `tx` needs 42 bytes. The window is all of `rx`.

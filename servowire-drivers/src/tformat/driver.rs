@@ -48,8 +48,8 @@ macro_rules! driver {
                 Released { uart: self.uart, direction: self.direction.release(), clock: self.clock }
             }
 
-            /// By how much the direction pin may have gone off too late after the last request, ns; 0 if it was in time for certain.
-            /// [`Worst`](crate::Worst) was stated too well then, or the processor was elsewhere.
+            /// By how much the direction pin may have gone off too late after the last request, ns; 0 if it was certainly in
+            /// time. If not, [`Worst`](crate::Worst) was too optimistic, or the processor was busy elsewhere.
             pub const fn late_ns(&self) -> u64 {
                 self.late_ns
             }
@@ -94,7 +94,7 @@ macro_rules! driver {
                 $wait!(self.run(&mut Reset::clear_errors()))
             }
 
-            /// ID D: the byte at `address` of `page`, which is looked at before and after.
+            /// ID D: the byte at `address` of `page`, which is checked before and after.
             ///
             /// # Errors
             /// [`Error`].
@@ -106,7 +106,7 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
             }
 
-            /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what is there.
+            /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what you overwrite.
             ///
             /// # Errors
             /// [`Error`]: whether the byte was written is not known then. Read it.
@@ -121,7 +121,7 @@ macro_rules! driver {
 
             /// Finds the encoder after its supply was switched on, now or before: at either rate, of which the driver keeps the one at
             /// which it was found. `set_rate` sets the UART, and is called before the first request too. Take
-            /// `Detection::on([line, line])` if one rate is enough, or the lines need other times than the defaults.
+            /// `Detection::on([line, line])` if one rate is enough, or if the lines need other times than the defaults.
             ///
             /// # Errors
             /// [`Error`], that of `set_rate` as [`Error::Io`]; [`Error::PinTooSlow`] if the pin is too slow for one of the rates.
@@ -140,8 +140,8 @@ macro_rules! driver {
                 $wait!(self.drive(&mut Tuning(&mut detection), tune))
             }
 
-            /// A procedure of several transactions at the driver's rate: does what its steps ask for. [`Detection`] has a
-            /// [call of its own](Self::detect).
+            /// A procedure of several transactions at the driver's rate: does what its steps ask for. [`Detection`] has its [own
+            /// call](Self::detect).
             ///
             /// # Errors
             /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
