@@ -12,6 +12,7 @@
    leads to that row, to the whole row.
 3. CONTRIBUTING.md lists the folder of every package.
 4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder.
+5. Every public name has a user (`names.py`).
 """
 
 import json
@@ -20,6 +21,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+sys.dont_write_bytecode = True
+import names as public_names  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -365,9 +369,11 @@ def check():
             for fault in faults_of_links(short(file), file.read_text())
         ),
     ]
+    public, idle, more = public_names.check(ROOT, packages, code_of, without_tests)
+    faults += more
     for fault in faults:
         print(fault, file=sys.stderr)
-    print(f"house: {len(roots)} crates, {len(faults)} faults")
+    print(f"house: {len(roots)} crates, {public} public names ({len(idle)} used by nothing but their own crate), {len(faults)} faults")
     return not faults
 
 
@@ -433,6 +439,7 @@ def self_test():
     places = [{"manifest_path": str(ROOT / name / "Cargo.toml")} for name in "ab"]
     equal("links", 1, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f)"))))
     equal("the map", 1, len(list(faults_of_map("| `a/` |", places))))
+    public_names.self_test(equal)
     print("house: the checks see what they look for")
 
 
