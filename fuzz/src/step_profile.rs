@@ -42,7 +42,7 @@ struct Model<'t> {
 /// An axis and a series of commands to it.
 ///
 /// ```text
-/// 0..3  speed constant above 250 kHz's     4  steps a ramp entry     5, 6  initial sync_time     7  arithmetic
+/// 0..3  speed constant above 250 kHz's     4  steps per ramp entry     5, 6  initial sync_time     7  arithmetic
 /// 8     ramp: 0 sin², else a flat one of that times 50     9..  commands of two bytes: start, ticks, abort, position
 /// ```
 pub fn axis(mut data: &[u8]) {

@@ -4,8 +4,8 @@
 //! changes of named channels with their times ([`Line`]), or bytes ([`ByteLog`]).
 
 pub mod analyzer;
-pub mod archive;
-pub mod byte_table;
+mod archive;
+mod byte_table;
 mod can;
 mod columns;
 pub mod fst;
@@ -139,7 +139,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
         Format::Raw | Format::Packed => {
             let Some(rate) = hints.sample_rate else {
                 return Err(
-                    input.fault(At::File, "raw samples carry no rate: say it with --rate, for example --rate 24M")
+                    input.fault(At::File, "raw samples carry no rate: give it with --rate, for example --rate 24M")
                 );
             };
             let unit = if format == Format::Packed { raw::Unit::Bit } else { raw::Unit::Bytes(hints.unit_size.max(1)) };
@@ -151,7 +151,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
         Format::Hex => Capture::Bytes(ByteLog::Hex(hexlog::HexLog::new(input))),
         Format::Records => {
             let Some(size) = hints.record_size else {
-                return Err(input.fault(At::File, "binary records need their size: say it with --record-size"));
+                return Err(input.fault(At::File, "binary records need their size: give it with --record-size"));
             };
             Capture::Bytes(ByteLog::Records(records::Records::new(input, size)))
         }
@@ -180,8 +180,7 @@ fn guess(input: &mut Input, has_rate: bool) -> Result<Format, Fault> {
         return Err(input.fault(At::File, "the file is empty"));
     }
     if let Some(format) = known(head) {
-        let what =
-            "the file says its times itself: --rate is for raw samples; for the rate of the line there is --bit-rate";
+        let what = "the file has times of its own: --rate is for raw samples, --bit-rate for the rate of the line";
         return if has_rate { Err(input.fault(At::File, what)) } else { Ok(format) };
     }
     if has_rate {

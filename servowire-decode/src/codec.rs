@@ -12,7 +12,7 @@ use crate::line::lane::LineDecoder;
 use crate::settings::Settings;
 use crate::sink::Sink;
 
-/// What is known of a protocol without decoding anything.
+/// What is known about a protocol without decoding anything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facts {
     /// Its name on a command line.
@@ -21,15 +21,15 @@ pub struct Facts {
     pub title: &'static str,
     /// A line about it, for the help of a program.
     pub about: &'static str,
-    /// What it is decoded from, for somebody who has something else.
+    /// What it is decoded from, for a message to users who have something else.
     pub needs: &'static str,
     /// The names of all fields that its events on a line or in packets may have.
     pub fields: &'static [&'static str],
-    /// Its nominal bit rates on a recorded line; none where there is no such line.
+    /// Its nominal bit rates on a recorded line; empty if there is no such line.
     pub rates: &'static [u32],
     /// What its frames prove on a recorded line.
     pub weights: Weights,
-    /// It has one rate, by the clock of its master: a recording may hold one sample a bit.
+    /// It has one rate, by the clock of its master: a recording may hold one sample per bit.
     pub clocked: bool,
     /// An answer says what it is without its request.
     pub answers_alone: bool,
@@ -40,7 +40,7 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// Of a protocol that has neither a line nor captures.
+    /// For a protocol that has neither a line nor captures.
     pub const NONE: Self = Self {
         name: "",
         title: "",
@@ -129,11 +129,11 @@ pub trait LogDecoder {
     }
 }
 
-/// What is found of a log as a whole, at its end.
+/// What was found about a log as a whole, at its end.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Why it is not read as it was written.
+    /// Why it cannot be read as it was written.
     pub misread: Option<String>,
-    /// What somebody has to look after, though every frame holds.
+    /// What needs attention although every frame is good.
     pub trouble: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! From a capture to events, whatever it is.
+//! From a capture of any kind to events.
 
 use std::collections::BTreeMap;
 
@@ -12,8 +12,7 @@ use crate::settings::Settings;
 use crate::sink::{Sink, Tally};
 use crate::{line, log};
 
-/// Decodes a capture called `file` to its end; `protocol`: otherwise it is found. What comes out before a fault has been
-/// given to `out`.
+/// Decodes a capture called `file` to its end; without `protocol`, it is found. Events before a fault have been given to `out`.
 pub fn decode(
     file: &str,
     capture: Capture,

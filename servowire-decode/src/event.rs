@@ -7,30 +7,30 @@ use bitflags::Flags;
 
 use crate::time::Time;
 
-/// A frame, or the absence of one that was due.
+/// A frame, or the absence of an expected one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// Where in the capture.
     pub place: Place,
     /// Who spoke.
     pub direction: Option<Direction>,
-    /// The kind of frame in the protocol's own words, as "ID 3".
+    /// The kind of frame in the protocol's own words, such as "ID 3".
     pub kind: Cow<'static, str>,
     /// The fields in the order of the line.
     pub fields: Vec<Field>,
     /// The position that the frame carries.
     pub position: Option<Position>,
-    /// The encoder, drive or device that speaks or is asked, where the protocol has addresses and this one is known.
+    /// The encoder, drive or device that speaks or is addressed, if the protocol has addresses and this one is known.
     pub address: Option<u32>,
     /// What happened with this frame that belongs in a list of events: an alarm, a servo that is switched on.
     pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
-    /// Whether the frame holds.
+    /// Whether the frame is good.
     pub verdict: Verdict,
-    /// Whether the times of its place are counted, as by the update counter of a drive, and not measured.
+    /// Whether the times of its place are counted, for instance by the update counter of a drive, rather than measured.
     pub counted: bool,
-    /// Whether this is no frame but a word about the recording, which is counted nowhere.
+    /// Whether this is not a frame but a remark about the recording, which is not counted.
     pub remark: bool,
 }
 
@@ -65,12 +65,12 @@ impl Event {
         self
     }
 
-    /// A frame whose beginning the capture does not hold: no fault of the line.
+    /// A frame whose beginning is not in the capture, which is not a fault of the line.
     pub fn cut(place: Place) -> Self {
         Self::remark(place, "cut", "the capture begins inside a frame")
     }
 
-    /// What there is to say about the recording at `place`.
+    /// A remark about the recording at `place`.
     pub fn remark(place: Place, kind: &'static str, note: impl Display) -> Self {
         Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
     }
@@ -96,7 +96,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// When it ends; none in a log without times.
+    /// When it ends; `None` in a log without times.
     pub fn end(self) -> Option<Time> {
         match self {
             Self::Time { end, .. } => Some(end),
@@ -117,11 +117,11 @@ pub enum Direction {
 /// A field of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// As the protocol's documents spell it.
+    /// Its name, spelt as in the protocol's documents.
     pub name: &'static str,
-    /// What it held.
+    /// Its value.
     pub value: Value,
-    /// Where it is; none of what is said of the frame as a whole, whose place is that of the event.
+    /// Its place; `None` for a statement about the whole frame, whose place is that of the event.
     pub span: Option<Span>,
 }
 
@@ -151,7 +151,7 @@ impl Span {
 }
 
 impl Field {
-    /// A field that is said of the frame as a whole.
+    /// A field that describes the frame as a whole.
     pub fn new(name: &'static str, value: Value) -> Self {
         Self { name, value, span: None }
     }
@@ -171,13 +171,13 @@ impl Field {
         Self::new(name, Value::Hex { value: value.into(), digits })
     }
 
-    /// Named bits, by the names that the protocol's crate gives them.
+    /// Named bits, with the names that the protocol's crate gives them.
     pub fn flags<F: Flags<Bits: Into<u64>>>(name: &'static str, flags: &F, digits: usize) -> Self {
         let set = flags.iter_names().map(|(name, _)| name).collect();
         Self::new(name, Value::Flags { raw: flags.bits().into(), digits, set })
     }
 
-    /// What displays itself.
+    /// Anything that implements `Display`.
     pub fn text(name: &'static str, what: impl Display) -> Self {
         Self::new(name, Value::Text(what.to_string()))
     }
@@ -234,18 +234,18 @@ pub enum Value {
 /// A position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Position {
-    /// What it is, in the protocol's own words, as `VPOS`. Positions of two names, or of two addresses, are two series.
+    /// Its name in the protocol's own words, such as `VPOS`. Positions with different names or addresses are different series.
     pub name: &'static str,
-    /// Counts, turns included where the frame carries them.
+    /// Counts, turns included if the frame carries them.
     pub counts: i64,
-    /// Counts after which the value begins again, where it does.
+    /// Counts after which the value wraps, if it does.
     pub span: Option<u64>,
-    /// Counts of a turn, where the resolution is known and the axis turns.
+    /// Counts per turn, if the resolution is known and the axis turns.
     pub per_turn: Option<u64>,
 }
 
 impl Position {
-    /// In turns, where the resolution is known.
+    /// In turns, if the resolution is known.
     pub fn turns(&self) -> Option<f64> {
         self.per_turn.map(|counts| self.counts as f64 / counts as f64)
     }
@@ -261,7 +261,7 @@ impl Position {
     }
 }
 
-/// Whether a frame holds.
+/// Whether a frame is good.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// All checks passed.
@@ -271,14 +271,14 @@ pub enum Verdict {
 }
 
 /// The class of an answer that was due and did not come.
-pub const NO_RESPONSE: &str = "no_response";
+pub(crate) const NO_RESPONSE: &str = "no_response";
 
 /// Why a frame was refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
     /// The class of the check, for statistics: `crc`, `delimiter`, `no_response` ...
     pub class: &'static str,
-    /// A sentence with what came and what was due.
+    /// A sentence that says what arrived and what was expected.
     pub reason: String,
     /// The field by its name.
     pub field: Option<String>,
@@ -291,7 +291,7 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    /// Why, and nothing of where.
+    /// The reason alone, without a place.
     pub fn new(class: &'static str, reason: impl Display) -> Self {
         Self { class, reason: reason.to_string(), field: None, bit: None, time: None, cause: None }
     }
@@ -321,7 +321,7 @@ impl Verdict {
         *self == Self::Ok
     }
 
-    /// Returns whether this is no frame but the absence of one.
+    /// Returns whether this is the absence of a frame.
     pub fn is_silence(&self) -> bool {
         matches!(self, Self::Refused(refusal) if refusal.class == NO_RESPONSE)
     }

@@ -11,7 +11,7 @@ pub struct Fault {
     pub file: String,
     /// Where in the file.
     pub at: At,
-    /// What is wrong and, where it is known, what to do.
+    /// What is wrong and, if known, what to do.
     pub what: String,
 }
 

@@ -110,6 +110,6 @@ fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
     let need = 4 * u64::from(bit_rate);
     let digits = |value: f64| format!("{value:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
     let (a_bit, mhz) = (digits(rate as f64 / f64::from(bit_rate)), digits(need as f64 / 1e6));
-    let what = format!("{a_bit} samples a bit are too few: 4 or more are needed, so sample at {mhz} MHz or faster");
+    let what = format!("{a_bit} samples per bit are too few: at least 4 are needed, so sample at {mhz} MHz or faster");
     (rate < need).then_some(what)
 }

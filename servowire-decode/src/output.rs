@@ -35,7 +35,7 @@ pub struct Output<'a> {
     done: bool,
     /// Frames so far.
     pub tally: Tally,
-    /// Those of them that were asked for.
+    /// Those that were requested.
     pub chosen: Tally,
     /// Refused frames by class, with the first cause that was given.
     refused: BTreeMap<&'static str, (u64, Option<String>)>,
@@ -67,13 +67,13 @@ impl<'a> Output<'a> {
         self
     }
 
-    /// Nothing is shown and read any more as soon as `enough` says so.
+    /// Stops reading and showing as soon as `enough` says so.
     #[must_use]
     pub fn with_enough(self, enough: &'a dyn Fn() -> bool) -> Self {
         Self { enough: Some(enough), ..self }
     }
 
-    /// The first refused frame that is shown is the last one.
+    /// Stops after the first refused frame that is shown.
     #[must_use]
     pub fn until_error(self) -> Self {
         Self { until_error: true, ..self }
@@ -91,13 +91,13 @@ impl<'a> Output<'a> {
         Self { notes: Some(notes), ..self }
     }
 
-    /// Only what passes is shown.
+    /// Shows only what passes.
     #[must_use]
     pub fn with_filter(self, filter: &'a mut filter::Filter) -> Self {
         Self { filter: Some(filter), ..self }
     }
 
-    /// Returns whether the changes of the line have a taker.
+    /// Returns whether any printer takes the changes of the line.
     pub fn wants_changes(&self) -> bool {
         self.printers.iter().any(|printer| printer.wants_changes())
     }
@@ -142,7 +142,7 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// The refused frames and the missing answers in a sentence; none where all hold.
+    /// The refused frames and the missing answers in a sentence; `None` if all are good.
     pub fn refusals(&self) -> Option<String> {
         let Tally { ok, refused, missing } = self.chosen;
         let said = |cause: &Option<String>| cause.as_ref().map_or(String::new(), |cause| format!(" ({cause})"));
@@ -157,17 +157,17 @@ impl<'a> Output<'a> {
         (!both.is_empty()).then_some(both)
     }
 
-    /// Returns whether nothing that was asked for can come any more once a recording was read up to `time`.
+    /// Returns whether nothing that was requested can follow once a recording was read up to `time`.
     pub fn is_over(&self, time: Time) -> bool {
         self.is_done() || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
     }
 
-    /// Whether the user has enough: what still comes is dropped.
+    /// Returns whether the user has enough: whatever follows is dropped.
     pub fn is_done(&self) -> bool {
         self.done || self.enough.is_some_and(|enough| enough())
     }
 
-    /// Nothing comes for a while: what is complete is shown.
+    /// Tells that nothing arrives for a while: what is complete is shown.
     pub fn flush(&mut self) -> io::Result<()> {
         self.printers.iter_mut().try_for_each(|printer| printer.flush())
     }

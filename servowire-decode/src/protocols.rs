@@ -15,10 +15,10 @@ pub mod tformat;
 
 use crate::codec::Codec;
 
-/// All of them. Where nothing else tells them apart, the first is taken.
+/// All of them. If nothing else distinguishes them, the first is taken.
 pub const CODECS: &[&dyn Codec] = &[&tformat::Tformat, &nikon::Nikon, &hdsl::Hdsl, &rtex::Rtex, &sorte::Sorte];
 
 /// The protocols that are meant: the one that was named, or all.
-pub fn meant(protocol: Option<&'static dyn Codec>) -> impl Iterator<Item = &'static dyn Codec> {
+pub(crate) fn meant(protocol: Option<&'static dyn Codec>) -> impl Iterator<Item = &'static dyn Codec> {
     CODECS.iter().copied().filter(move |codec| protocol.is_none_or(|protocol| protocol == *codec))
 }

@@ -15,20 +15,20 @@ pub(crate) fn mbit(rate: f64) -> f64 {
     rate / 1e6
 }
 
-/// What is said on a line, and what speaks for it.
+/// The protocol recognised on a line, and the evidence for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recognition {
     /// Its channel by name, or that of the requests and that of the answers.
     pub channels: Vec<String>,
     /// The protocol.
     pub protocol: &'static dyn Codec,
-    /// The rate of the protocol in bits a second.
+    /// The rate of the protocol in bits per second.
     pub rate: u32,
     /// Whether the line is decoded upside down.
     pub inverted: bool,
-    /// The level at which the line rests, where it does.
+    /// The level at which the line rests, if it does.
     pub idle: Option<bool>,
-    /// The rate that the runs of the line look like, in bits a second.
+    /// The rate that the runs of the line suggest, in bits per second.
     pub seen: Option<f64>,
     /// What was measured on the line.
     pub rates: Rates,
@@ -83,7 +83,7 @@ impl fmt::Display for Recognition {
     }
 }
 
-/// What somebody who decodes a capture should know and did not ask for.
+/// What a user who decodes a capture should know without asking.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
     /// A line was found.
@@ -142,7 +142,7 @@ pub(crate) fn traffic(packets: &BTreeMap<&'static str, u64>) -> String {
 
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let so = "frames hold so; leave out what says otherwise";
+        let so = "frames are valid that way; leave out the option that says otherwise";
         match self {
             Self::Line { file, line } => write!(f, "{file}: {line}"),
             Self::LineRather { file, line } => {
@@ -152,9 +152,12 @@ impl fmt::Display for Note {
                 write!(f, "{file}: it looks like {title} at {rate} Mbit/s{upside}: {ok} of {} {so}", ok + refused)
             }
             Self::Channels { file, moving, tried } => {
-                write!(f, "{file}: {moving} channels move, and the {tried} busiest were tried: name one by --channel")
+                write!(
+                    f,
+                    "{file}: {moving} channels move, and only the {tried} busiest were tried: name one with --channel"
+                )
             }
-            Self::Traffic { file, packets } => write!(f, "{file}: {} are passed over", traffic(packets)),
+            Self::Traffic { file, packets } => write!(f, "{file}: {} were skipped", traffic(packets)),
             Self::Log { protocol, share } => {
                 write!(f, "taken as {}, of which {share} % of the first frames hold", protocol.title)
             }

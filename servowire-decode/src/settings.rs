@@ -28,7 +28,7 @@ pub struct Options {
     pub inverted: Option<bool>,
 }
 
-/// What the frames do not tell of an encoder.
+/// What the frames do not tell about an encoder.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Widths {
     /// Bits of a turn; otherwise as the encoder says, if the line carries it.
@@ -56,7 +56,7 @@ pub struct Rtex {
     pub period_ns: Option<u32>,
     /// Electronic gear of the drives, for the same limit.
     pub gear: Gear,
-    /// Every block is shown whole, not what changed in it.
+    /// Show every block whole, instead of what changed in it.
     pub whole: bool,
 }
 

@@ -13,7 +13,7 @@ pub trait Sink {
 /// Counts frames by their verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Events that hold.
+    /// Good frames.
     pub ok: u64,
     /// Frames refused.
     pub refused: u64,

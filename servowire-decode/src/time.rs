@@ -18,7 +18,7 @@ pub const SECOND: i64 = 1_000_000_000_000;
 pub struct Time(i128);
 
 impl Time {
-    /// Where a capture begins that does not say it otherwise.
+    /// The beginning of a capture that does not give another one.
     pub const ZERO: Self = Self(0);
     /// After all captures.
     pub const MAX: Self = Self(i128::MAX);
@@ -33,14 +33,14 @@ impl Time {
         self.0
     }
 
-    /// In microseconds, nearly.
+    /// In microseconds, approximately.
     pub fn us(self) -> f64 {
         self.0 as f64 / 1e6
     }
 
     /// The same instant on a clock that is 0 at `origin`.
     #[must_use]
-    pub const fn since(self, origin: Self) -> Self {
+    pub(crate) const fn since(self, origin: Self) -> Self {
         Self(self.0.saturating_sub(origin.0))
     }
 }
@@ -135,7 +135,7 @@ pub(crate) fn from_seconds(seconds: f64) -> Option<Time> {
 }
 
 /// A frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
-/// A small `m` is meant as mega, as sigrok has it.
+/// A small `m` means mega, as in sigrok.
 pub fn frequency(text: &str) -> Option<f64> {
     let bare = text.trim();
     let bare = match bare.len().checked_sub(2).map(|at| (bare.get(..at), bare.get(at..))) {

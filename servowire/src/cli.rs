@@ -20,26 +20,26 @@ pub struct Cli {
 enum Command {
     /// Decode captures of a line.
     Decode(Decode),
-    /// Write a report of a capture, for a browser or a printer.
+    /// Write a report about a capture, for a browser or a printer.
     Report(report::Arguments),
     /// Show one frame of a capture, bit by bit.
     Explain(explain::Arguments),
-    /// Times of the steps of a move on a 4 us cycle.
+    /// Compute the times of the steps of a move on a 4 us cycle.
     Profile(profile::Arguments),
-    /// The reference machine: SORTE master, four devices, four motors.
+    /// Run the reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),
-    /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
+    /// Talk to a T-Format encoder on a USB-RS485 adapter, or act as one.
     Talk(talk::Arguments),
-    /// Who is on an encoder's line when: shortest cycle, worst fault.
+    /// Show who is on an encoder's line when: shortest cycle, worst fault.
     Timing(timing::Arguments),
-    /// The register map of a HIPERFACE DSL receiver in words.
+    /// Describe the register map of a HIPERFACE DSL receiver in words.
     Registers(registers::Arguments),
-    /// Completions for a shell: put them where it looks for them.
+    /// Print completions for a shell, to be put where the shell looks for them.
     Completions {
         /// Which shell.
         shell: clap_complete::Shell,
     },
-    /// The manual page of the program, or of a command: `servowire man decode | man -l -`.
+    /// Print the manual page of the program or of a command: `servowire man decode | man -l -`.
     Man {
         /// The command.
         command: Option<String>,

@@ -54,42 +54,43 @@ const LONG: u64 = 2_000_000;
 
 /// Run the reference machine: a master, up to 254 devices, stepper motors at up to 250 kHz.
 ///
-/// Master and devices start up over simulated cables, then exchange data every 4 us, or as long as the line needs: the
-/// motion of the axes goes through PTO words and frames into the devices' SYNC0 generators and from there into the motors.
+/// Master and devices start up over simulated cables, then exchange data every 4 us, or at the shortest cycle that the line
+/// allows: the motion of the axes goes through PTO words and frames into the devices' SYNC0 generators and from there into the
+/// motors.
 /// Each device runs on its own crystal; frames, slots, data and pulses are where its counter puts them. Prints the
-/// start-up, what the cycle has room for, and what became of every step. The same seed gives the same run. With --gcode the
+/// start-up, what fits into the cycle, and what became of every step. The same seed gives the same run. With --gcode the
 /// first three axes follow a part program, each within the first --freq (100000), --accel and --jerk.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Devices in the line, a motor each.
+    /// Devices in the line, with one motor each.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=254))]
     devices: u8,
-    /// Delay of the cables in ns, 500 at most (100 m), the one at the master first; the last stands for those after it.
+    /// Delay of the cables in ns, 500 at most (100 m), starting at the master; the last one stands for all that follow.
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "85")]
     cables: Vec<u16>,
-    /// Cycle of the IO exchange in ns, a multiple of 4000; without it the shortest that the line fits.
+    /// Cycle of the IO exchange in ns, a multiple of 4000; by default the shortest that the line allows.
     #[arg(long, value_name = "NS", value_parser = cycle_time)]
     cycle_time: Option<u32>,
     /// Print cycle time against devices, cable and payload, and stop; with --svg, draw it.
     #[arg(long)]
     scaling: bool,
-    /// Length of a move in steps; 51200 are a turn at 1/256.
+    /// Length of a move in steps; 51200 steps are one turn at 1/256.
     #[arg(long, value_name = "N", default_value_t = 51_200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
-    /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
+    /// all steps have the same phase, which suits that machine. In a longer cycle motion is slower in proportion.
     #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = hertz)]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
     k: u32,
-    /// Moves, each back from the one before.
+    /// Number of moves, each back from the one before.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["cycles", "dance"])]
     moves: u64,
     /// Move there and back for this many cycles, then come to rest.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     cycles: Option<u64>,
-    /// Each axis its own move: other lengths, and the frequencies in turn.
+    /// Give each axis its own move: different lengths, and the frequencies in turn.
     #[arg(long, conflicts_with = "dance")]
     independent: bool,
     /// Play a tune instead.
@@ -100,17 +101,17 @@ pub struct Arguments {
     /// Greatest acceleration of an axis of a part program, in steps/s².
     #[arg(long, value_name = "A", requires = "gcode", default_value_t = Part::ACCELERATION, value_parser = clap::value_parser!(u32).range(1..))]
     accel: u32,
-    /// Its greatest jerk, in steps/s³; without it a trapezoid.
+    /// Its greatest jerk, in steps/s³; without it the profile is a trapezoid.
     #[arg(long, value_name = "J", requires = "gcode")]
     jerk: Option<u64>,
-    /// The devices as published: their SYNC0 generator, which loses steps, and the last word again when a frame is lost.
+    /// Use the devices as published: their SYNC0 generator loses steps, and they repeat the last word when a frame is lost.
     #[arg(long)]
     published_sync0: bool,
-    /// Leave the command words free, as the reference design does; without it they carry positions, so that an axis that
-    /// missed a frame catches up (an extension of this project).
+    /// Leave the command words free, as the reference design does; by default they carry positions, so that an axis that missed
+    /// a frame catches up (an extension of this project).
     #[arg(long)]
     no_positions: bool,
-    /// Steps that an axis may be behind before the motion is stopped.
+    /// Steps by which an axis may lag before the motion is stopped.
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..=16_000))]
     max_lag: u16,
     /// From an event of the devices' timers to its handler, in ns. Latency and seven writes below 600 ns lose nothing.
@@ -153,11 +154,11 @@ pub struct Arguments {
     /// Pull the cable in front of a device in a cycle.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
     unplug: Option<(usize, u64)>,
-    /// The motor driver of a device shuts down in a cycle: over-current, or what is named after it, as 2@500=BPDF, =unpowered
+    /// The motor driver of a device shuts down in a cycle: over-current, or the fault named, such as 2@500=BPDF, =unpowered
     /// or =reset.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = driver_fault)]
     driver_fault: Option<(usize, u64, Fault)>,
-    /// Switch a motor driver off when its axis has had no step for this many cycles; it needs 1 ms to wake.
+    /// Switch a motor driver off when its axis has had no step for this many cycles; waking it takes 1 ms.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
     power_save: Option<u32>,
     /// Seed of bit errors, crystals and counters.

@@ -62,9 +62,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let piped = match if files == 0 { files::piped(described.is_some()) } else { Piped::Nothing } {
         Piped::Content(input) => Some(input),
         Piped::Silence => {
-            eprintln!(
-                "nothing comes from the standard input: the captures of the program are shown; name - to wait for it"
-            );
+            eprintln!("nothing has arrived on standard input: showing the bundled captures; name - to wait for input");
             None
         }
         Piped::Nothing => None,

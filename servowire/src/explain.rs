@@ -24,10 +24,10 @@ const BITS: usize = 60;
 /// A frame is looked for so long after the time, in picoseconds.
 const AFTER: i64 = 20_000_000_000;
 
-/// One frame of a capture, bit by bit.
+/// Show one frame of a capture, bit by bit.
 ///
-/// Shows the frame on the line at a time of the capture, or the nearest one: its levels, its bits, where each field is, and
-/// the bit or field that broke it. Exit code 0: the frame holds; 1: it was refused, or nothing was found; 2: wrong use.
+/// Shows the frame on the line at a time of the capture, or the nearest one: its levels, its bits, where each field lies, and
+/// the bit or field that is wrong. Exit code 0: the frame holds; 1: it was refused, or nothing was found; 2: wrong use.
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
   servowire explain line.vcd --at 1.2345ms
@@ -35,13 +35,13 @@ const AFTER: i64 = 20_000_000_000;
 pub(crate) struct Arguments {
     /// The capture.
     file: PathBuf,
-    /// The time, as 1.2345ms.
+    /// The time, such as 1.2345ms.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
     at: Time,
     /// Draw the frame into this file.
     #[arg(long, value_name = "OUT")]
     svg: Option<PathBuf>,
-    /// What is read, and how.
+    /// What to read, and how.
     #[command(flatten)]
     reading: Reading,
 }
@@ -65,7 +65,7 @@ impl Arguments {
         let name = self.file.display();
         let read = self.reading.decode(&self.file, &mut scope, Vec::new(), Some(&mut filter))?;
         let Some(clip) = scope.clips().next() else {
-            let why = read.fault.unwrap_or_else(|| format!("{name}: no frame on a line is found"));
+            let why = read.fault.unwrap_or_else(|| format!("{name}: no frame was found on a line"));
             return Err(why.into());
         };
         say(format_args!("{}", text(clip, self.at)))?;

@@ -26,16 +26,17 @@ pub(crate) const AXES: usize = 3;
 pub(crate) struct Part {
     /// Follow a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), rests (G4), references (G28, G30), G53 to
     /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min; arcs are chords
-    /// within 2 um. What is not in it is refused with its line.
+    /// within 2 um. Anything else is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
-    /// Steps in a millimetre of each axis of a part program.
+    /// Steps per millimetre of each axis of a part program.
     #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     steps_per_mm: u32,
-    /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000, in mm/min, mm/s² and mm/s³; once for each axis.
+    /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000, in mm/min, mm/s² and mm/s³; repeat it for
+    /// each axis.
     #[arg(long, value_name = "AXIS", requires = "gcode")]
     axis: Vec<setup::Setup>,
-    /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P say otherwise.
+    /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P override it.
     #[arg(long, value_name = "UM", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     deviation: u32,
     /// Leave out the lines of a part program that begin with a slash.

@@ -22,26 +22,27 @@ use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 use crate::gcode::Part;
 use servowire_decode::time;
 
-/// Times of the steps of a move on a 4 us cycle.
+/// Compute the times of the steps of a move on a 4 us cycle.
 ///
 /// The sin² ramp and the integers of the 250 kHz motion controller of TIDEP0061: for every step the cycle of its pulse
-/// and the start of the pulse in that cycle. Without an output option a summary and a table of the ramp.
+/// and the start of the pulse in that cycle. Without an output option, prints a summary and a table of the ramp.
 ///
-/// With --shape trapezoid or s-curve the fastest move within --accel and --jerk; --compare sets all shapes side by side, at the
+/// With --shape trapezoid or s-curve, computes the fastest move within --accel and --jerk; --compare shows all shapes side by
+/// side, at the
 /// same speed and peak acceleration. With --gcode the steps of three axes along the path of a part program, each axis within
 /// --freq, --accel and --jerk (100 kHz, 400000 steps/s² and none).
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Step frequency at full speed, as 94570 or 94.57kHz.
+    /// Step frequency at full speed, such as 94570 or 94.57kHz.
     #[arg(long, value_name = "HZ", value_parser = frequency, required_unless_present_any = ["tone", "gcode"])]
     freq: Option<Frequency>,
-    /// A tone of Table 3 instead of a frequency: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
+    /// A note of Table 3 instead of a frequency: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
     #[arg(long, value_name = "NAME", value_parser = tone, conflicts_with = "freq")]
     tone: Option<Tone>,
     /// Length of the move.
     #[arg(long, value_name = "N", required_unless_present = "gcode", default_value_t = 0)]
     steps: u32,
-    /// Steps that each of the 32 ramp entries lasts; 1, or what --accel allows.
+    /// Steps that each of the 32 ramp entries lasts; 1 by default, or what --accel allows.
     #[arg(long, value_name = "N", conflicts_with = "accel")]
     k: Option<u32>,
     /// Shape of the move.
@@ -50,10 +51,10 @@ pub struct Arguments {
     /// Greatest acceleration in steps/s².
     #[arg(long, value_name = "A", value_parser = clap::value_parser!(u32).range(1..))]
     accel: Option<u32>,
-    /// Greatest jerk in steps/s³, for the S-curve; without it ten times A² / V.
+    /// Greatest jerk in steps/s³, for the S-curve; by default ten times A² / V.
     #[arg(long, value_name = "J", requires = "accel")]
     jerk: Option<u64>,
-    /// All shapes side by side, within --accel and --jerk.
+    /// Show all shapes side by side, within --accel and --jerk.
     #[arg(long, requires = "accel", conflicts_with_all = ["csv", "json"])]
     compare: bool,
     /// sync_time before the first step in ns, 0 to 3999.
@@ -64,10 +65,10 @@ pub struct Arguments {
     arithmetic: Mode,
     #[command(flatten)]
     part: Part,
-    /// A line a step, with a header.
+    /// CSV, one line per step, with a header.
     #[arg(long, group = "output")]
     csv: bool,
-    /// JSON Lines, an object a step.
+    /// JSON Lines, one object per step.
     #[arg(long, group = "output")]
     json: bool,
     /// Draw speed, acceleration and step time over time into this file.
@@ -78,7 +79,7 @@ pub struct Arguments {
     vcd: Option<PathBuf>,
 }
 
-/// How the speed grows and falls.
+/// How the speed rises and falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Shape {
     /// The published ramp: sin² over the steps, in 32 levels.
@@ -94,9 +95,9 @@ enum Shape {
 enum Mode {
     /// By true division.
     Corrected,
-    /// Bit for bit as the PRU, wrap-arounds included.
+    /// Bit for bit as on the PRU, wrap-arounds included.
     PruExact,
-    /// By true division, fractions of a nanosecond carried on.
+    /// By true division, carrying fractions of a nanosecond over.
     Carried,
 }
 
@@ -264,7 +265,7 @@ fn frequency(text: &str) -> Result<Frequency, String> {
     let millihertz = time::frequency(text).map_or(0.0, |hz| (hz * 1e3).round());
     let step = (1.0..=f64::from(u32::MAX)).contains(&millihertz);
     let ratio = step.then(|| Frequency::from_ratio(millihertz as u32, 1000)).flatten();
-    ratio.ok_or_else(|| format!("\"{text}\" is not a step frequency from 1 mHz to 4.29 MHz, as 94570 or 94.57kHz"))
+    ratio.ok_or_else(|| format!("\"{text}\" is not a step frequency from 1 mHz to 4.29 MHz, such as 94570 or 94.57kHz"))
 }
 
 fn tone(text: &str) -> Result<Tone, String> {

@@ -66,10 +66,10 @@ fn guarded(call: &mut dyn FnMut()) {
     panic::set_hook(hook);
 }
 
-/// What is read, and how.
+/// What to read, and how.
 #[derive(Debug, Args)]
 pub(crate) struct Reading {
-    /// What is spoken on the line; otherwise every protocol is tried on every channel, and each line found is decoded.
+    /// Protocol on the line; by default every protocol is tried on every channel, and each line found is decoded.
     #[arg(short, long, value_enum, default_value_t = Meant(None))]
     pub(crate) protocol: Meant,
     /// How the file is to be read.
@@ -90,29 +90,29 @@ pub(crate) struct Reading {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "File")]
 pub(crate) struct FileArgs {
-    /// File format, where the content does not tell it.
+    /// File format, if the content does not tell it.
     #[arg(long, value_enum)]
     format: Option<Named>,
-    /// Samples a second of a raw file, as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
+    /// Samples a second of a raw file, such as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     rate: Option<u64>,
-    /// Bytes a sample of a raw file, otherwise 1.
+    /// Bytes per sample of a raw file; 1 by default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     unit_size: Option<u8>,
-    /// The files are logs of bytes as hex digits, a burst a line.
+    /// The files are logs of bytes in hex, one burst per line.
     #[arg(long, conflicts_with_all = ["format", "rate"])]
     bytes: bool,
-    /// The files are binary records of this many bytes, a burst each.
+    /// The files are binary records of this many bytes, one burst each.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
     record_size: Option<u16>,
-    /// The file still grows: what comes to it is decoded too, until the program is stopped.
+    /// The file is still growing: decode what is appended to it, until the program is stopped.
     #[arg(long)]
     pub(crate) follow: bool,
-    /// Whether the packets of a network capture end with their frame check sequence, which most network cards take off;
-    /// otherwise as the file says.
+    /// Whether the packets of a network capture end with their frame check sequence, which most network cards strip; by default
+    /// as the file says.
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     fcs: Option<bool>,
-    /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
+    /// Voltage above which a column of an oscilloscope's table is high; by default half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     threshold: Option<f64>,
 }
@@ -121,19 +121,19 @@ pub(crate) struct FileArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Line")]
 pub(crate) struct LineArgs {
-    /// Channel by name or number; otherwise the one that decodes best.
+    /// Channel by name or number; by default the one that decodes best.
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
-    /// Channel of the requests, where the answers are on another one.
+    /// Channel of the requests, if the answers are on another one.
     #[arg(long, value_name = "NAME", requires = "rx", conflicts_with = "channel")]
     tx: Option<String>,
     /// Channel of the answers.
     #[arg(long, value_name = "NAME", requires = "tx", conflicts_with = "channel")]
     rx: Option<String>,
-    /// Bits a second, as 2500000 or 2.5M; otherwise found from the lengths of the runs.
+    /// Bits a second, such as 2500000 or 2.5M; by default found from the lengths of the runs.
     #[arg(long, value_name = "HZ", value_parser = bit_rate)]
     bit_rate: Option<u32>,
-    /// Whether the line idles high (normal) or low; otherwise the one that decodes best.
+    /// Whether the line idles high (normal) or low; by default the one that decodes best.
     #[arg(long, value_enum)]
     polarity: Option<Polarity>,
 }
@@ -151,10 +151,10 @@ pub(crate) enum Polarity {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Encoder (T-Format, A-format)")]
 pub(crate) struct TformatArgs {
-    /// Bits of a turn; otherwise from the encoder ID or type word seen on the line.
+    /// Bits of a turn; by default from the encoder ID or type word seen on the line.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=24))]
     single_turn_bits: Option<u8>,
-    /// Bits that count turns; otherwise from the encoder ID or type word, else 16.
+    /// Bits that count turns; by default from the encoder ID or type word, else 16.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(0..=24))]
     multi_turn_bits: Option<u8>,
 }
@@ -163,13 +163,14 @@ pub(crate) struct TformatArgs {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "RTEX")]
 pub(crate) struct RtexArgs {
-    /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
+    /// Bytes of a block, 16 or 32; by default what the log looks like. A line or record may hold several blocks.
     #[arg(long, value_name = "BYTES", value_parser = block_size)]
     block_size: Option<u8>,
-    /// Update period, as 500us or 0.5ms: gives a log without times its times, and checks the steps of the position.
+    /// Update period, such as 500us or 0.5ms: supplies the times of a log that has none, and is used to check the steps of the
+    /// position.
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) period: Option<u32>,
-    /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
+    /// Electronic gear of the drives, such as 8/1: steps of the position are checked against it.
     #[arg(long, value_name = "N/D", value_parser = gear, requires = "period")]
     gear: Option<Gear>,
     /// Only the blocks of this drive.
@@ -181,7 +182,7 @@ pub(crate) struct RtexArgs {
 fn period(text: &str) -> Result<u32, String> {
     match time::duration(text).map(|time| (time.ps() + 500) / 1000) {
         Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
-        _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
+        _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, such as 500us or 0.5ms")),
     }
 }
 
@@ -195,7 +196,7 @@ fn yes_or_no(text: &str) -> Result<bool, &'static str> {
 
 fn gear(text: &str) -> Result<Gear, String> {
     let read = text.split_once('/').and_then(|(n, d)| Gear::new(n.trim().parse().ok()?, d.trim().parse().ok()?));
-    read.ok_or_else(|| format!("\"{text}\" is not a gear of two whole numbers above 0, as 8/1"))
+    read.ok_or_else(|| format!("\"{text}\" is not a gear of two whole numbers above 0, such as 8/1"))
 }
 
 fn block_size(text: &str) -> Result<u8, String> {

@@ -18,7 +18,7 @@ use crate::terminal::say;
 
 /// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
 ///
-/// Exit code 0: the map could be read, whatever it says; 2: it could not.
+/// Exit code 0: the map could be read, whatever its content; 2: it could not.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// The registers, as bytes or as hex digits; - for the standard input. More bytes may follow.
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Whose receiver it is.
     #[arg(long, value_enum, default_value_t = Receiver::Ti)]
     receiver: Receiver,
-    /// Where the map begins in a dump of a memory, in bytes.
+    /// Offset of the map in a memory dump, in bytes.
     #[arg(long, value_name = "BYTES", default_value_t = 0)]
     at: usize,
 }
@@ -35,14 +35,14 @@ pub struct Arguments {
 enum Receiver {
     /// Firmware of the Motor Control SDK: 86 bytes, 00h to 55h.
     Ti,
-    /// SICK IP core: 64 bytes, 00h to 3Fh, and if it was read the bank of safe channel 2, 00h to 1Fh, behind them.
+    /// SICK IP core: 64 bytes, 00h to 3Fh, followed by the bank of safe channel 2, 00h to 1Fh, if it was read.
     Sick,
-    /// The map of a receiver made with the crate hdsl, by the rules of SICK's: 86 bytes.
+    /// A receiver made with the crate hdsl, following SICK's rules: 86 bytes.
     Hdsl,
 }
 
 impl Arguments {
-    /// Prints the map. 2: there is none.
+    /// Prints the map. 2: it could not be read.
     pub fn run(&self) -> ExitCode {
         match self.text().and_then(|text| Ok(say(format_args!("{text}"))?)) {
             Ok(()) => ExitCode::SUCCESS,
@@ -110,7 +110,7 @@ impl Map {
                 line(out, "fast position", format_args!("{}, {velocity} steps a frame", number(id, position)))?;
             }
             _ if d.contains(OnlineD::POS) => line(out, "fast position", "none to be used: POS")?,
-            _ => line(out, "fast position", "none to be used: the link is down")?,
+            _ => line(out, "fast position", "not usable: the link is down")?,
         }
         self.safe(out, id)?;
         self.messages(out)?;

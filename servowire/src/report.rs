@@ -22,11 +22,11 @@ use crate::scope::{Scope, Wanted};
 /// Refused frames that are listed.
 const LISTED: usize = 500;
 
-/// A report of a capture: one file, for a browser or a printer.
+/// Write a report about a capture: one file, for a browser or a printer.
 ///
 /// What was found and how, the settings, figures of each encoder, its position, delays and errors over time, each kind of
-/// damage once as it looks on the line, a list of what was refused, and the SHA-256 of the capture. Exit code 0: all frames
-/// good; 1: a frame was refused, or the capture is not whole (the report is written all the same); 2: wrong use.
+/// damage once as it looks on the line, a list of the refused frames, and the SHA-256 of the capture. Exit code 0: all frames
+/// good; 1: a frame was refused, or the capture is incomplete (the report is still written); 2: wrong use.
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
   servowire report line.vcd -o report.html
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     /// The report.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// What is read, and how.
+    /// What to read, and how.
     #[command(flatten)]
     reading: Reading,
 }
@@ -106,7 +106,7 @@ impl Arguments {
             return ExitCode::from(2);
         }
         if self.file.as_os_str() == "-" {
-            eprintln!("error: a report is about a file, which its SHA-256 tells");
+            eprintln!("error: a report needs a file, which it identifies by its SHA-256");
             return ExitCode::from(2);
         }
         match self.report() {

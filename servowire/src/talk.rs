@@ -24,12 +24,12 @@ use record::Recorded;
 
 use crate::units::tformat_rate;
 
-/// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
+/// Talk to a T-Format encoder on a USB-RS485 adapter, or act as one.
 ///
-/// Exit code 0: it was done; 1: the encoder did not answer as it should, or the port failed; 2: wrong use.
+/// Exit code 0: done; 1: the encoder did not answer as it should, or the port failed; 2: wrong use.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The serial port, as /dev/ttyUSB0 or COM3.
+    /// The serial port, such as /dev/ttyUSB0 or COM3.
     #[arg(long)]
     port: String,
     /// Bits a second, 2.5M or 5M.
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.
     #[arg(long, value_name = "MS", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     timeout: u64,
-    /// Print JSON, an object a line.
+    /// Print JSON, one object per line.
     #[arg(long, global = true)]
     json: bool,
     /// Write all bytes sent and received into this file, with their times; servowire decode reads it.
@@ -52,41 +52,41 @@ pub struct Arguments {
 enum What {
     /// Read position, turns and alarms once.
     Read,
-    /// Read them again and again, live.
+    /// Read position, turns and alarms continuously.
     Watch(Watch),
-    /// Say what the encoder and the adapter are.
+    /// Identify the encoder and the adapter.
     Info,
     /// Clear latched alarms. Position and turns stay.
     ClearErrors,
     /// Set the turns to 0, clear all errors and read both back. The multi-turn reference of the machine is lost.
     ZeroTurns {
-        /// Has to be given: the machine does not know any more where it is.
+        /// Required: afterwards the machine no longer knows where it is.
         #[arg(long, required = true)]
         lose_multi_turn_reference: bool,
-        /// Turns that the count may be from 0 afterwards: a shaft on the boundary of a turn trembles.
+        /// Turns by which the count may differ from 0 afterwards: a shaft at the boundary of a turn may tremble.
         #[arg(long, value_name = "TURNS", default_value_t = 1)]
         tolerance: u32,
-        /// Do not ask.
+        /// Do not ask for confirmation.
         #[arg(long)]
         yes: bool,
     },
     /// Make the present position the zero of the turn and read it back. This shifts the commutation angle: a motor whose drive
-    /// commutates by this encoder gets its current into the wrong phases and may run away. The shaft has to stand still.
+    /// commutates by this encoder puts its current into the wrong phases and may run away. The shaft has to stand still.
     ZeroSingleTurn {
-        /// Has to be given: it is for encoders that are being fitted, never for a motor in service.
+        /// Required: this is for encoders that are being fitted, never for a motor in service.
         #[arg(long, required = true)]
         shift_commutation_angle: bool,
-        /// Counts that the position may be from 0 afterwards.
+        /// Counts by which the position may differ from 0 afterwards.
         #[arg(long, value_name = "COUNTS")]
         tolerance: u32,
-        /// Do not ask.
+        /// Do not ask for confirmation.
         #[arg(long)]
         yes: bool,
     },
     /// Read or write the EEPROM.
     #[command(subcommand)]
     Eeprom(Eeprom),
-    /// Be an encoder, or pass everything on to a real one and log it.
+    /// Act as an encoder, or pass everything on to a real one and log it.
     Simulate(Simulate),
 }
 
@@ -95,7 +95,7 @@ struct Watch {
     /// Time from one reading to the next.
     #[arg(long, value_name = "MS", default_value_t = 20)]
     period: u64,
-    /// End after this many readings.
+    /// Stop after this many readings.
     #[arg(long)]
     count: Option<u64>,
     /// Write every reading into this file as CSV.
@@ -105,27 +105,28 @@ struct Watch {
 
 #[derive(Debug, Subcommand)]
 enum Eeprom {
-    /// Write all pages into a file, with encoder ID, widths, date and check sum. The page that was selected is selected again.
+    /// Write all pages into a file, with encoder ID, widths, date and checksum. The page that was selected before is selected
+    /// again.
     #[command(visible_alias = "dump")]
     Backup {
-        /// The file, which must not be there yet; the standard output without it.
+        /// The file, which must not exist yet; standard output by default.
         file: Option<PathBuf>,
         /// Pages: six in Tamagawa's encoders, eight in a compatible one.
         #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=8))]
         pages: u8,
     },
-    /// Write the bytes of a backup that differ, into an encoder of the same kind. Motor makers keep name plate and commutation
-    /// data in this memory: a motor may not run any more with the data of another.
+    /// Write those bytes of a backup that differ into an encoder of the same kind. Motor makers keep name plate and commutation
+    /// data in this memory: a motor may no longer run with the data of another.
     Restore {
         /// The backup.
         file: PathBuf,
-        /// Has to be given: the memory is overwritten.
+        /// Required: the memory is overwritten.
         #[arg(long, required = true)]
         overwrite_eeprom: bool,
-        /// Where the memory goes before it is overwritten; beside the backup, with the time in its name, without it.
+        /// Where to save the memory before it is overwritten; by default beside the backup, with the time in the file's name.
         #[arg(long, value_name = "FILE")]
         before: Option<PathBuf>,
-        /// Do not ask.
+        /// Do not ask for confirmation.
         #[arg(long)]
         yes: bool,
     },
@@ -136,16 +137,16 @@ struct Simulate {
     /// Encoder ID, 0x17 for 23 bits a turn.
     #[arg(long, default_value = "0x17", value_parser = encoder_id)]
     id: u8,
-    /// Turns of the shaft a minute.
+    /// Speed of the shaft in turns per minute.
     #[arg(long, default_value_t = 60.0, allow_negative_numbers = true)]
     rpm: f64,
-    /// The adapter hears itself.
+    /// The adapter hears its own transmissions.
     #[arg(long)]
     echo: bool,
-    /// The port of a second adapter with a real encoder: requests are passed on to it, answers back, and all of it is printed.
+    /// The port of a second adapter with a real encoder: requests are passed on to it, answers back, and everything is printed.
     #[arg(long, value_name = "PORT", conflicts_with_all = ["id", "rpm"])]
     encoder: Option<String>,
-    /// Write it into this file as CSV too.
+    /// Also write it into this file as CSV.
     #[arg(long, value_name = "FILE", requires = "encoder")]
     csv: Option<PathBuf>,
 }
@@ -155,7 +156,7 @@ fn encoder_id(text: &str) -> Result<u8, String> {
         Some(digits) => u8::from_str_radix(digits, 16),
         None => text.parse(),
     };
-    parsed.map_err(|_| format!("\"{text}\" is not a byte, as 0x17 or 23"))
+    parsed.map_err(|_| format!("\"{text}\" is not a byte, such as 0x17 or 23"))
 }
 
 impl Arguments {

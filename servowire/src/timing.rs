@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 
 use crate::terminal::say;
 
-/// Who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
+/// Show who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -72,9 +72,9 @@ struct Bar {
 struct Plan {
     title: String,
     bars: Vec<Bar>,
-    /// From the start of one request to the start of the next, at the least.
+    /// Shortest time from the start of one request to the start of the next.
     cycle_ns: u64,
-    /// From the start of a request that fails to the start of the next, at the most.
+    /// Longest time from the start of a request that fails to the start of the next.
     fault_ns: u64,
 }
 

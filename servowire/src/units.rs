@@ -7,7 +7,7 @@ use tformat::BitRate;
 pub(crate) fn frequency(text: &str) -> Result<u64, String> {
     match time::frequency(text) {
         Some(hertz) if (1.0..=1e12).contains(&hertz.round()) => Ok(hertz.round() as u64),
-        _ => Err(format!("\"{text}\" is not a frequency from 1 to 10^12 Hz, as 24M or 2500000")),
+        _ => Err(format!("\"{text}\" is not a frequency from 1 to 10^12 Hz, such as 24M or 2500000")),
     }
 }
 
@@ -15,13 +15,13 @@ pub(crate) fn frequency(text: &str) -> Result<u64, String> {
 pub(crate) fn bit_rate(text: &str) -> Result<u32, String> {
     match frequency(text)? {
         rate @ 1..=1_000_000_000 => Ok(rate as u32),
-        rate => Err(format!("{rate} bits a second are more than 10^9")),
+        rate => Err(format!("{rate} bit/s is more than 10^9")),
     }
 }
 
 /// A time of the capture.
 pub(crate) fn moment(text: &str) -> Result<Time, String> {
-    time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, as 20us, 1.5ms or 2s"))
+    time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, such as 20us, 1.5ms or 2s"))
 }
 
 /// One of the bit rates that a protocol has, in the same form; `6.67M` is near enough to 6,666,667.

@@ -30,7 +30,7 @@ const DRAWN_BITS: f64 = 9.5;
 const FIELD_BITS: i64 = 10;
 
 /// A table of bytes after its heading.
-pub struct Analyzer {
+pub(super) struct Analyzer {
     lines: Lines,
     columns: Columns,
     channels: Vec<String>,
@@ -103,7 +103,7 @@ impl Columns {
 
 impl Analyzer {
     /// Reads the heading, and rows enough to know the analysers.
-    pub fn new(input: Input) -> Result<Self, Fault> {
+    pub(super) fn new(input: Input) -> Result<Self, Fault> {
         let mut lines = Lines::new(input);
         let mut heading = Vec::new();
         lines.next(&mut heading)?;

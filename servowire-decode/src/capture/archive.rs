@@ -22,7 +22,7 @@ const MOST_KEYS: u64 = 1 << 20;
 type Archive = ZipArchive<Box<dyn SeekRead>>;
 
 /// Opens a session.
-pub fn open(input: Input) -> Result<Capture, Fault> {
+pub(super) fn open(input: Input) -> Result<Capture, Fault> {
     let name = input.name().to_owned();
     let fault = |what: String| Fault::new(&name, At::File, what);
     let mut archive = ZipArchive::new(input.seekable()?).map_err(|e| fault(format!("not a whole zip file: {e}")))?;
@@ -67,14 +67,14 @@ fn sample_rate(text: &str) -> Option<u64> {
     (1.0..=1e12).contains(&rate).then_some(rate as u64)
 }
 
-const NO_RATE: &str = "the session does not know its sample rate: export it with -O binary and say --rate";
+const NO_RATE: &str = "the session does not give its sample rate: export it with -O binary and use --rate";
 
 /// A sigrok session, version 1 or 2.
 fn sigrok(name: &str, mut archive: Archive) -> Result<Capture, Fault> {
     let fault = |what: &str| Fault::new(name, At::File, what);
     let version = text(&mut archive, "version").unwrap_or_default();
     if !matches!(version.trim(), "1" | "2") {
-        return Err(fault(&format!("a sigrok session of version {:?}, and only 1 and 2 are known", version.trim())));
+        return Err(fault(&format!("a sigrok session of version {:?}: only 1 and 2 are known", version.trim())));
     }
     let metadata = text(&mut archive, "metadata").map_err(|what| fault(&what))?;
     let Some(base) = value(&metadata, "capturefile").map(str::to_owned) else {
@@ -248,12 +248,12 @@ impl Dsview {
             other => {
                 let version = other.unwrap_or("1");
                 return Err(fault(&format!(
-                    "a DSView session of version {version}, and only 2 and 3 are known: export it as CSV"
+                    "a DSView session of version {version}: only 2 and 3 are known; export it as CSV"
                 )));
             }
         }
         if value(header, "device mode").is_some_and(|mode| mode != "0") {
-            return Err(fault("no logic analyser session: export it as CSV"));
+            return Err(fault("not a logic analyser session: export it as CSV"));
         }
         let clock = Clock::new(sample_rate(header).ok_or_else(|| fault(NO_RATE))?);
         let total = value(header, "total samples").and_then(|total| total.parse().ok()).unwrap_or(u64::MAX);

@@ -31,7 +31,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// By the names of the heading; `None` where it is none of messages.
+    /// By the names of the heading; `None` if it is not a table of messages.
     fn of(heading: &str) -> Option<Self> {
         let separator = separator(heading.as_bytes());
         let names: Vec<String> = titles(&heading.to_lowercase(), separator);
@@ -119,7 +119,7 @@ impl ByteTable {
         self.columns.time.is_some()
     }
 
-    /// The message of the next row; a row that cannot be read says why. None at the end.
+    /// The message of the next row; if the row cannot be read, the reason. `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         let mut text = Vec::new();
         while self.lines.next(&mut text)? {

@@ -2,7 +2,7 @@
 
 /// What to say of them.
 pub(super) const REFUSED: &str = "a log of a CAN bus (candump): none of the protocols that are decoded runs on CAN. If an \
-    adapter carried bytes of a serial line, cut them out, a burst a line, and give --bytes";
+    adapter carried bytes of a serial line, cut them out, one burst per line, and give --bytes";
 
 /// Whether the first lines are frames of a CAN bus.
 ///

@@ -21,7 +21,7 @@ const CHANNELS: usize = 65_535;
 /// The type of a block that holds a whole file, packed by gzip; its own length and that of the file follow.
 const WRAPPED: u8 = 254;
 
-const DAMAGED: &str = "not FST as it should be: the file is damaged";
+const DAMAGED: &str = "not valid FST: the file is damaged";
 
 /// The library panics on some damaged files. That is their fault, not ours: `guard` comes back from it, and there is no
 /// result.
@@ -65,7 +65,7 @@ impl Fst {
     pub fn new(input: Input, guard: Option<Guard>) -> Result<Self, Fault> {
         let name = input.name().to_owned();
         let fault = |what: String| Fault::new(&name, At::File, what);
-        let broken = |e: fst_reader::ReaderError| fault(format!("not FST as it should be: {e}"));
+        let broken = |e: fst_reader::ReaderError| fault(format!("not valid FST: {e}"));
         let mut source = unwrapped(input)?.seekable()?;
         blocks::check(source.as_mut()).map_err(fault)?;
         let opened = guarded(guard, || FstReader::open(source));
@@ -161,7 +161,7 @@ impl Line for Fst {
         };
         let read = guarded(self.guard, || reader.read_signals(&filter, take));
         let read = read.ok_or_else(|| Fault::new(&self.name, At::File, DAMAGED))?;
-        read.map_err(|e| Fault::new(&self.name, At::File, format!("not FST as it should be: {e}")))?;
+        read.map_err(|e| Fault::new(&self.name, At::File, format!("not valid FST: {e}")))?;
         if too_large {
             return Err(Fault::new(&self.name, At::File, "its times are too large"));
         }

@@ -57,11 +57,11 @@ struct Gathered {
 pub struct Burst {
     /// Its number, from 1.
     pub line: u64,
-    /// When it was, where the log says so.
+    /// When it was sent, if the log says so.
     pub time: Option<Time>,
-    /// Who sent it, where the log says so.
+    /// Who sent it, if the log says so.
     pub direction: Option<Direction>,
-    /// What it holds; at least one byte, unless it is spoilt.
+    /// Its content; at least one byte, unless it is damaged.
     pub bytes: Vec<u8>,
     /// Why the line is not bytes.
     pub spoilt: Option<String>,
@@ -163,7 +163,7 @@ impl HexLog {
         self.input.peek().is_ok_and(|head| Sample::of(&String::from_utf8_lossy(head)).timed)
     }
 
-    /// The next burst; none at the end.
+    /// The next burst; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         if self.shape == Shape::Unknown {
             let head = String::from_utf8_lossy(self.input.peek()?).into_owned();
@@ -232,7 +232,7 @@ fn dump_line(
     ready: &mut VecDeque<Burst>,
 ) -> Result<(), String> {
     if dump == Dump::Octal {
-        return Err("octal words, which do not tell how they were made: dump with od -An -tx1, or xxd".to_owned());
+        return Err("octal words, whose byte order is unknown: dump with od -An -tx1, or xxd".to_owned());
     }
     let mut give = |gathered: &mut Gathered| {
         let bytes = std::mem::take(&mut gathered.bytes);

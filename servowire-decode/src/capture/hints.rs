@@ -47,11 +47,11 @@ impl Format {
         (Self::Fst, &["fst"], "FST, as GTKWave and Verilator write it"),
         (Self::SigrokText, &["sigrok-text"], "Text of sigrok-cli -O bits or -O hex"),
         (Self::Ols, &["ols"], "A file of the OLS client, or of sigrok-cli -O ols"),
-        (Self::Raw, &["raw"], "One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary)"),
+        (Self::Raw, &["raw"], "One sample in one or more whole bytes, one bit per channel (sigrok-cli -O binary)"),
         (Self::Packed, &["packed"], "One channel, eight samples a byte, the oldest in bit 0"),
-        (Self::Hex, &["hex"], "Bytes as hex digits, a burst a line"),
+        (Self::Hex, &["hex"], "Bytes as hex digits, one burst per line"),
         (Self::ByteTable, &["byte-table"], "A table of messages: columns data, time, direction"),
-        (Self::Records, &["records"], "Binary records of one size (--record-size), a burst each"),
+        (Self::Records, &["records"], "Binary records of one size (--record-size), one burst each"),
         (Self::Pcapng, &["pcapng", "pcap"], "Packets of a network capture, pcap or pcapng"),
     ];
 
@@ -71,7 +71,7 @@ impl Format {
     }
 }
 
-/// Makes a call from which it comes back even if that panics. Somebody who has none calls the argument.
+/// Makes a call and returns even if the call panics. Without a guard, the argument is called directly.
 pub type Guard = fn(&mut dyn FnMut());
 
 /// What the user said about the files.
@@ -79,16 +79,16 @@ pub type Guard = fn(&mut dyn FnMut());
 pub struct Hints {
     /// The format; otherwise it is found from the content and the name.
     pub format: Option<Format>,
-    /// Samples a second of a raw file.
+    /// Samples per second of a raw file.
     pub sample_rate: Option<u64>,
-    /// Bytes a sample of a raw file.
+    /// Bytes per sample of a raw file.
     pub unit_size: usize,
     /// Bytes of a record.
     pub record_size: Option<usize>,
     /// The voltage above which a column of a table is high; otherwise half-way between its levels.
     pub threshold: Option<f64>,
-    /// The file still grows: its end is waited for.
+    /// The file is still growing: reading waits for its end.
     pub grows: bool,
-    /// How the library for FST is called, which panics on some damaged files; otherwise straight.
+    /// How to call the library for FST, which panics on some damaged files; by default directly.
     pub guard: Option<Guard>,
 }

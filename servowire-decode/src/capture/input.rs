@@ -25,7 +25,7 @@ pub trait SeekRead: BufRead + Seek {}
 
 impl<R: BufRead + Seek> SeekRead for R {}
 
-/// What is recorded while it is read: a pipe, or a file that still grows.
+/// What is recorded while it is read: a pipe, or a file that is still growing.
 pub trait Live: Read {
     /// Whether something is there, or the end; may wait for a moment.
     fn is_ready(&mut self) -> bool;
@@ -104,17 +104,17 @@ impl Input {
     }
 
     /// Returns whether what is complete should be shown now.
-    pub fn is_due(&mut self) -> bool {
+    pub(crate) fn is_due(&mut self) -> bool {
         self.reader.get_mut().live().is_some_and(Live::is_overdue) || self.pauses()
     }
 
     /// Whether a read would have to wait: nothing is there, and nothing comes for a moment.
-    pub fn pauses(&mut self) -> bool {
+    pub(crate) fn pauses(&mut self) -> bool {
         self.head_taken == self.head.len() && self.waits()
     }
 
     /// Unpacks gzip and zstd, as often as they are packed.
-    pub fn unpacked(mut self) -> Result<Self, Fault> {
+    pub(crate) fn unpacked(mut self) -> Result<Self, Fault> {
         let head = self.peek()?;
         let packed = match head {
             [0x1f, 0x8b, 0x08, ..] => Some(true),
@@ -157,13 +157,13 @@ impl Input {
         let read = self.by_ref().take(MOST_HELD + 1).read_to_end(&mut bytes);
         read.map_err(|e| self.io_fault(At::File, &e))?;
         if bytes.len() as u64 > MOST_HELD {
-            let what = format!("more than {} MB of this format have to be a file, not a stream", MOST_HELD >> 20);
+            let what = format!("more than {} MB of this format need a file, not a stream", MOST_HELD >> 20);
             return Err(self.fault(At::File, what));
         }
         Ok(Box::new(Cursor::new(bytes)))
     }
 
-    /// The beginning of the file without taking it: 4 KiB, or all there are.
+    /// The beginning of the file without consuming it: 4 KiB, or the whole file if it is shorter.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
         // What was taken of the beginning is no longer it.
         self.head.drain(..self.head_taken);
@@ -275,7 +275,7 @@ impl BufRead for Input {
 fn plain(error: &io::Error) -> String {
     let text = error.to_string();
     if error.kind() == io::ErrorKind::UnexpectedEof || text.contains("UnexpectedEof") {
-        return "what is packed in it ends too early: it was cut off".to_owned();
+        return "its packed content ends too early: it was cut off".to_owned();
     }
     text.split(" (os error").next().unwrap_or(&text).to_lowercase()
 }

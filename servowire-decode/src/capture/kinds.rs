@@ -22,7 +22,7 @@ pub enum Capture {
 
 /// Bytes that were written down, in bursts.
 pub enum ByteLog {
-    /// Hex digits, a burst a line.
+    /// Hex digits, one burst per line.
     Hex(HexLog),
     /// Records of one size.
     Records(Records),
@@ -31,7 +31,7 @@ pub enum ByteLog {
 }
 
 impl ByteLog {
-    /// The next burst; none at the end.
+    /// The next burst; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         match self {
             Self::Hex(log) => log.burst(),
@@ -40,7 +40,7 @@ impl ByteLog {
         }
     }
 
-    /// Returns whether it says when its bytes were sent. To be asked before anything is read.
+    /// Returns whether it says when its bytes were sent. Call it before anything is read.
     pub fn has_times(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.has_times(),
@@ -50,7 +50,7 @@ impl ByteLog {
     }
 
     /// Returns whether the next burst has to be waited for.
-    pub fn pauses(&mut self) -> bool {
+    pub(crate) fn pauses(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.input().pauses(),
             Self::Records(log) => log.input().pauses(),

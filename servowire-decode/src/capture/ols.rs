@@ -67,7 +67,9 @@ impl Ols {
             .split_once('@')
             .and_then(|(word, sample)| Some((u64::from_str_radix(word, 16).ok()?, sample.parse::<u64>().ok()?)));
         let Some((word, sample)) = read else {
-            return Err(self.input.fault(At::Line(self.line), format!("{line:?} is no word at a sample, as 06@1")));
+            return Err(self
+                .input
+                .fault(At::Line(self.line), format!("{line:?} is not a word at a sample, such as 06@1")));
         };
         if sample < self.sample {
             let what = format!("sample {sample} comes after sample {}", self.sample);

@@ -43,17 +43,17 @@ pub struct Packet {
     pub time: Time,
     /// Link type of its interface.
     pub link: DataLink,
-    /// To the capturing side (`Some(true)`) or from it, where the file says so.
+    /// To the capturing side (`Some(true)`) or from it, if the file says so.
     pub inbound: Option<bool>,
-    /// Whether the file says that its bytes end with their frame check sequence. Most network cards take it off, and most files
-    /// say nothing.
+    /// Whether the file says that its bytes end with their frame check sequence. Most network cards strip it, and most files do
+    /// not say.
     pub has_fcs: bool,
     /// Its bytes.
     pub bytes: Vec<u8>,
 }
 
 impl Packet {
-    /// What it is by its EtherType, if that is of ordinary network traffic. Frames of a drive bus without an EtherType are none.
+    /// Its kind by EtherType, if that belongs to ordinary network traffic. Frames of a drive bus without an EtherType are not.
     pub fn traffic(&self) -> Option<&'static str> {
         if self.link != DataLink::ETHERNET {
             return None;
@@ -93,7 +93,7 @@ impl Pcapng {
         self.live
     }
 
-    /// The next packet; none at the end.
+    /// The next packet; `None` at the end.
     pub fn packet(&mut self) -> Result<Option<Packet>, Fault> {
         loop {
             let reader = match &mut self.reader {
@@ -166,6 +166,6 @@ fn say(error: &PcapError) -> String {
     match error {
         PcapError::IncompleteBuffer => "the file ends inside a block".to_owned(),
         PcapError::IoError(error) => format!("cannot be read: {error}"),
-        other => format!("not pcapng as it should be: {other}"),
+        other => format!("not valid pcapng: {other}"),
     }
 }

@@ -11,7 +11,7 @@ use crate::time::{Clock, Time};
 pub enum Unit {
     /// One channel, eight samples a byte, the oldest in bit 0.
     Bit,
-    /// So many bytes a sample, little endian, bit k = channel k.
+    /// This many bytes per sample, little endian, bit k = channel k.
     Bytes(usize),
 }
 
@@ -90,7 +90,7 @@ impl Raw {
         let got = self.input.read_full(buffer, n).map_err(|e| self.input.io_fault(At::Byte(at), &e))?;
         let rest = got % n;
         if rest != 0 {
-            let what = format!("{rest} bytes are left, where a sample has {n}: cut off, or another --unit-size");
+            let what = format!("{rest} bytes are left over, but a sample has {n}: cut off, or another --unit-size");
             self.ragged = Some(self.input.fault(At::Byte(at + (got - rest) as u64), what));
         }
         Ok((got - rest, (got / n) as u64))

@@ -16,12 +16,12 @@ pub struct Change {
     pub level: bool,
 }
 
-/// A part of a recording in which nothing is known of the lines; times in picoseconds.
+/// A part of a recording in which the lines are unknown; times in picoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hole {
     /// Where the recording stops.
     pub from: Time,
-    /// Where it goes on.
+    /// Where it continues.
     pub to: Time,
 }
 

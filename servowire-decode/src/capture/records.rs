@@ -22,7 +22,7 @@ impl Records {
         &mut self.input
     }
 
-    /// The next record, numbered from 1; none at the end.
+    /// The next record, numbered from 1; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         let mut bytes = vec![0; self.size];
         self.record += 1;

@@ -54,7 +54,7 @@ impl SaleaeBinary {
         let version = i32::from_le_bytes(take(&mut rest));
         let kind = i32::from_le_bytes(take(&mut rest));
         if !(0..=1).contains(&version) {
-            let what = format!("is of version {version}, and only 0 and 1 are known; export as CSV or VCD");
+            let what = format!("is of version {version}: only 0 and 1 are known; export as CSV or VCD");
             return Err(input.fault(At::Byte(8), what));
         }
         match kind {

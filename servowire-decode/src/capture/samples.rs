@@ -46,7 +46,7 @@ impl<'a> Samples<'a> {
         self.clock
     }
 
-    /// 64 samples from number `at` on, the oldest in bit 0, where all of them are there.
+    /// 64 samples from number `at` on, the oldest in bit 0, if all of them exist.
     #[inline]
     pub fn word(&self, at: u64) -> Option<u64> {
         let place = at.checked_sub(self.first)?;

@@ -101,7 +101,7 @@ impl SigrokText {
         let place =
             line.match_indices(':').find(|(at, _)| only(line.get(at + 1..).unwrap_or(""), |c| c.is_ascii_hexdigit()));
         let Some((name, rest)) = place.and_then(|(at, _)| Some((line.get(..at)?, line.get(at + 1..)?))) else {
-            return Err(self.input.fault(At::Line(self.line), format!("{line:?} is no line of samples")));
+            return Err(self.input.fault(At::Line(self.line), format!("{line:?} is not a line of samples")));
         };
         let mut samples = Vec::with_capacity(rest.len());
         for group in rest.split_ascii_whitespace() {
@@ -137,7 +137,7 @@ impl SigrokText {
         for round in lines.chunks(self.channels.len().max(1)) {
             let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);
             if round.iter().enumerate().any(twice) {
-                return Err(self.input.fault(At::Line(self.line), "a channel comes twice in a round of lines"));
+                return Err(self.input.fault(At::Line(self.line), "a channel occurs twice in one round of lines"));
             }
             // All channels have the same samples; where not, those that all of them have are good.
             let least = round.iter().map(|(_, samples)| samples.len()).min().unwrap_or(0);

@@ -223,7 +223,7 @@ impl Table {
         match (cell::level(text), &column.threshold) {
             (Cell::Other, None) if column.bit.is_some() => match (cell::word(text), column.bit) {
                 (Some(word), Some(bit)) => Ok(Some(word >> bit & 1 == 1)),
-                _ => Err(format!("{:?} is no number in hex", shown())),
+                _ => Err(format!("{:?} is not a number in hex", shown())),
             },
             (Cell::Level(level), None) => Ok(Some(level)),
             (Cell::Nothing, _) => Ok(None),

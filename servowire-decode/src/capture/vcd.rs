@@ -1,6 +1,6 @@
 //! Value change dumps (IEEE 1364): sigrok, PulseView, Logic 2, GTKWave, simulators.
 //!
-//! The header is read as words, whatever its types and attributes; the body by its first letters, line ends or not.
+//! The header is read as words, ignoring types and attributes; the body by its first letters, with or without line ends.
 
 mod codes;
 mod header;
@@ -91,7 +91,7 @@ impl Vcd {
         self.to -= self.from;
         self.from = 0;
         if self.to == self.buffer.len() {
-            return Err(self.fault("not VCD in the middle of a value change: a word without end"));
+            return Err(self.fault("not VCD in the middle of a value change: an unterminated word"));
         }
         let free = self.buffer.get_mut(self.to..).unwrap_or_default();
         match self.input.read(free) {
@@ -219,7 +219,7 @@ impl Vcd {
         }
         let Some(stamp) = stamp.filter(|_| !whole.is_empty() && fraction.iter().all(u8::is_ascii_digit)) else {
             let text = String::from_utf8_lossy(digits).into_owned();
-            return Err(format!("not VCD in the middle of a value change: #{text} is no time"));
+            return Err(format!("not VCD in the middle of a value change: #{text} is not a time"));
         };
         let time = self.tick.time_between(stamp, fraction);
         let (now, between) = time.ok_or_else(|| format!("time #{stamp} is too large"))?;

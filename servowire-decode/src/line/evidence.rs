@@ -7,14 +7,14 @@ use crate::event::{Direction, Event, Place, Value, Verdict};
 use crate::sink::{Sink, Tally};
 use crate::time::Time;
 
-/// Bits of proof in the sound frames of a protocol: what of a frame is fixed or checked.
+/// Bits of proof in the valid frames of a protocol: the part of a frame that is fixed or checked.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Weights {
-    /// A sound request.
+    /// A valid request.
     pub request: i64,
-    /// A sound answer to it.
+    /// A valid answer to it.
     pub answer: i64,
-    /// A sound answer without a request.
+    /// A valid answer without a request.
     pub alone: i64,
 }
 
@@ -22,7 +22,7 @@ pub struct Weights {
 const ONLY_THE_CHECK: i64 = 4;
 /// The encoder's own refusal is a sound frame.
 const REJECTED: i64 = 10;
-/// A frame that is not one.
+/// A frame that is not valid.
 const NO_FRAME: i64 = -6;
 /// Worse than this, more does not help.
 const HOPELESS: i64 = -90;

@@ -48,7 +48,7 @@ fn strange(name: &str, edges: &Edges, protocol: Option<&'static dyn Codec>) -> S
         );
     }
     format!(
-        "channel \"{name}\" runs at about {:.digits$} Mbit/s, where {known}; if that is right, say it with --bit-rate",
+        "channel \"{name}\" runs at about {:.digits$} Mbit/s, where {known}; if that is right, give it with --bit-rate",
         mbit(seen)
     )
 }

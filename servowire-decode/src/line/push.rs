@@ -82,7 +82,7 @@ pub struct PushDecoder {
 }
 
 impl PushDecoder {
-    /// Of a recording called `file` with channels of these names; `protocol`: otherwise all are tried.
+    /// For a recording called `file` with channels of these names; without `protocol`, all are tried.
     pub fn new(
         file: &str,
         names: &[String],
@@ -172,8 +172,8 @@ impl PushDecoder {
         running.decoder.samples(samples, out)
     }
 
-    /// Nothing else has changed until `time`. To be called after each piece: what was held back to see what it is, is
-    /// judged here.
+    /// Tells that nothing else has changed until `time`. Call it after each piece: it judges what was held back until more is
+    /// known.
     pub fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         if self.is_due() {
             self.judge(false, false, out)?;
@@ -181,7 +181,7 @@ impl PushDecoder {
         self.reach_lines(time, out)
     }
 
-    /// Nothing comes for a while: what is certain so far is decoded and shown.
+    /// Tells that nothing arrives for a while: what is certain so far is decoded and shown.
     pub fn pause(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         self.early(out)?;
         self.reach_lines(time, out)?;
@@ -196,7 +196,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// A hole in the recording before the next changes.
+    /// Tells of a gap in the recording before the next changes.
     pub fn hole(&mut self, hole: Hole, out: &mut Output<'_>) -> io::Result<()> {
         if let Some(held) = &self.held {
             self.holes.push((held.len(), hole));
@@ -209,7 +209,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// The recording ends at `time`. Lines of which nothing was found, or that were upside down, are a fault.
+    /// Ends the recording at `time`. Lines in which nothing was found, or that were inverted, are a fault.
     pub fn finish(mut self, time: Time, out: &mut Output<'_>) -> Result<(), Stop> {
         self.end(time, out)?;
         Ok(self.verdict(out)?)
@@ -237,7 +237,7 @@ impl PushDecoder {
         if !inverted || self.candidates.inverted.is_some() || out.tally.ok <= out.tally.faults() {
             return Ok(());
         }
-        let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";
+        let what = "the line is inverted: exchange A and B, or confirm it with --polarity inverted";
         Err(Fault::new(&self.file, At::File, what))
     }
 

@@ -70,7 +70,7 @@ impl Default for Rates {
 
 impl Rates {
     /// The mean rate as a share of the nominal one; none before a field was measured.
-    pub fn mean(&self) -> Option<f64> {
+    pub(crate) fn mean(&self) -> Option<f64> {
         (self.weight > 0.0).then(|| self.sum / self.weight)
     }
 
@@ -440,7 +440,7 @@ impl Fit {
     }
 }
 
-/// The nearest whole number, of what is not below -0.5.
+/// The nearest whole number, for values not below -0.5.
 #[inline]
 fn nearest(number: f64) -> f64 {
     (number + 0.5) as i64 as f64

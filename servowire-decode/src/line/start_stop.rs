@@ -18,12 +18,12 @@ pub struct LineField {
     pub end: Time,
     /// Spikes that were dropped before it or in it.
     pub spikes: u32,
-    /// For the first field of a speaker: the bits of the line from its start bit on, as long as he speaks, the first in
+    /// For the first field of a speaker: the bits of the line from its start bit on, as long as it speaks, the first in
     /// bit 0; those after it are 1. Otherwise 0.
     pub bits: u128,
 }
 
-/// A protocol on a start-stop line: takes fields, gives events.
+/// A protocol on a start-stop line: takes fields, returns events.
 pub trait StartStop {
     /// Content bits of a field: 8 or 16.
     const CONTENT_BITS: u32;

@@ -1,4 +1,4 @@
-//! Which frames are shown.
+//! Which frames to show.
 
 use std::collections::BTreeMap;
 
@@ -6,20 +6,20 @@ use super::printer::Origin;
 use crate::event::{Direction, Event, Place};
 use crate::time::Time;
 
-/// What the user wants to see; what is left empty lets everything through.
+/// What the user wants to see; an empty field lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Choice {
     /// The whole name of a frame or its last word, in any case.
     pub kinds: Vec<String>,
     /// Of an encoder, drive or device.
     pub address: Option<i64>,
-    /// Only what this encoder says, and what is asked of it; by its name, channel or address.
+    /// Only what this encoder sends and what is sent to it; by its name, channel or address.
     pub encoder: Option<String>,
     /// The first instant that is shown.
     pub from: Option<Time>,
-    /// From here on nothing is shown.
+    /// Nothing is shown from here on.
     pub to: Option<Time>,
-    /// Only what is refused.
+    /// Only refused frames.
     pub errors: bool,
 }
 

@@ -13,9 +13,9 @@ pub struct Lane {
     pub channel: String,
     /// Its channels by index.
     pub channels: Vec<u16>,
-    /// What is spoken on it.
+    /// Its protocol.
     pub protocol: &'static dyn Codec,
-    /// Bits a second, as the protocol has it.
+    /// Bits per second, by the protocol.
     pub rate: u32,
 }
 
@@ -36,20 +36,20 @@ impl Origin {
         self.lanes.get(self.speaks)
     }
 
-    /// Who says an event, or is asked by it.
+    /// Who sends an event, or is addressed by it.
     pub fn speaker(&self, event: &Event) -> Speaker {
         Speaker { lane: self.speaks, address: event.address }
     }
 
     /// Whether a speaker is meant by what a person wrote: its name, its channel, its address, or both as `A/3`.
-    pub fn is_meant(&self, speaker: Speaker, what: &str) -> bool {
+    pub(crate) fn is_meant(&self, speaker: Speaker, what: &str) -> bool {
         let channel = self.lanes.get(speaker.lane).map_or("", |lane| lane.channel.as_str());
         let address = speaker.address.map(|address| address.to_string());
         let both = what.rsplit_once('/').is_some_and(|(a, b)| a == channel && address.as_deref() == Some(b));
         what == channel || address.as_deref() == Some(what) || both || what == self.name(speaker)
     }
 
-    /// A name of a speaker for a person: its channel, where there are several, and its address. Empty where there is no other.
+    /// A readable name of a speaker: its channel, if there are several, and its address. Empty if there is no other speaker.
     pub fn name(&self, speaker: Speaker) -> String {
         let lane = self.lanes.get(speaker.lane).filter(|_| self.lanes.len() > 1);
         let address = speaker.address.map(|address| format!("address {address}"));
@@ -57,12 +57,12 @@ impl Origin {
     }
 }
 
-/// An encoder, drive or device: what it says goes together, and goes with nothing else.
+/// An encoder, drive or device, whose events belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Speaker {
     /// The number of its line, from 0.
     pub lane: usize,
-    /// Its address, where the protocol has one.
+    /// Its address, if the protocol has one.
     pub address: Option<u32>,
 }
 

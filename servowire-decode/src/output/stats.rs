@@ -21,16 +21,16 @@ pub struct Stats<W> {
     gathered: Gathered,
 }
 
-/// The figures of one that spoke, in words.
+/// The figures of one speaker, in words.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
-    /// Its name; empty where there is only one.
+    /// Its name; empty if there is only one.
     pub speaker: String,
     /// What is counted, and the figures; what belongs to the row above has no name.
     pub rows: Vec<(&'static str, String)>,
 }
 
-/// Figures of each encoder, drive or device by itself.
+/// Figures of each encoder, drive or device.
 #[derive(Debug, Default)]
 pub struct Gathered {
     /// Counts that a position may move from one frame to the next.
@@ -279,7 +279,7 @@ impl Gathered {
         }
     }
 
-    /// A table for each that spoke.
+    /// A table for each speaker.
     pub fn tables(&self, origin: &Origin) -> Vec<Table> {
         let one = |(speaker, figures): (&Speaker, &Figures)| Table {
             speaker: origin.name(*speaker),
@@ -315,7 +315,7 @@ impl<W: Write> Stats<W> {
         Self { out, json: false, gathered: Gathered::new(limit) }
     }
 
-    /// JSON Lines in place of tables.
+    /// JSON Lines instead of tables.
     #[must_use]
     pub fn in_json(self) -> Self {
         Self { json: true, ..self }

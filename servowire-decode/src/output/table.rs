@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Value, Verdict};
 
-/// Columns that every file has; those of the fields follow, and at last what has none.
+/// Columns that every file has; those of the fields follow, and finally what has no column of its own.
 const COLUMNS: [&str; 17] = [
     "file",
     "channel",

@@ -58,7 +58,7 @@ impl<W: Write> Text<W> {
         Self { headings: true, ..self }
     }
 
-    /// Lets refused frames stand out.
+    /// Highlights refused frames.
     #[must_use]
     pub fn with_colour(mut self) -> Self {
         self.line.colour = true;

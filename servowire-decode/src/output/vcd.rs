@@ -61,7 +61,7 @@ impl VcdOut {
         }
     }
 
-    /// Writes only what lies between two times of the capture, which are those of the file too.
+    /// Writes only what lies between two times of the capture; the file keeps these times.
     #[must_use]
     pub fn within(self, from: Time, to: Time) -> Self {
         Self { window: Some((from, to)), ..self }

@@ -54,7 +54,7 @@ pub(super) fn slipped_bit(raw: u128, len: u32, sound: impl Fn(u128) -> bool) -> 
         if sound(more(0)) || sound(more(1)) {
             return Some(LOST);
         }
-        sound((low | raw >> (at + 1) << at) & mask).then_some("a bit came twice, or one was added on the way")
+        sound((low | raw >> (at + 1) << at) & mask).then_some("a bit was doubled or inserted on the line")
     })
 }
 
@@ -66,10 +66,10 @@ pub(super) fn joined(bits: u128, behind: u128, at: i64) -> u128 {
 }
 
 /// What is said of an answer that came a bit short.
-pub(super) const LOST: &str = "a bit of it was lost on the way";
+pub(super) const LOST: &str = "a bit was lost on the line";
 
 /// What is said of an answer that ends early.
-pub(super) const CUT: &str = "it was cut: the encoder broke off, or somebody switched the line";
+pub(super) const CUT: &str = "it was cut short: the encoder stopped, or the line was switched";
 
 /// High bits at the end of a whole answer that say more of an idle line than of its check field.
 pub(super) const CUT_BITS: u32 = 5;
@@ -120,8 +120,8 @@ mod tests {
         let good = 0b1011_0111_0010_u128;
         let sound = |bits: u128| bits == good;
         // Bit 5 is missing; a bit came in at 3; all is well.
-        assert_eq!(slipped_bit(0b101_1011_0010, 12, sound), Some("a bit of it was lost on the way"));
-        assert_eq!(slipped_bit(0b1_0110_1110_1010, 12, sound), Some("a bit came twice, or one was added on the way"));
+        assert_eq!(slipped_bit(0b101_1011_0010, 12, sound), Some("a bit was lost on the line"));
+        assert_eq!(slipped_bit(0b1_0110_1110_1010, 12, sound), Some("a bit was doubled or inserted on the line"));
         assert_eq!(slipped_bit(0b1111, 12, sound), None);
         assert_eq!(slipped_bit(0, 12, sound), None);
     }

@@ -122,7 +122,7 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
     })
 }
 
-/// A table that cannot be is no answer, whatever its check says.
+/// An impossible table is not an answer, even if its check is right.
 fn contents(frame: &Frame<'_>) -> Verdict {
     match frame {
         Frame::Discovery(view) => match Network::new(*view) {

@@ -45,7 +45,7 @@ fn ordinary_traffic_is_named_once() {
     ip[13] = 0x00;
     let (ok, refused, said, fault) = decode(&[&ARP, &SYNC, &ip, &ARP, &SYNC]);
     assert_eq!((ok, refused, fault), (2, 0, None));
-    assert_eq!(said, "net: 3 packets of ordinary network traffic (ARP 2, IPv4 1) are passed over");
+    assert_eq!(said, "net: 3 packets of ordinary network traffic (ARP 2, IPv4 1) were skipped");
     let (ok, refused, said, fault) = decode(&[&ARP, &ip]);
     assert_eq!((ok, refused, said.as_str()), (0, 0, ""));
     assert!(fault.unwrap().contains("2 packets of ordinary network traffic (ARP 1, IPv4 1), and nothing else"));

@@ -94,7 +94,7 @@ impl Host {
     fn trouble(&self, stop: bool, worst: u16, nodes: &[Node]) -> Option<String> {
         for (axis, node) in (1..).zip(nodes) {
             if let Err(error) = node.set_up {
-                return Some(format!("the driver of axis {axis} does not take its settings: {error}"));
+                return Some(format!("the driver of axis {axis} does not accept its settings: {error}"));
             }
             if node.status.looks_unpowered() {
                 return Some(format!("the driver of axis {axis} has no supply"));

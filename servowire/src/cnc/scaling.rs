@@ -37,7 +37,7 @@ pub(super) fn table(out: &mut dyn Write) -> io::Result<()> {
         }
         writeln!(out)?;
     }
-    write!(out, "jitter: each port may add so much to a frame, in ns rms, that no two meet:")?;
+    write!(out, "jitter: what each port may add to a frame, in ns rms, before two frames meet:")?;
     for devices in [4, 7, 16, 64, 254] {
         let (mut good, mut bad) = (0, 1_000_000);
         while good + 1 < bad {

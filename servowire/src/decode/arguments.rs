@@ -11,10 +11,10 @@ use crate::units::moment;
 
 /// Decode captures of a line.
 ///
-/// Prints a transaction a line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
-/// polarity and bit rate are found from the capture; what was found is said on the error output. Exit code 0: all
-/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use; 4: all frames good, and a drive reported
-/// an alarm, did not answer or stood still; 5: both 1 and 4.
+/// Prints one transaction per line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
+/// polarity and bit rate are found from the capture; what was found is reported on standard error. Exit code 0: all
+/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use; 4: all frames good, but a drive reported an
+/// alarm, did not answer or stood still; 5: both 1 and 4.
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
   servowire decode line.vcd
@@ -25,12 +25,12 @@ use crate::units::moment;
 pub(crate) struct Decode {
     /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
     /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
-    /// comes through a pipe, else the captures that come with the program.
+    /// comes through a pipe, or else the bundled captures.
     pub(super) files: Vec<PathBuf>,
-    /// JSON Lines, an object a frame; times in picoseconds.
+    /// JSON Lines, one object per frame; times in picoseconds.
     #[arg(long)]
     pub(super) json: bool,
-    /// A table for spreadsheets, a row a frame, a column a field; times in microseconds.
+    /// A table for spreadsheets, one row per frame and one column per field; times in microseconds.
     #[arg(long, conflicts_with_all = ["json", "stats"])]
     pub(super) csv: bool,
     /// Figures instead of frames: errors by class, cycle time, answer delay, largest move of the position.
@@ -42,7 +42,7 @@ pub(crate) struct Decode {
     /// Write the capture as VCD, with the decoded fields beside it as strings.
     #[arg(short = 'o', long, value_name = "OUT")]
     pub(super) vcd: Option<PathBuf>,
-    /// Write only this piece of it, as 1ms..2ms, and show only its frames.
+    /// Write only this piece of it, such as 1ms..2ms, and show only its frames.
     #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, requires = "vcd", conflicts_with_all = ["from", "to"])]
     pub(super) cut: Option<(Time, Time)>,
     /// Stop at the first refused frame or missing answer.
@@ -51,10 +51,10 @@ pub(crate) struct Decode {
     /// Draw position and errors over time, and how long answers took.
     #[arg(long, value_name = "OUT")]
     pub(super) svg: Option<PathBuf>,
-    /// What is read, and how.
+    /// What to read, and how.
     #[command(flatten)]
     pub(super) reading: Reading,
-    /// Which frames are shown.
+    /// Which frames to show.
     #[command(flatten)]
     pub(super) filter: FilterArgs,
 }
@@ -63,7 +63,7 @@ pub(crate) struct Decode {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Filter")]
 pub(crate) struct FilterArgs {
-    /// Only frames of these kinds, as 3 or D (T-Format), ABS40, H-frame.
+    /// Only frames of these kinds, such as 3 or D (T-Format), ABS40, H-frame.
     #[arg(long, value_name = "KIND", value_delimiter = ',')]
     pub(super) id: Vec<String>,
     /// Only the encoder (EA), drive (MAC-ID) or device (SA) of this address.
@@ -72,13 +72,13 @@ pub(crate) struct FilterArgs {
     /// Only the encoder of this channel, address, or both as A/3, as the tables name it.
     #[arg(long, value_name = "NAME")]
     pub(super) encoder: Option<String>,
-    /// Only frames from this time of the capture on, as 20us, 1.5ms or 2s.
+    /// Only frames from this time of the capture on, such as 20us, 1.5ms or 2s.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
     pub(super) from: Option<Time>,
     /// Only frames before this time.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
     pub(super) to: Option<Time>,
-    /// Only what is refused.
+    /// Only refused frames.
     #[arg(long)]
     pub(super) errors: bool,
 }
@@ -92,7 +92,7 @@ pub(crate) enum Until {
 
 /// Two times with two dots between them.
 fn stretch(text: &str) -> Result<(Time, Time), String> {
-    let (from, to) = text.split_once("..").ok_or_else(|| format!("\"{text}\" is not two times, as 1ms..2ms"))?;
+    let (from, to) = text.split_once("..").ok_or_else(|| format!("\"{text}\" is not two times, such as 1ms..2ms"))?;
     let (from, to) = (moment(from)?, moment(to)?);
     if from < to { Ok((from, to)) } else { Err(format!("nothing lies in \"{text}\"")) }
 }

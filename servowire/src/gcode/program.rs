@@ -22,9 +22,9 @@ pub(crate) struct Line {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Item {
     Line(Line),
-    /// Come to rest, for so many ns.
+    /// Come to rest, for this many ns.
     Rest(u64),
-    /// From here on corners may be rounded by so many um; `None` as the machine has it.
+    /// From here on corners may be rounded by this many um; `None`: by the machine's setting.
     Deviation(Option<u32>),
 }
 
@@ -179,7 +179,7 @@ impl State {
                     let (group, what) = self.general(word.value, items)?;
                     let place = groups.get_mut(group).ok_or("no such group")?;
                     if let Some(other) = place.replace(word.value) {
-                        return Err(format!("G{other} and G{} in one line: only one of them can hold", word.value));
+                        return Err(format!("G{other} and G{} in one line: only one of them can apply", word.value));
                     }
                     smooth |= tenths(word.value) == 640;
                     once = what.or(once);
@@ -319,7 +319,7 @@ impl State {
             }
             Some(Once::Shift) => {
                 if !moves {
-                    return Err("G92 needs X, Y or Z: what the place is called from here on".to_owned());
+                    return Err("G92 needs X, Y or Z: the coordinates that this place has from here on".to_owned());
                 }
                 for ((shift, at), axis) in self.shift.iter_mut().zip(self.at).zip(numbers.axes) {
                     if let Some(word) = axis {
@@ -361,7 +361,7 @@ impl State {
         let feed = match (self.motion, self.feed) {
             (Motion::None, _) => return Err("no G0 to G3 before it".to_owned()),
             (Motion::Cancelled, _) => {
-                return Err("G80 has cancelled the motion: a G0 to G3 begins it again".to_owned());
+                return Err("G80 has cancelled the motion mode: G0 to G3 sets it again".to_owned());
             }
             (Motion::Straight { rapid: true }, _) => None,
             (_, Some(feed)) => Some((feed * 1000.0 / 60.0).round() as u32),
@@ -410,7 +410,7 @@ impl State {
             return Ok([from[0] + i, from[1] + j]);
         };
         if numbers.center.iter().any(Option::is_some) {
-            return Err("R beside I, J and K: an arc has one of them".to_owned());
+            return Err("R together with I, J or K: an arc takes one or the other".to_owned());
         }
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let chord = x.hypot(y);
@@ -440,7 +440,7 @@ impl State {
         let units = |place: [f64; 2]| place.map(|mm| (mm * 1e4).round() as i32);
         let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, CHORD)
             .map_err(|e| {
-                format!("{e}, in 0.1 um: begin and end are not on one circle around the center, or it is none")
+                format!("{e}, in 0.1 um: start and end are not on one circle around the center, or its radius is 0")
             })?
             .map(|chord| chord.map(|part| f64::from(part) / 1e4))
             .collect();

@@ -22,11 +22,11 @@ impl FromStr for Setup {
         let (name, settings) =
             text.split_once(':').ok_or("X, Y or Z, a colon, and settings: X:steps-per-mm=80,speed=6000")?;
         let axis = ["X", "Y", "Z"].iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()));
-        let axis = axis.ok_or_else(|| format!("\"{name}\" is no axis: X, Y or Z"))?;
+        let axis = axis.ok_or_else(|| format!("\"{name}\" is not an axis: X, Y or Z"))?;
         let mut new = Self { axis, steps_per_mm: None, speed: None, acceleration: None, jerk: None };
         for setting in settings.split(',') {
             let (key, value) =
-                setting.split_once('=').ok_or_else(|| format!("\"{setting}\" is no setting: speed=6000"))?;
+                setting.split_once('=').ok_or_else(|| format!("\"{setting}\" is not a setting, such as speed=6000"))?;
             let place = match key.trim() {
                 "steps-per-mm" => &mut new.steps_per_mm,
                 "speed" => &mut new.speed,
@@ -49,7 +49,7 @@ impl FromStr for Setup {
 }
 
 impl Setup {
-    /// An axis with what is not said here as in `other`.
+    /// An axis that takes what is not given here from `other`.
     pub(super) fn over(&self, other: AxisSetup) -> Result<AxisSetup, String> {
         let steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
         let per_mm = f64::from(steps_per_m) / 1000.0;

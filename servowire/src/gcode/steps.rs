@@ -19,7 +19,7 @@ pub(crate) struct Steps {
     per_mm: [f64; AXES],
     deviation: u32,
     line: Option<LinePulses<AXES>>,
-    /// Nothing goes on before a rest of so many ns.
+    /// Nothing moves before a rest of this many ns has ended.
     rest: Option<u64>,
     /// When the last line ends, in ns.
     end: u64,

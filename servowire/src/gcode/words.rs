@@ -32,7 +32,7 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
         match letter {
             ';' => break,
             '(' => {
-                left.by_ref().find(|c| *c == ')').ok_or("a comment without its end: \")\" is missing")?;
+                left.by_ref().find(|c| *c == ')').ok_or("unterminated comment: \")\" is missing")?;
             }
             _ if letter.is_whitespace() => {}
             _ if letter.is_ascii_alphabetic() => {
@@ -48,12 +48,12 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
                         return Err(format!("{letter}: values are numbers, not variables or sums; write the number"));
                     }
                     (Err(_), _) if digits.is_empty() => return Err(format!("{letter} has no number")),
-                    (Err(_), _) => return Err(format!("{letter}{digits}: \"{digits}\" is no number")),
+                    (Err(_), _) => return Err(format!("{letter}{digits}: \"{digits}\" is not a number")),
                 };
                 out.words.push(Word { letter, value });
             }
             '#' | '[' => return Err("values are numbers, not variables or sums; write the number".to_owned()),
-            _ => return Err(format!("\"{letter}\" is no G-code: a word is a letter and a number")),
+            _ => return Err(format!("\"{letter}\" is not G-code: a word is a letter and a number")),
         }
     }
     // The number of a line, and of a program.

@@ -56,7 +56,7 @@ pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Drawn<String> {
     let stretches = stretches(profile, steps);
     let k = profile.parameters().steps_per_entry;
     let title = format!(
-        "{steps} steps at {:.3} kHz, {k} steps a ramp entry: {:.3} ms",
+        "{steps} steps at {:.3} kHz, {k} steps per ramp entry: {:.3} ms",
         65_536_000.0 / f64::from(profile.parameters().speed.raw()),
         profile.duration_ns(steps) as f64 / 1e6
     );

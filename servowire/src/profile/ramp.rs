@@ -48,10 +48,12 @@ pub(super) fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> 
     }
     let shape = profile.shape(steps);
     let proved = if profile.pru_is_exact() { "exact" } else { "outside its proved domain (68.045 kHz and above)" };
-    writeln!(out, "speed constant  {}, a step each {exact:.3} ns ({:.3} kHz)", parameters.speed.raw(), 1e6 / exact)?;
+    writeln!(out, "speed constant  {}, a step every {exact:.3} ns ({:.3} kHz)", parameters.speed.raw(), 1e6 / exact)?;
     match parameters.arithmetic {
-        Arithmetic::Carried => writeln!(out, "full speed      on average as asked, fractions of a ns are carried on")?,
-        _ => writeln!(out, "full speed      a step each {full} ns, {:.1} ppm fast", (exact - full) / full * 1e6)?,
+        Arithmetic::Carried => {
+            writeln!(out, "full speed      on average as asked, fractions of a ns are carried over")?;
+        }
+        _ => writeln!(out, "full speed      a step every {full} ns, {:.1} ppm fast", (exact - full) / full * 1e6)?,
     }
     writeln!(
         out,

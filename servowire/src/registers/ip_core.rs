@@ -14,17 +14,17 @@ const ERR: u8 = 0x20;
 pub(super) fn write(mut map: Registers, bank: bool, out: &mut String) -> fmt::Result {
     let link = if map.link() { "up" } else { "down" };
     line(out, "link", format_args!("{link}, quality {} of 15", map.quality()))?;
-    line(out, "online status", "no register of this core: it comes with every access")?;
+    line(out, "online status", "not a register of this core: it is returned with every access")?;
     let id = identity(&map, out)?;
     let [p4, p3, p2, p1, p0] = map.get(Register::Pos);
     let raw = u64::from_be_bytes([0, 0, 0, p4, p3, p2, p1, p0]);
     let [v2, v1, v0] = map.get(Register::Vel);
     let velocity = i32::from_be_bytes([v2, v1, v0, 0]) >> 8;
     if map.link() {
-        let condition = "to be used only while POS is clear in the online status";
+        let condition = "valid only while POS is clear in the online status";
         line(out, "fast position", format_args!("{}, {velocity} steps a frame, {condition}", number(id, raw)))?;
     } else {
-        line(out, "fast position", "none to be used: the link is down")?;
+        line(out, "fast position", "not usable: the link is down")?;
     }
     let summary = byte(&map, MIR_SUM);
     let crc = check(&map, MIR_SUM, Register::VPos, Register::VPosCrc);

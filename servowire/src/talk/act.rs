@@ -66,7 +66,7 @@ const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::
 /// The position and the degrees that it is, if it may be shown; why not otherwise.
 fn place(all: &AllData) -> Result<(Sample, f64), String> {
     let Some(Hint { resolution, .. }) = Resolution::from_enid(all.enid) else {
-        return Err(format!(" (encoder ID {:#04x} says nothing of their widths)", all.enid));
+        return Err(format!(" (encoder ID {:#04x} does not tell their widths)", all.enid));
     };
     let judged = Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN);
     let sample = judged.map_err(|doubt| format!(": {doubt}"))?;

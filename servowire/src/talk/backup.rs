@@ -169,7 +169,7 @@ impl TryFrom<File> for Backup {
 
 fn page(number: usize, text: &str) -> Result<PageData, String> {
     let byte =
-        |word: &str| u8::from_str_radix(word, 16).map_err(|_| format!("page {number}: {word:?} is no byte in hex"));
+        |word: &str| u8::from_str_radix(word, 16).map_err(|_| format!("page {number}: {word:?} is not a byte in hex"));
     let bytes = text.split(' ').map(byte).collect::<Result<Vec<_>, _>>()?;
     let count = bytes.len();
     bytes.try_into().map_err(|_| format!("page {number} has {count} bytes instead of {PAGE_LEN}"))

@@ -223,7 +223,7 @@ impl<P: Port> Encoder<P> {
             let error = match self.link.exchange(Request::read_eeprom(Address::PAGE_REGISTER)) {
                 Ok(Response::ReadEeprom(memory)) if !memory.adf.busy() => {
                     let none =
-                        || Fault::Input(format!("the page register holds {:#04x}, which is no page", memory.edf));
+                        || Fault::Input(format!("the page register holds {:#04x}, which is not a page", memory.edf));
                     return Page::new(memory.edf).ok_or_else(none);
                 }
                 Ok(_) => Fault::Encoder(Error::Busy { tries }),
@@ -247,6 +247,6 @@ impl<P> From<Link<P>> for Encoder<P> {
 
 /// The widths that an encoder ID tells.
 fn resolution(enid: u8) -> Result<Resolution, Fault> {
-    let unknown = || Fault::Input(format!("encoder ID {enid:#04x} says nothing of its widths: nothing was sent"));
+    let unknown = || Fault::Input(format!("encoder ID {enid:#04x} does not tell its widths: nothing was sent"));
     Resolution::from_enid(enid).map(|hint| hint.resolution).ok_or_else(unknown)
 }

@@ -16,19 +16,19 @@ pub enum Fault {
     #[error("the output cannot be written: {0}")]
     Output(io::Error),
     /// The port failed.
-    #[error("the port is gone or refuses: {0}")]
+    #[error("the port is gone or refused: {0}")]
     Io(#[from] io::Error),
     /// Nobody has answered well, not even once.
     #[error("{0}: is the encoder's power on, is {1} Mbit/s its rate, are A and B the right way round?")]
     Nobody(tformat::Error, f64),
-    /// The answer was refused, or there was none.
+    /// The answer was refused or missing.
     #[error("{0}")]
     Encoder(#[from] tformat::Error),
     /// The request came back, and nothing else.
-    #[error("only the own request came back: no encoder is there, it has no power, or A and B are swapped")]
+    #[error("only our own request came back: no encoder is connected, it has no power, or A and B are swapped")]
     OnlyEcho,
     /// The page register holds another page than before, and could not be put back.
-    #[error("{because}; the page register could not be put back, it held {page}")]
+    #[error("{because}; the page register could not be restored; it held {page}")]
     PageLeft {
         /// What it held.
         page: u8,

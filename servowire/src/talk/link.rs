@@ -126,7 +126,7 @@ impl<P: Port> Link<P> {
                 Err(error) => return Err(error.into()),
             }
         }
-        Err(Fault::Input("the line does not become quiet".to_owned()))
+        Err(Fault::Input("the line does not go quiet".to_owned()))
     }
 
     /// A good answer in its place: at the end of what came, or one byte before it; after the echo, if the adapter hears itself,

@@ -48,7 +48,7 @@ pub fn open(name: &str, rate: BitRate) -> Result<Box<dyn SerialPort>, Fault> {
             Io(io::ErrorKind::PermissionDenied) => {
                 format!("{error}; on Linux your user has to be in the group that owns the port, often dialout")
             }
-            _ => format!("this is no serial port, or it makes no {} Mbit/s: {error}", megabits(rate)),
+            _ => format!("this is not a serial port, or it does not support {} Mbit/s: {error}", megabits(rate)),
         };
         Fault::Port(format!("{name}: {text}"))
     })
@@ -79,7 +79,7 @@ pub(super) fn about(name: &str, rate: BitRate) -> Vec<String> {
     let device = name.rsplit('/').next().unwrap_or(name);
     if let Ok(timer) = std::fs::read_to_string(format!("/sys/bus/usb-serial/devices/{device}/latency_timer")) {
         let timer = timer.trim();
-        lines.push(format!("latency timer {timer} ms: that long the adapter holds short answers back"));
+        lines.push(format!("latency timer {timer} ms: the adapter holds short answers back for that long"));
         if timer != "1" {
             lines
                 .push(format!("to read faster: echo 1 > /sys/bus/usb-serial/devices/{device}/latency_timer (as root)"));
@@ -94,8 +94,8 @@ fn made_rate(vid: u16, pid: u16, rate: BitRate) -> String {
     // FTDI H types: 12 MHz divided by eighths; the others: 3 MHz by eighths, nothing between 2 and 3 MHz.
     let made = match (vid, pid) {
         (0x0403, 0x6010 | 0x6011 | 0x6014) => Some(12e6 / ((12e6 / asked * 8.0).floor() / 8.0)),
-        (0x0403, 0x6001 | 0x6015) => return ": this chip makes neither 2.5 nor 5 Mbit/s, take an FT232H".to_owned(),
-        (0x10c4, 0xea60) => return ": this chip makes neither 2.5 nor 5 Mbit/s well, take an FT232H".to_owned(),
+        (0x0403, 0x6001 | 0x6015) => return ": this chip makes neither 2.5 nor 5 Mbit/s: use an FT232H".to_owned(),
+        (0x10c4, 0xea60) => return ": this chip makes neither 2.5 nor 5 Mbit/s well: use an FT232H".to_owned(),
         _ => None,
     };
     made.map_or_else(String::new, |made| {

@@ -53,7 +53,7 @@ impl Echo {
 pub enum Said {
     /// A request, and what came of it.
     Request(Request, Result<Response, Fault>),
-    /// Bytes that are not one.
+    /// Bytes that do not form one.
     Junk(Vec<u8>),
 }
 
@@ -105,7 +105,7 @@ pub fn run<M: Port, E: Port>(
             echo.sent(frame.as_bytes());
         }
         let gone = match &outcome {
-            Err(Fault::Io(error)) => Some(Fault::Port(format!("the encoder's port is gone or refuses: {error}"))),
+            Err(Fault::Io(error)) => Some(Fault::Port(format!("the encoder's port is gone or refused: {error}"))),
             _ => None,
         };
         log(&Said::Request(request, outcome))?;

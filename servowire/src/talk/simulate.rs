@@ -21,7 +21,7 @@ pub struct Simulated {
     pub rate: BitRate,
     /// Encoder ID.
     pub id: u8,
-    /// Turns of the shaft a minute.
+    /// Speed of the shaft in turns per minute.
     pub rpm: f64,
     /// Whether the adapter hears itself: what comes first after an answer, and is the same, is thrown away.
     pub echo: bool,

@@ -21,20 +21,19 @@ pub(super) struct Arguments {
     /// Bits a second, 2.5M, 4M, 6.67M, 8M or 16M.
     #[arg(long, value_name = "HZ", default_value = "4M", value_parser = rate)]
     rate: BitRate,
-    /// What is asked for, by name (ABS24_LOW) or code: ABS40 by default, ABS40_MT of several encoders.
+    /// What to ask for, by name (ABS24_LOW) or code; ABS40 by default, ABS40_MT for several encoders.
     #[arg(long, value_name = "COMMAND", value_parser = command)]
     command: Option<Command>,
     /// The addresses of the encoders.
     #[arg(long, value_name = "LIST", default_value = "0", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=7))]
     addresses: Vec<u8>,
-    /// The responses close up where an address is not there; without it each waits for the place of its address. No document
-    /// says which.
+    /// Responses close up where an address is missing; by default each keeps the place of its address. No document says which.
     #[arg(long)]
     closed_up: bool,
     /// Length of the cable in metres, 5 ns a metre each way.
     #[arg(long, value_name = "M", default_value_t = 0)]
     cable: u16,
-    /// From the end of the request to the first response, at the encoder, in ns. No document says it; one vendor's simulated
+    /// From the end of the request to the first response, at the encoder, in ns. No document gives it; one vendor's simulated
     /// encoder waits 2800.
     #[arg(long, value_name = "NS", default_value_t = 2_800)]
     turn_around: u32,
@@ -56,7 +55,7 @@ fn rate(text: &str) -> Result<BitRate, String> {
 fn command(text: &str) -> Result<Command, String> {
     let named = Command::ALL.into_iter().find(|command| command.name().eq_ignore_ascii_case(text));
     let coded = text.parse().ok().and_then(Command::from_code);
-    named.or(coded).ok_or_else(|| "a name as ABS40 or STATUS_MT, or a code from 0 to 30".to_owned())
+    named.or(coded).ok_or_else(|| "a name such as ABS40 or STATUS_MT, or a code from 0 to 30".to_owned())
 }
 
 /// Any request with this command: arguments do not change the times.
@@ -87,7 +86,7 @@ impl Arguments {
         let several = on_line.len() > 1;
         let command = self.command.unwrap_or(if several { Command::Abs40Mt } else { Command::Abs40 });
         if several && !command.is_multi_response() {
-            return Err(format!("{command} asks one encoder, and {} are named", on_line.len()).into());
+            return Err(format!("{command} addresses one encoder, but {} are named", on_line.len()).into());
         }
         let request = Request::new(highest, operation(command));
         let line = Line::new(rate).with_highest(highest);
@@ -149,7 +148,7 @@ fn free(request: Request, on_line: Addresses, line: Line, responses: &[Heard]) -
             (1..).zip(&heard.contents).map(move |(k, content)| (*content, heard.start_ns + k * frame_ns))
         })
     };
-    let unheard = "the response begins sooner after the request than the controller takes it for an answer";
+    let unheard = "the response begins so soon after the request that the controller does not accept it as an answer";
     if request.command().is_multi_response() {
         let start = || BusTransaction::start(request, Resolution::default(), on_line, line, 0);
         let (mut heard, mut lost) = (start(), start());

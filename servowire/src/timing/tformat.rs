@@ -13,7 +13,7 @@ pub(super) struct Arguments {
     /// Bits a second, 2.5M or 5M.
     #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
-    /// What is asked for, one hex digit: 0 position, 1 turns, 2 encoder ID, 3 all, 6 and D EEPROM, 7, 8 and C reset.
+    /// What to ask for, one hex digit: 0 position, 1 turns, 2 encoder ID, 3 all, 6 and D EEPROM, 7, 8 and C reset.
     #[arg(long, value_name = "ID", default_value = "3", value_parser = data_id)]
     id: DataId,
     /// Length of the cable in metres, 5 ns a metre each way.

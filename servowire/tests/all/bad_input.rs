@@ -144,7 +144,7 @@ fn raw_damaged() {
         .decode("a.raw", odd, &["--rate", "20M", "--unit-size", "2"])
         .fails_with("1 bytes are left, where a sample has 2");
     let slow = good_traffic(2.5e6).raw(8e6, 0);
-    bench.decode("slow.raw", slow, &["--rate", "8M"]).fails_with("3.2 samples a bit are too few");
+    bench.decode("slow.raw", slow, &["--rate", "8M"]).fails_with("3.2 samples per bit are too few");
     bench
         .decode("flat.raw", [0xff; 5000], &["--rate", "20M"])
         .fails_with("no traffic: at most 0 edges on any of 8 channels");
@@ -188,7 +188,7 @@ fn sigrok_text_whose_channels_differ() {
     let run = bench.decode("a.bits", format!("{head}D0:11111111 0000\nD1:1111\nD0:1111\nD1:0000\n"), &[]);
     run.fails_with("the lines of a round have different numbers of samples");
     let run = bench.decode("a.bits", format!("{head}D0:1111\nD1:1111\nD0:1111\nD0:0000\n"), &[]);
-    run.fails_with("line 6: a channel comes twice in a round of lines");
+    run.fails_with("line 6: a channel occurs twice in one round of lines");
     let many = (0..2000).map(|k| format!("D{k}:1111\n")).collect::<Vec<_>>().concat();
     bench.decode("a.bits", format!("{head}{many}"), &[]).fails_with("more than 1024 channels");
 }
@@ -230,7 +230,7 @@ fn packed_files_cut_off() {
     packer.write_all(wave.vcd().as_bytes()).unwrap();
     let packed = packer.finish().unwrap();
     let run = bench.decode("a.vcd.gz", &packed[..packed.len() / 2], &["--json"]);
-    run.fails_with("what is packed in it ends too early: it was cut off");
+    run.fails_with("its packed content ends too early: it was cut off");
     assert!(run.json().len() > 1000, "{}", run.json().len());
     bench.decode("b.vcd.gz", &packed[..60], &[]).fails_with("it was cut off");
     let zstd = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/samples/hpm-uart.vcd.zst")).unwrap();

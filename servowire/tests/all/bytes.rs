@@ -155,7 +155,9 @@ fn what_a_log_looks_like() {
         (&nikon, "rtex", "A-format: 20 of 20"),
     ] {
         let run = bench.decode("log.txt", text, &["--bytes", "-p", wrong]);
-        run.fails_with(&format!("it looks like {right} frames hold so; leave out what says otherwise"));
+        run.fails_with(&format!(
+            "it looks like {right} frames are valid that way; leave out the option that says otherwise"
+        ));
     }
     for (text, right) in [(&tformat, "tformat"), (&nikon, "nikon")] {
         let run = bench.decode("log.txt", text, &["--bytes", "-p", right]);

@@ -55,7 +55,7 @@ fn a_status_that_contradicts_the_alarms() {
     // SF left at 0: some encoders do so.
     let silent = sealed(&[0x1a, 0x00, 1, 0, 0, 0x17, 0, 0, 0, 0x04]);
     wave.exchange(&[0x1a], &id3(1, 0, 0x40)).exchange(&[0x1a], &wrong).exchange(&[0x1a], &silent);
-    assert_eq!(notes(&wave), ["SF does not say what ALMC says: EA0 is due"]);
+    assert_eq!(notes(&wave), ["SF contradicts ALMC: EA0 is expected"]);
 }
 
 #[test]

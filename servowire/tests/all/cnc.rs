@@ -204,7 +204,7 @@ fn a_driver_says_what_it_has() {
         ("2@500=BPDF", "the driver of axis 2 reports BPDF"),
         ("4@500=stdlat", "the driver of axis 4 reports STDLAT"),
         ("1@500=unpowered", "the driver of axis 1 has no supply"),
-        ("3@0=unpowered", "the driver of axis 3 does not take its settings: DRV8711 register 1 reads 0xbff"),
+        ("3@0=unpowered", "the driver of axis 3 does not accept its settings: DRV8711 register 1 reads 0xbff"),
     ] {
         let output = servowire(&["cnc", "--steps", "3000", "--driver-fault", fault]);
         assert!(failure(&output).contains(line), "{fault}: {output:?}");

@@ -61,7 +61,7 @@ fn a_frame_bit_by_bit() {
     bench.decode("a.txt", "1A\n", &["--bytes"]);
     let log = bench.path("a.txt");
     let run = common::servowire(&["explain", log.to_str().unwrap(), "--bytes", "--at", "1us"]);
-    run.fails_with("no frame on a line is found");
+    run.fails_with("no frame was found on a line");
 }
 
 #[test]

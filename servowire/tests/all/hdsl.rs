@@ -108,7 +108,7 @@ fn a_stream_of_bits() {
     // At another rate four samples a bit are needed.
     bench
         .decode("bits.bin", [0x5a; 400], &["--format", "packed", "--rate", "9M"])
-        .fails_with("samples a bit are too few");
+        .fails_with("samples per bit are too few");
 }
 
 #[test]

@@ -158,7 +158,7 @@ fn a_pipe_that_is_silent_at_first() {
     assert!(said.status.success());
     let (out, err) = (String::from_utf8(said.stdout).unwrap(), String::from_utf8(said.stderr).unwrap());
     assert!(
-        out.contains("captures/hpm-uart-readme.vcd") && err.contains("nothing comes from the standard input"),
+        out.contains("captures/hpm-uart-readme.vcd") && err.contains("nothing has arrived on standard input"),
         "{err}"
     );
 }

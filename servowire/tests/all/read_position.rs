@@ -115,7 +115,7 @@ fn nobody_gives_no_position() {
     let (said, error) = say(SHORT, |_, _| Vec::new());
     assert_eq!((said, error.as_str()), (vec![], "no response"));
     let (said, error) = say(SHORT, |heard, _| heard.to_vec());
-    let only = "only the own request came back: no encoder is there, it has no power, or A and B are swapped";
+    let only = "only our own request came back: no encoder is connected, it has no power, or A and B are swapped";
     assert_eq!((said, error.as_str()), (vec![], only));
 }
 

@@ -49,7 +49,7 @@ fn channels_of_a_sigrok_session() {
     }
     // Which has no names.
     common::decode(&sample("demo-3of4.ols"), &[]).fails_with("channel \"1\" runs at about 1.00 Mbit/s");
-    common::decode(&sample("demo-3of4.sr"), &["--channel", "D1"]).fails_with("samples a bit are too few");
+    common::decode(&sample("demo-3of4.sr"), &["--channel", "D1"]).fails_with("samples per bit are too few");
 }
 
 /// A byte order mark, a blank in a name, SystemVerilog types, a vector by its bits.

@@ -139,7 +139,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     // A backup is not overwritten.
     let output = bench.talk(&["eeprom", "backup", "--pages", "1", &first]);
     assert_eq!(output.status.code(), Some(1));
-    assert_eq!(text(&output), format!("{first}: there is such a file already; backups are not overwritten\n"));
+    assert_eq!(text(&output), format!("{first}: the file already exists; backups are not overwritten\n"));
 
     let mut pages = backup.pages().to_vec();
     pages[1][0] = 0x12;
@@ -150,7 +150,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     assert!(text(&output).contains("nothing was written"), "{}", text(&output));
     // Where the memory would go is a file already: nothing is written.
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &first, &second]);
-    assert_eq!(text(&output), format!("{first}: there is such a file already; backups are not overwritten\n"));
+    assert_eq!(text(&output), format!("{first}: the file already exists; backups are not overwritten\n"));
     let output =
         bench.talk(&["--json", "eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &before, &second]);
     assert_eq!(text(&output), format!("{{\"backup\":\"{before}\",\"differed\":1,\"written\":1}}\n"));
@@ -165,7 +165,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
         std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     assert_eq!(names.filter(|name| name.starts_with("before.before-20")).count(), 1);
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", &first]);
-    assert_eq!(text(&output), "the memory holds this already: nothing was written\n");
+    assert_eq!(text(&output), "the memory already holds this: nothing was written\n");
     // A file that was touched by hand.
     let touched = std::fs::read_to_string(&second).unwrap().replacen("12 ff", "13 ff", 1);
     std::fs::write(&second, touched).unwrap();
@@ -336,7 +336,7 @@ fn what_is_wrong_is_said() {
     File::create(&empty).unwrap();
     let empty = empty.to_str().unwrap();
     let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
-    assert!(said.starts_with(&format!("{empty}: this is no backup: ")), "{said}");
+    assert!(said.starts_with(&format!("{empty}: this is not a backup: ")), "{said}");
     let said = at(&bench.name, &["eeprom", "dump", "--pages", "7"]);
     assert!(said.ends_with("it has no page 6\n"), "{said}");
     bench.end();
@@ -376,7 +376,7 @@ fn an_encoder_that_is_not_there_is_said_to_be_so() {
     bench.end();
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output).contains(": the port is gone or refuses: "), "{}", text(&output));
+    assert!(text(&output).contains(": the port is gone or refused: "), "{}", text(&output));
     let counted = String::from_utf8_lossy(&output.stdout);
     assert!(counted.lines().last().unwrap().ends_with(" good, 0 refused or missing"), "{counted}");
 }

@@ -271,7 +271,7 @@ fn a_restore_that_is_broken_off_can_be_finished() {
         }
         if adapter.page() != 3 {
             assert!(matches!(&fault, Fault::PageLeft { page: 3, .. }), "after {after}: {fault}");
-            assert!(fault.to_string().ends_with("the page register could not be put back, it held 3"), "{fault}");
+            assert!(fault.to_string().ends_with("the page register could not be restored; it held 3"), "{fault}");
         }
     }
     assert!(broken > 20, "{broken}");
@@ -297,7 +297,7 @@ fn resets_are_read_back() {
     // An ID that tells no widths: its position cannot be judged.
     let unknown = Adapter::new(0x33);
     let fault = unknown.encoder().zero_turns_and_lose_multi_turn_reference(0).unwrap_err();
-    assert_eq!(fault.to_string(), "encoder ID 0x33 says nothing of its widths: nothing was sent");
+    assert_eq!(fault.to_string(), "encoder ID 0x33 does not tell its widths: nothing was sent");
     // ID 3 by `open`, which tries twice with an echo first, and once more.
     assert!(unknown.0.borrow().asked <= 4);
 }

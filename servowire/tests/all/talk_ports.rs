@@ -141,5 +141,5 @@ impl Port for Gone {
 #[test]
 fn a_port_that_is_gone_is_said_to_be_gone() {
     let fault = Link::open(Gone, Duration::from_millis(10)).unwrap_err();
-    assert!(fault.to_string().starts_with("the port is gone or refuses: "), "{fault}");
+    assert!(fault.to_string().starts_with("the port is gone or refused: "), "{fault}");
 }

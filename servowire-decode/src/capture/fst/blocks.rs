@@ -41,7 +41,7 @@ pub(super) fn check(file: &mut dyn SeekRead) -> Result<(), String> {
         }
         let after = (at + 1).checked_add(length).filter(|after| got > 8 && length >= 8 && *after <= end);
         let Some(after) = after else {
-            return Err("not whole: a block ends beyond the end of the file, so it was cut off or is damaged".into());
+            return Err("incomplete: a block ends beyond the end of the file, so it was cut off or is damaged".into());
         };
         let too_large = |unpacked: u64| unpacked > MOST || unpacked > length * PACKED;
         // The number of variables, of which each takes a byte at least.

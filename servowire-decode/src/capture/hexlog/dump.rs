@@ -85,7 +85,7 @@ impl Dump {
             let group = group.strip_prefix("0x").unwrap_or(group);
             if self == Self::Bits {
                 let byte = u8::from_str_radix(group, 2);
-                bytes.push(byte.map_err(|_| format!("{group:?} is no byte in bits"))?);
+                bytes.push(byte.map_err(|_| format!("{group:?} is not a byte in bits"))?);
                 continue;
             }
             if group.len() % 2 != 0 || !group.bytes().all(|b| b.is_ascii_hexdigit()) {
@@ -106,7 +106,7 @@ impl Dump {
     }
 }
 
-/// Whether the text beside the bytes is theirs if those of each word are taken from its end, and only then.
+/// Whether the text beside the bytes matches them only if the bytes of each word are read from its end.
 fn is_swapped(rest: &str, columns: usize) -> bool {
     let Some((groups, text)) = rest.split_at_checked(columns) else { return false };
     let (groups, text) = (groups.split_whitespace().collect::<Vec<_>>(), text.trim());

@@ -203,7 +203,7 @@ fn bytes(word: &str, out: &mut Vec<u8>) -> Result<(), String> {
         };
         let single = prefixed.is_some() && digits.len() == 1;
         if digits.is_empty() || digits.len() % 2 != 0 && !single || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
-            return Err(format!("\"{word}\" is not bytes in hex: two digits each, as in 1A 20 29"));
+            return Err(format!("\"{word}\" is not bytes in hex: two digits each, such as 1A 20 29"));
         }
         out.extend(digits.as_bytes().chunks(2).map(|pair| pair.iter().fold(0, |n, &d| n << 4 | nibble(d))));
     }

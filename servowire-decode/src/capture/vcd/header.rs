@@ -126,7 +126,7 @@ impl Header {
                     let tick = femtoseconds(&said).ok_or_else(|| {
                         words
                             .input
-                            .fault(At::Line(words.line), format!("not VCD in the header: {said:?} is no time scale"))
+                            .fault(At::Line(words.line), format!("not VCD in the header: {said:?} is not a time scale"))
                     })?;
                     header.tick = tick;
                 }

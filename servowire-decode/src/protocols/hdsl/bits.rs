@@ -73,7 +73,7 @@ pub(super) struct Mark {
     /// Number of the bit that begins there.
     pub(super) bit: u64,
     pub(super) time: Time,
-    /// The level from there on.
+    /// The level after it.
     pub(super) level: bool,
     /// Up to the next mark all edges lie on a grid of samples.
     pub(super) grid: Option<Grid>,
@@ -150,7 +150,7 @@ impl Bits {
         if bits > 0 { time as f64 / bits as f64 } else { self.nominal as f64 }
     }
 
-    /// A head of so many bits begins at bit `at`: measured are the first ones, then some of them.
+    /// A head of this many bits begins at bit `at`: the first ones are all measured, later only some.
     pub(super) fn heard_head(&mut self, at: u64, len: u64) {
         self.heard.heads += 1;
         if self.heard.heads > MEASURED && self.heard.heads % SOME != 0 {

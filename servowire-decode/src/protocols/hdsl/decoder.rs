@@ -280,7 +280,7 @@ impl Decoder {
         let place = bits.place(from + u64::from(delay)..from + u64::from(delay + ANSWER_BITS));
         let silent = line(0).bits().trailing_ones() > 56;
         if score < 4 || silent {
-            let why = if silent { "no answer" } else { "hardly a word of the answer holds" };
+            let why = if silent { "no answer" } else { "hardly any word of the answer is valid" };
             let class = if silent { NO_RESPONSE } else { "invalid_word" };
             let verdict = Err((class, why.to_owned()));
             self.step(None);

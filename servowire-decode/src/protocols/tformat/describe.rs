@@ -169,7 +169,7 @@ impl Encoder {
 const NOTHING: AllData =
     AllData { sf: StatusField::empty(), abs: Abs::truncate(0), enid: 0, abm: Abm::truncate(0), almc: Almc::empty() };
 
-/// Where the fields put the shaft, for looking at. What else speaks against it stands beside it: alarms, damage, another
+/// Where the fields put the shaft, for looking at. Other reasons against its use are shown beside it: alarms, damage, another
 /// encoder ID.
 fn shown(full: AllData, resolution: Resolution, tolerated: Tolerated) -> Result<Sample, Doubt> {
     let fields = AllData { abs: full.abs, abm: full.abm, ..NOTHING };
@@ -192,7 +192,7 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
     if let Response::ReadAll(full) = response {
         // Encoders that leave SF at 0 do so always.
         if full.sf.bits() != 0 && !full.sf.agrees_with(full.almc) {
-            out.push(format!("SF does not say what ALMC says: {} is due", StatusField::of_alarms(full.almc)));
+            out.push(format!("SF contradicts ALMC: {} is expected", StatusField::of_alarms(full.almc)));
         }
     }
     out

@@ -75,7 +75,7 @@ impl Frame {
         ControlField::parse(self.first())?.data_id()
     }
 
-    /// The first field, 0 where there is none.
+    /// The first field, 0 if it is missing.
     pub(super) fn first(&self) -> u8 {
         self.contents().first().copied().unwrap_or_default()
     }

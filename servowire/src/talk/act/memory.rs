@@ -41,7 +41,7 @@ fn store(backup: &Backup, file: &Path) -> Result<(), Fault> {
 }
 
 fn exists(file: &Path) -> Fault {
-    Fault::File(format!("{}: there is such a file already; backups are not overwritten", file.display()))
+    Fault::File(format!("{}: the file already exists; backups are not overwritten", file.display()))
 }
 
 pub(in crate::talk) fn restore<P: Port>(
@@ -53,11 +53,11 @@ pub(in crate::talk) fn restore<P: Port>(
 ) -> Done {
     let wrong = |what| Fault::File(format!("{}: {what}", file.display()));
     let text = fs::read_to_string(file).map_err(Fault::file(file))?;
-    let want = Backup::parse(&text).map_err(|error| wrong(format!("this is no backup: {error}")))?;
+    let want = Backup::parse(&text).map_err(|error| wrong(format!("this is not a backup: {error}")))?;
     let restore = encoder.plan(&want)?;
     let count = restore.changes().len();
     if count == 0 {
-        print.say("the memory holds this already: nothing was written", || json!({ "written": 0 }))?;
+        print.say("the memory already holds this: nothing was written", || json!({ "written": 0 }))?;
         return Ok(ExitCode::SUCCESS);
     }
     let before = before.map_or_else(|| beside(file, restore.before()), Path::to_owned);
@@ -75,7 +75,7 @@ pub(in crate::talk) fn restore<P: Port>(
     });
     let broken_off = if end.is_err() { "broken off: " } else { "" };
     let text = format!(
-        "{broken_off}{bytes} of {count} bytes that differed are written and read back; what was there before is in {}",
+        "{broken_off}{bytes} of {count} bytes that differed were written and read back; the previous content is in {}",
         before.display()
     );
     if kept {

@@ -12,7 +12,7 @@ use super::kernels;
 const STEPS: [[u32; 3]; 4] =
     [[415_345, 262_144, 0], [1000, 692_989, 3999], [1000, 262_144, 1000], [4500, 932_886, 2131]];
 
-/// Arithmetic, speed constant, steps a ramp entry, initial sync_time.
+/// Arithmetic, speed constant, steps per ramp entry, initial sync_time.
 type Given = (Arithmetic, u32, u32, u32);
 
 const GIVEN: [Given; 3] = [

@@ -9,7 +9,7 @@ use super::super::refused::{Refused, event, position, refusal};
 use super::{Break, Decoder, Neighbour};
 use crate::event::{Direction, Field, Place, Span};
 
-const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
+const DISPARITY: &str = "all words are in the tables, but cannot follow one another: bits of at least one were flipped";
 const TAIL: &str =
     "the next answer does not begin at the running disparity that this one leaves: a bit was flipped at its end";
 const FRONT: &str =
@@ -18,7 +18,7 @@ const ANEW: &str =
     "it begins with running disparity +, and all others begin anew with -: a bit was flipped at its front";
 const BETWEEN: &str =
     "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
-const STRAY: &str = "VSYNC is due in each eighth answer, and only there";
+const STRAY: &str = "VSYNC is expected in every eighth answer, and only there";
 const SWITCH: &str = "the switch bit is not the inverse of the bit before it";
 /// The answer at hand is the last of a V-frame of which the others are not known.
 const LAST: u8 = 8;
@@ -213,7 +213,7 @@ fn encoder_symbol(byte: EncoderByte) -> Field {
     }
 }
 
-/// Whether it is a block that was damaged, and not one that says there is no position.
+/// Whether the block was damaged, as opposed to one that says there is no position.
 fn is_damage(error: Option<Error>) -> bool {
     error.is_some_and(|error| matches!(error, Error::InvalidWord { .. } | Error::WrongKind { .. } | Error::Crc { .. }))
 }

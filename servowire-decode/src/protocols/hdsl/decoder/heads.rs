@@ -11,9 +11,9 @@ use super::super::refused::event;
 use super::Decoder;
 use crate::event::{Direction, Field, Span};
 
-const LONE: &str = "a lone nibble between two frames without one is no message: a bit was flipped";
+const LONE: &str = "a lone nibble between two frames that have none is not a message: a bit was flipped";
 const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
-const PAUSED: &str = "the line rests here, though frames follow each other for ever";
+const PAUSED: &str = "the line is idle here, although frames should follow each other without end";
 /// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of that, and how far a
 /// length may be off where other speakers were in between.
 const SHORTEST: u64 = H_FRAME_BITS as u64;
