@@ -13,6 +13,7 @@
 3. CONTRIBUTING.md lists the folder of every package.
 4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder.
 5. Every public name has a user (`names.py`).
+6. Figures that the README of servowire-drivers repeats are those of their sources: the table of the images, `budget.toml`.
 """
 
 import json
@@ -354,6 +355,28 @@ def faults_of_links(name, text):
         yield f"{name}: the link {found[1]} leads nowhere on docs.rs"
 
 
+def cells_of(text):
+    """The rows of all tables, by the name that stands in the first cell that has only one."""
+    for row in re.findall(r"^\|(.*)\|$", text, re.MULTILINE):
+        cells = [cell.strip() for cell in row.split("|")]
+        name = next((found[1] for cell in cells if (found := re.fullmatch(r"\[?`([\w-]+)`(?:\]\(.*\))?", cell))), None)
+        if name:
+            yield name, cells
+
+
+def faults_of_figures(text, images, budget):
+    images = {name: cells[1:4] for name, cells in cells_of(images)}
+    kernels = dict(re.findall(r"^(\w+) = \{ (O3 = [\d.]+, Os = [\d.]+)", budget, re.MULTILINE))
+    for name, cells in cells_of(text):
+        if name in images and cells[-3:] != images[name]:
+            yield f"servowire-drivers/README.md: {name} has {images[name]} in the table of the images"
+        if name in kernels:
+            measured = [float(figure) for figure in re.findall(r"= ([\d.]+)", kernels[name])]
+            said = [float(figure.replace(",", "")) for figure in cells[-1].split(";")]
+            if len(said) != len(measured) or any(abs(a - b) > 0.05 * b for a, b in zip(said, measured)):
+                yield f"servowire-drivers/README.md: {name} takes {measured}"
+
+
 def check():
     workspace = metadata(ROOT / "Cargo.toml")
     others = [ROOT / "fuzz/Cargo.toml", ROOT / "tests/bare-metal/Cargo.toml", *ROOT.glob("examples/firmware/*/Cargo.toml")]
@@ -367,6 +390,11 @@ def check():
             fault
             for file in (Path(package["manifest_path"]).with_name("README.md") for package in workspace if package["publish"] is None)
             for fault in faults_of_links(short(file), file.read_text())
+        ),
+        *faults_of_figures(
+            (ROOT / "servowire-drivers/README.md").read_text(),
+            (ROOT / "examples/firmware/README.md").read_text(),
+            (ROOT / "tests/bare-metal/budget.toml").read_text(),
         ),
     ]
     public, idle, more = public_names.check(ROOT, packages, code_of, without_tests)
@@ -438,6 +466,9 @@ def self_test():
         equal(f"a drawing that is wrong ({words})", True, any(words in fault for fault in faults))
     places = [{"manifest_path": str(ROOT / name / "Cargo.toml")} for name in "ab"]
     equal("links", 1, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f)"))))
+    images, budget = "| [`one`](a/README.md) | 1 kB | 2 B | 3 B | 4 |", "two = { O3 = 1234.4, Os = 56.2, limit_O3 = 7 }"
+    equal("true figures", [], list(faults_of_figures("| `one` | x | 1 kB | 2 B | 3 B |\n| y | `two` | 1,234; 56 |", images, budget)))
+    equal("figures", 2, len(list(faults_of_figures("| `one` | x | 1 kB | 2 B | 4 B |\n| y | `two` | 1,234; 50 |", images, budget))))
     equal("the map", 1, len(list(faults_of_map("| `a/` |", places))))
     public_names.self_test(equal)
     print("house: the checks see what they look for")

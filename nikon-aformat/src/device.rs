@@ -294,8 +294,8 @@ impl<const BANKS: usize> Device<BANKS> {
             return true;
         }
         self.deaf_ns = None;
-        let patience_ns = self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
-        if pause_ns > patience_ns.into() {
+        let longest_gap_ns = self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
+        if pause_ns > longest_gap_ns.into() {
             self.len = 0;
         }
         false

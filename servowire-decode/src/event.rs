@@ -250,14 +250,14 @@ impl Position {
         self.per_turn.map(|counts| self.counts as f64 / counts as f64)
     }
 
-    /// The way from `before`, the shorter one where the value wraps.
+    /// The move from `before`, the shorter one where the value wraps.
     pub(crate) fn moved_from(&self, before: &Self) -> i64 {
-        let way = self.counts.wrapping_sub(before.counts);
+        let moved = self.counts.wrapping_sub(before.counts);
         let Some(span) = self.span.and_then(|span| i64::try_from(span).ok()).filter(|span| *span > 0) else {
-            return way;
+            return moved;
         };
-        let way = way.rem_euclid(span);
-        if way > span / 2 { way - span } else { way }
+        let moved = moved.rem_euclid(span);
+        if moved > span / 2 { moved - span } else { moved }
     }
 }
 

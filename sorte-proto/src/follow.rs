@@ -84,12 +84,12 @@ impl Asked {
     }
 }
 
-/// The way from `from` to `to` modulo 2^16, the shorter one.
+/// The shorter distance from `from` to `to`, modulo 2^16.
 const fn difference(to: u16, from: u16) -> i16 {
     i16::from_le_bytes(to.wrapping_sub(from).to_le_bytes())
 }
 
-const fn way(steps: i16) -> Direction {
+const fn direction_of(steps: i16) -> Direction {
     if steps < 0 { Direction::High } else { Direction::Low }
 }
 
@@ -154,7 +154,7 @@ impl Follower {
             Pto::Pulse { .. } => rest,
             // A pulse at the start of this cycle is 4 us and more after any of the cycle before the last, and 4 us and
             // more before any of the next.
-            _ if lag != 0 && self.quiet => Pto::Pulse { start: StartTime::MIN, direction: way(lag) },
+            _ if lag != 0 && self.quiet => Pto::Pulse { start: StartTime::MIN, direction: direction_of(lag) },
             _ => rest,
         }
     }

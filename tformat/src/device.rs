@@ -269,8 +269,8 @@ impl<const PAGES: usize> Device<PAGES> {
     /// Whether what arrives now is the rest of a request that was already judged. A pause of half a field begins a new
     /// request, so that nothing after a damaged control field is ever taken for another command.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
-        let patience = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
-        if now_ns.saturating_sub(self.last_byte_ns) > patience {
+        let longest_gap_ns = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
+        if now_ns.saturating_sub(self.last_byte_ns) > longest_gap_ns {
             self.len = 0;
             self.deaf = false;
         }

@@ -73,7 +73,7 @@ impl Program {
             Self::Part(part) => return part.next(words),
             Self::Turns { group, profiles, steps, done, moves } => {
                 if group.state() == MoveState::Idle && done < moves {
-                    let direction = way(*done);
+                    let direction = direction_of(*done);
                     let profile = profiles.get((*done % profiles.len().max(1) as u64) as usize);
                     // The group is idle and has motors, so the move begins.
                     if let Some(profile) = profile {
@@ -85,7 +85,7 @@ impl Program {
             }
             Self::Independent { axes, done, moves } => {
                 if axes.iter().all(|(axis, ..)| axis.state() == MoveState::Idle) && done < moves {
-                    let direction = way(*done);
+                    let direction = direction_of(*done);
                     for (axis, profile, steps) in axes.iter_mut() {
                         // The axis is idle, so the move begins.
                         let _: Result<_, _> = axis.start(*profile, *steps, direction);
@@ -162,7 +162,7 @@ impl Follower {
 }
 
 /// There, and back again.
-fn way(done: u64) -> step_profile::Direction {
+fn direction_of(done: u64) -> step_profile::Direction {
     if done % 2 == 1 { step_profile::Direction::Reverse } else { step_profile::Direction::Forward }
 }
 

@@ -64,8 +64,8 @@ impl Setup {
 
     /// Whether the delay field of SYNC is too short, so that this project's extension is needed.
     pub(super) fn is_long(&self) -> bool {
-        let way: u64 = self.cables_ns.iter().map(|ns| u64::from(*ns) + 355).sum();
-        way > u64::from(u16::MAX)
+        let out_ns: u64 = self.cables_ns.iter().map(|ns| u64::from(*ns) + 355).sum();
+        out_ns > u64::from(u16::MAX)
     }
 
     pub(super) fn master(&self) -> master::Config {

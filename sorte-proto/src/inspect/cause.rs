@@ -56,10 +56,10 @@ servowire_core::one_line!(Cause {
     Self::Disturbed => "single bits were disturbed";
 });
 
-type Guess<'a> = (Option<Cause>, Option<Frame<'a>>);
+type Diagnosis<'a> = (Option<Cause>, Option<Frame<'a>>);
 
 /// Undoes the usual mistakes one by one; the first that gives a sound frame is the cause.
-pub(super) fn of(during: During, bytes: &[u8], error: Error) -> Guess<'_> {
+pub(super) fn of(during: During, bytes: &[u8], error: Error) -> Diagnosis<'_> {
     if let Ok(frame) = strip_preamble(bytes).and_then(|frame| Frame::parse(during, frame)) {
         return (Some(Cause::PreambleLeft), Some(frame));
     }
@@ -69,7 +69,7 @@ pub(super) fn of(during: During, bytes: &[u8], error: Error) -> Guess<'_> {
     }
 }
 
-fn of_start_up(bytes: &[u8], error: Error) -> Guess<'_> {
+fn of_start_up(bytes: &[u8], error: Error) -> Diagnosis<'_> {
     let head = match bytes {
         [MULTICAST, _, code, _, ..] => FrameType::from_code(*code),
         _ => None,
@@ -90,7 +90,7 @@ fn of_start_up(bytes: &[u8], error: Error) -> Guess<'_> {
 }
 
 /// What the length of a frame tells whose type has `len` bytes.
-fn of_length(bytes: &[u8], len: usize) -> Option<Guess<'_>> {
+fn of_length(bytes: &[u8], len: usize) -> Option<Diagnosis<'_>> {
     let (got, body) = (bytes.len(), len.saturating_sub(4));
     if got == body {
         return Some((Some(Cause::FcsMissing), without_fcs(bytes)));
@@ -133,7 +133,7 @@ fn exchange_frame(bytes: &[u8]) -> Option<Frame<'_>> {
     usual.then_some(frame)
 }
 
-fn of_exchange(bytes: &[u8], error: Error) -> Guess<'_> {
+fn of_exchange(bytes: &[u8], error: Error) -> Diagnosis<'_> {
     if let Ok(frame) = Frame::parse(During::StartUp, bytes) {
         return (Some(Cause::StartUpFrame), Some(frame));
     }

@@ -236,8 +236,8 @@ impl Transaction {
         let fields_ns = u64::from(field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
         let longest_ns = fields_ns.saturating_add(response_timeout_ns.into()).saturating_add(hand_over_ns.into());
         let latest_ns = self.asked_ns.saturating_add(longest_ns);
-        let patience = u64::from(field_timeout_ns).saturating_add(hand_over_ns.into());
-        self.until_ns = end_ns.saturating_add(patience).min(latest_ns).max(self.until_ns);
+        let longest_gap_ns = u64::from(field_timeout_ns).saturating_add(hand_over_ns.into());
+        self.until_ns = end_ns.saturating_add(longest_gap_ns).min(latest_ns).max(self.until_ns);
     }
 
     /// The UART reports a framing error for the byte that ended at `end_ns`.
