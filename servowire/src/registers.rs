@@ -109,7 +109,7 @@ impl Map {
             (Some(position), Some(velocity)) => {
                 line(out, "fast position", format_args!("{}, {velocity} steps a frame", number(id, position)))?;
             }
-            _ if d.contains(OnlineD::POS) => line(out, "fast position", "none to be used: POS")?,
+            _ if d.contains(OnlineD::POS) => line(out, "fast position", "not usable: POS")?,
             _ => line(out, "fast position", "not usable: the link is down")?,
         }
         self.safe(out, id)?;
@@ -123,14 +123,14 @@ impl Map {
         let [summary] = map.get(Register::SafeSum);
         let crc = check(map, Register::SafeSum as u8, Register::VPos, Register::VPosCrc);
         let stale = match map.online_1() {
-            flags if flags.contains(Online1::VPOS) => ", not to be used: VPOS",
+            flags if flags.contains(Online1::VPOS) => ", not usable: VPOS",
             flags if flags.contains(Online1::SCE) => ", not new: SCE",
             _ => "",
         };
         let position = number(id, map.vpos());
         line(out, "safe position", format_args!("{position}, SUMMARY {summary:02X}h, CRC {crc}{stale}"))?;
         let stale = match map.online_2() {
-            flags if flags.contains(Online2::VPOS2) => ", not to be used: VPOS2",
+            flags if flags.contains(Online2::VPOS2) => ", not usable: VPOS2",
             flags if flags.contains(Online2::SCE2) => ", not new: SCE2",
             _ => "",
         };

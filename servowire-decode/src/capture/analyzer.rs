@@ -205,7 +205,7 @@ impl Analyzer {
         };
         let said = text(value);
         let byte = byte(&said).ok_or_else(|| {
-            format!("{said:?} is not a byte as 0x1A: export the table with hexadecimal values of eight bits")
+            format!("{said:?} is not a byte such as 0x1A: export the table with hexadecimal values of eight bits")
         })?;
         let name = name.map_or_else(|| "bytes".to_owned(), text);
         let delimiter = framing.is_none_or(|framing| {

@@ -215,7 +215,7 @@ fn refusals_name_the_line_and_what_to_do() {
         ("G0 X10\nG2 X-5 I-10 F10", "line 2: an arc from a radius of"),
         ("G2 X10 R4 F10", "R4: two places 10.0000 mm apart"),
         ("G2 R4 F10", "needs I, J or K"),
-        ("G2 X1 R5 I1 F10", "R beside I, J and K"),
+        ("G2 X1 R5 I1 F10", "R together with I, J or K"),
         ("G2 X1 K1 F10", "a center of I and J in G17"),
         ("X5", "line 1: no G0 to G3 before it"),
         ("G0 X1\nG80\nX5", "line 3: G80 has cancelled the motion"),

@@ -77,9 +77,9 @@ mod tests {
         assert_eq!(setup.over(machine), Ok(AxisSetup::new(Limits::new(8000, 400_000).unwrap(), 80_000)));
         for (text, want) in [
             ("X", "a colon"),
-            ("A:speed=1", "\"A\" is no axis"),
+            ("A:speed=1", "\"A\" is not an axis"),
             ("X:feed=1", "\"feed\": steps-per-mm, speed"),
-            ("X:speed", "is no setting"),
+            ("X:speed", "is not a setting"),
             ("X:speed=0", "above 0"),
             ("X:steps-per-mm=20000", "0.001 to 10000"),
         ] {

@@ -85,7 +85,7 @@ mod tests {
         );
         assert_eq!(pairs("O1001 (PLATE)"), []);
         assert_eq!(pairs("%"), []);
-        assert!(words("x 12 3").unwrap_err().contains("\"3\" is no G-code"));
+        assert!(words("x 12 3").unwrap_err().contains("\"3\" is not G-code"));
         assert!(words("/2 G0 X1").unwrap().optional && !words("G0 X1").unwrap().optional);
     }
 
@@ -103,9 +103,9 @@ mod tests {
             ("G0 X[1+2]", "not variables"),
             ("#1=5", "not variables"),
             ("G0 X", "X has no number"),
-            ("G0 X1.2.3", "no number"),
-            ("G0 (left", "a comment without its end"),
-            ("G0 &", "is no G-code"),
+            ("G0 X1.2.3", "not a number"),
+            ("G0 (left", "unterminated comment"),
+            ("G0 &", "is not G-code"),
         ] {
             let error = words(line).unwrap_err();
             assert!(error.contains(want), "{line}: {error}");

@@ -161,7 +161,7 @@ impl TryFrom<File> for Backup {
         let backup = Self { date, encoder_id, widths: [abs_bits, abm_bits], pages };
         let want = format!("{:08x}", backup.crc32());
         if crc32 != want {
-            return Err(format!("its check sum is {crc32}, that of its content {want}: it was changed or damaged"));
+            return Err(format!("its checksum is {crc32}, but its content gives {want}: it was changed or damaged"));
         }
         Ok(backup)
     }

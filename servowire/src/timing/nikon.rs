@@ -228,7 +228,7 @@ mod tests {
             (Ok(BitRate::Mbit6_67), Ok(Command::StatusMt), Ok(Command::ZeroPreset))
         );
         let one = Arguments { command: Some(Command::Abs40), ..arguments(BitRate::Mbit4, &[0, 1]) };
-        assert!(one.plan().unwrap_err().to_string().contains("asks one encoder"));
+        assert!(one.plan().unwrap_err().to_string().contains("addresses one encoder"));
         let early = Arguments { turn_around: 100, ..arguments(BitRate::Mbit4, &[0]) };
         assert!(early.plan().is_err());
     }

@@ -29,7 +29,7 @@ fn unknown_formats() {
 fn a_sample_rate_for_a_file_that_has_times() {
     let bench = Bench::new();
     let run = bench.decode("a.vcd", good_traffic(2.5e6).vcd(), &["--rate", "5M"]);
-    run.fails_with("--rate is for raw samples; for the rate of the line there is --bit-rate");
+    run.fails_with("--rate is for raw samples, --bit-rate for the rate of the line");
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn raw_damaged() {
     let odd = &raw[..raw.len() / 2 * 2 - 1];
     bench
         .decode("a.raw", odd, &["--rate", "20M", "--unit-size", "2"])
-        .fails_with("1 bytes are left, where a sample has 2");
+        .fails_with("1 bytes are left over, but a sample has 2");
     let slow = good_traffic(2.5e6).raw(8e6, 0);
     bench.decode("slow.raw", slow, &["--rate", "8M"]).fails_with("3.2 samples per bit are too few");
     bench

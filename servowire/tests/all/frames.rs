@@ -237,7 +237,7 @@ fn a_bit_lost_or_added() {
             assert!(events.len() >= 2 && events[1]["verdict"] != "ok", "{at} {add}: {}", run.out);
             all += 1;
             let cause = events[1]["cause"].as_str().unwrap_or_default();
-            let want = if add { "or one was added" } else { "was lost" };
+            let want = if add { "or inserted" } else { "was lost" };
             right += usize::from(events.len() == 2 && (cause.contains(want) || cause.contains("bit(s)")));
         }
     }

@@ -200,9 +200,9 @@ fn a_line_of_another_protocol_than_was_said() {
     {
         let run = bench.decode("a.vcd", &traffic, wrong);
         let frames = common::GOOD_FRAMES;
-        let said = format!("it looks like T-Format at 2.5 Mbit/s: {frames} of {frames} frames hold so");
+        let said = format!("it looks like T-Format at 2.5 Mbit/s: {frames} of {frames} frames are valid that way");
         run.fails_with(&said);
-        assert!(run.err.contains("leave out what says otherwise"), "{wrong:?}: {}", run.err);
+        assert!(run.err.contains("leave out the option that says otherwise"), "{wrong:?}: {}", run.err);
     }
     for right in [&[][..], &["-p", "tformat"], &["--bit-rate", "2.5M"], &["--polarity", "normal"]] {
         let run = bench.decode("a.vcd", &traffic, right);

@@ -160,7 +160,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     assert_eq!(Backup::parse(&text(&output)).unwrap().pages(), pages);
     // And back, with the name that the tool chooses.
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", &before]);
-    assert!(text(&output).starts_with("1 of 1 bytes that differed are written and read back; "), "{}", text(&output));
+    assert!(text(&output).starts_with("1 of 1 bytes that differed were written and read back; "), "{}", text(&output));
     let names =
         std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     assert_eq!(names.filter(|name| name.starts_with("before.before-20")).count(), 1);

@@ -86,7 +86,7 @@ impl Master {
         let Some(present) = present else { return Err(Error::WrongState) };
         let (hops, first) = (u32::from(address.hops_before()), u32::from(self.line.checked().unwrap_or_default()));
         let path_ns = hop_ns.saturating_mul(hops).saturating_add(first);
-        let arrives = self.config.slots.send_ns(address, path_ns).saturating_add(way.into());
+        let arrives = self.config.slots.send_ns(address, path_ns).saturating_add(path_ns.into());
         let arrives = arrives.saturating_add(CAPTURE_NS.into()).saturating_sub(TRIGGER_NS.into());
         let cycle_ns = self.config.cycle_ns;
         let from = |cycle: &Cycle| nearest(sof_ns, cycle.trigger_ns.saturating_add_signed(arrives), cycle_ns);
