@@ -107,7 +107,8 @@ impl SigrokText {
         for group in rest.split_ascii_whitespace() {
             if group.len() == 2 && rest.trim().len() != 2 || !only(group, |c| matches!(c, '0' | '1')) {
                 let byte = u8::from_str_radix(group, 16);
-                let byte = byte.map_err(|_| self.input.fault(At::Line(self.line), format!("{group:?} is not a byte")))?;
+                let byte =
+                    byte.map_err(|_| self.input.fault(At::Line(self.line), format!("{group:?} is not a byte")))?;
                 samples.extend((0..8).rev().map(|bit| byte >> bit & 1 == 1));
             } else {
                 samples.extend(group.bytes().map(|digit| digit == b'1'));
