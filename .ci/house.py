@@ -11,7 +11,8 @@
    every line of the drawing is a dependency. Dependencies of tests do not count. An arrow leads to the name under it; if no other one
    leads to that row, to the whole row.
 3. CONTRIBUTING.md lists the folder of every package.
-4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder.
+4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder. Its first screen of 45
+   lines shows what to call: code, or a table that begins with what one has.
 5. Every public name has a user (`names.py`).
 6. Figures that the README of servowire-drivers repeats are those of their sources: the table of the images, `budget.toml`.
 """
@@ -355,6 +356,12 @@ def faults_of_links(name, text):
         yield f"{name}: the link {found[1]} leads nowhere on docs.rs"
 
 
+def faults_of_first_screen(name, text):
+    screen = "\n".join(text.split("\n")[:45])
+    if not re.search(r"^(```(rust|c|console)$|\| you have \|)", screen, re.MULTILINE):
+        yield f"{name}: nothing in the first 45 lines says what to call"
+
+
 def cells_of(text):
     """The rows of all tables, by the name that stands in the first cell that has only one."""
     for row in re.findall(r"^\|(.*)\|$", text, re.MULTILINE):
@@ -389,7 +396,7 @@ def check():
         *(
             fault
             for file in (Path(package["manifest_path"]).with_name("README.md") for package in workspace if package["publish"] is None)
-            for fault in faults_of_links(short(file), file.read_text())
+            for fault in [*faults_of_links(short(file), file.read_text()), *faults_of_first_screen(short(file), file.read_text())]
         ),
         *faults_of_figures(
             (ROOT / "servowire-drivers/README.md").read_text(),
@@ -466,6 +473,7 @@ def self_test():
         equal(f"a drawing that is wrong ({words})", True, any(words in fault for fault in faults))
     places = [{"manifest_path": str(ROOT / name / "Cargo.toml")} for name in "ab"]
     equal("links", 1, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f)"))))
+    equal("first screens", 1, sum(len(list(faults_of_first_screen("README.md", "\n" * n + "```rust"))) for n in (44, 45)))
     images, budget = "| [`one`](a/README.md) | 1 kB | 2 B | 3 B | 4 |", "two = { O3 = 1234.4, Os = 56.2, limit_O3 = 7 }"
     equal("true figures", [], list(faults_of_figures("| `one` | x | 1 kB | 2 B | 3 B |\n| y | `two` | 1,234; 56 |", images, budget)))
     equal("figures", 2, len(list(faults_of_figures("| `one` | x | 1 kB | 2 B | 4 B |\n| y | `two` | 1,234; 50 |", images, budget))))
