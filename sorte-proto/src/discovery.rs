@@ -264,7 +264,7 @@ impl Discovery {
     }
 }
 
-/// What a device knows of itself after DISCOVERY.
+/// What a device knows about itself after DISCOVERY.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Assignment {

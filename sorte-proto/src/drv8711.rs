@@ -7,11 +7,11 @@
 use crate::sync0::PULSE_NS;
 use crate::timing::CNC_CYCLE_NS;
 
-/// STEP must be high, and low, for so long, in ns.
+/// How long STEP must stay high, and low, in ns.
 pub const STEP_NS: u32 = 1900;
 /// From a change of DIR to a rising STEP, and from a rising STEP to a change of DIR, in ns.
 pub const DIR_SETUP_HOLD_NS: u32 = 200;
-/// Most steps in a second.
+/// Maximum number of steps per second.
 pub const MAX_STEP_HZ: u32 = 250_000;
 /// From waking the chip (nSLEEP high) to the first step, in ns.
 pub const WAKE_NS: u32 = 1_000_000;

@@ -26,7 +26,7 @@ impl Positions {
     }
 }
 
-/// In spite of what a position may be used.
+/// Despite what a position may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -37,10 +37,10 @@ pub struct Tolerated {
 impl Tolerated {
     /// Nothing.
     pub const NOTHING: Self = Self { alarms: drv8711::Status::empty() };
-    /// Both stall bits: they mean something only where the detection of stalls is set up.
+    /// Both stall bits: they are meaningful only if stall detection is set up.
     pub const STALL: Self = Self::NOTHING.alarms(drv8711::Status::STD.union(drv8711::Status::STDLAT));
 
-    /// In spite of these bits of the motor driver's STATUS, in place of those before.
+    /// Also tolerates these bits of the motor driver's STATUS, replacing those set before.
     #[must_use]
     pub const fn alarms(self, alarms: drv8711::Status) -> Self {
         Self { alarms }
@@ -51,10 +51,10 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// Up to which age, and in spite of what, a position may be used.
+/// Up to what age, and despite what, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// What a device has told of its axis, with the instant: judged where it is used, by [`at`](Self::at).
+/// What a device has reported about its axis, with the instant: judged where it is used, by [`at`](Self::at).
 ///
 /// ```
 /// use sorte_proto::{DeviceFrameView, Doubt, Evidence, Policy, Positions};
@@ -174,7 +174,7 @@ impl Sample {
         self.told.ordered
     }
 
-    /// Who told it.
+    /// The device that reported it.
     pub const fn address(self) -> DeviceAddress {
         self.address
     }

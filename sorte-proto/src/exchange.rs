@@ -99,7 +99,7 @@ impl<'a> MasterFrameView<'a> {
     }
 }
 
-/// Writes a master frame and gives its length, `output.len() + 5`.
+/// Writes a master frame and returns its length, `output.len() + 5`.
 ///
 /// # Errors
 /// [`Error::BufferTooSmall`]
@@ -148,7 +148,7 @@ impl<const S: usize> MasterFrame<S> {
         Ok(Self { status: view.status(), output: *output, time_stamp: view.time_stamp() })
     }
 
-    /// Writes the frame from SA to the time stamp and gives its length.
+    /// Writes the frame from SA to the time stamp and returns its length.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
@@ -243,7 +243,7 @@ impl<const P: usize> DeviceFrame<P> {
         Ok(Self { address: view.address(), status: view.status(), payload: *payload })
     }
 
-    /// Writes the frame from SA to the CRC and gives its length.
+    /// Writes the frame from SA to the CRC and returns its length.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]

@@ -323,7 +323,7 @@ impl Device {
         }
     }
 
-    /// The own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
+    /// Tells that our own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
     ///
     /// # Errors
     /// As [`LongFrame::parse`] and [`DelayReq::of`]; the round trip is then not used.

@@ -48,7 +48,7 @@ impl Device {
         }
     }
 
-    /// The host takes the device out of the line's work: in [`State::Error`] it lets frames pass and is silent itself until
+    /// Takes the device out of service: in [`State::Error`] it lets frames pass and is silent itself until
     /// [`reset`](Self::reset). The published device has the state and never enters it.
     pub fn enter_error(&mut self) {
         for port in [PortId::A, PortId::B] {
