@@ -40,7 +40,7 @@ impl Tolerated {
     /// Both stall bits: they are meaningful only if stall detection is set up.
     pub const STALL: Self = Self::NOTHING.alarms(drv8711::Status::STD.union(drv8711::Status::STDLAT));
 
-    /// Also tolerates these bits of the motor driver's STATUS, replacing those set before.
+    /// Tolerates these bits of the motor driver's STATUS, replacing those set before.
     #[must_use]
     pub const fn alarms(self, alarms: drv8711::Status) -> Self {
         Self { alarms }
