@@ -166,7 +166,7 @@ fn frequencies_have_units_everywhere() {
 /// The rows of the README's table of keys: key, type, when.
 fn schema() -> Vec<(String, String, String)> {
     let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
-    let table = readme.lines().skip_while(|line| *line != "| key | type | there |").skip(2);
+    let table = readme.lines().skip_while(|line| *line != "| key | type | present |").skip(2);
     let rows = table.take_while(|line| line.starts_with('|')).map(|line| {
         let cells: Vec<&str> = line.split('|').map(str::trim).collect();
         (cells[1].trim_matches('`').to_owned(), cells[2].to_owned(), cells[3].to_owned())

@@ -22,7 +22,7 @@ fn unknown_formats() {
     bench.decode("letter.doc", words, &[]).fails_with("begins with \"Dear all,\": no format that is known");
     bench.decode("session.sr", b"PK\x03\x04....", &[]).fails_with("not a whole zip file");
     bench.decode("a.csv.xz", b"\xfd7zXZ\0....", &[]).fails_with("packed by xz: unpack it first");
-    bench.decode("a.raw", [0; 100], &["--format", "packed"]).fails_with("say it with --rate");
+    bench.decode("a.raw", [0; 100], &["--format", "packed"]).fails_with("give it with --rate");
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn saleae_binary_damaged() {
         out[at..at + bytes.len()].copy_from_slice(bytes);
         out
     };
-    bench.decode("a.bin", with(8, &[2, 0, 0, 0]), &[]).fails_with("is of version 2, and only 0 and 1 are known");
+    bench.decode("a.bin", with(8, &[2, 0, 0, 0]), &[]).fails_with("is of version 2: only 0 and 1 are known");
     bench.decode("a.bin", with(12, &[100, 0, 0, 0]), &[]).fails_with("is the inside of a .sal capture");
     bench.decode("a.bin", with(12, &[1, 0, 0, 0]), &[]).fails_with("is not a digital channel");
     bench.decode("a.bin", with(20, &f64::NAN.to_le_bytes()), &[]).fails_with("begin or end is not a time");
@@ -200,8 +200,8 @@ fn fst_whose_lengths_lie() {
     header[7..9].copy_from_slice(&329_u16.to_be_bytes());
     let with = |block: &[u8]| [&header, block].concat();
     // A block without a length would be read again and again.
-    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 0, 0]), &[]).fails_with("not whole: a block ends beyond");
-    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 1, 0]), &[]).fails_with("not whole: a block ends beyond");
+    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 0, 0]), &[]).fails_with("incomplete: a block ends beyond");
+    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 1, 0]), &[]).fails_with("incomplete: a block ends beyond");
     let number = |n: u64| n.to_be_bytes();
     let variables = [&[3][..], &number(24), &number(1 << 60), &number(1 << 60)].concat();
     bench.decode("a.fst", with(&variables), &[]).fails_with("a list of variables is longer than its block can hold");

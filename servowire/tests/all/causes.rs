@@ -103,7 +103,7 @@ fn damage_is_told(kind: Kind, rates: &[f64], field: usize, repeats: usize) {
     let mut faults = Vec::new();
     let (mut right, mut all) = (0, 0);
     for k in 0..repeats {
-        for (what, word) in [("lost", "lost"), ("added", "twice"), ("cut", "cut"), ("flipped", "disturbed")] {
+        for (what, word) in [("lost", "lost"), ("added", "doubled"), ("cut", "cut"), ("flipped", "disturbed")] {
             let at = rng.below(1 << 20) as usize;
             let same = std::cell::Cell::new(false);
             let (verdict, cause) = spoilt(kind, &mut rng, rates[k % rates.len()], |bits| {

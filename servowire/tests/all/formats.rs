@@ -203,7 +203,7 @@ fn fractions_of_the_unit_of_a_vcd() {
     all_good(&bench.decode("a.vcd", &text, &["--json"]));
     let back = bench.decode("a.vcd", text + "#1.25\n#1.125\n", &["--json"]);
     back.fails_with("time goes back");
-    bench.decode("b.vcd", wave.vcd() + "#9999999999.x\n", &[]).fails_with("#9999999999.x is no time");
+    bench.decode("b.vcd", wave.vcd() + "#9999999999.x\n", &[]).fails_with("#9999999999.x is not a time");
 }
 
 /// Extended VCD: the range of a port stands in the place of its width, a letter a line, then the strengths.

@@ -318,8 +318,8 @@ fn what_is_wrong_is_said() {
         String::from_utf8(output.stderr).unwrap()
     };
     assert!(at("/dev/ttyNone", &["read"]).starts_with("/dev/ttyNone: there is no such port; there "));
-    assert!(at("/dev/null", &["read"]).starts_with("/dev/null: this is no serial port"));
-    assert!(at("/", &["read"]).starts_with("/: this is no serial port"));
+    assert!(at("/dev/null", &["read"]).starts_with("/dev/null: this is not a serial port"));
+    assert!(at("/", &["read"]).starts_with("/: this is not a serial port"));
     let said = at(&bench.name, &["simulate", "--encoder", "/dev/ttyNone"]);
     assert!(said.starts_with("/dev/ttyNone: there is no such port"), "{said}");
     let folder = tempfile::tempdir().unwrap();
