@@ -119,7 +119,8 @@ pub fn inspect(expected: Expected, line: Window) -> Report {
     }
 }
 
-/// Every word, the switch bit, the check of the acceleration and the disparity hold: the best [`score`] but for the test pattern.
+/// Every word, the switch bit, the check of the acceleration and the disparity are good: the best [`score`] except that of the
+/// test pattern.
 pub const PERFECT: usize = 12;
 
 /// How well an answer fits at the beginning of this line: a point for each good word, more for its checks; most for the test

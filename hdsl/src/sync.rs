@@ -217,7 +217,7 @@ impl Synchroniser {
     /// that an exchange between both does not move the edge.
     ///
     /// `late` is time(pulse) - time(edge) in eighths, rounded, if the present frame is on a pulse and the pulse was
-    /// seen: a later pulse makes the next edge later, by [`MAX_CORRECTION`](Self::MAX_CORRECTION) at most. Without
+    /// seen: a later pulse makes the next edge later, by six eighths at most. Without
     /// a pulse the frames run on with the period as it was given and what was learned of it.
     pub fn next(&mut self, late: Option<i16>) -> Next {
         self.spread = self.spread.saturating_add(self.remainder);

@@ -12,7 +12,7 @@ servowire_core::errors! {
             /// Bytes that a block has: 16 or 32.
             want: u16,
         },
-        /// The slice is longer than a block: its end is the end of the block.
+        /// The slice is longer than a block, which must fill it exactly.
         #[error("{got} bytes, a block has {want}")]
         TooLong = 2 {
             /// Bytes that were there; 65535 for more.

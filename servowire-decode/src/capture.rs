@@ -1,7 +1,7 @@
 //! Capture files: what a logic analyser, a simulator or a serial port recorded.
 //!
-//! One file per format under `capture/`. Every reader streams with fixed buffers and gives the same thing: level
-//! changes of named channels with their times ([`Line`]), or bytes ([`ByteLog`]).
+//! One file per format under `capture/`. Every reader streams with fixed buffers and yields the same: level changes of named
+//! channels with their times ([`Line`]), or bytes ([`ByteLog`]).
 
 pub mod analyzer;
 mod archive;

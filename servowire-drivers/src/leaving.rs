@@ -56,7 +56,7 @@ impl Leaving {
         self.field_ns.saturating_mul(4).saturating_add(self.window_ns.saturating_mul(2))
     }
 
-    /// Whether so much time passed that an answer may have begun.
+    /// Whether enough time has passed for an answer to have begun.
     pub(crate) const fn is_late(&self, before_ns: u64, after_ns: u64) -> bool {
         after_ns.saturating_sub(before_ns) > self.window_ns
     }

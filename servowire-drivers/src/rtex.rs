@@ -15,7 +15,7 @@
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. The counter
 //! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at [`FrameCount`] before
-//! and after, and reads once more if it was not one frame. If it is not again, each axis takes its block only if that is on time
+//! and after, and reads once more if it was not one frame. If that fails again, each axis takes its block only if it is on time
 //! ([`Arrival`](rtex_block::master::Arrival)); where two frames have the same counter (two communications in an update period) and the
 //! bank was switched between, none is taken. System Design Guide for Master, chapters 1 and 2.
 //!

@@ -34,7 +34,7 @@ use crate::interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
 /// 2^32 / 4000 rounded up: `FOUR_US_P32_CONST` of TI's `sorte_master_cfg.inc`.
 pub(crate) const RECIPROCAL: u32 = 1_073_742;
 
-/// The quotient by [`RECIPROCAL`] is exact for every step time below this one, in ns.
+/// The quotient by TI's reciprocal, 1073742 / 2^32, is exact for every step time below this one, in ns.
 pub const EXACT_BELOW: u32 = 6_103_999;
 
 /// What the sequence leaves in its registers.

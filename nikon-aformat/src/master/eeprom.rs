@@ -39,8 +39,8 @@ pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) ->
 /// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
 /// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. Which response is the
 /// first is not known where a read was broken off, by this controller before it started again or by another: then the
-/// response to the next request has the data of the old read, and that to the one after it is undetermined. And a busy
-/// memory does not begin with a read. So another address is read before, until ES0 is clear: at the beginning and after a
+/// response to the next request has the data of the old read, and that to the one after it is undetermined. And a busy memory
+/// does not start a read. So another address is read before, until ES0 is clear: at the beginning and after a
 /// response that is missing or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

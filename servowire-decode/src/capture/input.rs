@@ -138,7 +138,7 @@ impl Input {
         Self { depth, quiet: true, taken: meter, ..unpacked }.unpacked()
     }
 
-    /// Text of two bytes a character as UTF-8.
+    /// Text with two bytes per character, converted to UTF-8.
     pub(crate) fn in_utf8(mut self) -> Result<Self, Fault> {
         let Some(unit) = utf16::mark(self.peek()?) else { return Ok(self) };
         let (name, meter) = (self.name.clone(), self.meter());

@@ -84,7 +84,7 @@ impl<'a> Sample<'a> {
         Self { lines, joined, settings }
     }
 
-    /// What holds by this reading; `None` where the lines are not of a dump, or nobody decodes logs.
+    /// The frames that are good by this reading; `None` if the lines are not a dump, or if no protocol decodes logs.
     fn tally(&self, reading: Reading) -> Option<Tally> {
         let bursts = if reading.wrapped { self.joined.as_ref()?.as_slice() } else { self.lines.as_slice() };
         let mut tally = Tally::default();

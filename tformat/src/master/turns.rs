@@ -22,7 +22,7 @@ use crate::response::Response;
 ///   neither there nor where it was;
 /// * the error of the exchange, if the count could not be read before: nothing was sent.
 ///
-/// It judges by the two counts alone, so it may begin after any past. ID C is sent at most ten times. Once done or failed it
+/// It judges only by the two counts, so it may follow any history. ID C is sent at most ten times. Once done or failed it
 /// stays so, until it is started again. Whether the errors are gone is to be seen by ID 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

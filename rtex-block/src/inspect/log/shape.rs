@@ -3,7 +3,7 @@
 use crate::block::BlockSize;
 use crate::inspect::strict;
 
-/// What the whole of a log looks like.
+/// The shape of a whole log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
