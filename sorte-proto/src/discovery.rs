@@ -194,7 +194,7 @@ impl Discovery {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
-    pub(crate) fn emit_request_into(place: Place, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_request_into(place: Place, into: &mut [u8]) -> Result<usize, Error> {
         let frame = room(into, Self::LEN)?;
         frame.fill(0);
         let status = place.choose(Status::FINAL, Status::DISCOVERY);
