@@ -1,6 +1,9 @@
 //! From a recorded line to what is said on it: find the channels, the protocol, the rate and the polarity, then receive.
 
+mod again;
 pub(crate) mod evidence;
+pub(crate) mod exchanges;
+mod floating;
 pub(crate) mod lane;
 mod nothing;
 mod push;
@@ -8,6 +11,7 @@ pub(crate) mod receive;
 pub(crate) mod spikes;
 pub(crate) mod start_stop;
 mod survey;
+mod trial;
 
 use std::io;
 

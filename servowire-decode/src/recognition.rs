@@ -48,6 +48,9 @@ impl fmt::Display for Recognition {
             channels => write!(f, "channel \"{}\"", channels.join(" + ")),
         }?;
         let rests = match (self.inverted, self.idle) {
+            (false, _) if self.rates.floats_low => {
+                "floats low, no bias: nobody drives it between frames; taken as high there"
+            }
             (false, Some(false)) => "taken as idling high, though it idles low (A and B swapped?)",
             (false, _) if self.channels.len() > 1 => "idle high",
             (false, _) => "idles high",
@@ -77,7 +80,20 @@ impl fmt::Display for Recognition {
             write!(f, "; next {} at {} Mbit/s", protocol.title, mbit(f64::from(rate)))?;
         }
         if self.rates.spikes * SPIKY > self.rates.edges {
-            write!(f, "; {} spikes beside {} edges: check termination", self.rates.spikes, self.rates.edges)?;
+            write!(f, "; {} spikes", self.rates.spikes)?;
+            let [rising, falling] = self.rates.spikes_at;
+            let most = rising.max(falling);
+            if 4 * most > 3 * self.rates.spikes {
+                let edges = if falling > rising { "falling" } else { "rising" };
+                let bits = self.rates.spike_bits / (rising + falling) as f64;
+                let edges = if 4 * most > 3 * (rising + falling) { edges } else { "all" };
+                write!(f, " of {bits:.1} bit on {edges} edges")?;
+            }
+            write!(f, " beside {} edges: check termination", self.rates.edges)?;
+        }
+        if self.rates.dips > 0 {
+            let bits = self.rates.dip_bits / self.rates.dips as f64;
+            write!(f, "; {} dips of {bits:.1} bits when a driver lets go: check the bias", self.rates.dips)?;
         }
         Ok(())
     }

@@ -45,6 +45,10 @@ pub(crate) struct EdgeReceiver {
     rest: i64,
     /// Falling edges of the first burst that are no start bits, until it has been read.
     skipped: u32,
+    /// Edges that were read, until they are [forgotten](Self::forget).
+    past: Vec<Edge>,
+    /// Bit lengths that had been heard when they were.
+    heard_before: Vec<f64>,
 }
 
 /// Bit rates measured on a line, relative to the nominal one.
@@ -60,11 +64,33 @@ pub struct Rates {
     pub spikes: u64,
     /// Edges that stayed.
     pub edges: u64,
+    /// Spikes that were dropped near a rising edge, and near a falling one.
+    pub spikes_at: [u64; 2],
+    /// How long these were together, in bits.
+    pub spike_bits: f64,
+    /// Dips when a driver let go of the line, behind which a frame was found by a second try.
+    pub dips: u64,
+    /// How long these were together, in bits.
+    pub dip_bits: f64,
+    /// Whether the line floats low where nobody drives it.
+    pub floats_low: bool,
 }
 
 impl Default for Rates {
     fn default() -> Self {
-        Self { least: f64::INFINITY, most: 0.0, sum: 0.0, weight: 0.0, spikes: 0, edges: 0 }
+        Self {
+            least: f64::INFINITY,
+            most: 0.0,
+            sum: 0.0,
+            weight: 0.0,
+            spikes: 0,
+            edges: 0,
+            spikes_at: [0; 2],
+            spike_bits: 0.0,
+            dips: 0,
+            dip_bits: 0.0,
+            floats_low: false,
+        }
     }
 }
 
@@ -114,7 +140,60 @@ impl EdgeReceiver {
             // A field is not high for longer.
             rest: ((f64::from(content_bits) + 3.0) * bit) as i64,
             skipped: 0,
+            past: Vec::new(),
+            heard_before: Vec::new(),
         }
+    }
+
+    /// One that has measured what was measured until edges were forgotten, and holds nothing.
+    #[must_use]
+    pub(super) fn emptied(&self) -> Self {
+        let heard = self.heard_before.clone();
+        Self { heard_before: heard.clone(), heard, rates: self.rates, ..Self::new(self.bit, self.content_bits) }
+    }
+
+    /// What was measured since edges were forgotten was no speaker.
+    pub(super) fn unlearn(&mut self) {
+        self.heard.clone_from(&self.heard_before);
+    }
+
+    /// What `other` has measured of the speakers is true of these.
+    pub(super) fn learn(&mut self, other: &Self) {
+        self.heard.clone_from(&other.heard);
+    }
+
+    /// Takes edges behind which the line rests.
+    pub(super) fn feed(&mut self, edges: &[Edge]) {
+        for edge in edges {
+            self.edge(*edge);
+        }
+        self.close();
+    }
+
+    /// The edges that were read since they were forgotten.
+    pub(super) fn past(&self) -> &[Edge] {
+        &self.past
+    }
+
+    /// Forgets the edges that were read.
+    pub(super) fn forget(&mut self) {
+        self.past.clear();
+        self.heard_before.clone_from(&self.heard);
+    }
+
+    /// The bit length that fits the speaker who was heard last, in picoseconds.
+    pub(super) fn bit_heard(&self) -> f64 {
+        self.heard.first().copied().unwrap_or(self.bit)
+    }
+
+    /// Whether all edges were read but for the first of what follows.
+    pub(super) fn is_between(&self) -> bool {
+        self.burst.len() < 2
+    }
+
+    /// When what follows has begun, if it has.
+    pub(super) fn begun(&self) -> Option<Time> {
+        self.burst.first().map(|first| first.time)
     }
 
     /// The capture begins inside a field: this many falling edges are passed over before the first start bit.
@@ -125,7 +204,8 @@ impl EdgeReceiver {
 
     /// What was measured so far.
     pub(crate) fn rates(&self) -> Rates {
-        self.rates
+        let (spikes_at, spike_bits) = self.spikes.near_edges();
+        Rates { spikes_at, spike_bits, ..self.rates }
     }
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
@@ -231,6 +311,7 @@ impl EdgeReceiver {
             rest = after;
         }
         let kept = burst.len() - rest.len();
+        self.past.extend_from_slice(burst.get(..kept).unwrap_or_default());
         self.burst = burst;
         self.burst.drain(..kept);
     }

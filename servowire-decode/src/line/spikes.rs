@@ -8,6 +8,9 @@ const SHORTEST_RUN: f64 = 0.375;
 /// A cluster between equal levels that holds the other one for so long is a bit in pieces, in bits.
 const TORN_BIT: f64 = 0.5;
 
+/// A spike within so many bits behind an edge is of it.
+const NEAR: f64 = 0.7;
+
 /// An edge between two levels that last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
@@ -38,6 +41,11 @@ pub(crate) struct Spikes {
     /// When the cluster began.
     begun: Time,
     dropped: u32,
+    /// The edge before.
+    last: Time,
+    /// Clusters near a rising edge and near a falling one, and how long their spikes were together, in bits.
+    near: [u64; 2],
+    near_bits: f64,
 }
 
 /// Up to two edges: those of a bit that was torn come together.
@@ -57,7 +65,15 @@ impl Spikes {
             other: 0,
             begun: Time::ZERO,
             dropped: 0,
+            last: Time::ZERO,
+            near: [0; 2],
+            near_bits: 0.0,
         }
+    }
+
+    /// Spikes that were near a rising edge and near a falling one, and how long they were together, in bits.
+    pub(crate) fn near_edges(&self) -> ([u64; 2], f64) {
+        (self.near, self.near_bits)
     }
 
     /// The same as [`change`](Self::change) where the change before was an edge and nothing else, as nearly always.
@@ -117,6 +133,7 @@ impl Spikes {
     fn cluster(&mut self, solid: bool) -> Edges {
         let (count, other) = (self.edges, self.other);
         (self.edges, self.other) = (0, 0);
+        self.classify(solid, other);
         if self.level != solid {
             self.dropped = self.dropped.saturating_add(count / 2);
             self.solid = Some(self.level);
@@ -130,6 +147,22 @@ impl Spikes {
         self.dropped = self.dropped.saturating_add(count / 2 - 1);
         let after = (self.begun + ((whole * self.bit) as i64)).min(self.since);
         [Some(self.edge(self.begun, !solid)), Some(self.edge(after, solid))]
+    }
+
+    /// Counts a cluster that holds spikes with the edge that it is near, if there is one.
+    fn classify(&mut self, solid: bool, other: i64) {
+        let rings = self.level != solid;
+        // A spike beside an edge of the line, or in front of the one that ends the cluster.
+        let (spike, rising) = if rings {
+            (other.min(self.since - self.begun - other), self.level)
+        } else if (self.begun - self.last) as f64 <= NEAR * self.bit {
+            (other, solid)
+        } else {
+            return;
+        };
+        let [up, down] = &mut self.near;
+        *(if rising { up } else { down }) += 1;
+        self.near_bits += spike as f64 / self.bit;
     }
 
     /// The last change of the line and the level since.
@@ -148,6 +181,7 @@ impl Spikes {
     }
 
     fn edge(&mut self, time: Time, level: bool) -> Edge {
+        self.last = time;
         Edge { time, level, spikes: std::mem::take(&mut self.dropped) }
     }
 }

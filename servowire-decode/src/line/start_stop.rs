@@ -31,8 +31,18 @@ pub trait StartStop {
     /// The capture begins, at `start`.
     fn begin(&mut self, start: Time);
 
+    /// Bits for which a line is low at the beginning of a request, and of an answer: the start bit and what is 0 behind it in
+    /// each of them.
+    const FIRST_LOW: [u32; 2];
+
     /// The next field of the line.
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// The line has rested until `now`: a frame that nothing can follow any more is over.
+    fn rest(&mut self, now: Time, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// Whether no frame is begun and not over.
+    fn is_between(&self) -> bool;
 
     /// The recording ends, at `end`.
     fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()>;

@@ -20,7 +20,8 @@ use crate::capture::hexlog::Burst;
 use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Event, Place, Verdict};
 use crate::line::evidence::Weights;
-use crate::line::lane::{LineDecoder, StartStopLine};
+use crate::line::exchanges::StartStopLine;
+use crate::line::lane::LineDecoder;
 use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::{CUT, CUT_BITS, LOST, SURELY_CUT_BITS, slipped_bit};
 use crate::settings::{Settings, Widths};
@@ -74,6 +75,9 @@ const LONGEST_BITS: i64 = 6 * FRAME_BITS as i64;
 
 /// A pause that ends a request whose memory data frames do not come, in picoseconds: drivers leave 1 to 10 us.
 const MEMORY_PAUSE: i64 = 50_000_000;
+
+/// The content of what a dip of the idle line looks like, but for the first bit.
+const IDLE: u16 = 0xffff;
 
 /// A reply begins within this time, in bits. The turn-around time is not documented.
 const REPLY_TIMEOUT_BITS: i64 = 1_000;
@@ -133,6 +137,17 @@ impl Decoder {
                 start - self.open.start() >= whole * self.bit
             }
         }
+    }
+
+    /// Whether the open group is a sound reply: what looks like a frame of idle line behind it is none of it.
+    #[cold]
+    fn is_whole(&self) -> bool {
+        let sound = |expected: Expected| {
+            let reply = RawResponse::from_words(expected.layout(), self.open.contents(), BitOrder::LsbFirst);
+            reply.and_then(|reply| Response::parse(&expected, &reply)).is_ok()
+        };
+        let asked = self.pending.map(|pending| pending.request);
+        self.open.kind() == Kind::Response && self.open.broken.is_none() && expected(&self.open, asked).is_ok_and(sound)
     }
 
     /// The open group is over.
@@ -272,6 +287,17 @@ fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
 
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 16;
+    // The sync codes 010 of a request and 001 of a reply.
+    const FIRST_LOW: [u32; 2] = [2, 3];
+
+    fn rest(&mut self, now: Time, out: &mut dyn Sink) -> io::Result<()> {
+        let over = !self.open.is_empty() && self.is_over(now, Kind::Other);
+        if over { self.close(out) } else { Ok(()) }
+    }
+
+    fn is_between(&self) -> bool {
+        self.open.is_empty()
+    }
 
     fn begin(&mut self, start: Time) {
         self.cut_until = None;
@@ -279,7 +305,9 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if !self.open.is_empty() && self.is_over(field.start, Kind::of(field.content)) {
+        let begins = Kind::of(field.content);
+        if !self.open.is_empty() && (self.is_over(field.start, begins) || field.content | 1 == IDLE && self.is_whole())
+        {
             self.close(out)?;
         }
         self.open.push(field.content, field, self.bit);

@@ -17,7 +17,8 @@ use crate::capture::hexlog::Burst;
 use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Direction, Event, Verdict};
 use crate::line::evidence::Weights;
-use crate::line::lane::{LineDecoder, StartStopLine};
+use crate::line::exchanges::StartStopLine;
+use crate::line::lane::LineDecoder;
 use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::CUT;
 use crate::settings::{Settings, Widths};
@@ -59,6 +60,9 @@ impl Codec for Tformat {
 
 /// A pause inside a frame that ends it, in bits: one and a half fields.
 const FIELD_TIMEOUT_BITS: i64 = 15;
+
+/// The ones in what a dip of the idle line looks like: it may be two bits long, and the answer may begin behind these.
+const IDLE: u16 = 0x1e;
 
 /// The shortest pause for the change of direction, in bits. Fields of one frame follow closer.
 const TURN_ROUND_BITS: i64 = 4;
@@ -126,6 +130,15 @@ impl Decoder {
                     || self.open.broken.is_some() && start - self.open.start() > whole * self.bit
             }
         }
+    }
+
+    /// Whether the open frame is a sound request of several fields: what looks like a field of idle line behind it is none of it.
+    fn is_long_request(&self) -> bool {
+        self.pending.is_none()
+            && self.open.len() > 1
+            && self.open.broken.is_none()
+            && Request::parse(self.open.contents())
+                .is_ok_and(|request| self.open.len() == usize::from(request.data_id().request_fields()))
     }
 
     /// Whether the open frame is whole as an answer and too long for a request.
@@ -279,6 +292,17 @@ impl Decoder {
 
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 8;
+    // The sink code 010 is the first in every control field.
+    const FIRST_LOW: [u32; 2] = [2, 2];
+
+    fn rest(&mut self, now: Time, out: &mut dyn Sink) -> io::Result<()> {
+        let over = !self.open.is_empty() && now - self.open.end > FIELD_TIMEOUT_BITS * self.bit;
+        if over { self.close(out) } else { Ok(()) }
+    }
+
+    fn is_between(&self) -> bool {
+        self.open.is_empty()
+    }
 
     fn begin(&mut self, start: Time) {
         (self.skip, self.cut_until) = (None, None);
@@ -287,7 +311,9 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if !self.open.is_empty() && self.is_over(field.start) {
+        if !self.open.is_empty()
+            && (self.is_over(field.start) || field.content & IDLE == IDLE && self.is_long_request())
+        {
             self.close(out)?;
         }
         if let Some(until) = self.skip {

@@ -153,7 +153,9 @@ impl Encoder {
             Ok(response) => {
                 position = self.response(response, &mut fields);
                 let crc = response.emit().crc().want;
-                let received = group.contents().last().map_or(crc, |last| (last >> 8) as u8).reverse_bits();
+                let last =
+                    usize::from(response.layout().frames()).checked_sub(1).and_then(|last| group.contents().get(last));
+                let received = last.map_or(crc, |last| (last >> 8) as u8).reverse_bits();
                 fields.push(Field::hex("CRC", received, 2));
                 let motion = self.motion.get_mut(usize::from(response.ea.get()));
                 let moved = position.zip(motion).and_then(|(position, motion)| motion.note(group.place(), position));

@@ -75,8 +75,9 @@ impl Encoder {
             }
             Err(_) => fields.push(bytes(frame)),
         }
-        if result.is_ok() {
-            fields.extend(frame.contents().last().map(|crc| Field::hex("CRC", *crc, 2)));
+        if let Ok(response) = result {
+            let last = usize::from(response.data_id().response_fields()).checked_sub(1);
+            fields.extend(last.and_then(|last| frame.contents().get(last)).map(|crc| Field::hex("CRC", *crc, 2)));
         }
         fields.extend(note);
         fields.extend(frame.spikes());

@@ -26,6 +26,19 @@ pub(crate) struct Bus {
     /// Spikes of up to a fifth of a bit, anywhere.
     pub(crate) spikes: usize,
     pub(crate) begins_low: bool,
+    /// What the line does where nobody drives it.
+    pub(crate) bias: Bias,
+}
+
+/// What a line does that nobody drives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Bias {
+    /// It rests high.
+    Good,
+    /// It falls low; the driver is on so many bits before its start bit, and so many behind its last bit.
+    Missing { lead: f64, hold: f64 },
+    /// It dips for so many bits when a driver lets go, before it rests high: least and most.
+    Weak(f64, f64),
 }
 
 impl Bus {
@@ -38,6 +51,7 @@ impl Bus {
         missing: 0.0,
         spikes: 0,
         begins_low: false,
+        bias: Bias::Good,
     };
 }
 
@@ -161,20 +175,25 @@ pub(crate) fn build(bus: &Bus, seed: u64) -> (Wire, Vec<Said>, f64) {
     let mut rng = Rng::new(seed);
     let nominal = 1e12 / bus.rate;
     let [asks, answers] = bus.clocks.map(|clock| nominal * clock);
-    let mut wire = Wire::new(!bus.begins_low);
+    let floats = matches!(bus.bias, Bias::Missing { .. });
+    let mut wire = Wire::new(!bus.begins_low && !floats);
     let mut said = Vec::new();
     let mut now = 30.0 * nominal;
-    wire.drive(now / 2.0, true);
+    wire.drive(now / 2.0, !floats);
     for _ in 0..bus.exchanges {
         let it = match bus.kind {
             Kind::Tformat => tformat(&mut rng),
             Kind::Aformat => aformat(&mut rng),
         };
         let start = now;
-        now = speak(&mut wire, now, asks, &it.request);
+        now = speak(&mut wire, now, asks, &it.request, bus.bias, &mut rng);
         let heard = |mut fields: Vec<(&'static str, Shown)>| {
             // Spikes beside a frame are counted with it.
-            fields.extend((bus.spikes > 0).then_some(("spikes", Shown::Any)));
+            // Where the last bit was flipped, its driver holds a low line high for a moment.
+            let rings = bus.spikes > 0 || bus.damaged > 0.0 && bus.bias != Bias::Good;
+            fields.extend(rings.then_some(("spikes", Shown::Any)));
+            // A dip that was passed over is told.
+            fields.extend(matches!(bus.bias, Bias::Weak(..)).then_some(("note", Shown::Any)));
             fields
         };
         said.push(Said { kind: it.kind, start, fields: heard(it.asked), position: None, damaged: false });
@@ -192,7 +211,7 @@ pub(crate) fn build(bus: &Bus, seed: u64) -> (Wire, Vec<Said>, f64) {
                 bits[at] = !bits[at];
             }
             let start = now + pause;
-            now = speak(&mut wire, start, answers, &bits);
+            now = speak(&mut wire, start, answers, &bits, bus.bias, &mut rng);
             let mut fields = heard(it.said);
             fields.push(("delay", Shown::Within(pause, 0.7 * nominal)));
             said.push(Said { kind: it.kind, start, fields, position: it.position, damaged });
@@ -203,10 +222,23 @@ pub(crate) fn build(bus: &Bus, seed: u64) -> (Wire, Vec<Said>, f64) {
     (wire, said, now)
 }
 
-/// Someone drives the line for these bits; then it rests high.
-fn speak(wire: &mut Wire, start: f64, bit: f64, bits: &[bool]) -> f64 {
+/// Someone drives the line for these bits and lets go of it.
+fn speak(wire: &mut Wire, start: f64, bit: f64, bits: &[bool], bias: Bias, rng: &mut Rng) -> f64 {
+    if let Bias::Missing { lead, .. } = bias {
+        wire.drive(start - lead * bit, lead > 0.0);
+    }
     let end = wire.send(start, bit, bits);
-    wire.drive(end, true);
+    match bias {
+        Bias::Good => wire.drive(end, true),
+        Bias::Missing { hold, .. } => {
+            wire.drive(end, hold > 0.0);
+            wire.drive(end + hold * bit, false);
+        }
+        Bias::Weak(least, most) => {
+            wire.drive(end, false);
+            wire.drive(end + rng.between(least, most) * bit, true);
+        }
+    }
     end
 }
 

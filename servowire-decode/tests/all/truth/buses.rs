@@ -1,6 +1,6 @@
 //! T-Format and A-format lines under many conditions.
 
-use super::bus::{Bus, Kind, build};
+use super::bus::{Bias, Bus, Kind, build};
 use super::line::{Recording, record};
 use super::rng::Rng;
 use super::{Outcome, decode, hold, judge};
@@ -29,6 +29,23 @@ const CONDITIONS: &[(&str, Condition)] = &[
     ("answers missing", |_, bus| exact(Bus { missing: 0.2, ..bus })),
     ("bits flipped", |_, bus| exact(Bus { damaged: 0.2, ..bus })),
     ("spikes", |_, bus| exact(Bus { spikes: 5, ..bus })),
+    ("floats low, its drivers on before their start bits", |rng, bus| {
+        let bias = Bias::Missing { lead: rng.between(0.5, 3.0), hold: rng.between(0.0, 1.5) };
+        (Bus { bias, ..bus }, Some(12.0), Recording::EXACT)
+    }),
+    ("floats low, its drivers on with their start bits", |rng, bus| {
+        let bias = Bias::Missing { lead: 0.0, hold: rng.between(0.0, 1.0) };
+        (Bus { bias, clocks: [rng.between(0.99, 1.01), rng.between(0.99, 1.01)], ..bus }, Some(12.0), Recording::EXACT)
+    }),
+    ("floats low, answers missing and bits flipped", |rng, bus| {
+        let bias = Bias::Missing { lead: rng.pick(&[0.0, 1.0]), hold: 0.2 };
+        exact(Bus { bias, missing: 0.1, damaged: 0.1, ..bus })
+    }),
+    ("dips when a driver lets go", |_, bus| exact(Bus { bias: Bias::Weak(0.6, 1.5), ..bus })),
+    ("dips, sampled, answers missing and bits flipped", |rng, bus| {
+        let bus = Bus { bias: Bias::Weak(0.6, 1.5), missing: 0.1, damaged: 0.1, ..bus };
+        (bus, Some(rng.between(8.0, 20.0)), Recording::EXACT)
+    }),
 ];
 
 fn run(name: &str, condition: Condition, kind: Kind, seed: u64) -> Outcome {
@@ -48,6 +65,15 @@ fn run(name: &str, condition: Condition, kind: Kind, seed: u64) -> Outcome {
     let mut outcome = judge(&events, &said, bit, |said, _| said.start > from);
     if notes.contains("swapped") != recording.inverted {
         outcome.wrong.push(notes.clone());
+    }
+    let told = [
+        ("floats low, no bias", matches!(bus.bias, Bias::Missing { .. })),
+        ("dips of", matches!(bus.bias, Bias::Weak(..))),
+    ];
+    for (what, is_so) in told {
+        if notes.contains(what) != is_so {
+            outcome.wrong.push(format!("{what}: {notes}"));
+        }
     }
     outcome.notes = notes;
     outcome

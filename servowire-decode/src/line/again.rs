@@ -1,0 +1,190 @@
+//! What is done where a frame failed: its edges are looked at again.
+//!
+//! When a driver lets go of the line, it may dip for a bit before the bias pulls it up, or somebody disturbs it: a receiver takes
+//! that for a start bit, and the frame behind it is lost. Here it is read a second time, from the next edge on. And where a frame
+//! stays broken, its edges may tell that two have driven the line.
+
+use super::evidence::Weights;
+use super::receive::EdgeReceiver;
+use super::spikes::Edge;
+use super::start_stop::StartStop;
+use super::trial::{Trial, is_failed};
+use crate::event::{Event, Field, Place, Value, Verdict};
+use crate::time::Time;
+
+/// Edges that are looked at again at most: those of an exchange or two.
+pub(super) const MOST_AGAIN: usize = 400;
+/// Pulses that are passed over in them at most.
+const ROUNDS: usize = 4;
+/// The longest low pulse that may be none of the frame, in bits.
+const LONGEST_PULSE: f64 = 1.75;
+/// So long the line is high behind it at least, in bits: nobody answers earlier.
+const QUIET: f64 = 3.0;
+/// So soon after a frame its driver lets go, in bits.
+const LETS_GO: f64 = 2.5;
+
+/// Where a frame failed.
+pub(super) struct Failed<'a, P> {
+    pub(super) receiver: &'a EdgeReceiver,
+    /// The protocol as it was before these edges.
+    pub(super) before: &'a P,
+    pub(super) weights: Weights,
+    pub(super) edges: &'a [Edge],
+    /// Where the frames begin that are told already.
+    pub(super) passed: &'a [Time],
+    /// Until when the line has rested.
+    pub(super) now: Time,
+    /// Picoseconds of a bit.
+    pub(super) bit: f64,
+}
+
+/// A low pulse that was passed over.
+#[derive(Debug, Clone, Copy)]
+struct Pulse {
+    time: Time,
+    bits: f64,
+}
+
+/// The better reading.
+pub(super) struct Better<P> {
+    pub(super) protocol: P,
+    pub(super) receiver: EdgeReceiver,
+    /// Events behind those that are told already.
+    pub(super) events: Vec<Event>,
+    /// Dips of drivers that let go, and how long they were together, in bits.
+    pub(super) dips: u64,
+    pub(super) dip_bits: f64,
+}
+
+impl<P: StartStop + Clone> Failed<'_, P> {
+    fn trial(&self, edges: &[Edge]) -> Trial<P> {
+        Trial::of(self.receiver, self.before, self.weights, edges, self.now)
+    }
+
+    /// Whether a reading has the frames that are told already.
+    fn goes_on(&self, trial: &Trial<P>) -> bool {
+        let same = |(start, event): (&Time, &Event)| match event.place {
+            Place::Time { start: own, .. } => !is_failed(event) && ((own - *start) as f64).abs() < self.bit,
+            Place::Line(_) => false,
+        };
+        trial.heard.events.len() >= self.passed.len() && self.passed.iter().zip(&trial.heard.events).all(same)
+    }
+
+    /// Low pulses that may be none of a frame: the places of their falling edges.
+    fn pulses(&self, edges: &[Edge]) -> Vec<(usize, Pulse)> {
+        let pulse = |(at, fall): (usize, &Edge)| {
+            let rise = edges.get(at + 1).filter(|_| !fall.level)?;
+            let bits = (rise.time - fall.time) as f64 / self.bit;
+            let quiet = edges.get(at + 2).map_or(f64::INFINITY, |next| (next.time - rise.time) as f64 / self.bit);
+            (bits < LONGEST_PULSE && quiet > QUIET).then_some((at, Pulse { time: fall.time, bits }))
+        };
+        edges.iter().enumerate().filter_map(pulse).collect()
+    }
+
+    /// A reading without some pulses in which more frames hold.
+    pub(super) fn again(&self) -> Option<Better<P>> {
+        let mut edges = self.edges.to_vec();
+        let mut best = self.trial(&edges);
+        let mut pulses = Vec::new();
+        while best.heard.failed > 0 && pulses.len() < ROUNDS {
+            let mut next: Option<(Trial<P>, Vec<Edge>, Pulse)> = None;
+            for (at, pulse) in self.pulses(&edges) {
+                let mut without = edges.clone();
+                without.drain(at..at + 2);
+                let trial = self.trial(&without);
+                // In the middle of a frame it would be a guess by which damage might hold by chance.
+                let inside = |event: &Event| match event.place {
+                    Place::Time { start, end } => pulse.time > start && pulse.time < end - (0.6 * self.bit) as i64,
+                    Place::Line(_) => false,
+                };
+                if trial.heard.events.iter().any(inside) {
+                    continue;
+                }
+                let than = next.as_ref().map_or(&best.heard, |(trial, ..)| &trial.heard);
+                if self.goes_on(&trial) && trial.heard.is_better_than(than) {
+                    next = Some((trial, without, pulse));
+                }
+            }
+            let Some((trial, without, pulse)) = next else { break };
+            pulses.push(pulse);
+            (best, edges) = (trial, without);
+        }
+        (!pulses.is_empty()).then(|| self.told(best, &pulses))
+    }
+
+    /// The events, with what was passed over beside them.
+    fn told(&self, best: Trial<P>, pulses: &[Pulse]) -> Better<P> {
+        let mut events = best.heard.events;
+        let (mut dips, mut dip_bits) = (0, 0.0);
+        for Pulse { time, bits } in pulses {
+            let before = |event: &&Event| event.place.end().is_some_and(|end| end < *time + (0.5 * self.bit) as i64);
+            let behind = events.iter().take_while(before).count();
+            let end = behind.checked_sub(1).and_then(|at| events.get(at)?.place.end());
+            let lets_go = end.is_some_and(|end| ((*time - end) as f64) < LETS_GO * self.bit);
+            let what = if lets_go { "dip" } else { "pulse" };
+            let when = if lets_go { ", when its driver let go" } else { " on the idle line" };
+            (dips, dip_bits) = (dips + u64::from(lets_go), dip_bits + if lets_go { *bits } else { 0.0 });
+            // What is told already cannot be told again.
+            let at = if lets_go && behind > self.passed.len() { behind - 1 } else { behind.max(self.passed.len()) };
+            if let Some(event) = events.get_mut(at) {
+                let when = if at + 1 == behind || !lets_go { when } else { ", when the driver before it let go" };
+                note(event, &format!("a {what} of {bits:.1} bits at {:.3} us{when}, is passed over", time.us()));
+            }
+        }
+        events.drain(..self.passed.len());
+        Better { protocol: best.protocol, receiver: best.receiver, events, dips, dip_bits }
+    }
+}
+
+/// Says something beside the fields of an event.
+fn note(event: &mut Event, what: &str) {
+    let known = event.fields.iter_mut().find(|field| field.name == "note");
+    match known.map(|field| &mut field.value) {
+        Some(Value::Text(text)) => {
+            text.push_str("; ");
+            text.push_str(what);
+        }
+        _ => event.fields.push(Field::text("note", what)),
+    }
+}
+
+/// An edge further from the grid of the others, in bits, is of another grid.
+const OFF_GRID: f64 = 0.27;
+/// Edges off the grid that two drivers leave in a frame at least, and one in so many of all.
+const FEWEST_OFF: usize = 4;
+const SHARE_OFF: usize = 6;
+/// So often the edges of a frame change from one grid to the other at least. One speaker behind the other changes once.
+const FEWEST_TURNS: usize = 4;
+
+/// Names what the edges of a frame that failed tell of its cause: two that drive at once have two clocks, so that no grid fits all
+/// edges. `bit`: that of the speaker, in picoseconds.
+pub(super) fn blame(event: &mut Event, edges: &[Edge], bit: f64) {
+    let Place::Time { start, end } = event.place else { return };
+    let Verdict::Refused(refusal) = &mut event.verdict else { return };
+    let first = edges.partition_point(|edge| edge.time < start - (0.5 * bit) as i64);
+    let last = edges.partition_point(|edge| edge.time < end + (3.0 * bit) as i64);
+    let own = edges.get(first..last).unwrap_or_default();
+    let Some(begin) = own.first() else { return };
+    // The grid on which most edges lie; clocks are off by up to 4 %.
+    let off = |bit: f64| {
+        move |edge: &Edge| {
+            let place = (edge.time - begin.time) as f64 / bit;
+            (place - place.round()).abs() > OFF_GRID
+        }
+    };
+    let bits = (-16_i32..=16).map(|k| bit * (1.0 + f64::from(k) / 400.0));
+    let counted = bits.map(|bit| (own.iter().filter(|edge| off(bit)(edge)).count(), bit));
+    let Some((count, bit)) = counted.min_by_key(|(count, _)| *count) else { return };
+    let is_off = off(bit);
+    let turns = own.windows(2).filter(|pair| matches!(pair, [a, b] if is_off(a) != is_off(b))).count();
+    if count < FEWEST_OFF || count * SHARE_OFF < own.len() || turns < FEWEST_TURNS {
+        return;
+    }
+    let at = own.iter().find(|edge| is_off(edge)).map_or(start, |edge| edge.time);
+    refusal.cause = Some(format!(
+        "two drive at once: from {:.3} us on, {count} of {} edges are off the grid of the others",
+        at.us(),
+        own.len()
+    ));
+    refusal.time = refusal.time.or(Some(at));
+}

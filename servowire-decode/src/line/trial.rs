@@ -1,0 +1,85 @@
+//! What a decoder would make of some edges, without anybody hearing of it.
+
+use std::io;
+
+use super::evidence::{Evidence, Weights};
+use super::receive::EdgeReceiver;
+use super::spikes::Edge;
+use super::start_stop::StartStop;
+use crate::event::{Event, Verdict};
+use crate::sink::Sink;
+use crate::time::Time;
+
+/// Whether an event is a frame that came and does not hold. What an encoder refuses, it refuses in a sound frame.
+pub(super) fn is_failed(event: &Event) -> bool {
+    match &event.verdict {
+        Verdict::Ok => false,
+        Verdict::Refused(refusal) => !event.remark && !event.verdict.is_silence() && refusal.class != "rejected",
+    }
+}
+
+/// Events that were heard, and what speaks for them.
+#[derive(Debug)]
+pub(super) struct Heard {
+    pub(super) events: Vec<Event>,
+    pub(super) evidence: Evidence,
+    /// Frames that do not hold.
+    pub(super) failed: usize,
+}
+
+impl Heard {
+    fn new(weights: Weights) -> Self {
+        Self { events: Vec::new(), evidence: Evidence::new(weights), failed: 0 }
+    }
+
+    /// Whether there is an answer, and nothing that does not hold.
+    pub(super) fn is_perfect(&self) -> bool {
+        self.failed == 0 && self.evidence.answers > 0
+    }
+
+    /// Frames in front of the first that failed.
+    fn sound(&self) -> usize {
+        let sound = self.events.iter().take_while(|event| !is_failed(event));
+        sound.filter(|event| event.verdict.is_ok()).count()
+    }
+
+    /// More of it holds: more answers, more in front of what failed, or all of it. A request alone proves little, and a piece of an answer may look like another
+    /// one, to which there is none.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        let more = self.evidence.answers > other.evidence.answers && self.failed <= other.failed;
+        let whole = self.failed == 0 && other.failed > 0;
+        let missing = self.evidence.tally.missing > other.evidence.tally.missing;
+        let further = self.sound() > other.sound() && self.failed <= other.failed;
+        (more || whole || further) && self.evidence.score > other.evidence.score && !missing
+    }
+}
+
+impl Sink for Heard {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.failed += usize::from(is_failed(event));
+        self.events.push(event.clone());
+        self.evidence.event(event)
+    }
+}
+
+/// A reading of some edges by a receiver and a protocol as they were before them.
+#[derive(Debug)]
+pub(super) struct Trial<P> {
+    pub(super) receiver: EdgeReceiver,
+    pub(super) protocol: P,
+    pub(super) heard: Heard,
+}
+
+impl<P: StartStop + Clone> Trial<P> {
+    /// Reads `edges`, behind which the line rests until `now`.
+    pub(super) fn of(receiver: &EdgeReceiver, protocol: &P, weights: Weights, edges: &[Edge], now: Time) -> Self {
+        let mut trial = Self { receiver: receiver.emptied(), protocol: protocol.clone(), heard: Heard::new(weights) };
+        trial.receiver.feed(edges);
+        for field in trial.receiver.take() {
+            // Nothing is written, so nothing fails.
+            let _ = trial.protocol.field(&field, &mut trial.heard);
+        }
+        let _ = trial.protocol.rest(now, &mut trial.heard);
+        trial
+    }
+}
