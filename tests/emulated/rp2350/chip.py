@@ -23,6 +23,7 @@ FLASH_BYTES, RAM_BYTES = 0x200000, 0x82000
 CLOCK_HZ = 150_000_000
 # Clocks for which one core runs before the other does.
 TURN = 64
+WFE = b"\x20\xbf"
 
 
 def clocks_of(code):
@@ -54,7 +55,7 @@ class Core:
         self.chip, self.number = chip, number
         self.clock, self.stop, self.after = 0.0, 0.0, None
         self.instructions = 0
-        self.costs, self.lately = {}, deque(maxlen=2048)
+        self.costs, self.waits, self.lately = {}, set(), deque(maxlen=2048)
         self.cached = set()
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M33)
@@ -68,7 +69,13 @@ class Core:
     def instruction(self, uc, address, size, _):
         cost = self.costs.get(address)
         if cost is None:
-            cost = self.costs[address] = clocks_of(bytes(uc.mem_read(address, size))) * self.chip.scale
+            code = bytes(uc.mem_read(address, size))
+            cost = self.costs[address] = clocks_of(code) * self.chip.scale
+            if code == WFE:
+                self.waits.add(address)
+        if address in self.waits:
+            # Nothing would wake it; whoever waits looks again.
+            uc.reg_write(UC_ARM_REG_PC, address + size | 1)
         if address != self.after:
             cost += 2 * self.chip.scale
         if address < RAM and self.chip.flash_clocks:
@@ -113,7 +120,7 @@ class Chip:
         self.elf = ELFFile(open(path, "rb"))
         for segment in self.elf.iter_segments():
             if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
-                data = segment.data().replace(b"\x20\xbf", b"\x00\xbf") if segment["p_flags"] & 1 else segment.data()
+                data = segment.data()
                 ctypes.memmove(ctypes.addressof(self.flash) + segment["p_paddr"] - FLASH, data, len(data))
         self.symbols = {s.name: s["st_value"] for s in self.elf.get_section_by_name(".symtab").iter_symbols()}
         self.registers = {}
@@ -121,6 +128,7 @@ class Chip:
         self.locks = [False] * 32
         self.launched, self.launching = False, []
         self.console = bytearray()
+        self.fed = 0
         self.pio = Pio(inputs, changed)
         self.dma = Dma(self, self.request, dma_clocks)
         self.now = 0
@@ -232,6 +240,7 @@ class Chip:
         elif block == 0x40070000 and offset == 0:
             self.console.append(value & 0xFF)
         else:
+            self.fed += (block, offset) == (0x400D8000, 0x04)
             self.registers[block | offset] = value
 
     def sio(self, core, offset):

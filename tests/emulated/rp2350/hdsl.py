@@ -21,6 +21,8 @@ STARTING, RUNNING = 252, 180
 RING, FRAMES_SYMBOL = 128, "FRAMES"
 # Positions a second, as the README says.
 RATE = 52_083
+# What the console says first: image, rate, clock, board.
+FIRST = "servowire-rp2350-hdsl 0.1.0, 9375000 bit/s, core 150000000 Hz of the crystal of 12000000 Hz, Raspberry Pi Pico 2, "
 # Clocks from the end of PARA to the first bit of an answer: one bit, then the cable.
 CABLE_EIGHTHS = 11
 FRAMES = 260
@@ -129,13 +131,24 @@ def check(name, line, chip, begun, margins, damaged=False):
 
 def positions(name, line, chip):
     """Every position that the console printed was one of the shaft at a sampling edge."""
-    said = bytes(chip.console).decode().split("\r\n")
+    # The run ends anywhere in a line.
+    said = bytes(chip.console).decode().split("\r\n")[:-1]
+    assert said[0].startswith(FIRST) and said[0].endswith(f" {RATE} positions a second"), f"{name}: {said[0]}"
     printed = [int(text.removeprefix("position ")) for text in said if text.startswith("position ")]
     truth = set(line.encoder.truth)
     assert printed, f"{name}: no position, only {said}"
     for position in printed:
         assert position in truth, f"{name}: the shaft never was at {position}"
     assert not any("late" in text for text in said), f"{name}: {said}"
+
+
+def watchdog(name, chip):
+    """It is fed while both cores are at work, and not by core 1 alone."""
+    assert chip.registers[0x400D8000] >> 30 & 1, f"{name}: no watchdog"
+    assert chip.fed > FRAMES // 2, f"{name}: the watchdog was fed {chip.fed} times"
+    core, fed = chip.cores[1], chip.fed
+    core.run(core.clock + 10 * RUNNING * BIT)
+    assert chip.fed <= fed + 1, f"{name}: core 1 feeds the watchdog while core 0 stands"
 
 
 def main():
@@ -155,6 +168,7 @@ def main():
             line, chip, begun, margins = run(image, damage_after, **speed)
             check(name, line, chip, begun, margins, damage_after is not None)
             positions(name, line, chip)
+            watchdog(name, chip)
             edges = line.edges[: len(line.edges) - 200]
             first = first or edges
             same = min(len(first), len(edges))

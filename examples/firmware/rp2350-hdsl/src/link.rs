@@ -1,10 +1,13 @@
 //! Core 0: the link.
 
+use core::sync::atomic::Ordering;
+
 use hdsl::Evidence;
 use hdsl::master::{Master, State, Transmission};
 
 use servowire_core::Writer;
 
+use crate::FRAME;
 use crate::frame::{RUNNING, STARTING};
 use crate::front_end::{Late, Line, WINDOW_END_NS};
 
@@ -19,6 +22,7 @@ pub fn run(
 ) -> Result<(), Late> {
     let (mut number, mut begin_ns, mut length) = (0_u32, start_ns, STARTING);
     loop {
+        FRAME.store(number, Ordering::Relaxed);
         // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
         let ahead = master.ahead();
         // What may follow from an answer takes longer than its frame leaves, so one goes between that nobody looks at: while the
