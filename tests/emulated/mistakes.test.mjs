@@ -1,4 +1,4 @@
-// The table "when nothing comes" of the README: each mistake is made, and the master has to say what stands there.
+// The table "If nothing arrives" of the README: each mistake is made, and the master has to say what stands there.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
