@@ -148,6 +148,21 @@ proptest! {
     }
 }
 
+/// A step that is due in the tick of a request, and so before the stop begins: those behind it are at their ticks.
+#[test]
+fn a_stop_in_the_tick_of_a_step() {
+    for target in [-1575, -900] {
+        let mut watched = Watched::new(Limits::new(21_485, 354_788).unwrap(), 1_000_000);
+        watched.tell(Request::Run(true, 6840)).unwrap();
+        watched.run_until(59_014).unwrap();
+        watched.tell(Request::MoveTo(target)).unwrap();
+        watched.run_until(59_014 + 41_333).unwrap();
+        watched.tell(Request::MoveTo(0)).unwrap();
+        watched.run_until(u64::MAX).unwrap();
+        assert_eq!(watched.position, 0);
+    }
+}
+
 fn mover() -> Mover {
     Mover::new(Clock::MICROSECONDS, Limits::new(10_000, 100_000).unwrap().with_jerk(2_000_000).unwrap()).unwrap()
 }

@@ -120,6 +120,19 @@ fn a_turn_at_1_mhz_and_at_200() {
     }
 }
 
+/// Moves of few steps, with a step where a piece of the jerk ends, or few of them in a piece.
+#[test]
+fn segments_of_pieces_of_few_steps() {
+    for (hz, limits, target) in [
+        (200_000_000, limits(285_392, 3_187_009, 1_099_701_122), -13),
+        (72_000_000, limits(108_080, 9_851_652, 15_353_617_130), 23),
+        (200_000_000, limits(43_714, 23_822_135, 194_861_935_563), 15),
+        (200_000_000, limits(230_797, 3_185_880, 11_771_609_240), 21),
+    ] {
+        compare(hz, limits, target, hz / 20).unwrap();
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Request {
     MoveTo(i64),
