@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the firmware images and runs those for which there is an emulator: RP2040s in pairs, two chips and a wire, with their PIO's
-# scheduler compared with an independent emulator; the RP2350 with both cores, PIO and DMA against an encoder; the STM32F405 under QEMU.
+# scheduler compared with an independent emulator; the RP2350 with its processors, PIO and DMA against encoders; the STM32F405 under QEMU.
 # Needs node, python3 and qemu-system-arm; installs the rest by name: targets from rustup, the emulators from npm and PyPI.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -58,6 +58,7 @@ done
 hdsl=$(built "$firmware/rp2350-hdsl")/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
 .venv/bin/python rp2350/compare.py "$hdsl"
 .venv/bin/python rp2350/hdsl.py "$hdsl"
+.venv/bin/python rp2350/masters.py "$(built "$firmware/pico2")/thumbv8m.main-none-eabihf/release"
 
 build stm32f405 --features emulated
 (cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)

@@ -1,7 +1,7 @@
 """An RP2350 that runs an unmodified image: both Cortex-M33 in `unicorn` over one memory, PIO 0, DMA, the FIFOs and spin locks of SIO,
-a timer, a UART, and as much of clocks and resets as a start needs.
+a timer, the SysTicks, a UART, and as much of clocks and resets as a start needs.
 
-Time is clocks of 150 MHz. What an instruction takes is a table (`clocks_of`), times a scale; a branch that is taken costs two
+Time is clocks of the system. What an instruction takes is a table (`clocks_of`), times a scale; a branch that is taken costs two
 more; flash costs `flash` clocks more for each eight bytes that were not read lately. That is not true to the cycle, so a test
 asks for the same result over a range of scales.
 
@@ -24,6 +24,8 @@ CLOCK_HZ = 150_000_000
 # Clocks for which one core runs before the other does.
 TURN = 64
 WFE = b"\x20\xbf"
+# SYST_CVR of either core.
+SYSTICK_NOW = 0xE000E018
 
 
 def clocks_of(code):
@@ -57,6 +59,7 @@ class Core:
         self.instructions = 0
         self.costs, self.waits, self.lately = {}, set(), deque(maxlen=2048)
         self.cached = set()
+        self.ticked = 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M33)
         uc.mem_map_ptr(FLASH, FLASH_BYTES, UC_PROT_ALL, ctypes.addressof(chip.flash))
@@ -86,6 +89,10 @@ class Core:
         if self.clock >= self.stop:
             uc.emu_stop()
 
+    def systick(self):
+        """Counts 24 bits down with the clock, from the last write on."""
+        return (self.ticked - int(self.clock)) & 0xFFFFFF
+
     def fetch(self, line):
         """What it costs to have these eight bytes of flash."""
         if line in self.cached:
@@ -114,7 +121,8 @@ class Core:
 class Chip:
     """The whole. `changed(clock, levels, directions)` is told of pins that PIO 0 drives, `inputs(clock)` gives all levels."""
 
-    def __init__(self, path, inputs, changed, scale=1.0, flash_clocks=0, dma_clocks=4):
+    def __init__(self, path, inputs, changed, scale=1.0, flash_clocks=0, dma_clocks=4, hz=CLOCK_HZ):
+        self.hz = hz
         self.scale, self.flash_clocks = scale, flash_clocks
         self.flash, self.ram = (ctypes.c_ubyte * FLASH_BYTES)(), (ctypes.c_ubyte * RAM_BYTES)()
         self.elf = ELFFile(open(path, "rb"))
@@ -192,6 +200,8 @@ class Chip:
             self.advance(int(core.clock))
         if address >> 28 == 0xD:
             return self.sio(core, address & 0xFFF)
+        if address == SYSTICK_NOW:
+            return core.systick()
         block, offset = address & ~0x3FFF, address & 0xFFF
         if block == 0x50000000:
             return self.dma.load(offset)
@@ -211,7 +221,7 @@ class Chip:
         if block == 0x40010000 and offset in (0x38, 0x44):
             return 1 << (self.registers.get(block | offset - 8, 0) & 3)
         if block == 0x400B0000 and offset in (0x24, 0x28):
-            micros = int(core.clock) * 1_000_000 // CLOCK_HZ
+            micros = int(core.clock) * 1_000_000 // self.hz
             return micros >> 32 if offset == 0x24 else micros & 0xFFFFFFFF
         if block == 0x40070000 and offset == 0x18:
             return 0x90
@@ -228,6 +238,9 @@ class Chip:
             self.advance(int(core.clock))
         if address >> 28 == 0xD:
             self.store_sio(core, address & 0xFFF, value)
+            return
+        if address == SYSTICK_NOW:
+            core.ticked = int(core.clock)
             return
         block, offset, kind = address & ~0x3FFF, address & 0xFFF, address >> 12 & 3
         if kind:

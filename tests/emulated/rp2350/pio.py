@@ -1,7 +1,8 @@
 """A PIO block of the RP2350, as far as its data sheet (chapter PIO) tells it and programs here need it: four state machines with
-automatic push and pull, joined FIFOs, side-set and delays, to the clock.
+automatic push and pull, joined FIFOs, side-set, delays, whole clock dividers and the flags between machines, to the clock.
 
-Left out, and refused when met: fractional clock dividers, WAIT, IRQ, MOV to and from FIFO words, EXEC of stalling instructions.
+Left out, and refused when met: fractional clock dividers, MOV to and from FIFO words, EXEC of stalling instructions, flags of a machine's
+own (REL) and of other blocks.
 """
 
 from collections import deque
@@ -47,31 +48,84 @@ class StateMachine:
         return self.shiftctrl >> shift & 31 or 32
 
     def step(self):
-        """One instruction at `time`, which moves on; a machine that stalls tries again a clock later."""
-        assert self.clkdiv >> 8 & 0xFFFF in (0, 0x100), "a machine with a clock divider"
+        """One instruction at `time`, which moves on; a machine that stalls tries again a cycle later."""
+        assert self.clkdiv & 0xFF00 == 0, "a machine with a fractional clock divider"
+        cycle = self.clkdiv >> 16 or 0x10000
         code = self.block.memory[self.pc]
-        if self.execute(code):
+        done = self.execute(code)
+        self.block.tell(self.time)
+        if done:
             top, bottom = self.execctrl >> 12 & 31, self.execctrl >> 7 & 31
             if not self.jumped:
                 self.pc = bottom if self.pc == top else self.pc + 1 & 31
-            self.time += 1 + (code >> 8 & 31)
+            self.time += cycle * (1 + (code >> 8 & (1 << 5 - self.side_bits()) - 1))
         else:
-            self.time += 1
+            self.time += cycle
+
+    def side_bits(self):
+        """How many bits of the delay field are side-set."""
+        return self.pinctrl >> 29
 
     def execute(self, code):
-        """Whether the instruction was done; side-set is not used here."""
-        assert self.pinctrl >> 29 == 0, "side-set"
+        """Whether the instruction was done. Its side-set takes place even if it stalls."""
+        if self.side_bits():
+            assert self.execctrl >> 29 & 3 == 0, "side-set that is optional, or of directions"
+            self.block.drive(self.pinctrl >> 10 & 31, self.side_bits(), (code >> 8 & 31) >> 5 - self.side_bits())
         self.jumped = False
         kind, operand, data = code >> 13, code >> 5 & 7, code & 31
         if kind == 0:
             return self.jump(operand, data)
+        if kind == 1:
+            return self.wait(code >> 7 & 1, code >> 5 & 3, data)
         if kind == 2 and operand == 0:
             return self.take(data or 32)
         if kind == 3:
             return self.put(operand, data or 32)
+        if kind == 4 and data == 0:
+            return self.pull_word(operand & 3) if operand >> 2 else self.push_word(operand & 3)
+        if kind == 5:
+            return self.move(operand, data)
+        if kind == 6 and operand & 6 == 0 and data < 8:
+            assert operand == 0, "an IRQ instruction that waits"
+            self.block.flags |= 1 << data
+            return True
         if kind == 7:
             return self.set(operand, data)
         raise AssertionError(f"instruction {code:#06x} is not modelled")
+
+    def wait(self, polarity, source, index):
+        """WAIT PIN, counted from the first input pin, and WAIT IRQ, which takes the flag away."""
+        if source == 1:
+            level = self.block.inputs(self.time - SYNCHRONISER) >> (self.pinctrl >> 15 & 31) + index & 1
+            return level == polarity
+        assert source == 2 and polarity == 1 and index < 8, f"WAIT for source {source} is not modelled"
+        came = self.block.flags >> index & 1
+        self.block.flags &= ~(came << index)
+        return bool(came)
+
+    def pull_word(self, how):
+        """PULL, which gives X if it does not block and nothing is there."""
+        assert how >> 1 == 0, "PULL IFEMPTY is not modelled"
+        if not self.tx and how & 1:
+            return False
+        self.osr, self.osr_bits = self.tx.popleft() if self.tx else self.x, 0
+        return True
+
+    def push_word(self, how):
+        """PUSH that blocks."""
+        assert how == 1, "only PUSH BLOCK is modelled"
+        return self.push()
+
+    def move(self, target, data):
+        """MOV without an operation between X, Y, OSR and ISR."""
+        assert data >> 3 == 0, "MOV with an operation is not modelled"
+        value = {1: self.x, 2: self.y, 3: 0, 6: self.isr, 7: self.osr}[data & 7]
+        assert target in (1, 2), f"MOV to {target} is not modelled"
+        if target == 1:
+            self.x = value
+        else:
+            self.y = value
+        return True
 
     def jump(self, condition, target):
         if condition == 0:
@@ -80,6 +134,8 @@ class StateMachine:
             taken, self.x = self.x != 0, self.x - 1 & MASK
         elif condition == 4:
             taken, self.y = self.y != 0, self.y - 1 & MASK
+        elif condition == 5:
+            taken = self.x != self.y
         else:
             raise AssertionError(f"condition {condition} is not modelled")
         if taken:
@@ -121,16 +177,18 @@ class StateMachine:
         value, self.osr = self.osr & (1 << count) - 1, self.osr >> count
         self.osr_bits = min(32, self.osr_bits + count)
         if target == 0:
-            self.block.drive(self.time, self.pinctrl & 31, self.pinctrl >> 20 & 63, value)
+            self.block.drive(self.pinctrl & 31, self.pinctrl >> 20 & 63, value)
         elif target == 1:
             self.x = value
+        elif target == 2:
+            self.y = value
         elif target != 3:
             raise AssertionError(f"OUT to {target} is not modelled")
         return True
 
     def set(self, target, data):
         if target == 0:
-            self.block.drive(self.time, self.pinctrl >> 5 & 31, self.pinctrl >> 26 & 7, data)
+            self.block.drive(self.pinctrl >> 5 & 31, self.pinctrl >> 26 & 7, data)
         elif target == 1:
             self.x = data
         elif target == 2:
@@ -149,14 +207,18 @@ class Pio:
         self.memory = [0] * 32
         self.machines = [StateMachine(number, self) for number in range(4)]
         self.inputs, self.changed = inputs, changed
-        self.levels = self.directions = self.fdebug = 0
+        self.levels = self.directions = self.fdebug = self.flags = 0
+        self.told = 0
         self.time = 0
 
-    def drive(self, time, base, count, value):
+    def drive(self, base, count, value):
         mask = ((1 << count) - 1) << base
-        levels = self.levels & ~mask | value << base & mask
-        if levels != self.levels:
-            self.levels = levels
+        self.levels = self.levels & ~mask | value << base & mask
+
+    def tell(self, time):
+        """An instruction changes the pins of its side-set and its own at once."""
+        if self.levels != self.told:
+            self.told = self.levels
             self.changed(time, self.levels, self.directions)
 
     def direct(self, base, count, value):
@@ -187,6 +249,8 @@ class Pio:
             )
         if offset == 0x08:
             return self.fdebug
+        if offset == 0x30:
+            return self.flags
         if 0x20 <= offset < 0x30:
             rx = machines[(offset - 0x20) // 4].rx
             return rx.popleft() if rx else 0
@@ -213,6 +277,10 @@ class Pio:
             machine = machines[(offset - 0x10) // 4]
             if len(machine.tx) < machine.depth("tx"):
                 machine.tx.append(value)
+        elif offset == 0x30:
+            self.flags &= ~value
+        elif offset == 0x34:
+            self.flags |= value & 0xFF
         elif 0x48 <= offset < 0xC8:
             self.memory[(offset - 0x48) // 4] = value & 0xFFFF
         elif 0xC8 <= offset < 0x128:
@@ -227,5 +295,6 @@ class Pio:
             elif register == 0x10:
                 machine.time = now
                 assert machine.execute(value & 0xFFFF), "an instruction that was executed at once stalls"
+                self.tell(now)
             elif register == 0x14:
                 machine.pinctrl = value
