@@ -20,18 +20,19 @@ impl Angle {
     /// Half a turn.
     pub const HALF: Self = Self(1 << 31);
 
-    /// From units of 2^-32 turn.
+    /// Creates an angle from units of 2^-32 turn.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
 
-    /// In units of 2^-32 turn.
+    /// The angle in units of 2^-32 turn.
     pub const fn to_bits(self) -> u32 {
         self.0
     }
 
-    /// From a count of an encoder and its counts per turn, rounded down to 2^-32 turn; exact if these are a power of two,
-    /// which also takes no division. Whole turns are dropped. With 0 counts per turn the angle is 0.
+    /// Creates an angle from the count of an encoder and its counts per turn, rounded down to 2^-32 turn. If the counts per turn
+    /// are a power of two, the result is exact and takes no division. Whole turns are dropped. With 0 counts per turn the angle
+    /// is 0.
     pub const fn from_counts(counts: u32, counts_per_turn: u32) -> Self {
         if counts_per_turn.is_power_of_two() {
             // A shift by 32, of one count per turn, leaves nothing: every count is whole turns.
@@ -43,23 +44,23 @@ impl Angle {
         }
     }
 
-    /// From thousandths of a degree, whole turns dropped; rounded down.
+    /// Creates an angle from thousandths of a degree, rounded down; whole turns are dropped.
     pub const fn from_millidegrees(millidegrees: u32) -> Self {
         Self::from_counts(millidegrees, 360_000)
     }
 
-    /// In thousandths of a degree, rounded to the nearest: 0 to 359,999.
+    /// The angle in thousandths of a degree, rounded to the nearest: 0 to 359,999.
     pub const fn millidegrees(self) -> u32 {
         let rounded = (self.0 as u64).wrapping_mul(360_000).wrapping_add(1 << 31) >> 32;
         if rounded < 360_000 { low(rounded) } else { 0 }
     }
 
-    /// This angle and another one, whole turns dropped.
+    /// Adds another angle; whole turns are dropped.
     pub const fn wrapping_add(self, other: Self) -> Self {
         Self(self.0.wrapping_add(other.0))
     }
 
-    /// This angle less another one.
+    /// Subtracts another angle.
     pub const fn wrapping_sub(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
     }
@@ -84,11 +85,11 @@ const fn low(bits: u64) -> u32 {
 pub enum Sense {
     /// Up.
     Up,
-    /// Down: the encoder is mounted the other way round, or two phases are exchanged.
+    /// Down: the encoder is mounted the other way round, or two phases are swapped.
     Down,
 }
 
-/// How an encoder sits on its motor: what makes the electrical angle out of the mechanical one.
+/// How an encoder sits on its motor: converts the mechanical angle to the electrical one.
 ///
 /// ```
 /// use servowire_core::{Angle, Commutation, Sense};
@@ -108,8 +109,8 @@ pub struct Commutation {
 }
 
 impl Commutation {
-    /// For a motor with `pole_pairs`: the electrical angle at which the encoder reads 0, and the direction in which the encoder
-    /// counts. `None` for 0 pole pairs.
+    /// Describes a motor with `pole_pairs` by the electrical angle at which the encoder reads 0 and the direction in which the
+    /// encoder counts. `None` for 0 pole pairs.
     pub const fn new(pole_pairs: u16, offset: Angle, sense: Sense) -> Option<Self> {
         match NonZeroU16::new(pole_pairs) {
             Some(pole_pairs) => Some(Self { pole_pairs, offset, sense }),
@@ -132,7 +133,8 @@ impl Commutation {
         self.sense
     }
 
-    /// The electrical angle for a mechanical one: times the pole pairs, forward or backward from the offset.
+    /// Returns the electrical angle for a mechanical one: the mechanical angle times the pole pairs, forward or backward from
+    /// the offset.
     pub const fn electrical(&self, mechanical: Angle) -> Angle {
         let turned = mechanical.0.wrapping_mul(self.pole_pairs.get() as u32);
         match self.sense {
@@ -141,7 +143,8 @@ impl Commutation {
         }
     }
 
-    /// The error of the electrical angle that follows from one of the mechanical angle: times the pole pairs, at most half a turn.
+    /// Returns the error of the electrical angle that follows from an error of the mechanical angle: this error times the pole
+    /// pairs, at most half a turn.
     pub const fn bound(&self, mechanical: Angle) -> Angle {
         let bound = mechanical.0.saturating_mul(self.pole_pairs.get() as u32);
         if bound < Angle::HALF.0 { Angle(bound) } else { Angle::HALF }

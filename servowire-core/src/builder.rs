@@ -1,5 +1,5 @@
-/// A `with_` method for each field of a settings struct that has a default: with an argument, or for one value that is named
-/// here.
+/// Writes a `with_` method for each field of a settings struct that has defaults. The method takes the value as its argument, or
+/// sets the one value named here.
 ///
 /// ```
 /// #[derive(Default)]

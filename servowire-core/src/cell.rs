@@ -8,20 +8,21 @@ pub trait Words<const W: usize>: Sized {
     /// Packs the value into words.
     fn to_words(&self) -> [u32; W];
 
-    /// Unpacks a value. A cell only ever gives words that [`to_words`](Self::to_words) has made; other ones may become any value.
+    /// Unpacks a value. A cell only passes words made by [`to_words`](Self::to_words); any other words may unpack to an
+    /// arbitrary value.
     fn from_words(words: [u32; W]) -> Self;
 }
 
-/// A place for the newest evidence, between an interrupt that receives it and a control loop of another priority, whichever
-/// preempts the other, on one core or two.
+/// Passes the newest evidence from the interrupt that receives it to a control loop of another priority. Either may preempt the
+/// other, and they may run on one core or two.
 ///
-/// Neither end ever waits, tries again or disables interrupts, and it takes loads and stores of 32 bits alone, as a
-/// Cortex-M0+ has them. What is read is whole; it is never older than what was read before, and no older than what was
-/// last put completely. It takes 4 × `W` + 2 words of memory. The order of all loads and stores is model-checked.
+/// Neither end ever waits, retries or disables interrupts, and the cell needs only loads and stores of 32 bits, which a
+/// Cortex-M0+ has. A value that is read is whole. It is never older than the value read before, and no older than the last value
+/// that was stored completely. It takes 4 × `W` + 2 words of memory. The order of all loads and stores is model-checked.
 ///
-/// [`split`](Self::split) gives the two ends, once. They may be moved to where they are used, an interrupt among them, if
-/// the cell is `'static`: take it from `cortex_m::singleton!` or a `StaticCell`, and hand one end to the interrupt before
-/// it is enabled, as a local resource of RTIC or a `static mut` of a `cortex-m-rt` handler, for example.
+/// [`split`](Self::split) returns the two ends, once. If the cell is `'static`, they may be moved to where they are used,
+/// including an interrupt: take the cell from `cortex_m::singleton!` or a `StaticCell`, and hand one end to the interrupt before
+/// it is enabled, for example as a local resource of RTIC or a `static mut` of a `cortex-m-rt` handler.
 ///
 /// ```
 /// use servowire_core::{Cell, Feedback, Policy, Words};
@@ -70,12 +71,12 @@ pub struct Cell<F, const W: usize> {
 }
 
 impl<F: Feedback + Words<W>, const W: usize> Cell<F, W> {
-    /// With [`Feedback::NEVER`] in it.
+    /// Creates a cell that holds [`Feedback::NEVER`].
     pub const fn new() -> Self {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// The two ends. The cell keeps what it holds.
+    /// Returns the two ends. The cell keeps what it holds.
     pub const fn split(&mut self) -> (Writer<'_, F, W>, Reader<'_, F, W>) {
         let slots = &self.slots;
         (Writer { slots, evidence: PhantomData }, Reader { slots, evidence: PhantomData })
@@ -108,7 +109,7 @@ pub struct Reader<'a, F, const W: usize> {
 }
 
 impl<F: Feedback + Words<W>, const W: usize> Reader<'_, F, W> {
-    /// The value of the newest evidence, if it may be used at this time.
+    /// Returns the value of the newest evidence, if it may be used at this time.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -117,7 +118,7 @@ impl<F: Feedback + Words<W>, const W: usize> Reader<'_, F, W> {
         self.latest().at(now_ns, policy)
     }
 
-    /// The newest evidence, not judged.
+    /// Returns the newest evidence, unjudged.
     #[inline]
     fn latest(&mut self) -> F {
         self.slots.get().map_or(F::NEVER, |(words, [])| F::from_words(words))

@@ -5,13 +5,13 @@ pub trait Class: Copy + Eq + Debug + 'static {
     /// All classes, in the order of the checks.
     const ALL: &'static [Self];
 
-    /// Place in [`ALL`](Self::ALL), from 0.
+    /// Index in [`ALL`](Self::ALL), from 0.
     fn index(self) -> usize;
 
     /// The name in `snake_case`, as logs and test vectors spell it.
     fn name(self) -> &'static str;
 
-    /// The number in logs and in other languages: 1 or more, and never changed.
+    /// The number used in logs and in other languages: 1 or more, never changed.
     fn number(self) -> u8;
 }
 

@@ -1,7 +1,7 @@
 /// Declares an enum whose variants are codes of a wire or of a register.
 ///
-/// Each has `ALL`, `code()`, `from_code()`, which gives `None` for a code without a meaning, and `name()`, which `Display`
-/// prints: the vendor's word.
+/// Each has `ALL`, `code()`, `from_code()`, which returns `None` for a code without a meaning, and `name()`, the vendor's word,
+/// which `Display` prints.
 ///
 /// ```
 /// servowire_core::codes! {
@@ -20,7 +20,7 @@
 /// assert_eq!(Mode::ALL.map(|mode| mode.to_string()), ["CP", "CV"]);
 /// ```
 ///
-/// The calling crate has the features `defmt`, `serde` and `arbitrary`; they add the traits of these crates.
+/// The calling crate must have the features `defmt`, `serde` and `arbitrary`, which add the traits of those crates.
 #[macro_export]
 macro_rules! codes {
     (
@@ -46,7 +46,7 @@ macro_rules! codes {
         }
 
         impl $name {
-            /// All that are defined, in the order of declaration.
+            /// All defined codes, in the order of declaration.
             pub const ALL: [Self; [$(Self::$variant),+].len()] = [$(Self::$variant),+];
 
             /// The code.

@@ -1,52 +1,52 @@
-//! What code that is generic over protocols may rely on. Whoever uses one crate calls its inherent methods, which have the
-//! same names; these traits only forward.
+//! The traits that code generic over protocols relies on. Users of a single crate call its inherent methods, which have the same
+//! names; these traits only forward to them.
 
 use crate::{Progress, Step};
 
 /// One exchange with the other end: what is sent, what is received as the answer, and how it ends.
 ///
-/// A machine does no I/O and reads no clock. It is told what arrived and when that ended, and asked what became of it.
+/// A machine does no I/O and reads no clock. It is told what arrived and when that ended, and is then asked for the result.
 pub trait Machine {
-    /// What leaves, and when.
+    /// What is sent, and when.
     type Transmission;
-    /// What is heard: bytes of a UART, frames of a line.
+    /// What is received: bytes of a UART, frames of a line.
     type Unit: ?Sized;
-    /// What the exchange is made for.
+    /// The result of the exchange.
     type Value;
-    /// Why it fails.
+    /// Why the exchange fails.
     type Error;
 
-    /// What is to be sent.
+    /// Returns what is to be sent.
     fn transmission(&self) -> Self::Transmission;
 
-    /// These units were heard one after the other; the last bit of the last one ended at `end_ns`.
+    /// Takes units that were received one after the other; the last bit of the last one ended at `end_ns`.
     fn hear(&mut self, unit: &Self::Unit, end_ns: u64) -> Progress<Self::Value, Self::Error>;
 
-    /// A unit that ended at `end_ns` was damaged in its framing.
+    /// Reports a framing error in a unit that ended at `end_ns`.
     fn framing_error(&mut self, end_ns: u64) -> Progress<Self::Value, Self::Error>;
 
-    /// Ends the exchange if its time is over at `now_ns`. Hand over what was heard first.
+    /// Ends the exchange if its time is over at `now_ns`. Hand over everything that was received before calling it.
     fn poll(&mut self, now_ns: u64) -> Progress<Self::Value, Self::Error>;
 
-    /// Where the exchange stands.
+    /// Returns the state of the exchange.
     fn progress(&self) -> Progress<Self::Value, Self::Error>;
 }
 
-/// Something that takes several exchanges: a reset, access to a memory, the search for an encoder.
+/// An operation that takes several exchanges: a reset, a memory access, the search for an encoder.
 pub trait Procedure {
     /// A message to the other end.
     type Request;
-    /// A message back.
+    /// A message from the other end.
     type Response;
-    /// What the procedure is made for.
+    /// The result of the procedure.
     type Value;
     /// Why it, or one of its exchanges, fails.
     type Error;
 
-    /// Begins anew at `now_ns`.
+    /// Restarts the procedure at `now_ns`.
     fn start(&mut self, now_ns: u64) -> Step<Self::Request, Self::Value, Self::Error>;
 
-    /// An exchange ended with this outcome, refused answers included; the line is free from `ready_ns` on.
+    /// Takes the outcome of an exchange, refused answers included; the line is free from `ready_ns`.
     fn receive(
         &mut self,
         outcome: Result<Self::Response, Self::Error>,
@@ -54,7 +54,7 @@ pub trait Procedure {
     ) -> Step<Self::Request, Self::Value, Self::Error>;
 }
 
-/// Implements [`Machine`](crate::Machine) by the inherent methods of the same names.
+/// Implements [`Machine`](crate::Machine) by forwarding to the inherent methods of the same names.
 ///
 /// `servowire_core::machine!(Transaction { Frame, [u8] => Exchange, Error });`
 #[macro_export]
@@ -89,7 +89,7 @@ macro_rules! machine {
     };
 }
 
-/// Implements [`Procedure`](crate::Procedure) by the inherent methods of the same names.
+/// Implements [`Procedure`](crate::Procedure) by forwarding to the inherent methods of the same names.
 ///
 /// `servowire_core::procedures!(Request => Response, Error { Reset => SingleTurn; Detection => AllData; });`
 #[macro_export]
@@ -118,15 +118,15 @@ macro_rules! procedures {
     };
 }
 
-/// The inherent method `receive` of a procedure with a field `end` and a method `next` that does the work: once it has ended, it
-/// stays ended, whatever it is fed.
+/// Writes the inherent method `receive` of a procedure that has a field `end` and a method `next` that does the work. Once the
+/// procedure has ended, it stays ended, whatever it receives.
 ///
 /// `servowire_core::receive! { SingleTurn }`
 #[macro_export]
 macro_rules! receive {
     ($(#[$more:meta])* $value:ty) => {
-        /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so, until it
-        /// is started again.
+        /// Takes the outcome of a transaction; the line is free from `ready_ns`. A procedure that is done or has failed stays so
+        /// until it is restarted.
         ///
         $(#[$more])*
         pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<$value> {

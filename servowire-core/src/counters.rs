@@ -2,7 +2,7 @@ use crate::{Class, Classified};
 
 /// How many transactions succeeded, and how many failed in each of `N` ways.
 ///
-/// Each crate names its own: `type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>`.
+/// Each crate declares its own: `type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters<const N: usize> {
@@ -42,7 +42,7 @@ impl<const N: usize> Counters<N> {
         self.errors.iter().fold(0, |sum, n| sum.saturating_add(*n))
     }
 
-    /// Failed transactions in a million; 0 before the first one.
+    /// Failed transactions per million; 0 before the first transaction.
     pub fn errors_per_million(&self) -> u32 {
         let errors = self.errors();
         let all = errors.saturating_add(self.good);
@@ -59,7 +59,7 @@ impl<const N: usize> core::fmt::Display for Counters<N> {
     }
 }
 
-/// As a list: what went well, then the failures in the order of the classes.
+/// Returns the counts as a list: the good transactions, then the failures in the order of the classes.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
 impl<const N: usize> serde::Serialize for Counters<N> {

@@ -1,7 +1,7 @@
-/// A leaky bucket: errors fill it, good transactions drain it, and above its limit the line must not be used.
+/// A leaky bucket: errors fill it, good transactions drain it, and while it is above its limit the line must not be used.
 ///
-/// One error in a hundred thousand transactions is the life of a drive, three in a row is a broken cable. With a
-/// `weight` of 100 and a `limit` of 250 the third error in a row is too much, and so is any rate above one in 101.
+/// One error in a hundred thousand transactions is normal for a drive; three in a row are a broken cable. With a
+/// `weight` of 100 and a `limit` of 250 the third error in a row is too many, and so is any rate above one in 101.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -12,7 +12,7 @@ pub struct ErrorRate {
 }
 
 impl ErrorRate {
-    /// An empty bucket. An error adds `weight`, a good transaction takes 1 away.
+    /// Creates an empty bucket. An error adds `weight`, a good transaction takes 1 away.
     pub const fn new(weight: u32, limit: u32) -> Self {
         Self { level: 0, weight, limit }
     }

@@ -1,12 +1,12 @@
-/// Writes the error enum of a crate, and the enum of its classes.
+/// Declares the error enum of a crate and the enum of its classes.
 ///
 /// Given the variants with their messages (`thiserror`) and documentation, it declares
 ///
-/// * `Error`, `Copy`, `#[non_exhaustive]`, at most 16 bytes, with `defmt::Format` and serde behind the features of these
-///   names of the calling crate, and `class()`;
+/// * `Error`, `Copy`, `#[non_exhaustive]`, at most 16 bytes, with `defmt::Format` and serde behind the calling crate's features
+/// of these names, and `class()`;
 /// * `ErrorClass` with a variant of the same name for each, [`Class`](crate::Class) and [`Classified`](crate::Classified),
-///   `ALL` in the order of declaration, `name()` in `snake_case`, and `number()`, which is written beside the variant and
-///   never changes: logs and programs in other languages keep it. 0 is left for "no error".
+///   `ALL` in the order of declaration, `name()` in `snake_case`, and `number()`, which is written beside the variant and never
+/// changes, because logs and programs in other languages store it. 0 is reserved for "no error".
 ///
 /// ```
 /// servowire_core::errors! {
@@ -33,7 +33,7 @@
 /// assert_eq!(ErrorClass::ALL.iter().map(|class| class.number()).collect::<Vec<_>>(), [1, 2]);
 /// ```
 ///
-/// An error that is too long does not compile, nor does a class with the number 0:
+/// An error that is too large does not compile, and neither does a class with the number 0:
 ///
 /// ```compile_fail,E0080
 /// servowire_core::errors! {
@@ -171,8 +171,8 @@ macro_rules! errors {
     };
 }
 
-/// Makes an error the error type of `nom` parsers. It needs a variant `Combinator` without fields, for the case that a
-/// combinator of the caller refuses the input.
+/// Makes an error the error type of `nom` parsers. The error needs a variant `Combinator` without fields, which is returned when
+/// a combinator of the caller refuses the input.
 ///
 /// ```
 /// servowire_core::errors! {
@@ -209,7 +209,7 @@ macro_rules! nom_error {
     };
 }
 
-/// A name in `snake_case`, made when the program is compiled.
+/// Converts a name to `snake_case` at compile time.
 #[derive(Debug, Clone, Copy)]
 pub struct Snake {
     bytes: [u8; 48],

@@ -1,4 +1,4 @@
-/// What a policy can tolerate: alarms that a drive can live with, status bits; `()` for a protocol without any.
+/// What a policy can tolerate: status bits and alarms that a drive can live with; `()` for a protocol that has none.
 pub trait Tolerance: Copy {
     /// Nothing: every alarm is a doubt.
     const NOTHING: Self;
@@ -11,7 +11,7 @@ impl Tolerance for () {
 /// How old a value may be, and which alarms it may carry, to be used. There is deliberately no default age: only the control
 /// loop knows how far a shaft turns in that time.
 ///
-/// Each protocol crate names its own: `type Policy = servowire_core::Policy<Tolerated>`.
+/// Each protocol crate declares its own: `type Policy = servowire_core::Policy<Tolerated>`.
 ///
 /// ```
 /// type Policy = servowire_core::Policy<()>;
@@ -28,18 +28,18 @@ pub struct Policy<T> {
 }
 
 impl<T: Tolerance> Policy<T> {
-    /// Values up to this age, in ns from the instant of sampling; no alarm is tolerated.
+    /// Accepts values up to this age, in ns from the instant of sampling; no alarm is tolerated.
     pub const fn new(max_age_ns: u64) -> Self {
         Self { max_age_ns, tolerated: T::NOTHING }
     }
 
-    /// Also values with these alarms, in place of those tolerated before.
+    /// Also accepts values with these alarms, in place of those tolerated before.
     #[must_use]
     pub const fn tolerating(self, tolerated: T) -> Self {
         Self { tolerated, ..self }
     }
 
-    /// The longest age, in ns from the instant of sampling.
+    /// The maximum age, in ns from the instant of sampling.
     pub const fn max_age_ns(&self) -> u64 {
         self.max_age_ns
     }
@@ -51,11 +51,11 @@ impl<T: Tolerance> Policy<T> {
 
     /// Checks the age of a value.
     ///
-    /// An instant of sampling after `now_ns` counts by its distance, so a clock that was set back does not make a value young.
+    /// If the instant of sampling lies after `now_ns`, the age is the distance between them, so a clock that was set back does
+    /// not make a value look young.
     /// A short distance is normal: a reader looks at its clock, and the writer interrupts it before it reads.
     ///
-    /// # Errors
-    /// The age, in ns: more than the longest one.
+    /// # Errors The age in ns, if it exceeds the maximum.
     pub const fn check_age(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
         if now_ns < sampled_ns {
             self.check_ahead(now_ns, sampled_ns)
@@ -64,7 +64,7 @@ impl<T: Tolerance> Policy<T> {
         }
     }
 
-    /// Out of the way of the ordinary case, so that this one takes no detour.
+    /// Kept out of line, so that the ordinary case takes no detour.
     #[cold]
     const fn check_ahead(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
         self.within(sampled_ns.abs_diff(now_ns))
@@ -77,8 +77,8 @@ impl<T: Tolerance> Policy<T> {
 
 /// Evidence of a position, speed or torque. It is judged where it is used, not where it was received, because it ages in between.
 ///
-/// Protocol crates implement it by forwarding to an inherent `const fn at`, so that the text of a control loop is the same
-/// for all of them:
+/// Protocol crates implement it by forwarding to an inherent `const fn at`, so a control loop is written the same way for all of
+/// them:
 ///
 /// ```
 /// use servowire_core::{Feedback, Policy, Tolerance};
@@ -123,10 +123,10 @@ pub trait Feedback: Copy {
     /// Why a value must not be used.
     type Doubt: Copy;
 
-    /// The evidence before the first exchange: a doubt under every policy.
+    /// The evidence before the first exchange: doubtful under every policy.
     const NEVER: Self;
 
-    /// The value, if it may be used at this time.
+    /// Returns the value, if it may be used at this time.
     ///
     /// # Errors
     /// Why it must not be used.

@@ -62,7 +62,7 @@ impl<C: Class> defmt::Format for Findings<C> {
     }
 }
 
-/// As a sequence of the classes.
+/// Serialised as a sequence of the classes.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
 impl<C: Class + serde::Serialize> serde::Serialize for Findings<C> {
@@ -97,9 +97,9 @@ impl<'de, C: Class + serde::Deserialize<'de>> serde::Deserialize<'de> for Findin
     }
 }
 
-/// What the inspection of a serial line has in common: `Findings`, a `Cause` that may be one of the line, and of
-/// `Report`, whose fields `error`, `findings` and `cause` these are, the getters and the words for a person. Arms that are named
-/// come after those of a fault.
+/// Declares what all inspections of a serial line have in common: `Findings`, a `Cause` that may lie in the line, and for
+/// `Report`, which has the fields `error`, `findings` and `cause`, the getters and the text for a person. The arms named here
+/// come after those for a fault.
 ///
 /// `servowire_core::report! { Self { response: Some(response), .. } => "sound: {}", response; }`
 #[macro_export]
@@ -111,7 +111,7 @@ macro_rules! report {
             }
         }
 
-        /// The kinds of faults found, as a set.
+        /// The kinds of fault found, as a set.
         pub type Findings = $crate::Findings<ErrorClass>;
 
         $crate::one_line!(Report {

@@ -1,20 +1,20 @@
-//! Words from one writer to one reader, wait-free for both, by loads and stores alone: Simpson's four slots.
+//! Passes words from one writer to one reader, wait-free for both, with loads and stores alone: Simpson's four slots.
 //!
-//! H. R. Simpson, "Four-slot fully asynchronous communication mechanism", IEE Proceedings 137 E 1 (1990). Two pairs of two
-//! slots: the writer keeps off the pair that the reader has announced, and within a pair it keeps off the newest slot. What
-//! Simpson keeps in two variables of the writer (newest pair, newest slot of each pair) is one word here, stored once a
-//! value, so the reader never sees one without the other.
+//! H. R. Simpson, "Four-slot fully asynchronous communication mechanism", IEE Proceedings 137 E 1 (1990). There are two pairs of
+//! two slots. The writer avoids the pair that the reader has announced, and within a pair it avoids the newest slot. What
+//! Simpson keeps in two variables of the writer (newest pair, newest slot of each pair) is one word here, stored once per value,
+//! so the reader never sees one without the other.
 //!
-//! Why it holds, whatever the order in which two cores see each other's stores:
+//! Why this holds, in whatever order two cores see each other's stores:
 //!
-//! * Never an older value after a newer one, and no older one than the last that was complete: both loads of a reading are
-//!   of `control` alone, and the loads of one variable do not step back.
+//! * A reading is never older than the one before it, nor older than the last complete value: both loads of a reading are of
+//! `control` alone, and the loads of one variable never go back.
 //! * No slot is read while it is written. The reader in pair p at its slot i has announced p, passed `Chooses`, and seen in
-//!   `control` that i is the newest of p. The writer comes back to this slot with the second value that it puts into p
-//!   from then on. The first one is not in what the reader saw, so the reader's `Chooses` came before the writer's
-//!   `Begins` of the second, and the writer sees p announced: it takes the other pair. Unless it sees a later announcement;
-//!   that was made behind `Announces`, after the slot had been read, and the writer writes behind `Writes`.
-//! * A slot is whole: it is written before `Publishes`, and read behind `Reads`.
+//!   `control` that i is the newest of p. The writer comes back to this slot with the second value that it puts into p after
+//! that. The reader had not seen the first one, so the reader's `Chooses` came before the writer's
+//!   `Begins` of the second, and the writer sees p announced: it takes the other pair. If it sees a later announcement instead,
+//! that one was made after `Announces`, when the slot had been read, and the writer writes after `Writes`.
+//! * A slot is whole: it is written before `Publishes` and read after `Reads`.
 
 #[cfg(all(test, loom))]
 mod model;
@@ -33,11 +33,11 @@ type Word = AtomicU32;
 
 /// `control` before the first value.
 const NOTHING: u32 = 0;
-/// In `control` from the first value on.
+/// Set in `control` from the first value onwards.
 const SOMETHING: u32 = 1;
 /// In `control`: the newest pair. A pair is named by its first slot, 0 or 2.
 const PAIR: u32 = 2;
-/// Bits of `control` below the newest slot of pair 0; that of pair 2 lies two bits higher.
+/// Bits of `control` below the newest slot of pair 0; the newest slot of pair 2 lies two bits higher.
 const NEWEST: u32 = 2;
 /// Any slot.
 const SLOT: u32 = 3;
@@ -45,13 +45,13 @@ const SLOT: u32 = 3;
 /// What keeps the loads and stores of one end in their order for the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Barrier {
-    /// The writer: the value before is there for the reader before the writer looks which pair is announced.
+    /// The writer: the previous value is visible to the reader before the writer looks which pair is announced.
     Begins,
     /// The writer looks which pair is announced before it writes into the other one.
     Writes,
-    /// The slot is written before it is the newest.
+    /// The slot is written before it becomes the newest.
     Publishes,
-    /// The reader: the slot before is read before another pair is announced.
+    /// The reader: the previous slot has been read before another pair is announced.
     Announces,
     /// The pair is announced before the reader looks for the newest slot in it.
     Chooses,
@@ -70,7 +70,7 @@ impl Barrier {
     }
 }
 
-/// A value: `W` words and `E` words more.
+/// A value: `W` words and `E` further words.
 type Value<const W: usize, const E: usize> = ([u32; W], [u32; E]);
 
 struct Slot<const W: usize, const E: usize>([Word; W], [Word; E]);
@@ -102,7 +102,7 @@ fn load<const N: usize>(from: &[Word; N]) -> [u32; N] {
     words
 }
 
-/// Four slots of `W` and `E` words. One end calls [`put`](Self::put), another one [`get`](Self::get).
+/// Four slots of `W` and `E` words. One end calls [`put`](Self::put), the other [`get`](Self::get).
 pub(crate) struct FourSlots<const W: usize, const E: usize> {
     /// Stored by the writer alone.
     control: AtomicU32,
@@ -112,14 +112,14 @@ pub(crate) struct FourSlots<const W: usize, const E: usize> {
 }
 
 impl<const W: usize, const E: usize> FourSlots<W, E> {
-    /// Without a value.
+    /// Creates slots without a value.
     #[cfg(not(all(test, loom)))]
     pub(crate) const fn new() -> Self {
         let control = AtomicU32::new(NOTHING);
         Self { control, announced: AtomicU32::new(0), slots: [const { Slot::new() }; 4] }
     }
 
-    /// Puts a value. Only ever called by one writer.
+    /// Stores a value. Only ever called by one writer.
     pub(crate) fn put(&self, value: &Value<W, E>) {
         let control = self.control.load(Ordering::Relaxed);
         let slot = self.free(control);
@@ -133,7 +133,7 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         self.control.store(control, Ordering::Relaxed);
     }
 
-    /// The slot for the next value: in the pair that is not announced the one that is not the newest.
+    /// Returns the slot for the next value: in the pair that is not announced, the slot that is not the newest.
     fn free(&self, control: u32) -> u32 {
         fence(Barrier::Begins);
         let pair = !self.announced.load(Ordering::Relaxed) & PAIR;
@@ -141,7 +141,7 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         pair | (!newest(control, pair) & 1)
     }
 
-    /// The newest value; `None` before the first one. Only ever called by one reader.
+    /// Returns the newest value; `None` before the first one. Only ever called by one reader.
     #[inline]
     pub(crate) fn get(&self) -> Option<Value<W, E>> {
         let control = self.control.load(Ordering::Relaxed);
@@ -180,8 +180,8 @@ fn fence(barrier: Barrier) {
 mod tests {
     use super::*;
 
-    /// What a reader may be in is left alone, whatever pairs it announced before: the announced pair, and in the other one the newest
-    /// slot, to which a reader goes that announces late.
+    /// Slots that a reader may be in are left alone, whatever pairs it announced before: the announced pair, and in the other
+    /// pair the newest slot, where a reader goes that announces late.
     #[test]
     fn the_writer_keeps_off_the_slot_of_the_reader() {
         for announcements in 0_u32..256 {

@@ -52,7 +52,7 @@ pub use show::write_names;
 pub use step_dir::{Command, Direction};
 pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 
-/// What the macros of this crate name; not for use by hand.
+/// Items that the macros of this crate refer to; not for direct use.
 #[doc(hidden)]
 pub mod private {
     pub use crate::errors::{Snake, snake_case};

@@ -1,4 +1,4 @@
-//! Where a shaft is between two samples: the writer divides, the reader multiplies.
+//! Computes where a shaft is between two samples: the writer divides, the reader multiplies.
 
 use crate::angle::Angle;
 
@@ -9,18 +9,18 @@ use crate::angle::Angle;
 pub struct Estimate {
     /// The angle.
     pub angle: Angle,
-    /// How far it may be off. Half a turn says that nothing is known.
+    /// How far it may be off. Half a turn means that nothing is known.
     pub bound: Angle,
 }
 
-/// The largest acceleration of a shaft, in either direction, including everything that its motor and its load can do to it.
+/// The largest acceleration of a shaft in either direction, including everything that its motor and load can cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Acceleration(u32);
 
 impl Acceleration {
-    /// From turns per second squared: 1 of them is 6.283 rad/s². `None` above 909,372.
+    /// Creates it from turns per second squared; one is 6.283 rad/s². `None` above 909,372.
     pub const fn from_turns_per_s2(turns_per_s2: u32) -> Option<Self> {
         // 2^72 / 10^18, rounded up: in units of 2^-72 turn/ns².
         match turns_per_s2.checked_mul(4_723) {
@@ -35,7 +35,7 @@ impl Acceleration {
     }
 }
 
-/// Times from here on are too long: 2.1 s.
+/// Times of this length or more are too long: 2.1 s.
 const TOO_LONG_NS: u32 = 1 << 31;
 
 /// The motion of a shaft at its last sample, from the last two.
@@ -44,13 +44,13 @@ const TOO_LONG_NS: u32 = 1 << 31;
 pub struct Motion {
     angle: Angle,
     sampled_ns: u64,
-    /// Time between both samples; 0 where the speed is not known.
+    /// Time between the two samples; 0 if the speed is not known.
     span_ns: u32,
     /// In 2^-48 turn/ns.
     speed: i32,
     /// How far the mean speed over the span may be off, in the same unit.
     speed_error: u32,
-    /// The width of a count, in 2^-32 turn.
+    /// The width of a count in units of 2^-32 turn.
     count: u32,
 }
 
@@ -58,29 +58,29 @@ impl Motion {
     /// Words that a motion is packed into.
     pub(crate) const WORDS: usize = 7;
 
-    /// Before the first sample, and after a doubtful one.
+    /// The state before the first sample and after a doubtful one.
     pub(crate) const UNKNOWN: Self = Self::standing(Angle::ZERO, 0, 0);
 
-    /// A sample without one before it.
+    /// Starts with a sample that has none before it.
     const fn standing(angle: Angle, sampled_ns: u64, count: u32) -> Self {
         Self { angle, sampled_ns, span_ns: 0, speed: 0, speed_error: 0, count }
     }
 
-    /// The mean speed between the last two samples in units of 2^-48 turn/ns, thus 3.55 millionths of a turn per second;
+    /// The mean speed between the last two samples in units of 2^-48 turn/ns, which is 3.55 millionths of a turn per second;
     /// `None` if it is not known.
     pub const fn speed(&self) -> Option<i32> {
         if self.span_ns == 0 { None } else { Some(self.speed) }
     }
 
-    /// Where the shaft is now, or was shortly before the sample: from the last angle with the last mean speed.
+    /// Returns where the shaft is now, or was shortly before the sample, extrapolated from the last angle with the last mean speed.
     ///
-    /// The bound holds for every motion within the acceleration. With a as the acceleration, s as the time between the last
-    /// two samples and t as the time since the last one: in the last sample the shaft is off by up to one count; the mean
+    /// The bound holds for every motion within the largest acceleration. Let a be the acceleration, s the time between the last
+    /// two samples and t the time since the last one. In the last sample the shaft is off by up to one count; the mean
     /// speed is off by up to a count per s; in the last sample the speed differs from the mean one by up to a·s/2; from there
-    /// the shaft departs by up to a·t²/2. Together: one count · (1 + t/s) + a·t·(s + t)/2. Where the speed is not known, or
-    /// more than 2.1 s away, it is half a turn.
+    /// the shaft departs by up to a·t²/2. Together: one count · (1 + t/s) + a·t·(s + t)/2. If the speed is not known, or either
+    /// time exceeds 2.1 s, the bound is half a turn.
     ///
-    /// The instants of both samples are taken as exact: an error of them counts with the speed.
+    /// The instants of both samples are taken as exact: an error in them is multiplied by the speed.
     pub fn at(&self, now_ns: u64, max_acceleration: Acceleration) -> Estimate {
         let unknown = Estimate { angle: self.angle, bound: Angle::HALF };
         let Ok(time_ns) = u32::try_from(now_ns.abs_diff(self.sampled_ns)) else { return unknown };
@@ -93,7 +93,7 @@ impl Motion {
         Estimate { angle, bound: self.bound(time_ns, max_acceleration) }
     }
 
-    /// The bound of [`at`](Self::at), every term rounded up.
+    /// Computes the bound of [`at`](Self::at), with every term rounded up.
     const fn bound(&self, time_ns: u32, max_acceleration: Acceleration) -> Angle {
         let mean = times(self.speed_error, time_ns) >> 16;
         // t·(s + t) in 2^16 ns², below 2^46; times 2^-72 turn/ns², in 2^-32 turn and halved, is a shift by 72 - 16 - 32 + 1.
@@ -120,7 +120,7 @@ impl Motion {
     }
 }
 
-/// A whole product: one instruction of a Cortex-M4.
+/// Returns the full product: one instruction of a Cortex-M4.
 const fn times(a: u32, b: u32) -> u64 {
     (a as u64).wrapping_mul(b as u64)
 }
@@ -130,7 +130,7 @@ const fn low(bits: u64) -> u32 {
     bits as u32
 }
 
-/// Makes [`Motion`] of successive samples. It belongs to the writer, because it divides.
+/// Derives [`Motion`] from successive samples. It belongs to the writer, because it divides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tracker {
@@ -140,11 +140,12 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// For an encoder with `counts_per_turn` on a shaft that never turns faster than `max_turns_per_s`.
+    /// Creates a tracker for an encoder with `counts_per_turn` on a shaft that never turns faster than `max_turns_per_s`.
     ///
-    /// Two samples tell the speed only if the shaft has moved less than half a turn between them, for 0.7 of a turn looks
-    /// like 0.3 of a turn backward. At 100 turns per second (6000 rpm) that is 5 ms. After a longer gap the next sample
-    /// counts as a first one. `None` if there are fewer than 3 counts, or the speed is not from 1 to 7000.
+    /// Two samples determine the speed only if the shaft has moved less than half a turn between them, because 0.7 of a turn
+    /// looks like 0.3 of a turn backward. At 100 turns per second (6000 rpm), half a turn takes 5 ms. After a longer gap the
+    /// next sample
+    /// counts as a first one. `None` if there are fewer than 3 counts, or if the speed is not between 1 and 7000.
     pub const fn new(counts_per_turn: u32, max_turns_per_s: u32) -> Option<Self> {
         if counts_per_turn < 3 || max_turns_per_s > 7_000 {
             return None;
@@ -160,8 +161,8 @@ impl Tracker {
         }
     }
 
-    /// The next sample. The same sample again changes nothing. One that contradicts the last (another angle at the same
-    /// instant, or an earlier instant because the clock was set back) is a first one.
+    /// Takes the next sample. The same sample again changes nothing. A sample that contradicts the last one (another angle at
+    /// the same instant, or an earlier instant because the clock was set back) counts as a first one.
     pub fn sample(&mut self, angle: Angle, sampled_ns: u64) -> Motion {
         let motion = match self.last {
             Some(last) if last.sampled_ns == sampled_ns && last.angle == angle => last,
@@ -172,13 +173,13 @@ impl Tracker {
         motion
     }
 
-    /// To be called when a sample is missing or doubtful: the next one is a first one.
+    /// Call this when a sample is missing or doubtful: the next one then counts as a first one.
     pub const fn interrupt(&mut self) -> Motion {
         self.last = None;
         Motion::UNKNOWN
     }
 
-    /// The motion from one sample to the next.
+    /// Computes the motion from one sample to the next.
     fn moved(&self, last: Motion, angle: Angle, sampled_ns: u64) -> Motion {
         let standing = Motion::standing(angle, sampled_ns, self.count);
         let span = sampled_ns.checked_sub(last.sampled_ns).and_then(|span| u32::try_from(span).ok());

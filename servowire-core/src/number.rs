@@ -1,7 +1,8 @@
-/// Declares a number of `BITS` bits as a type of its own, over `arbitrary_int::UInt`.
+/// Declares a type for numbers of `BITS` bits, based on `arbitrary_int::UInt`.
 ///
-/// Each has the same three ways in (`try_from` checked with a reason, `new` checked in const, `truncate` cut to its
-/// width) and `get` out. An illegal value cannot be written down, nor deserialised.
+/// Each type has the same three constructors (`try_from`, which checks and names the reason; `new`, which checks in const
+/// context; `truncate`, which cuts to the width), and `get` returns the number. An illegal value can neither be constructed nor
+/// deserialised.
 ///
 /// ```
 /// servowire_core::number! {
@@ -16,7 +17,7 @@
 /// assert_eq!(MacId::MAX.to_string(), "31");
 /// ```
 ///
-/// The calling crate has the features `defmt`, `serde` and `arbitrary`; they add the traits of these crates.
+/// The calling crate must have the features `defmt`, `serde` and `arbitrary`, which add the traits of those crates.
 #[macro_export]
 macro_rules! number {
     ($(#[$meta:meta])* pub struct $name:ident($inner:ty, $bits:literal);) => {
@@ -40,7 +41,7 @@ macro_rules! number {
                 }
             }
 
-            /// The low bits of `value`.
+            /// Keeps the low bits of `value`.
             #[inline]
             pub const fn truncate(value: $inner) -> Self {
                 match Self::new(value & Self::MAX.get()) {
@@ -126,13 +127,13 @@ number! {
 }
 
 impl U24 {
-    /// From three bytes, the low one first.
+    /// Creates the number from three bytes, the low one first.
     #[inline]
     pub const fn from_le_bytes([low, middle, high]: [u8; 3]) -> Self {
         Self::truncate(u32::from_le_bytes([low, middle, high, 0]))
     }
 
-    /// As three bytes, the low one first.
+    /// Returns the number as three bytes, the low one first.
     #[inline]
     pub const fn to_le_bytes(self) -> [u8; 3] {
         let [low, middle, high, _] = self.get().to_le_bytes();

@@ -1,7 +1,7 @@
 /// The state of a procedure.
 ///
-/// `T` is what it was made for, `E` why it failed. Both ends say from when on the line is free for the next request:
-/// until then an answer that was given up may still be talking, or the encoder is at work.
+/// `T` is its result, `E` why it failed. Both `Done` and `Failed` say when the line is free for the next request: until then an
+/// abandoned answer may still be arriving, or the encoder may still be busy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -9,29 +9,29 @@
 pub enum Progress<T, E> {
     /// Not finished. Poll at this time if nothing is received earlier.
     Pending {
-        /// When the wait is over, in ns.
+        /// When the wait ends, in ns.
         until_ns: u64,
     },
     /// Finished.
     Done {
-        /// What it was made for.
+        /// The result.
         value: T,
-        /// The line is free for the next request from this time on, in ns.
+        /// When the line is free for the next request, in ns.
         ready_ns: u64,
     },
     /// Failed.
     Failed {
         /// Why.
         error: E,
-        /// The line is free for the next request from this time on, in ns.
+        /// When the line is free for the next request, in ns.
         ready_ns: u64,
     },
 }
 
-/// What a procedure of several transactions wants next: a master's reset, EEPROM access or detection.
+/// What a procedure of several transactions (a reset, an EEPROM access or a detection by the master) asks for next.
 ///
-/// `R` is the request, `T` what the procedure is made for, `E` why it fails. The outcome of each transaction, refused
-/// answers included, is handed to the procedure as it is; the procedure decides whether to try again.
+/// `R` is the request, `T` the result of the procedure, `E` why it fails. Hand the outcome of each transaction to the procedure
+/// unchanged, refused answers included; the procedure decides whether to try again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -46,22 +46,22 @@ pub enum Step<R, T, E> {
     },
     /// The procedure has succeeded.
     Done {
-        /// What it was made for.
+        /// The result.
         value: T,
-        /// The encoder is ready for other requests from this time on, in ns.
+        /// When the encoder is ready for other requests, in ns.
         ready_ns: u64,
     },
     /// The procedure has failed.
     Failed {
         /// Why.
         error: E,
-        /// The encoder is ready for other requests from this time on, in ns.
+        /// When the encoder is ready for other requests, in ns.
         ready_ns: u64,
     },
 }
 
 impl<R, T, E> Step<R, T, E> {
-    /// The next step of a procedure that is built on this one: `done` continues when this one has succeeded.
+    /// Returns the next step of a procedure that is built on this one: `done` continues when this one has succeeded.
     pub fn and_then<U>(self, done: impl FnOnce(T, u64) -> Step<R, U, E>) -> Step<R, U, E> {
         match self {
             Self::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
@@ -72,7 +72,7 @@ impl<R, T, E> Step<R, T, E> {
 }
 
 impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
-    /// How the procedure ended, done or failed; `None` if there is something to send.
+    /// Returns how the procedure ended, done or failed; `None` if there is something to send.
     pub const fn ended(&self) -> Option<Self> {
         if matches!(self, Self::Send { .. }) { None } else { Some(*self) }
     }

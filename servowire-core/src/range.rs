@@ -1,14 +1,14 @@
-/// A number that its field cannot hold.
+/// A number that does not fit its field.
 ///
-/// Only numbers that a caller hands over are refused with it; what came over a wire and is wrong is an `Error` of the crate.
+/// It refuses only numbers passed in by a caller; a wrong number from the wire is an `Error` of the crate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("{got} is out of range, the limit is {max}")]
 pub struct OutOfRange {
-    /// The number; the nearest that an `i64` holds.
+    /// The number, or the nearest that an `i64` can hold.
     pub got: i64,
-    /// The limit that it passes: the largest value, or the smallest if the number lies below it.
+    /// The limit that it exceeds: the largest value, or the smallest if the number lies below it.
     pub max: i64,
 }
 

@@ -1,23 +1,23 @@
-//! The loop that takes a procedure through its exchanges, for those who wait and for those who are woken.
+//! The loop that takes a procedure through its exchanges, in a blocking and an async form.
 
 use crate::{Procedure, Step};
 
-/// How an exchange ended, as a procedure hears it.
+/// How an exchange ended, as it is passed to a procedure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ended<T, E> {
-    /// The answer or the value, or why it is missing.
+    /// The answer or the value, or the reason why there is none.
     pub outcome: Result<T, E>,
-    /// The line is free from this time on, in ns.
+    /// When the line is free, in ns.
     pub ready_ns: u64,
 }
 
 /// Takes a procedure through its exchanges.
 ///
-/// `exchange` is given a request and the time in ns before which it must not leave. It does the exchange and says how it ended,
-/// refused answers included. Its own error ends the procedure at once; it is meant for what the procedure cannot handle, such
-/// as a port that is gone.
+/// `exchange` receives a request and the time in ns before which the request must not leave. It performs the exchange and
+/// returns how it ended, refused answers included. An error of `exchange` itself ends the procedure at once; it is meant for
+/// faults that the procedure cannot handle, such as a port that is gone.
 ///
 /// ```
 /// use servowire_core::{Ended, Procedure, Step, run};
@@ -54,7 +54,7 @@ pub struct Ended<T, E> {
 /// ```
 ///
 /// # Errors
-/// That of `exchange`. Whether the last request took effect is then unknown.
+/// The error of `exchange`. Whether the last request took effect is then unknown.
 pub fn run<P: Procedure, F>(
     procedure: &mut P,
     now_ns: u64,
@@ -74,10 +74,10 @@ pub fn run<P: Procedure, F>(
     }
 }
 
-/// Like [`run`], with an exchange that is awaited.
+/// Like [`run`], but awaits each exchange.
 ///
 /// # Errors
-/// That of `exchange`.
+/// The error of `exchange`.
 pub async fn run_async<P: Procedure, F>(
     procedure: &mut P,
     now_ns: u64,

@@ -6,7 +6,7 @@ use crate::feedback::{Feedback, Policy};
 use crate::four_slots::FourSlots;
 use crate::motion::{Acceleration, Estimate, Motion, Tracker};
 
-/// Feedback of where a shaft is.
+/// Feedback about the angle of a shaft.
 pub trait Shaft: Feedback {
     /// The angle within the turn, and the instant of sampling in ns.
     fn shaft(sample: &Self::Sample) -> (Angle, u64);
@@ -15,8 +15,8 @@ pub trait Shaft: Feedback {
 /// A [`Cell`](crate::Cell) that carries the motion of the shaft beside the evidence: for a control loop that runs more
 /// often than the encoder is read, or at other times.
 ///
-/// The writer finds angle and speed, with divisions; the reader needs none for the electrical angle of this instant and the
-/// bound of its error. It takes 4 × (`W` + 7) + 2 words of memory.
+/// The writer computes angle and speed, with divisions; the reader computes the electrical angle at this instant and the bound
+/// of its error without any. It takes 4 × (`W` + 7) + 2 words of memory.
 ///
 /// ```
 /// use servowire_core::{Acceleration, Angle, Commutation, Policy, Sense, ShaftCell, Tracker};
@@ -74,12 +74,13 @@ pub struct ShaftCell<F, const W: usize> {
 }
 
 impl<F: Shaft + Words<W>, const W: usize> ShaftCell<F, W> {
-    /// With [`Feedback::NEVER`] in it.
+    /// Creates a cell that holds [`Feedback::NEVER`].
     pub const fn new() -> Self {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// The two ends, as those of [`Cell`](crate::Cell::split). The cell keeps what it holds; the next sample is a first one.
+    /// Returns the two ends, as [`Cell::split`](crate::Cell::split) does. The cell keeps what it holds; the next sample counts
+    /// as a first one.
     pub const fn split(&mut self, tracker: Tracker) -> (ShaftWriter<'_, F, W>, ShaftReader<'_, F, W>) {
         let slots = &self.slots;
         (ShaftWriter { slots, tracker, evidence: PhantomData }, ShaftReader { slots, evidence: PhantomData })
@@ -102,7 +103,7 @@ pub struct ShaftWriter<'a, F, const W: usize> {
 impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
     /// Stores the newest evidence, replacing all earlier evidence.
     ///
-    /// The policy, that of the reader as a rule, decides which evidence goes into the speed. After a doubt the speed is not
+    /// The policy, as a rule that of the reader, decides which evidence is used for the speed. After a doubt the speed is not
     /// known until there are two good samples again, as at the start.
     pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
         let motion = if let Ok(sample) = evidence.at(now_ns, policy) {
@@ -122,7 +123,7 @@ pub struct ShaftReader<'a, F, const W: usize> {
 }
 
 impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
-    /// The value of the newest evidence, if it may be used at this time.
+    /// Returns the value of the newest evidence, if it may be used at this time.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -131,7 +132,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
         self.latest().at(now_ns, policy)
     }
 
-    /// Speed and mechanical angle, if the newest evidence may be used at this time.
+    /// Returns the speed and the mechanical angle, if the newest evidence may be used at this time.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -141,8 +142,8 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
         evidence.at(now_ns, policy).map(|_| motion)
     }
 
-    /// The electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
-    /// tolerate: where the speed is not known it is half a turn.
+    /// Returns the electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
+    /// tolerate; if the speed is not known, the bound is half a turn.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -158,7 +159,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
         Ok(Estimate { angle: commutation.electrical(angle), bound: commutation.bound(bound) })
     }
 
-    /// The newest evidence, not judged.
+    /// Returns the newest evidence, unjudged.
     #[inline]
     fn latest(&mut self) -> F {
         self.newest().0
@@ -173,13 +174,13 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     }
 }
 
-/// `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` of a protocol whose encoders count turns.
+/// Declares `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` for a protocol whose encoders count turns.
 ///
-/// All reasons against using a position are in one word of marks, so that one mask says which are tolerated. What the
-/// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
-/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names the reason against using a
-/// position. The fields are private to the module in which this stands, so nobody else makes a sample. The last word is the name
-/// of the field for the width of the single turn, in files.
+/// All reasons against using a position are bits of one word of marks, so one mask says which are tolerated. The protocol
+/// defines what the marks mean. It has in scope its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
+/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it implements `Evidence::doubt`, which names the reason against
+/// using a position. The fields are private to the module that calls this macro, so nothing else can create a sample. The last
+/// argument is the serialised name of the field for the width of the single turn.
 #[macro_export]
 macro_rules! shaft_evidence {
     ($(#[$about:meta])* Evidence, $bits:ident) => {
@@ -199,10 +200,10 @@ macro_rules! shaft_evidence {
         });
 
         impl Evidence {
-            /// Nothing was heard yet.
+            /// Nothing has been received yet.
             pub const NEVER: Self = Self { sampled_ns: 0, single_turn: 0, turns: 0, marks: NEVER };
 
-            /// The position, if it may be used at `now_ns`.
+            /// Returns the position, if it may be used at `now_ns`.
             ///
             /// # Errors
             /// [`Doubt`], in the order in which its variants are declared.
@@ -245,10 +246,10 @@ macro_rules! shaft_evidence {
             }
         }
 
-        /// Carries evidence from where it is received to where it is used, between two priorities or cores.
+        /// Passes evidence from where it is received to where it is used, between two priorities or cores.
         pub type EvidenceCell = $crate::Cell<Evidence, 5>;
 
-        /// Like [`EvidenceCell`], and also gives the angle at an instant between two samples.
+        /// Like [`EvidenceCell`], and also returns the angle at an instant between two samples.
         pub type EvidenceShaftCell = $crate::ShaftCell<Evidence, 5>;
 
         /// For an [`EvidenceCell`]: the instant of sampling, low half first, single turn, turns, marks.
@@ -269,7 +270,7 @@ macro_rules! shaft_evidence {
 
         /// A position that may be used, and when it was sampled: from [`Evidence::at`].
         ///
-        /// It has turns where the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be anything, and are not here.
+        /// It has turns if the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be anything, so they are left out.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize))]
         pub struct Sample {
@@ -286,17 +287,17 @@ macro_rules! shaft_evidence {
         });
 
         impl Sample {
-            /// When it was sampled, in ns by the clock of the master, as the exchange says. Its age counts from here.
+            /// When it was sampled, in ns by the clock of the master, as reported by the exchange. Its age counts from here.
             pub const fn sampled_ns(self) -> u64 {
                 self.sampled_ns
             }
 
-            /// Counts in the turn.
+            /// Counts within the turn.
             pub const fn single_turn(self) -> u32 {
                 self.single_turn
             }
 
-            /// The place in the turn as an angle.
+            /// The position within the turn as an angle.
             pub const fn angle(self) -> $crate::Angle {
                 $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.$bits as u32)))
             }
@@ -306,7 +307,7 @@ macro_rules! shaft_evidence {
                 self.turns
             }
 
-            /// Both parts in counts, turns times the counts of a turn and the single turn; if the policy judged the turns.
+            /// Both parts in counts, turns times the counts of a turn plus the single turn, if the policy judged the turns.
             pub const fn counts(self) -> Option<i64> {
                 match self.turns {
                     Some(turns) => Some((turns as i64).wrapping_shl(self.$bits as u32) | self.single_turn as i64),

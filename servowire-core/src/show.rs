@@ -1,14 +1,14 @@
 use core::fmt;
 
-/// Writes names with a blank between them: how the crates print a set, `OF BE BA`; `-` for none.
+/// Writes names separated by a space, which is how the crates print a set: `OF BE BA`, or `-` for the empty set.
 pub fn write_names<'a>(f: &mut fmt::Formatter<'_>, names: impl IntoIterator<Item = &'a str>) -> fmt::Result {
     let mut names = names.into_iter();
     f.write_str(names.next().unwrap_or("-"))?;
     names.try_for_each(|name| write!(f, " {name}"))
 }
 
-/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, of sets declared with `bitflags` over
-/// `u8` or `u16`: the names of the set bits, then the bits without a name as one number, `LAST 40h`; `-` for the
+/// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, for sets declared with `bitflags`
+/// over `u8` or `u16`: the names of the set bits, then the bits without a name as one number, `LAST 40h`; `-` for the
 /// empty set.
 ///
 /// ```
@@ -61,8 +61,8 @@ macro_rules! show_flags {
     };
 }
 
-/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, of a value that is a list: each item by the same
-/// format string, with a blank between two, `-` for none. There is no `core::fmt` in firmware.
+/// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, for a value that is a list: each
+/// item by the same format string, separated by a space, or `-` for none. Firmware then needs no `core::fmt`.
 ///
 /// ```
 /// pub struct Frames(Vec<u16>);
@@ -104,8 +104,8 @@ macro_rules! listed {
     };
 }
 
-/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, by the same format strings, one for each
-/// pattern of the value: the same words on a host and in a log, and no `core::fmt` in firmware.
+/// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, by the same format strings, one
+/// for each pattern of the value: the words are the same on a host and in a log, and firmware needs no `core::fmt`.
 ///
 /// ```
 /// pub enum Level {

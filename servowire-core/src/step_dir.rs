@@ -1,4 +1,4 @@
-//! What a stepper driver is told: STEP and DIR, by the cycle of a PTO word.
+//! Commands to a stepper driver: STEP and DIR, one per cycle of the PTO word.
 
 use core::fmt;
 
@@ -20,12 +20,12 @@ impl Direction {
         matches!(self, Self::Reverse)
     }
 
-    /// The direction of this many steps; forward for 0.
+    /// Returns the direction of this many steps; forward for 0.
     pub const fn of(steps: i64) -> Self {
         if steps < 0 { Self::Reverse } else { Self::Forward }
     }
 
-    /// `steps` and one more in this direction.
+    /// Returns `steps` plus one step in this direction.
     pub const fn advance(self, steps: i64) -> i64 {
         match self {
             Self::Forward => steps.wrapping_add(1),
@@ -42,8 +42,8 @@ impl Direction {
 /// | `Hold` | 0x0000, with DIR in bit 15 |
 /// | `Pulse` | start time 1..=3990 ns, with DIR in bit 15 |
 ///
-/// The word itself is made by the crate that speaks the wire. It has to send sync_time 0 as 1 and 3991..=3999 as
-/// 3990: 0 would be read as "no pulse", a lost step.
+/// The word itself is encoded by the crate of the wire protocol. That crate has to send sync_time 0 as 1 and 3991..=3999 as
+/// 3990: 0 would be read as "no pulse", which loses a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

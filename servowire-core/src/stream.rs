@@ -1,11 +1,11 @@
-//! What the `nom` parsers of the crates have in common.
+//! Functions that the `nom` parsers of the crates share.
 
 use core::num::NonZeroUsize;
 
 use nom::error::{ErrorKind, FromExternalError, ParseError};
 use nom::{Err, IResult, Needed};
 
-/// A decoder's refusal as an error of `nom`.
+/// Converts a decoder's refusal to an error of `nom`.
 pub fn refused<I, E, F>(input: I, error: F) -> Err<E>
 where
     E: FromExternalError<I, F>,
@@ -13,7 +13,7 @@ where
     Err::Error(E::from_external_error(input, ErrorKind::Verify, error))
 }
 
-/// `Incomplete`, with the number of bytes (or bits) that are missing; 0 stands for an unknown number.
+/// Returns `Incomplete` with the number of missing bytes (or bits); 0 stands for an unknown number.
 pub const fn missing<E>(count: usize) -> Err<E> {
     Err::Incomplete(match NonZeroUsize::new(count) {
         Some(count) => Needed::Size(count),
@@ -21,10 +21,10 @@ pub const fn missing<E>(count: usize) -> Err<E> {
     })
 }
 
-/// Takes a unit of `len` bytes off the front and decodes it.
+/// Takes a unit of `len` bytes from the start of the input and decodes it.
 ///
 /// # Errors
-/// `Incomplete` with the number of missing bytes; what `parse` refuses, as an `Error`.
+/// `Incomplete` with the number of missing bytes; `Error` with what `parse` refuses.
 pub fn unit<'a, T, E, F>(
     input: &'a [u8],
     len: usize,

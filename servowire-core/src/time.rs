@@ -17,7 +17,7 @@ pub enum ClockError {
     /// Its tick is longer than [`MAX_TICK_NS`].
     #[error("a clock of {hz} Hz is too coarse, the limit is {limit_hz} Hz")]
     TooCoarse {
-        /// The rate that was asked for.
+        /// The requested rate.
         hz: u32,
         /// The lowest rate that will do, [`MIN_TICK_HZ`].
         limit_hz: u32,
@@ -25,16 +25,16 @@ pub enum ClockError {
     /// A reading lies before the last one: the clock was set back or reset, or its counter was not read for too long.
     #[error("the clock went back by {by_ns} ns")]
     Backwards {
-        /// By how much, ns.
+        /// By how much, in ns.
         by_ns: u64,
     },
     /// More time has passed since the last reading than can have passed.
     #[error("the clock jumped ahead by {by_ns} ns")]
     Ahead {
-        /// From the last reading to this one, ns.
+        /// From the last reading to this one, in ns.
         by_ns: u64,
     },
-    /// It gives the same reading again and again.
+    /// It returns the same reading again and again.
     #[error("the clock stands still")]
     Stopped,
 }

@@ -1,5 +1,5 @@
-//! Every interleaving of a writer and a reader, and every order in which their stores can be seen, by `loom`:
-//! `.ci/run loom`. And that the model sees faults: each barrier is left out once.
+//! Checks with `loom` every interleaving of a writer and a reader, and every order in which their stores can be seen: `.ci/run
+//! loom`. Also checks that the model sees faults: each barrier is left out once.
 
 use core::cell::Cell;
 use std::panic::catch_unwind;
@@ -24,8 +24,8 @@ pub(super) fn fence(barrier: Barrier) {
     }
 }
 
-/// A word of a slot. Where it is watched, every load has to be ordered with every store, as if it were not atomic. This
-/// finds what values do not show, for the model makes no load see a store of its future, as a processor may.
+/// A word of a slot. If it is watched, every load has to be ordered with every store, as if it were not atomic. This finds
+/// faults that the values do not show, because in the model no load sees a store from its future, as it may on a processor.
 pub(super) struct Word {
     value: AtomicU32,
     access: UnsafeCell<()>,
@@ -63,7 +63,7 @@ fn value(n: u32) -> ([u32; 1], [u32; 1]) {
     ([n], [!n])
 }
 
-/// Values 1 to 4 against this number of readings, with four preemptions at most.
+/// Writes values 1 to 4 against this number of readings, with four preemptions at most.
 fn explore(gets: u32) {
     let mut builder = Builder::new();
     builder.preemption_bound = Some(4);
@@ -99,7 +99,7 @@ fn no_value_is_torn_stale_or_older_than_the_one_before() {
     explore(3);
 }
 
-/// Whether the model finds something without this barrier.
+/// Returns whether the model finds a fault without this barrier.
 fn is_missed(barrier: Barrier, watched: bool) -> bool {
     LEFT_OUT.set(Some(barrier));
     WATCHED.set(watched);

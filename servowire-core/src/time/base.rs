@@ -1,7 +1,7 @@
 use super::{ClockError, TickRate};
 
-/// Time from a counter that wraps after `BITS` bits: 32 for a cycle counter or a timer of 32 bits, 24 for the SysTick, 16 for a
-/// small timer; 8 to 32 are possible.
+/// Derives the time from a counter of `BITS` bits that wraps: 32 for a cycle counter or a 32-bit timer, 24 for the SysTick, 16
+/// for a small timer; 8 to 32 are possible.
 ///
 /// ```
 /// use servowire_core::{ClockError, TickRate, TimeBase};
@@ -15,24 +15,25 @@ use super::{ClockError, TickRate};
 /// assert_eq!(time.now_ns(197), Ok(3_000)); // time goes on from where it was
 /// ```
 ///
-/// The time is 0 at the start and never goes back. It is off by less than 1 ns and what its [`TickRate`] is rounded by, however long it
-/// counts, for no error adds up: the ticks themselves are counted.
+/// The time is 0 at the start and never goes back. Its error is less than 1 ns plus the rounding of its [`TickRate`], however
+/// long it runs. No error accumulates, because the ticks themselves are counted.
 ///
-/// A counter that counts down (SysTick) is read inverted: `!SYST::get_current()`. Bits above `BITS` are not looked at.
+/// A counter that counts down (SysTick) is read inverted: `!SYST::get_current()`. Bits above `BITS` are ignored.
 ///
-/// **The counter has to be read within half of its range** ([`read_within_ns`](Self::read_within_ns)). A longer way forward is one
-/// back, and [`ClockError::Backwards`] tells of both: of a counter that was reset or set back, and of one that stood unread.
-/// What cannot be told is a reset of a counter that was beyond the middle of its range, which looks like a wrap, and whole
-/// turns that nobody has seen.
+/// **The counter has to be read within half of its range** ([`read_within_ns`](Self::read_within_ns)). A larger step forward
+/// cannot be told from a step back. [`ClockError::Backwards`] reports both: a counter that was reset or set back, and one that
+/// was not read for too long.
+/// Two faults are not detected: a reset of a counter that was beyond the middle of its range, which looks like a wrap, and whole
+/// wraps between two readings.
 ///
-/// Where several priorities read one time base, counter and [`now_ns`](Self::now_ns) belong into one critical section: a reading
-/// that is older than the last one is a clock that went back.
+/// If several priorities read one time base, read the counter and call [`now_ns`](Self::now_ns) in one critical section: a
+/// reading older than the last one looks like a clock that went back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeBase<const BITS: u32> {
-    /// The time when `ticks` was 0; modulo 2^64.
+    /// The time at which `ticks` was 0, modulo 2^64.
     base_ns: u64,
-    /// The ticks of the last reading, of which the low bits are the counter.
+    /// The ticks at the last reading; their low bits are the counter.
     ticks: u32,
     rate: TickRate,
 }
@@ -44,17 +45,17 @@ impl<const BITS: u32> TimeBase<BITS> {
         32_u32.wrapping_sub(BITS)
     };
 
-    /// Starts at 0 ns, with a counter that counts at this rate and reads `counter` now.
+    /// Starts at 0 ns with a counter that counts at this rate and reads `counter` now.
     pub const fn new(rate: TickRate, counter: u32) -> Self {
         let mut time = Self { base_ns: 0, ticks: 0, rate };
         time.go_on(counter, 0);
         time
     }
 
-    /// The time since the start, in ns, from a reading of the counter. It wraps after 584 years.
+    /// Returns the time since the start, in ns, from a reading of the counter. It wraps after 584 years.
     ///
     /// # Errors
-    /// [`ClockError::Backwards`], once: the next reading goes on from here, at the time of the last good one.
+    /// [`ClockError::Backwards`], once: the next reading continues from this one, at the time of the last good one.
     #[inline]
     pub const fn now_ns(&mut self, counter: u32) -> Result<u64, ClockError> {
         let past = counter.wrapping_sub(self.ticks) << Self::ABOVE;
@@ -85,13 +86,13 @@ impl<const BITS: u32> TimeBase<BITS> {
         self.base_ns.wrapping_add(self.rate.low_ns(self.ticks))
     }
 
-    /// It is `now_ns`, and the counter reads this.
+    /// Sets the time to `now_ns` at this counter reading.
     const fn go_on(&mut self, counter: u32, now_ns: u64) {
         self.ticks = counter << Self::ABOVE >> Self::ABOVE;
         self.base_ns = now_ns.wrapping_sub(self.rate.low_ns(self.ticks));
     }
 
-    /// Out of line: it is rare, and what it needs would fill the registers of a Cortex-M0+ in every reading.
+    /// Kept out of line: it is rare, and its operands would fill the registers of a Cortex-M0+ in every reading.
     #[cold]
     #[inline(never)]
     const fn wrap(&mut self) {

@@ -1,10 +1,10 @@
 use super::ClockError;
 
-/// Makes sure that a wait ends: checks every reading of a clock that comes from elsewhere, and limits the readings of one that stands
-/// still.
+/// Makes sure that a wait ends: checks every reading of a clock from outside and limits the number of readings of a clock that
+/// has stopped.
 ///
-/// A loop that waits for a time never ends on a clock that stands, or was set back, or is a counter of 32 bits that wraps before
-/// that time comes. With the check in it, it does:
+/// A loop that waits for a time never ends if the clock has stopped, was set back, or is a 32-bit counter that wraps before that
+/// time. With this check it does:
 ///
 /// ```
 /// use servowire_core::{ClockCheck, ClockError};
@@ -28,8 +28,8 @@ pub struct ClockCheck {
 }
 
 impl ClockCheck {
-    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor makes
-    /// within one tick.
+    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor can
+    /// make within one tick.
     pub const fn new(max_looks: u32) -> Self {
         Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
     }
@@ -39,11 +39,11 @@ impl ClockCheck {
         self.last_ns
     }
 
-    /// The reading, if it is plausible.
+    /// Returns the reading, if it is plausible.
     ///
     /// # Errors
-    /// [`ClockError::Backwards`] if it is before the last one, once: the next one is compared with this one.
-    /// [`ClockError::Stopped`] if it was repeated too often, until it changes.
+    /// [`ClockError::Backwards`] if it is before the last one, reported once: the next reading is compared with this one.
+    /// [`ClockError::Stopped`] if it was repeated too often, reported until it changes.
     #[inline]
     pub const fn check(&mut self, now_ns: u64) -> Result<u64, ClockError> {
         if now_ns > self.last_ns {
@@ -56,10 +56,11 @@ impl ClockCheck {
         }
     }
 
-    /// The reading, if it is plausible and at most `most_ns` after the last one; `most_ns` is at most 2^63.
+    /// Returns the reading, if it is plausible and at most `most_ns` after the last one; `most_ns` is at most 2^63.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check), and [`ClockError::Ahead`] if more has passed, once: the next one is compared with this one.
+    /// Those of [`check`](Self::check), and [`ClockError::Ahead`] if more time has passed, reported once: the next reading is
+    /// compared with this one.
     #[inline]
     pub const fn check_within(&mut self, now_ns: u64, most_ns: u64) -> Result<u64, ClockError> {
         // What is not after the last one is far above.
@@ -70,7 +71,7 @@ impl ClockCheck {
         self.without(now_ns)
     }
 
-    /// A reading that is not after the last one or too long after it.
+    /// Handles a reading that is not after the last one, or too long after it.
     #[cold]
     #[inline(never)]
     const fn without(&mut self, now_ns: u64) -> Result<u64, ClockError> {
@@ -81,7 +82,7 @@ impl ClockCheck {
         }
     }
 
-    /// What is wrong with a reading that is not after the last one.
+    /// Returns what is wrong with a reading that is not after the last one.
     #[cold]
     #[inline(never)]
     const fn refuse(&mut self, now_ns: u64) -> Option<ClockError> {

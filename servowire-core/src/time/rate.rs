@@ -1,7 +1,7 @@
 use super::ClockError;
 
 /// The longest tick that a clock may have, ns: an encoder answers 3 us after its request, and a field lasts 2 us at 5 Mbit/s. A
-/// clock that counts slower cannot tell one field from the next.
+/// slower clock cannot tell one field from the next.
 pub const MAX_TICK_NS: u32 = 1_000;
 
 /// The lowest rate of a clock, Hz: ticks of [`MAX_TICK_NS`].
@@ -9,8 +9,8 @@ pub const MIN_TICK_HZ: u32 = NS_PER_S / MAX_TICK_NS;
 
 const NS_PER_S: u32 = 1_000_000_000;
 
-/// ARMv6-M (Cortex-M0+) has no multiplication of 32 by 32 bits to 64, and calls a function of 64 by 64 for it. It has no
-/// compare-and-swap either, which is how a crate can tell.
+/// ARMv6-M (Cortex-M0+) has no multiplication of 32 by 32 bits to 64 and calls a 64-by-64 function for it. It has no
+/// compare-and-swap either, and a crate can test for that.
 const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has_atomic = "32")));
 
 /// How fast a clock counts, as the length of its tick: whole nanoseconds and a fraction of 32 bits.
@@ -28,7 +28,7 @@ const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has
 /// assert_eq!(TickRate::new(32_768), Err(ClockError::TooCoarse { hz: 32_768, limit_hz: 1_000_000 }));
 /// ```
 ///
-/// A constant that is too low does not compile, nor does a tick of no time:
+/// A constant that is too low does not compile, nor does a tick of zero length:
 ///
 /// ```compile_fail,E0080
 /// let _ = servowire_core::TickRate::of::<999_999>();
@@ -40,19 +40,19 @@ const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TickRate {
-    /// Whole ns a tick, at most [`MAX_TICK_NS`].
+    /// Whole ns per tick, at most [`MAX_TICK_NS`].
     whole: u32,
-    /// 2^-32 ns a tick.
+    /// Fraction of a tick, in units of 2^-32 ns.
     fraction: u32,
 }
 
 impl TickRate {
-    /// A rate that is known when the program is compiled, Hz. Below [`MIN_TICK_HZ`] it does not compile.
+    /// Creates a rate that is known at compile time, in Hz. A rate below [`MIN_TICK_HZ`] does not compile.
     pub const fn of<const HZ: u32>() -> Self {
         Self::of_ratio::<1, HZ>()
     }
 
-    /// The same from the length of a tick, `NUM` / `DENOM` seconds, as the types of `fugit` name it.
+    /// Creates the rate from the length of a tick, `NUM` / `DENOM` seconds, as in the types of `fugit`.
     pub const fn of_ratio<const NUM: u32, const DENOM: u32>() -> Self {
         const {
             assert!(
@@ -64,7 +64,7 @@ impl TickRate {
         }
     }
 
-    /// A rate that is known at run time, Hz.
+    /// Creates a rate that is known at run time, in Hz.
     ///
     /// # Errors
     /// [`ClockError::TooCoarse`] below [`MIN_TICK_HZ`].
@@ -87,16 +87,16 @@ impl TickRate {
         Self { whole: (ns / denom) as u32, fraction: fraction as u32 }
     }
 
-    /// The duration of `ticks`, ns, rounded down; modulo 2^64, which is 584 years.
+    /// Returns the duration of `ticks` in ns, rounded down, modulo 2^64 ns, which is 584 years.
     ///
-    /// A counter of 64 bits needs nothing else. For one that wraps use [`TimeBase`](super::TimeBase).
+    /// A 64-bit counter needs nothing else. For a counter that wraps use [`TimeBase`](super::TimeBase).
     #[inline]
     pub const fn ns(self, ticks: u64) -> u64 {
         let [low, high] = words(ticks);
         self.turns_ns(high).wrapping_add(self.low_ns(low))
     }
 
-    /// 2^32 ticks, ns: the tick with its fraction moved up by as much.
+    /// 2^32 ticks in ns: the tick with its fraction shifted up by 32 bits.
     #[inline]
     pub(super) const fn turn_ns(self) -> u64 {
         (self.whole as u64) << 32 | self.fraction as u64
@@ -106,7 +106,7 @@ impl TickRate {
         self.turn_ns().wrapping_mul(turns as u64)
     }
 
-    /// Less than 2^32 ticks, ns, rounded down.
+    /// Returns the duration of fewer than 2^32 ticks in ns, rounded down.
     #[inline]
     pub(super) const fn low_ns(self, ticks: u32) -> u64 {
         if MULTIPLIES_TO_32_BITS { self.low_ns_by_halves(ticks) } else { self.low_ns_by_words(ticks) }
@@ -119,7 +119,7 @@ impl TickRate {
         ticks.wrapping_mul(self.whole as u64).wrapping_add(fraction)
     }
 
-    /// The same by products of 16 bits. No sum is longer than 32 bits.
+    /// Computes the same from products of 16 bits. No sum exceeds 32 bits.
     #[inline]
     const fn low_ns_by_halves(self, ticks: u32) -> u64 {
         let (low, high) = (ticks & 0xffff, ticks >> 16);
