@@ -1,32 +1,32 @@
 use crate::Window;
 
-/// What most likely damaged a message that was refused, as far as the line alone shows.
+/// The most likely cause of damage to a refused message, as far as the line alone shows it.
 ///
-/// [`Search::find`] gives it; a protocol crate adds the causes that only its protocol knows.
+/// [`Search::find`] returns it; a protocol crate adds the causes that only its protocol knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
+    /// Every level is inverted: A and B are swapped, or the receiver's polarity is wrong.
     LineInverted,
-    /// The response was taken `bits` bits too early (negative: too late), as after a glitch at the turn-round.
+    /// The response was taken `bits` bits too early (negative: too late), for example after a glitch at the turn-around.
     Shifted {
-        /// Idle bits in front of the response; negative: bits of it that are missing.
+        /// Idle bits before the response; negative: bits of the response that are missing.
         bits: i8,
     },
     /// Bits are packed most significant first and were read least significant first, or the other way round.
     WrongBitOrder,
-    /// The own request came back, and the response after it.
+    /// The master's own request came back, followed by the response.
     OwnEcho,
-    /// Only the own request came back: nobody is there, or A and B are exchanged on a half-duplex line.
+    /// Only the master's own request came back: no encoder is connected, or A and B are swapped on a half-duplex line.
     OnlyEcho,
-    /// The line was sampled twice a bit: the real rate is half of the assumed one.
+    /// The line was sampled twice per bit: the real rate is half of the assumed one.
     HalfRate,
-    /// The line does not move from 0: short circuit, driver stuck, or no supply.
+    /// The line stays at 0: short circuit, driver stuck, or no supply.
     StuckLow,
-    /// The line does not move from 1: nobody answers.
+    /// The line stays at 1: nobody answers.
     StuckHigh,
-    /// Everything is right but a check: single bits were disturbed.
+    /// Only a check fails: single bits were disturbed.
     Disturbed,
 }
 
@@ -44,7 +44,7 @@ servowire_core::one_line!(Cause {
 });
 
 impl Cause {
-    /// Returns whether the line did not move at all. A line without bits stands for silence.
+    /// Returns whether the line never changed its level. A line without bits counts as silent.
     pub const fn stuck(line: Window) -> Option<Self> {
         if line.inverted().bits() == 0 {
             Some(Self::StuckHigh)
@@ -56,7 +56,7 @@ impl Cause {
     }
 }
 
-/// Undoes the usual mistakes one by one, to find the one without which a refused message is valid.
+/// Undoes the usual mistakes one by one, to find the mistake without which a refused message is valid.
 ///
 /// ```
 /// use nrz_line::{Cause, Search, Window};
@@ -74,15 +74,15 @@ impl Cause {
 pub struct Search {
     /// Our own request, if it can come back.
     pub sent: Option<Window>,
-    /// Most idle bits that are looked for in front of a message. Default 0.
+    /// The maximum number of idle bits to look for before a message. Default 0.
     pub late_bits: u8,
-    /// Most bits that are looked for as missing at its beginning; they are completed with 0. Default 0.
+    /// The maximum number of missing bits to look for at the beginning of a message; they are filled with 0. Default 0.
     pub early_bits: u8,
-    /// A message that begins late is completed with idle line up to this length. Default 0: it is not.
+    /// A message that begins late is filled up with idle line to this length. Default 0: it is not filled up.
     pub complete_to: u32,
 }
 
-/// What was found.
+/// The result of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found<T> {
@@ -93,7 +93,7 @@ pub struct Found<T> {
 }
 
 impl Search {
-    /// Looks for mistakes that need no setting.
+    /// Creates a search for the mistakes that need no settings.
     pub const fn new() -> Self {
         Self { sent: None, late_bits: 0, early_bits: 0, complete_to: 0 }
     }
@@ -105,8 +105,8 @@ impl Search {
         with_complete_to: complete_to, u32;
     }
 
-    /// The first mistake without which `decode` accepts the line, in the order: inverted, other bit order, own echo, half the
-    /// rate, late, early; and finally an echo that is followed by nothing.
+    /// Returns the first mistake without which `decode` accepts the line, in the order: inverted, other bit order, own echo,
+    /// half the rate, late, early, and finally an echo followed by nothing.
     pub fn find<T>(&self, line: Window, decode: impl Fn(Window) -> Option<T>) -> Option<Found<T>> {
         let after_echo = self.after_echo(line);
         let attempts = [
@@ -126,7 +126,7 @@ impl Search {
         after_echo.filter(|rest| rest.is_empty()).map(|_| Found { cause: Cause::OnlyEcho, message: None })
     }
 
-    /// What follows the own request and the idle line after it; nothing is left if nobody answers.
+    /// Returns what follows the own request and the idle line after it; nothing is left if nobody answers.
     fn after_echo(&self, line: Window) -> Option<Window> {
         let sent = self.sent?;
         let rest = line.skip(sent.len())?;
@@ -135,7 +135,7 @@ impl Search {
         if same { rest.skip(rest.bits().trailing_ones().min(rest.len())) } else { None }
     }
 
-    /// The message some bits later, or with the bits put back that are missing in front.
+    /// Returns the message from some bits later, or with the bits restored that are missing at its start.
     fn shifted<T>(&self, line: Window, decode: impl Fn(Window) -> Option<T>) -> Option<Found<T>> {
         let found = |bits: i8, message| Found { cause: Cause::Shifted { bits }, message: Some(message) };
         for bits in 1..=self.late_bits.min(i8::MAX.unsigned_abs()) {
@@ -161,7 +161,7 @@ impl Default for Search {
     }
 }
 
-/// Every second bit, if the line shows each twice.
+/// Returns every second bit, if the line shows each bit twice.
 fn halved(line: Window) -> Option<Window> {
     let pairs = line.len() / 2;
     let first = Window::from_bits(line.decimated().bits(), pairs)?;

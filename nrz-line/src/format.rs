@@ -18,22 +18,22 @@ pub struct Format {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FormatError {
-    /// 2 and 3 samples leave no room to find an edge; above 80 the limits below are not proved.
+    /// 2 or 3 samples leave no room to find an edge; above 80 the limits below are not proved.
     #[error("{got} samples per bit: only 1 (a plain bit stream) or 4 to 80 are possible")]
     SamplesPerBit {
-        /// What was asked for.
+        /// The requested number.
         got: u32,
     },
     /// Fields carry a byte or a 16-bit word.
     #[error("{got} content bits: only 8 or 16 are possible")]
     ContentBits {
-        /// What was asked for.
+        /// The requested number.
         got: u32,
     },
 }
 
 impl Format {
-    /// `samples_per_bit`: 4..=80, or 1 for a plain bit stream; `content_bits`: 8 or 16.
+    /// Creates a format. `samples_per_bit` is 4..=80, or 1 for a plain bit stream; `content_bits` is 8 or 16.
     ///
     /// # Errors
     /// [`FormatError`] for any other number.
@@ -57,17 +57,17 @@ impl Format {
         self.content_bits
     }
 
-    /// Bits of one field with start bit and delimiter: 10 or 18.
+    /// Bits of one field including start bit and delimiter: 10 or 18.
     pub const fn field_bits(self) -> u32 {
         self.content_bits.saturating_add(2)
     }
 
-    /// Samples from the edge of a bit to the place where its level is taken.
+    /// Samples from the edge of a bit to the point where its level is taken.
     pub(crate) const fn middle(self) -> u32 {
         self.samples_per_bit >> 1
     }
 
-    /// What a receiver's bits are before the first content bit: a mark that content bits push to bit 0.
+    /// Initial value of a receiver's bits, before the first content bit: a mark that the content bits push to bit 0.
     pub(crate) const fn mark(self) -> u32 {
         1_u32.wrapping_shl(self.content_bits)
     }

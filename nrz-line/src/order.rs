@@ -10,8 +10,8 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum BitOrder {
-    /// The first bit of the line is bit 0 of its byte.
+    /// The first bit on the line is bit 0 of its byte.
     LsbFirst,
-    /// The first bit of the line is bit 7 of its byte.
+    /// The first bit on the line is bit 7 of its byte.
     MsbFirst,
 }

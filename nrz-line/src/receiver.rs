@@ -1,11 +1,11 @@
 use crate::{Format, Samples};
 
-/// One field as it came from the line.
+/// One field as received from the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Field {
-    /// The content bits, the first of the line in bit 0; 8 or 16 of them.
+    /// The 8 or 16 content bits, the first on the line in bit 0.
     pub content: u16,
     /// Whether the delimiter read 1. A field with `delimiter: false` is a framing error: nothing in it can be trusted.
     pub delimiter: bool,
@@ -17,10 +17,10 @@ pub struct Field {
 
 /// Start-stop reception of a sampled line, with the clock recovered from every edge.
 ///
-/// A falling edge on an idle line begins a field. A counter of N samples restarts at *every* edge, and a bit
-/// is taken where it reaches N / 2. A start bit that reads 1 there was a spike and is dropped; a delimiter that
-/// reads 0 is a framing error. After the delimiter the receiver hunts for the next falling edge, so fields may
-/// follow each other with any pause or none.
+/// A falling edge on an idle line starts a field. A counter of N samples restarts at *every* edge, and a bit is sampled when it
+/// reaches N / 2. A start bit that reads 1 at that point was a spike and is dropped; a delimiter that
+/// reads 0 is a framing error. After the delimiter the receiver looks for the next falling edge, so fields may follow each other
+/// with or without a pause.
 ///
 /// The line may be fed sample by sample ([`push`](Self::push)), as runs of equal samples ([`run`](Self::run)) or
 /// as packed words ([`feed`](Self::feed)); the results are identical, and the three may be mixed.
@@ -30,22 +30,22 @@ pub struct Receiver {
     format: Format,
     /// Level of the last sample: 0 or 1.
     level: u32,
-    /// The content bits taken so far, pushed in from the top, after a mark that reaches bit 0 when only the delimiter is
+    /// The content bits taken so far, shifted in from the top behind a mark that reaches bit 0 when only the delimiter is
     /// missing; or [`IDLE`], or [`START`].
     bits: u32,
-    /// Samples up to the next middle of a bit, 1 or more; on an idle line up to the next time that the origin moves.
+    /// Samples until the middle of the next bit, 1 or more; on an idle line, until the origin moves next.
     left: u32,
     /// Index of the sample after that middle, counted from the origin.
     next: u32,
-    /// Index of a sample not far back, so that all else is counted in 32 bits.
+    /// Index of a recent sample, so that everything else is counted in 32 bits.
     origin: u64,
     /// Index of the first low sample of the start bit.
     start: u64,
     spikes: u32,
 }
 
-/// The [bits](Receiver::bits) while no field is on the line. Odd as [`START`] is and as a whole content with its mark is: one
-/// test tells what is no ordinary bit. Bits 1 and 2 are 0 in a whole content.
+/// The [bits](Receiver::bits) while no field is on the line. Odd like [`START`] and like complete content with its mark: a
+/// single test detects everything that is not an ordinary bit. Bits 1 and 2 are 0 in complete content.
 const IDLE: u32 = 0b101;
 
 /// The [bits](Receiver::bits) before the middle of the start bit.
@@ -54,31 +54,31 @@ const START: u32 = 0b011;
 /// Samples after which the origin moves on an idle line.
 const LONG: u32 = 0x4000_0000;
 
-/// Samples after which the origin moves while a field does not end, as on a line that carries something else.
+/// Samples after which the origin moves if a field does not end, for example on a line that carries something else.
 const NEAR: u32 = 0x7fff_ffff;
 
 impl Receiver {
-    /// A receiver on an idle (high) line.
+    /// Creates a receiver on an idle (high) line.
     pub const fn new(format: Format) -> Self {
         Self { format, level: 1, bits: IDLE, left: LONG, next: LONG, origin: 0, start: 0, spikes: 0 }
     }
 
-    /// The format it was made for.
+    /// The format it was created for.
     pub const fn format(&self) -> Format {
         self.format
     }
 
-    /// Samples taken so far: the index of the next one.
+    /// Samples taken so far, which is the index of the next one.
     pub const fn position(&self) -> u64 {
         self.origin.wrapping_add(self.here() as u64)
     }
 
-    /// Whether a field has begun and not ended; at the end of a capture: whether it was cut off.
+    /// Returns whether a field has begun and not ended; at the end of a capture, whether the last field was cut off.
     pub const fn is_receiving(&self) -> bool {
         self.bits != IDLE
     }
 
-    /// Takes one sample; returns a field when its delimiter was sampled.
+    /// Takes one sample; returns a field when its delimiter has been sampled.
     #[inline]
     pub const fn push(&mut self, sample: bool) -> Option<Field> {
         if sample as u32 != self.level {
@@ -88,9 +88,9 @@ impl Receiver {
         if self.left == 0 { self.take() } else { None }
     }
 
-    /// Takes `len` samples of the same level at once: what is between two edges of a capture, or a part of it.
+    /// Takes `len` samples of the same level at once: the stretch between two edges of a capture, or a part of it.
     ///
-    /// At most one field ends in a run, because a field holds both levels.
+    /// At most one field ends in a run, because every field contains both levels.
     #[inline]
     pub const fn run(&mut self, level: bool, len: u64) -> Option<Field> {
         if len == 0 {
@@ -113,7 +113,7 @@ impl Receiver {
         field
     }
 
-    /// Takes samples off the front of `samples` until a field is complete or none are left.
+    /// Takes samples from the front of `samples` until a field is complete or none are left.
     ///
     /// ```
     /// use nrz_line::{Format, Receiver, Samples};
@@ -146,8 +146,8 @@ impl Receiver {
         None
     }
 
-    /// Takes `len` samples of `word`, from bit 0 on, or fewer, up to a middle that is not that of an ordinary bit: `left`
-    /// is 0 there. Gives how many.
+    /// Takes up to `len` samples of `word`, starting at bit 0. It stops at a middle that does not belong to an ordinary bit,
+    /// where `left` is 0. Returns how many it took.
     #[inline]
     const fn scan(&mut self, word: u32, len: u32) -> u32 {
         let (half, period) = (self.format.middle(), self.format.samples_per_bit());
@@ -216,7 +216,7 @@ impl Receiver {
         self.next.wrapping_sub(self.left)
     }
 
-    /// The next sample has another level: a field begins, or the clock starts again.
+    /// The next sample has another level: a field begins, or the clock restarts.
     #[inline]
     const fn edge(&mut self, level: u32) {
         self.level = level;
@@ -247,7 +247,7 @@ impl Receiver {
         None
     }
 
-    /// The middle of a delimiter was reached, or of a spike; or the line was idle for long.
+    /// The middle of a delimiter or of a spike was reached, or the line was idle for a long time.
     #[inline]
     const fn end(&mut self) -> Option<Field> {
         let bits = self.bits;

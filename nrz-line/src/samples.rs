@@ -1,24 +1,24 @@
 /// Up to 64 consecutive samples of a line, the oldest in bit 0: the unit in which a
 /// [`Receiver`](crate::Receiver) takes a packed capture.
 ///
-/// The receiver takes samples away from the front until a field is complete, so the same value is
-/// offered again until it is [empty](Self::is_empty).
+/// The receiver takes samples from the front until a field is complete, so offer the same value again until it is
+/// [empty](Self::is_empty).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Samples {
-    /// The oldest in bit 0, copies of the youngest one above it.
+    /// The oldest sample in bit 0, and copies of the youngest above the last one.
     low: u32,
     high: u32,
     len: u32,
 }
 
 impl Samples {
-    /// 64 samples, the oldest in bit 0.
+    /// Creates a group of 64 samples, the oldest in bit 0.
     pub const fn new(word: u64) -> Self {
         Self::partial(word, 64)
     }
 
-    /// The oldest `len` samples of `word`; all 64 where `len` is larger.
+    /// Creates a group of the oldest `len` samples of `word`; all 64 if `len` is larger.
     #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "copies of the top bit come in")]
     pub const fn partial(word: u64, len: u32) -> Self {
         let len = if len > 64 { 64 } else { len };
@@ -33,18 +33,18 @@ impl Samples {
         self.len
     }
 
-    /// Returns whether all samples were taken.
+    /// Returns whether all samples have been taken.
     pub const fn is_empty(self) -> bool {
         self.len == 0
     }
 
-    /// The oldest samples from bit 0 on, and how many there are, at most 32.
+    /// Returns the oldest samples, starting at bit 0, and how many there are, at most 32.
     #[inline]
     pub(crate) const fn front(self) -> (u32, u32) {
         (self.low, if self.len < 32 { self.len } else { 32 })
     }
 
-    /// Takes `count` samples off the front, 1 to 32.
+    /// Removes `count` samples from the front, 1 to 32.
     #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "copies of the top bit come in")]
     #[inline]
     pub(crate) const fn skip(&mut self, count: u32) {

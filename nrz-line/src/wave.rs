@@ -1,4 +1,4 @@
-/// When the bits of a transmitter begin, in samples of a receiver whose clock differs.
+/// The instants at which the bits of a transmitter begin, in samples of a receiver whose clock differs.
 ///
 /// The picture that a logic analyser or an oversampling receiver takes of a line: for simulated
 /// lines, rendered captures and tolerance tests.
@@ -13,15 +13,15 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Wave {
-    /// Samples a bit in 32.32 fixed point.
+    /// Samples per bit in 32.32 fixed point.
     period: u64,
-    /// Part of a sample period by which bit 0 comes later than a sampling instant, 0.32 fixed point.
+    /// Fraction of a sample period by which bit 0 begins after a sampling instant, 0.32 fixed point.
     phase: u32,
 }
 
 impl Wave {
-    /// `samples_per_bit` at the nominal rate, a transmitter that is `ppm` parts per million faster (negative: slower,
-    /// down to -999 999, for which all lower numbers stand), and the `phase` of bit 0 as a fraction of a sample period (2^32 = a whole one).
+    /// Describes a transmitter with `samples_per_bit` at the nominal rate that is `ppm` parts per million faster (negative:
+    /// slower; lower numbers count as -999 999), with the `phase` of bit 0 as a fraction of a sample period (2^32 = a whole one).
     #[expect(
         clippy::cast_sign_loss,
         clippy::cast_possible_truncation,
@@ -37,7 +37,7 @@ impl Wave {
         Self { period, phase }
     }
 
-    /// Index of the first sample that sees bit `bit`.
+    /// Returns the index of the first sample that sees bit `bit`.
     #[expect(clippy::cast_possible_truncation, reason = "captures are shorter than 2^64 samples")]
     pub const fn first_sample(self, bit: u64) -> u64 {
         let time = (self.period as u128).saturating_mul(bit as u128).saturating_add(self.phase as u128);

@@ -1,8 +1,8 @@
 use crate::BitOrder;
 
-/// Up to 128 consecutive bits of a line, the first of them in bit 0.
+/// Up to 128 consecutive bits of a line, the first one in bit 0.
 ///
-/// One bounds check and one load give a whole frame as an integer; a protocol crate then tests its
+/// One bounds check and one load turn a whole frame into an integer; a protocol crate then tests its
 /// framing with constant masks and takes every field with a constant shift.
 ///
 /// ```text
@@ -22,11 +22,11 @@ pub struct Window {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("window of {len} bits at bit {offset} does not fit: {available} bits there, 128 at most")]
 pub struct OutOfBounds {
-    /// First bit asked for, counted from the start of the buffer.
+    /// First requested bit, counted from the start of the buffer.
     pub offset: usize,
-    /// Bits asked for.
+    /// Number of requested bits.
     pub len: u32,
-    /// Bits that the buffer holds from `offset` on.
+    /// Bits that the buffer holds from `offset`.
     pub available: usize,
 }
 
@@ -34,10 +34,10 @@ impl Window {
     /// Longest window, in bits.
     pub const MAX_LEN: u32 = 128;
 
-    /// The window without bits.
+    /// The empty window.
     pub const EMPTY: Self = Self { bits: 0, len: 0 };
 
-    /// The `len` bits of `bytes` that begin at line bit `offset`.
+    /// Takes the `len` bits of `bytes` that begin at line bit `offset`.
     ///
     /// # Errors
     /// [`OutOfBounds`] if `bytes` ends earlier or `len` exceeds [`Self::MAX_LEN`].
@@ -67,7 +67,7 @@ impl Window {
         Ok(Self { bits: bits & Self::mask(len), len })
     }
 
-    /// A window over the `len` lowest bits of `bits`; `None` if `len` exceeds [`Self::MAX_LEN`].
+    /// Creates a window of the `len` lowest bits of `bits`; `None` if `len` exceeds [`Self::MAX_LEN`].
     pub const fn from_bits(bits: u128, len: u32) -> Option<Self> {
         if len > Self::MAX_LEN {
             return None;
@@ -75,7 +75,7 @@ impl Window {
         Some(Self { bits: bits & Self::mask(len), len })
     }
 
-    /// The bits, the first of the line in bit 0; bits at and above [`len`](Self::len) are 0.
+    /// The bits, the first on the line in bit 0; bits at and above [`len`](Self::len) are 0.
     pub const fn bits(self) -> u128 {
         self.bits
     }
@@ -90,23 +90,23 @@ impl Window {
         self.len == 0
     }
 
-    /// The level of line bit `at`; `None` after the end.
+    /// Returns the level of line bit `at`; `None` after the end.
     pub const fn get(self, at: u32) -> Option<bool> {
         if at < self.len { Some(self.bits >> at & 1 == 1) } else { None }
     }
 
-    /// The same line with every level inverted, as if the two wires of the pair were exchanged.
+    /// Returns the same line with every level inverted, as if the two wires of the pair were swapped.
     pub const fn inverted(self) -> Self {
         Self { bits: !self.bits & Self::mask(self.len), len: self.len }
     }
 
-    /// The same line with the bits of each byte in the other order, as if it had been packed in one order and read in the
-    /// other. Bits after the last whole byte are those that the other order finds there: padding, read as 0.
+    /// Returns the same line with the bits of each byte in the other order, as if it had been packed in one order and read in the
+    /// other. Bits after the last whole byte are what the other order finds there: padding, read as 0.
     pub const fn reordered(self) -> Self {
         Self { bits: self.bits.swap_bytes().reverse_bits() & Self::mask(self.len), len: self.len }
     }
 
-    /// Every second bit, the first one included: a line that was sampled twice a bit. Half as long, rounded up.
+    /// Returns every second bit, starting with the first: undoes sampling twice per bit. The result is half as long, rounded up.
     pub(crate) const fn decimated(self) -> Self {
         // Pairs of bits move together, then fours, eights ...
         let mut bits = self.bits & (u128::MAX / 3);
@@ -119,7 +119,7 @@ impl Window {
         Self { bits, len: self.len.div_ceil(2) }
     }
 
-    /// The window followed by idle line (1) up to `len` bits; unchanged if it is already that long. `None` if `len` exceeds
+    /// Returns the window followed by idle line (1) up to `len` bits; unchanged if it is already that long. `None` if `len` exceeds
     /// [`Self::MAX_LEN`].
     pub const fn padded(self, len: u32) -> Option<Self> {
         if self.len >= len {
@@ -128,7 +128,7 @@ impl Window {
         Self::from_bits(self.bits | !Self::mask(self.len), len)
     }
 
-    /// The window without its first `count` bits; `None` if it has fewer.
+    /// Returns the window without its first `count` bits; `None` if it has fewer.
     pub const fn skip(self, count: u32) -> Option<Self> {
         match self.len.checked_sub(count) {
             Some(0) => Some(Self::EMPTY),
@@ -137,7 +137,7 @@ impl Window {
         }
     }
 
-    /// The bits as bytes, first line bit in the first byte; bits after the end are 0.
+    /// Returns the bits as bytes, the first line bit in the first byte; bits after the end are 0.
     pub const fn to_bytes(self, order: BitOrder) -> [u8; 16] {
         match order {
             BitOrder::LsbFirst => self.bits.to_le_bytes(),
@@ -145,7 +145,7 @@ impl Window {
         }
     }
 
-    /// Writes the bits over those of `bytes` that begin at line bit `offset`; other bits stay.
+    /// Overwrites the bits of `bytes` that begin at line bit `offset`; other bits are left unchanged.
     ///
     /// # Errors
     /// [`OutOfBounds`] if `bytes` ends earlier; nothing is written then.
@@ -194,7 +194,7 @@ impl Window {
 impl<O: bitvec::order::BitOrder> TryFrom<&bitvec::slice::BitSlice<u8, O>> for Window {
     type Error = OutOfBounds;
 
-    /// The bits of a slice in its own order, for host tools that keep captures in `bitvec`.
+    /// Takes the bits of a slice in its own order, for host tools that keep captures in `bitvec`.
     fn try_from(slice: &bitvec::slice::BitSlice<u8, O>) -> Result<Self, OutOfBounds> {
         let len = u32::try_from(slice.len()).unwrap_or(u32::MAX);
         if len > Self::MAX_LEN {
@@ -208,7 +208,7 @@ impl<O: bitvec::order::BitOrder> TryFrom<&bitvec::slice::BitSlice<u8, O>> for Wi
 #[cfg(feature = "bitvec")]
 #[cfg_attr(docsrs, doc(cfg(feature = "bitvec")))]
 impl Window {
-    /// The bits as a `bitvec` array of 128 bits in the order `O`; take the first [`len`](Self::len) of them.
+    /// Returns the bits as a `bitvec` array of 128 bits in the order `O`; take the first [`len`](Self::len) of them.
     ///
     /// ```
     /// use bitvec::prelude::*;
