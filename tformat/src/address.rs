@@ -4,7 +4,7 @@ servowire_core::number! {
 }
 
 impl Address {
-    /// The page register: writing selects the page, reading gives it.
+    /// The page register: writing it selects the page, reading it returns the page.
     pub const PAGE_REGISTER: Self = Self::truncate(127);
 }
 
@@ -16,8 +16,8 @@ servowire_core::number! {
     ///            data of the page   | page register
     /// ```
     ///
-    /// Tamagawa's encoders have six pages of 127 bytes (762 in all), a compatible one eight. How many an encoder has is
-    /// part of its [`Resolution`](crate::Resolution).
+    /// Tamagawa's encoders have six pages of 127 bytes (762 in all); one compatible encoder has eight. The number of pages is
+    /// part of the encoder's [`Resolution`](crate::Resolution).
     pub struct Page(u8, 3);
 }
 
@@ -27,7 +27,7 @@ impl Page {
     /// Pages of Tamagawa's encoders.
     pub const COUNT: u8 = 6;
 
-    /// Page and address of the byte `index` of a memory of `pages` pages; `None` after its end.
+    /// Returns page and address of the byte `index` of a memory of `pages` pages; `None` after its end.
     pub const fn locate(index: u16, pages: u8) -> Option<(Self, Address)> {
         let [page, above] = (index / Self::LEN).to_le_bytes();
         let [offset, _] = (index % Self::LEN).to_le_bytes();
@@ -41,10 +41,10 @@ impl Page {
     }
 }
 
-/// The address field (ADF) of EEPROM access: address in bits 0..=6, busy flag in bit 7 (TIDM-1011, table 2-7).
+/// The address field (ADF) of an EEPROM access: address in bits 0..=6, busy flag in bit 7 (TIDM-1011, table 2-7).
 ///
-/// A master sends the busy flag as 0, an encoder ignores it; in a response 1 means that the memory was still busy,
-/// the operation was not done, and the data byte says nothing.
+/// A master sends the busy flag as 0, and an encoder ignores it. In a response, 1 means that the memory was still busy, the
+/// operation was not done, and the data byte is meaningless.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -53,23 +53,23 @@ pub struct Adf(u8);
 impl Adf {
     const BUSY: u8 = 0x80;
 
-    /// Any byte is an address field.
+    /// Every byte is a valid address field.
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
     }
 
-    /// The field of an address, not busy: what a master sends.
+    /// Creates the field of an address with the busy flag 0, as a master sends it.
     pub const fn of(address: Address) -> Self {
         Self(address.get())
     }
 
-    /// With the busy flag, as an encoder answers.
+    /// Sets the busy flag, as an encoder answers while its memory is busy.
     #[must_use]
     pub(crate) const fn with_busy(self) -> Self {
         Self(self.0 | Self::BUSY)
     }
 
-    /// As an encoder answers whose memory may be busy.
+    /// Sets the busy flag to `busy`, as an encoder answers.
     pub(crate) const fn answered(address: Address, busy: bool) -> Self {
         let adf = Self::of(address);
         if busy { adf.with_busy() } else { adf }

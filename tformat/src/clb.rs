@@ -1,8 +1,8 @@
-//! The receive logic of TI's configurable logic block (CLB) design, for people who build it in an FPGA or a CLB.
+//! The receive logic of TI's configurable logic block (CLB) design, for designers who implement it in an FPGA or a CLB.
 //!
 //! TIDM-1011, section 2.3.6, aligns the clock of an SPI peripheral to the line with one state machine, two counters and
-//! two look-up tables. The printed text lost some negations (LUT_0, LUT_1) and names a state bit s2 that does not exist;
-//! the equations here are those of the tables, of the vendor's configuration files, and of each other.
+//! two look-up tables. The printed text is missing some negations (LUT_0, LUT_1) and names a state bit s2 that does not exist.
+//! The equations here agree with the tables, with the vendor's configuration files, and with each other.
 //!
 //! ```text
 //!             START_OPERATION        tx clocks done        falling edge of the response
@@ -21,11 +21,11 @@ servowire_core::codes! {
     pub enum State: u8 {
         /// 00: nothing happens.
         Idle = 0 => "IDLE",
-        /// 01: the request is sent.
+        /// 01: the request is being sent.
         TransmitData = 1 => "TRANSMIT_DATA",
-        /// 10: the request is out, the response has not begun.
+        /// 10: the request has been sent, the response has not begun.
         WaitForStart = 2 => "WAIT_FOR_START",
-        /// 11: the response is received.
+        /// 11: the response is being received.
         ReceiveData = 3 => "RECEIVE_DATA",
     }
 }
@@ -41,12 +41,12 @@ pub struct Events {
 }
 
 impl State {
-    /// State bit s1: the response is waited for or received.
+    /// State bit s1: the response is awaited or being received.
     pub const fn s1(self) -> bool {
         matches!(self, Self::WaitForStart | Self::ReceiveData)
     }
 
-    /// State bit s0: bits are clocked.
+    /// State bit s0: bits are being clocked.
     pub const fn s0(self) -> bool {
         matches!(self, Self::TransmitData | Self::ReceiveData)
     }
@@ -85,19 +85,19 @@ pub const fn lut1(start: bool, falling_edge: bool, state: State) -> bool {
 
 /// The check register that is clocked with the data bits of the line: rotate left, XOR the bit into bit 0.
 ///
-/// Fed with fields least significant bit first, as they come, it ends as the *bit-reversed* check field, which is how
-/// the SPI shows a field too.
+/// Fed with fields least significant bit first, in line order, it ends up holding the *bit-reversed* check field, which is also
+/// how the SPI shows a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SerialCrc(u8);
 
 impl SerialCrc {
-    /// A register of 0.
+    /// Creates a register that holds 0.
     pub const fn new() -> Self {
         Self(0)
     }
 
-    /// Takes one data bit, not a start bit or delimiter.
+    /// Takes one data bit; start bits and delimiters are left out.
     pub const fn bit(&mut self, bit: bool) {
         self.0 = self.0.rotate_left(1) ^ bit as u8;
     }
@@ -119,7 +119,7 @@ impl SerialCrc {
     }
 }
 
-/// What the tile is given in one cycle.
+/// The inputs of the tile in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Inputs {
@@ -129,7 +129,7 @@ pub struct Inputs {
     pub response: bool,
 }
 
-/// What the tile puts out in one cycle.
+/// The outputs of the tile in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Outputs {
@@ -137,7 +137,7 @@ pub struct Outputs {
     pub state: State,
     /// Clock of the SPI; it idles high.
     pub clock: bool,
-    /// Whether the clock rises in this cycle: the SPI samples the line.
+    /// Whether the clock rises in this cycle, at which the SPI samples the line.
     pub clock_rises: bool,
     /// Driver enable of the transceiver.
     pub transmit_enable: bool,
@@ -152,7 +152,7 @@ pub struct Outputs {
 ///
 /// The response passes a synchroniser of two cycles, so a bit is sampled d + 2 cycles after its edge.
 ///
-/// The design assumes, and this model too, that START_OPERATION comes only in IDLE and never together with an edge.
+/// The design assumes, as does this model, that START_OPERATION comes only in IDLE and never together with an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tile {
@@ -165,14 +165,14 @@ pub struct Tile {
     counter1: u16,
     match2: u16,
     transmit_enable: bool,
-    /// The response as the edge detector sees it: this cycle's value and the one before.
+    /// The response as the edge detector sees it: the values of this cycle and the one before.
     seen: bool,
     seen_before: bool,
 }
 
 impl Tile {
-    /// `divider` is d, half a bit in CLB cycles; `tx_clocks` is 1 + 10 a field of the request, `rx_clocks` is 10 a
-    /// field of the response.
+    /// Creates the tile. `divider` is d, half a bit in CLB cycles; `tx_clocks` is 1 plus 10 per field of the request;
+    /// `rx_clocks` is 10 per field of the response.
     pub const fn new(divider: u16, tx_clocks: u16, rx_clocks: u16) -> Self {
         Self {
             divider,
@@ -189,7 +189,7 @@ impl Tile {
         }
     }
 
-    /// COUNTER_0 match 1: the count at which the clock is made to rise, d - 1.
+    /// COUNTER_0 match 1: the count at which the clock rises, d - 1.
     pub const fn match1(&self) -> u16 {
         self.divider.saturating_sub(1)
     }
@@ -199,7 +199,7 @@ impl Tile {
         self.divider.saturating_mul(2).saturating_sub(1)
     }
 
-    /// One CLB cycle: the outputs in it, then the registers for the next one.
+    /// Runs one CLB cycle: computes its outputs, then the registers for the next cycle.
     pub const fn cycle(&mut self, inputs: Inputs) -> Outputs {
         let rising = self.state.s0() && self.counter0 == self.divider;
         let outputs = Outputs {

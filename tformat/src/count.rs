@@ -1,15 +1,15 @@
-//! The two 24-bit fields. They are types of their own, so that one is never taken for the other.
+//! The two 24-bit fields. They are separate types, so that one is never mistaken for the other.
 
 macro_rules! le_bytes {
     ($name:ident) => {
         impl $name {
-            /// From the three fields, the low byte first.
+            /// Creates the value from its three fields, the low byte first.
             #[inline]
             pub const fn from_le_bytes([low, middle, high]: [u8; 3]) -> Self {
                 Self::truncate(u32::from_le_bytes([low, middle, high, 0]))
             }
 
-            /// As three fields, the low byte first.
+            /// Returns the value as three fields, the low byte first.
             #[inline]
             pub const fn to_le_bytes(self) -> [u8; 3] {
                 let [low, middle, high, _] = self.get().to_le_bytes();
@@ -20,7 +20,7 @@ macro_rules! le_bytes {
 }
 
 servowire_core::number! {
-    /// ABS0..ABS2: the single-turn position as received, 24 bits. Its width is the encoder's, see
+    /// ABS0..ABS2: the single-turn position as received, 24 bits. Its width depends on the encoder, see
     /// [`Resolution`](crate::Resolution).
     pub struct Abs(u32, 24);
 }

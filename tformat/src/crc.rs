@@ -1,18 +1,17 @@
 use crate::error::Error;
 
-/// The check field over `bytes`: the data bits of all fields before it, in line order.
+/// Computes the check field over `bytes`: the data bits of all fields before it, in line order.
 ///
 /// Generator x^8 + 1, width 8, initial value 0, no final XOR (TIDM-1011, section 2.3.1). Because
 /// x^8 = 1 modulo the generator, the remainder is the **XOR of the bytes**; bit order and reflection make no
-/// difference. Over a whole frame with its check field it is 0.
+/// difference. Over a whole frame including its check field, the result is 0.
 ///
-/// What it sees: every odd number of wrong bits, every burst of up to eight data bits. What it does not see:
+/// It detects every odd number of wrong bits and every burst of up to eight data bits. It does not detect:
 ///
 /// * an even number of errors in the same bit column, such as the same bit wrong in two fields. Of all 2-bit
 ///   errors in the data bits, 9.7 % of a 4-field frame, 10.6 % of a 6-field frame and 11.5 % of an 11-field
 ///   frame pass;
-/// * exchanged fields;
-/// * a line stuck at 0 and, in frames of 4 or 6 fields, at 1.
+/// * swapped fields; * a line stuck at 0 and, in frames of 4 or 6 fields, at 1.
 ///
 /// That is why a response also has to pass the framing, sink code, parity and echo of its control field.
 ///
@@ -29,7 +28,7 @@ pub const fn crc(mut bytes: &[u8]) -> u8 {
     sum
 }
 
-/// Checks the last field against the ones before it.
+/// Checks the last field against the fields before it.
 pub(crate) fn check(fields: &[u8]) -> Result<(), Error> {
     match (crc(fields), fields) {
         (0, _) | (_, []) => Ok(()),

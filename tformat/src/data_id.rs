@@ -1,7 +1,7 @@
 use crate::error::Error;
 
 servowire_core::codes! {
-/// What a request asks for: the nine documented data IDs.
+/// The nine documented data IDs, which say what a request asks for.
 ///
 /// | ID | name | request | response |
 /// |---|---|---|---|
@@ -15,13 +15,13 @@ servowire_core::codes! {
 /// | C | [`ResetTurnsAndErrors`](Self::ResetTurnsAndErrors) | `CF` | `CF SF ABS0 ABS1 ABS2 CRC` |
 /// | D | [`ReadEeprom`](Self::ReadEeprom) | `CF ADF CRC` | `CF ADF EDF CRC` |
 ///
-/// Requests are those of TIDM-1011, table 2-4; responses those of tables 2-5 and 2-7.
+/// Requests follow TIDM-1011, table 2-4; responses follow tables 2-5 and 2-7.
 ///
 /// TIDM-1011 table 2-2 describes IDs 7, 8 and C differently (7 single-turn, 8 multi-turn, C errors). Six drivers and
-/// their documents, among them TI's own later ones, agree on the effects given here. A servo drive that trusts the table
-/// shifts its commutation angle when it means to clear an alarm.
+/// their documents, among them TI's own later ones, agree on the effects given here. A servo drive that trusts the table shifts
+/// its commutation angle when it is meant to clear an alarm.
 ///
-/// Its code is the four bits cc0..cc3 as a number, 0..=15. It prints as `ID C`.
+/// The code of a data ID is its four bits cc0..cc3 as a number, 0..=15. It prints as `ID C`.
 pub enum DataId: u8 {
     /// ID 0: reads single-turn data, ABS.
     ReadSingleTurn = 0x0 => "ID 0",
@@ -47,9 +47,9 @@ pub enum DataId: u8 {
 /// The fields of a request and of its response, by name in the order of the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Layout {
-    /// Of the request.
+    /// The fields of the request.
     pub request: &'static [&'static str],
-    /// Of the response.
+    /// The fields of the response.
     pub response: &'static [&'static str],
 }
 
@@ -72,12 +72,12 @@ impl DataId {
         Layout { request, response }
     }
 
-    /// How often the request is sent for one act: 10 for the resets, else 1.
+    /// How many times the request is sent for one operation: 10 for resets, otherwise 1.
     pub const fn repeats(self) -> u8 {
         if self.effect().is_some() { 10 } else { 1 }
     }
 
-    /// What a reset does to the encoder, in words for a log.
+    /// Describes what a reset does to the encoder, for a log.
     pub const fn effect(self) -> Option<&'static str> {
         match self {
             Self::ResetErrors => Some("clears errors"),
@@ -92,13 +92,13 @@ impl DataId {
         ControlField::compose(self.code())
     }
 
-    /// Fields of the request, 1, 3 or 4.
+    /// Number of fields of the request: 1, 3 or 4.
     #[expect(clippy::cast_possible_truncation, reason = "4 at the most")]
     pub const fn request_fields(self) -> u8 {
         self.layout().request.len() as u8
     }
 
-    /// Fields of the response, 4, 6 or 11.
+    /// Number of fields of the response: 4, 6 or 11.
     #[expect(clippy::cast_possible_truncation, reason = "11 at the most")]
     pub const fn response_fields(self) -> u8 {
         self.layout().response.len() as u8
@@ -116,7 +116,7 @@ impl DataId {
 /// The parity is even over cc0..cc4, so CF = 0x02 | ID << 3 | parity(ID) << 7, and no single wrong bit turns one
 /// control field into another.
 ///
-/// Vendors' own commands come in through here: [`ControlField::compose`] gives the control field of any code, and
+/// Vendors' own commands start here: [`ControlField::compose`] returns the control field of any code, and
 /// [`VendorCommand`](crate::VendorCommand) carries it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
@@ -125,7 +125,7 @@ pub struct ControlField(u8);
 servowire_core::one_line!(ControlField { Self(cf) => "CF {:02X}h", cf; });
 
 impl ControlField {
-    /// The control field of a data ID code; only the four low bits of `code` count.
+    /// Returns the control field of a data ID code; only the four low bits of `code` count.
     pub const fn compose(code: u8) -> Self {
         let id = code & 0xf;
         let parity = (id ^ id >> 1 ^ id >> 2 ^ id >> 3) & 1;

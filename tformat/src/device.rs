@@ -1,14 +1,14 @@
-//! The encoder's side without I/O: what a simulator or a test bench runs.
+//! The encoder's side without I/O, for simulators and test benches.
 //!
-//! A [`Device`] hears a request in bytes or in bits and says what it answers and when. Position, turns and alarms
-//! are set from outside; the EEPROM, the ten-fold resets and the reaction to damaged requests are its own. Faults can
-//! be switched on to see what a master makes of them.
+//! A [`Device`] receives a request as bytes or bits and returns what it answers and when. Position, turns and alarms
+//! are set from outside; the EEPROM, the ten-fold resets and the reaction to damaged requests are built in. Faults can be
+//! switched on to see how a master handles them.
 //!
-//! It is written from the documents with numbers of its own, not with those of the [`master`](crate::master) that it
-//! tests. What the documents leave open is a switch of its [`Behaviour`]; by default a damaged or unknown request is answered
+//! It is written from the documents with its own constants, independent of the [`master`](crate::master) that it tests. Each
+//! point that the documents leave open is a switch of its [`Behaviour`]. By default a damaged or unknown request is answered
 //! with ID 3, with CA0 for a parity error, CA1 for a delimiter error and neither for a wrong check field or data ID; a
-//! wrong sink code is not answered. A write makes the EEPROM busy for 18 ms, in which writes are ignored and every access
-//! is answered with the busy flag, after a read with data 0. Selecting a page takes no time. After power-on the page is 0
+//! wrong sink code is not answered. A write makes the EEPROM busy for 18 ms. During this time writes are ignored and every
+//! access is answered with the busy flag; a read returns data 0. Selecting a page takes no time. After power-on the page is 0
 //! and unwritten bytes are 0xff.
 //!
 //! ```
@@ -41,7 +41,7 @@ use crate::timing::BitRate;
 
 pub use behaviour::{AbsentPage, Behaviour, BusyData, Interval};
 
-/// A fault that the encoder or its line can be given.
+/// A fault that the encoder or its line can be made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -50,7 +50,7 @@ pub enum Fault {
     /// None.
     #[default]
     None,
-    /// It does not answer.
+    /// The encoder does not answer.
     Silent,
     /// Bit `at` of the response's line bits is inverted; nothing happens if the response is shorter.
     FlipBit {
@@ -64,7 +64,7 @@ pub enum Fault {
     },
     /// The response's check field is inverted.
     BadCrc,
-    /// Every request is taken for a damaged one.
+    /// Every request is treated as damaged.
     RejectAll,
 }
 
@@ -72,7 +72,7 @@ pub enum Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// The fields as a UART sends them. A fault in a start bit or delimiter is only in [`line`](Self::line).
+    /// The fields as a UART sends them. A fault in a start bit or delimiter shows only in [`line`](Self::line).
     pub frame: Frame,
     /// The line bits.
     pub line: Window,
@@ -85,7 +85,7 @@ pub struct Transmission {
 /// Time for which a write keeps the EEPROM busy, and for which a single-turn zero is stored: 18 ms.
 const STORING_NS: u64 = 18_000_000;
 
-/// An encoder with `PAGES` pages of EEPROM (6 in Tamagawa's).
+/// An encoder with `PAGES` pages of EEPROM (6 in Tamagawa's encoders).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device<const PAGES: usize> {
     behaviour: Behaviour,
@@ -94,7 +94,7 @@ pub struct Device<const PAGES: usize> {
     abs: Abs,
     zero: Abs,
     abm: Abm,
-    /// Alarms that are set, and those whose cause is still there.
+    /// Alarms that are set, and alarms whose cause is still present.
     almc: Almc,
     causes: Almc,
     fault: Fault,
@@ -105,25 +105,25 @@ pub struct Device<const PAGES: usize> {
     effects: u32,
     repeated: Option<DataId>,
     repeats: u8,
-    /// Start of the last reset request, and end of the response to it.
+    /// Start of the last reset request and end of its response.
     last_reset_start_ns: u64,
     last_reset_end_ns: u64,
     received: [u8; 4],
     len: u8,
-    /// A request was judged and no pause has come since.
+    /// A request has been judged and no pause has followed since.
     deaf: bool,
     last_byte_ns: u64,
     bits: Receiver,
 }
 
-/// Line bits at one sample each, for [`Device::hear_bit`].
+/// Receives line bits at one sample each, for [`Device::hear_bit`].
 const PLAIN_BITS: Format = match Format::new(1, 8) {
     Ok(format) => format,
     Err(_) => panic!(),
 };
 
 impl<const PAGES: usize> Device<PAGES> {
-    /// An encoder at position 0 without alarms, as after power-on.
+    /// Creates an encoder at position 0 without alarms, as after power-on.
     pub const fn new(enid: u8, rate: BitRate) -> Self {
         Self {
             behaviour: Behaviour::new(),
@@ -152,55 +152,55 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// Sets what the documents leave open, from now on.
+    /// Sets the points that the documents leave open; takes effect at once.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
 
-    /// How often a reset, of either kind, has had its effect since power-on.
+    /// How many times a reset of any kind has taken effect since power-on.
     pub const fn effects(&self) -> u32 {
         self.effects
     }
 
-    /// Turns the shaft: ABS before the single-turn zero is applied, and ABM.
+    /// Turns the shaft: sets ABS before the single-turn zero is applied, and ABM.
     pub const fn set_position(&mut self, abs: Abs, abm: Abm) {
         self.abs = abs;
         self.abm = abm;
     }
 
-    /// The cause of these alarms comes: they are set.
+    /// Starts the cause of these alarms, which sets them.
     pub const fn raise_alarms(&mut self, alarms: Almc) {
         self.causes = self.causes.union(alarms);
         self.almc = self.almc.union(alarms);
     }
 
-    /// The cause of these alarms goes. A latched alarm stays set until a reset finds its cause gone.
+    /// Ends the cause of these alarms. A latched alarm stays set until a reset finds its cause gone.
     pub const fn end_alarms(&mut self, alarms: Almc) {
         self.causes = self.causes.difference(alarms);
         self.almc = self.almc.difference(alarms.difference(Almc::LATCHED));
     }
 
-    /// Switches a fault on or, with [`Fault::None`], off.
+    /// Switches a fault on, or off with [`Fault::None`].
     pub const fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
     }
 
-    /// The error byte as it would be answered now.
+    /// Returns the error byte as the encoder would answer it now.
     pub const fn almc(&self) -> Almc {
         self.almc
     }
 
-    /// ABS as it would be answered now: from the zero that ID 8 set, in the width that the encoder ID names.
+    /// Returns ABS as the encoder would answer it now: relative to the zero that ID 8 set, in the width that the encoder ID names.
     pub const fn abs(&self) -> Abs {
         self.single_turn()
     }
 
-    /// ABM as it would be answered now.
+    /// Returns ABM as the encoder would answer it now.
     pub const fn abm(&self) -> Abm {
         self.abm
     }
 
-    /// The EEPROM page that is selected.
+    /// The selected EEPROM page.
     pub const fn page(&self) -> u8 {
         self.page
     }
@@ -210,7 +210,8 @@ impl<const PAGES: usize> Device<PAGES> {
         &mut self.eeprom
     }
 
-    /// Takes bytes that were received back to back without a framing error, the delimiter of the last one at `end_ns`. Returns
+    /// Takes bytes that were received back to back without a framing error; the delimiter of the last one ended at `end_ns`.
+    /// Returns
     /// the response once a request is complete.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Option<Transmission> {
         let field_ns = u64::from(self.rate.fields_ns(1));
@@ -246,7 +247,7 @@ impl<const PAGES: usize> Device<PAGES> {
         self.transmission(response?, end_ns)
     }
 
-    /// A byte that ended at `end_ns` was received with a framing error: the request is damaged.
+    /// Reports a framing error in the byte that ended at `end_ns`: the request is damaged.
     pub fn framing_error(&mut self, end_ns: u64) -> Option<Transmission> {
         if self.is_deaf(end_ns) {
             return None;
@@ -266,8 +267,8 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// Whether what arrives now is the rest of a request that was already judged. A pause of half a field begins a new
-    /// request, so that nothing after a damaged control field is ever taken for another command.
+    /// Returns whether the data arriving now is the rest of a request that was already judged. A pause of half a field begins a
+    /// new request, so nothing after a damaged control field is ever taken for another command.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
         let longest_gap_ns = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
         if now_ns.saturating_sub(self.last_byte_ns) > longest_gap_ns {
@@ -278,14 +279,14 @@ impl<const PAGES: usize> Device<PAGES> {
         self.deaf
     }
 
-    /// One line bit was received, which ended at `end_ns`; the line idles high.
+    /// Takes one line bit, which ended at `end_ns`; the line idles high.
     #[inline]
     pub fn hear_bit(&mut self, level: bool, end_ns: u64) -> Option<Transmission> {
         let field = self.bits.push(level)?;
         self.field(field, end_ns)
     }
 
-    /// One bit in ten at most ends a field: what it takes stays out of the way of the others.
+    /// At most one bit in ten ends a field, so that work is kept out of the path of the other bits.
     #[inline(never)]
     fn field(&mut self, field: Field, end_ns: u64) -> Option<Transmission> {
         let [byte, _] = field.content.to_le_bytes();
@@ -302,7 +303,7 @@ impl<const PAGES: usize> Device<PAGES> {
         self.unless_silent(response, now_ns)
     }
 
-    /// Nothing leaves an encoder that is made silent, or that is at work.
+    /// An encoder that is made silent, or that is busy, sends nothing.
     fn unless_silent(&self, response: Response, now_ns: u64) -> Option<Response> {
         // The request that completes the ten is still answered.
         let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
@@ -332,7 +333,7 @@ impl<const PAGES: usize> Device<PAGES> {
         if self.behaviour.leaves_status_zero { StatusField::empty() } else { StatusField::of_alarms(self.almc) }
     }
 
-    /// ABS from the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
+    /// Returns ABS relative to the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
     const fn single_turn(&self) -> Abs {
         let bits = match Resolution::from_enid(self.enid) {
             Some(hint) => hint.resolution.abs_bits(),
@@ -351,7 +352,7 @@ impl<const PAGES: usize> Device<PAGES> {
         Response::ReadAll(self.all_data(self.sf().union(damage)))
     }
 
-    /// Ten equal reset requests in a row, 40 us apart or more, do their work.
+    /// Ten equal reset requests in a row, 40 us apart or more, take effect.
     fn count_resets(&mut self, id: DataId, now_ns: u64) {
         if !matches!(id, DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors) {
             if self.behaviour.others_restart_count {
@@ -413,7 +414,7 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// A cell of the page that is selected.
+    /// A cell of the selected page.
     fn cell(&mut self, address: Address) -> Option<&mut u8> {
         self.eeprom.get_mut(usize::from(self.page))?.get_mut(usize::from(address.get()))
     }
@@ -430,7 +431,7 @@ impl<const PAGES: usize> Device<PAGES> {
         Memory { adf: Adf::answered(address, busy), edf }
     }
 
-    /// The response as it leaves, with the fault that is switched on.
+    /// Returns the response as it is sent, including the fault that is switched on.
     fn transmission(&self, response: Response, end_ns: u64) -> Option<Transmission> {
         let sound = response.emit();
         let line = sound.line();

@@ -1,24 +1,24 @@
 use crate::status::{Almc, StatusField};
 
-/// Why a position must not be used. The raw fields of the response stay readable.
+/// Why a position must not be used. The raw fields of the response remain readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Doubt {
-    /// Nothing was heard yet.
+    /// Nothing has been received yet.
     #[error("no position was heard yet")]
     Never,
     /// The position was sampled too long ago, or by a clock that was set back in the meantime.
     #[error("the position is {age_ns} ns old")]
     Old {
-        /// How far the instant of sampling is away, in ns.
+        /// Distance to the instant of sampling, in ns.
         age_ns: u64,
     },
-    /// The response carries no such position: ID 2, the EEPROM, turns where only ABS comes.
+    /// The response carries no such position: it answers ID 2 or an EEPROM request, or turns are wanted and it has only ABS.
     #[error("the response carries no such position")]
     Absent,
-    /// Information bits of SF are set, which are always 0: the fields are not where they should be.
+    /// Information bits of SF are set, although they are always 0: the fields are not where they should be.
     #[error("the fields are shifted: status [{sf}]")]
     Shifted {
         /// The status.
@@ -30,9 +30,8 @@ pub enum Doubt {
         /// The status.
         sf: StatusField,
     },
-    /// The response says that it comes from an encoder with another number of single-turn bits. Not checked where
-    /// [`Resolution::with_upper_bits_ignored`](crate::Resolution::with_upper_bits_ignored) says that the encoder has rules of its
-    /// own.
+    /// The response says that it comes from an encoder with another number of single-turn bits. Not checked if
+    /// [`Resolution::with_upper_bits_ignored`](crate::Resolution::with_upper_bits_ignored) says that the encoder has its own rules.
     #[error("the encoder calls itself {enid:#04x}, the resolution has {abs_bits} single-turn bits")]
     OtherEncoder {
         /// ENID of the response.
@@ -45,20 +44,20 @@ pub enum Doubt {
     UpperBits {
         /// The 24-bit field.
         value: u32,
-        /// Those of its bits that must be 0.
+        /// The set bits of the field that must be 0.
         excess: u32,
     },
     /// The encoder reports errors that are not tolerated.
     #[error("the encoder reports [{alarms}]")]
     Alarms {
-        /// Those alarms.
+        /// The alarms.
         alarms: Almc,
     },
-    /// EA0 or EA1 of a response without ALMC: some alarm that is not tolerated. ID 3 says which. In a response to ID 3: one
-    /// that ALMC does not tell.
+    /// EA0 or EA1 is set in a response without ALMC: some alarm is not tolerated. ID 3 says which. In a response to ID 3, it is
+    /// an alarm that ALMC does not show.
     #[error("the encoder reports errors: status [{sf}]")]
     Status {
-        /// Those bits of the status.
+        /// The status bits concerned.
         sf: StatusField,
     },
 }

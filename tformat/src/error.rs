@@ -19,21 +19,21 @@ servowire_core::errors! {
         /// A start bit reads 1.
         #[error("field {field}: the start bit is 1")]
         StartBit = 1 {
-            /// First field with this fault.
+            /// The first field with this fault.
             field: u8,
         },
         /// A delimiter reads 0.
         #[error("field {field}: the delimiter is 0")]
         Delimiter = 2 {
-            /// First field with this fault.
+            /// The first field with this fault.
             field: u8,
         },
-        /// The frame ends too early, or the next field did not come in time.
+        /// The frame ends too early, or the next field did not arrive in time.
         #[error("the frame ends after {got} of {want} fields")]
         Truncated = 3 {
-            /// Whole fields that were there.
+            /// Number of whole fields received.
             got: u16,
-            /// Fields of the whole frame.
+            /// Number of fields of the whole frame.
             want: u16,
         },
         /// The control field does not begin with the sink code 0, 1, 0.
@@ -54,7 +54,7 @@ servowire_core::errors! {
             /// The four bits of the data ID.
             code: u8,
         },
-        /// The response answers another data ID than was asked for.
+        /// The response answers a different data ID from the one requested.
         #[error("the response has control field {got:#04x}, the request had {want:#04x}")]
         CfMismatch = 7 {
             /// Control field of the response.
@@ -62,10 +62,10 @@ servowire_core::errors! {
             /// Control field of the request.
             want: u8,
         },
-        /// The encoder refused the request: it answered with a sound ID 3 frame that was not asked for.
+        /// The encoder refused the request: it answered with a sound ID 3 frame that was not requested.
         #[error("the encoder refused the request: ID 3 response with status [{sf}]")]
         Rejected = 8 {
-            /// Status of that frame; CA0 and CA1 name the damage.
+            /// Status of that frame; CA0 and CA1 say what was damaged.
             sf: StatusField,
         },
         /// The check field is not the XOR of the fields before it.
@@ -73,10 +73,10 @@ servowire_core::errors! {
         Crc = 9 {
             /// Received.
             got: u8,
-            /// Computed over the received fields.
+            /// The check field computed over the received fields.
             want: u8,
         },
-        /// An EEPROM response speaks of another address.
+        /// An EEPROM response is for another address.
         #[error("the response is for EEPROM address {got:#04x}, expected {want:#04x}")]
         AddressMismatch = 10 {
             /// Address in the response.
@@ -105,24 +105,24 @@ servowire_core::errors! {
         /// No response within the time-out.
         #[error("{}", if *.echo { "only our own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
         NoResponse = 13 {
-            /// Whether the own request was received: the line works, but nobody answers on it.
+            /// Whether the master's own request was received, in which case the line works but nobody answers.
             echo: bool,
         },
-        /// The EEPROM stayed busy, or the encoder did not take a value, after all tries.
+        /// The EEPROM stayed busy or the encoder did not accept a value, after all tries.
         #[error("the EEPROM was still busy after {tries} requests")]
         Busy = 14 {
-            /// Requests made.
+            /// Number of requests sent.
             tries: u16,
         },
-        /// The act was not done: reading back shows it.
+        /// The operation was not done, as reading back shows.
         #[error("not done, after {sent} requests: {because}")]
         NotDone = 15 {
-            /// Requests that were sent.
+            /// Number of requests sent.
             sent: u8,
             /// How it failed.
             because: ErrorClass,
         },
-        /// Whether the act was done is not known. Read back what can be read before it is tried again.
+        /// It is not known whether the operation was done. Read back what can be read before trying again.
         #[error("it is not known whether it was done: {because}")]
         EffectUnknown = 16 {
             /// How it failed.
@@ -139,18 +139,18 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 18,
-        /// Two sound responses came in one block: which one answers the request is not known.
+        /// Two sound responses came in one block, and it is not known which one answers the request.
         #[error("two responses came to one request")]
         TwoResponses = 19,
-        /// The settings of the line leave no time for a response: nothing is to be sent.
+        /// The settings of the line leave no time for a response: nothing may be sent.
         #[error("the settings of the line leave no time for a response")]
         Line = 20,
     }
 }
 
 impl Error {
-    /// The field in which the fault shows, 0 for the control field; `None` if it is not in one field, or depends on the length
-    /// of the frame: the check field is the last.
+    /// The field in which the fault shows, 0 for the control field. `None` if the fault is not in one field, or if its field
+    /// depends on the length of the frame, as for the check field, which is the last.
     pub const fn field(self) -> Option<u8> {
         match self {
             Self::StartBit { field } | Self::Delimiter { field } => Some(field),
@@ -181,7 +181,7 @@ impl Error {
     }
 }
 
-/// The first data bit that differs, 1 to 8.
+/// Returns the first data bit that differs, 1 to 8.
 const fn data_bit(got: u8, want: u8) -> Option<u8> {
     match (got ^ want).trailing_zeros().to_le_bytes() {
         [8, ..] => None,

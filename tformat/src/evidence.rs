@@ -10,12 +10,14 @@ use crate::status::StatusField;
 use crate::tolerated::{Policy, Tolerated};
 
 servowire_core::shaft_evidence! {
-    /// What an encoder has said of its position, and when it was sampled: judged where it is used, by [`at`](Self::at).
+    /// What an encoder has reported about its position, and when it was sampled. It is judged where it is used, by
+    /// [`at`](Self::at).
     ///
-    /// Who receives the response makes it, [`Exchange::evidence`](crate::master::Exchange::evidence), and finds out what does not
-    /// depend on the user: whether the request was damaged, whether the fields fit the widths. Who uses the position, in an
-    /// interrupt of another priority perhaps, with a [`servowire_core::Cell`] in between, says how old it may be and which alarms
-    /// he lives with: one that commutates a motor by the single turn others than one that counts turns.
+    /// The receiver of the response creates it with [`Exchange::evidence`](crate::master::Exchange::evidence), which checks what
+    /// does not depend on the user: whether the request was damaged and whether the fields fit the widths. The user of the
+    /// position, perhaps in an interrupt of another priority with a [`servowire_core::Cell`] in between, decides how old it may
+    /// be and which alarms are tolerable. These differ between code that commutates a motor by the single-turn position and code
+    /// that counts turns.
     ///
     /// ```
     /// use tformat::{Almc, Doubt, Evidence, Policy, Request, Resolution, Response, Tolerated};
@@ -37,10 +39,11 @@ servowire_core::shaft_evidence! {
 }
 
 impl Evidence {
-    /// What a response says of the position of an encoder with these widths, sampled at `sampled_ns`: for tools and buffers;
-    /// a master's [`Exchange`](crate::master::Exchange) knows when that was, and that the response is no older than its request.
+    /// Creates evidence from a response of an encoder with these widths, sampled at `sampled_ns`, for tools and buffers. A
+    /// master uses its [`Exchange`](crate::master::Exchange) instead, which knows the instant, and that the response is no older
+    /// than its request.
     ///
-    /// ABS comes with ID 0, 3, 7, 8 and C, the turns with ID 3.
+    /// ABS comes with ID 0, 3, 7, 8 and C; the turns come with ID 3.
     pub const fn of(response: Response, resolution: Resolution, sampled_ns: u64) -> Self {
         let mut evidence =
             Self { sampled_ns, marks: of_widths(resolution.abs_bits(), resolution.abm_bits()), ..Self::NEVER };
@@ -63,7 +66,7 @@ impl Evidence {
         evidence
     }
 
-    /// Takes over the fields that are valid, and marks those that are not.
+    /// Takes the valid fields and marks those that are not valid.
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
     const fn take_all(&mut self, data: AllData, resolution: Resolution) -> u32 {
         // EA0 and EA1 without the alarm that they stand for: one of the two bytes is wrong.
@@ -86,7 +89,7 @@ impl Evidence {
         marks
     }
 
-    /// Off the hot path: the reason why it must not be used.
+    /// Returns the reason why it must not be used; off the hot path.
     #[cold]
     #[inline(never)]
     #[expect(clippy::cast_sign_loss, reason = "a field that was stored there")]
@@ -117,7 +120,7 @@ impl Evidence {
     }
 }
 
-/// A field that is wider than the encoder's.
+/// Returns the doubt about a field that is wider than the encoder's.
 const fn upper_bits(value: u32, bits: u32) -> Doubt {
     Doubt::UpperBits { value, excess: value & u32::MAX.wrapping_shl(bits) }
 }

@@ -71,7 +71,7 @@ impl Frame {
         Self { bytes, len: 11 }
     }
 
-    /// A frame of these data bytes; `None` if there are none or more than 11.
+    /// Creates a frame of these data bytes; `None` if there are none or more than 11.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         let len = u8::try_from(bytes.len()).ok().filter(|len| *len > 0)?;
         let mut frame = Self { bytes: [0; Self::MAX_FIELDS], len };
@@ -159,7 +159,7 @@ pub(crate) const fn is_framed(line: u128, bits: u32) -> bool {
 
 /// The line bits of eleven fields in four groups of three, 30 bits each: every field has the same place in each group.
 ///
-/// In place of a twelfth field there is a framed one with the data bits 0.
+/// The place of a twelfth field holds a framed one with the data bits 0.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "a group is the low 30 bits")]
 const fn groups(line: u128) -> [u32; 4] {
@@ -170,9 +170,9 @@ const fn groups(line: u128) -> [u32; 4] {
 const START3: u32 = 1 | 1 << 10 | 1 << 20;
 const DELIMITER3: u32 = START3 << 9;
 
-/// 0 if eleven fields are framed and their XOR is 0, as it is over a whole frame with its check field.
+/// Returns 0 if eleven fields are framed and their XOR is 0, as it is over a whole frame with its check field.
 ///
-/// The groups are tested all at once: that is what a 32-bit core does with the fewest constants.
+/// All groups are tested at once, which takes the fewest constants on a 32-bit core.
 #[inline(always)]
 pub(crate) const fn faults11(line: u128) -> u32 {
     let [a, b, c, d] = groups(line);
@@ -183,7 +183,7 @@ pub(crate) const fn faults11(line: u128) -> u32 {
     starts | delimiters | crc
 }
 
-/// As [`faults11`], for the six fields in the low 60 bits.
+/// Like [`faults11`], for the six fields in the low 60 bits.
 #[inline(always)]
 pub(crate) const fn faults6(line: u128) -> u32 {
     let [a, b, ..] = groups(line);
@@ -192,14 +192,14 @@ pub(crate) const fn faults6(line: u128) -> u32 {
     (a | b) & START3 | !(a & b) & DELIMITER3 | crc
 }
 
-/// As [`faults11`], for the four fields in the low 40 bits.
+/// Like [`faults11`], for the four fields in the low 40 bits.
 #[inline(always)]
 pub(crate) const fn faults4(line: u128) -> u32 {
     // In place of the fifth and sixth field there are framed ones with the data bits 0.
     faults6(line & first(40) | (1 << 9 | 1 << 19) << 40)
 }
 
-/// The data bytes of eleven fields, each with a constant shift.
+/// Extracts the data bytes of eleven fields, each with a constant shift.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "each shift brings a field's data bits to bits 0..=7")]
 pub(crate) const fn unpack(line: u128) -> [u8; Frame::MAX_FIELDS] {
@@ -249,12 +249,12 @@ pub(crate) fn load(bytes: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> u128
     }
 }
 
-/// How many fields there are, as an error tells it.
+/// The number of fields, as an error reports it.
 pub(crate) fn count(bytes: &[u8]) -> u16 {
     u16::try_from(bytes.len()).unwrap_or(u16::MAX)
 }
 
-/// Off the hot path: names the first fault of the framing in a line that should hold `fields` fields.
+/// Names the first framing fault in a line that should hold `fields` fields; off the hot path.
 #[cold]
 pub(crate) fn framing(line: Window, fields: u8) -> Error {
     for field in 0..fields {

@@ -1,7 +1,7 @@
 //! For tools: looks at a line that was refused, lists every fault and guesses the cause.
 //!
-//! Decoders stop at the first fault and give no value; that is right for a drive and unhelpful at a bench. Here all
-//! fields are read whatever their framing, and the usual mistakes (wires exchanged, wrong bit order, one bit early or
+//! Decoders stop at the first fault and return no value, which is right for a drive and unhelpful at a bench. Here all fields
+//! are read whatever their framing, and the usual mistakes (swapped wires, wrong bit order, one bit early or
 //! late, own echo, wrong rate, wrong data ID) are undone one by one: the one that makes the frame sound is the cause.
 //!
 //! ```
@@ -45,14 +45,14 @@ pub struct RawField {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// The line itself was damaged, or is connected or read in a wrong way.
+    /// The line itself was damaged, or is connected or read in the wrong way.
     Line(LineCause),
     /// A sound response to another data ID.
     OtherDataId {
-        /// What was answered.
+        /// The data ID that was answered.
         answered: DataId,
     },
-    /// A sound ID 3 frame that was not asked for: the encoder found the request damaged.
+    /// A sound ID 3 frame that was not requested: the encoder found the request damaged.
     RequestRefused,
 }
 
@@ -66,7 +66,7 @@ servowire_core::one_line!(Cause {
     Self::RequestRefused => "the encoder found the request damaged and answered with ID 3";
 });
 
-/// What an inspection found out about a line.
+/// The result of an inspection of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -87,7 +87,7 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// The response: as received if nothing is wrong, or as it would be without the cause. For display only.
+    /// The response as received if nothing is wrong, otherwise as it would be without the cause. For display only.
     pub const fn response(&self) -> Option<Response> {
         self.response
     }
@@ -124,7 +124,7 @@ pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
     report
 }
 
-/// The usual mistakes: those of the line, and a response to something else.
+/// Looks for the usual mistakes: those of the line, and a response to something else.
 fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
     if let Error::Rejected { .. } = error {
         let response = Response::parse_line(Request::ReadAll, line).ok();
@@ -150,7 +150,7 @@ fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Opt
     (disturbed.then_some(LineCause::Disturbed.into()), None)
 }
 
-/// A sound response to something else.
+/// Looks for a sound response to something else.
 fn other_data_id(request: Request, line: Window) -> Option<(DataId, Response)> {
     let cf = Frame::from_line(line, 1).ok()?;
     let answered = ControlField::parse(*cf.as_bytes().first()?).ok()?.data_id().ok()?;

@@ -1,10 +1,10 @@
-//! The controller's side as state machines without I/O: they are told what arrived and what time it is, and say what
-//! to do next. Time is a count of nanoseconds from any origin.
+//! The controller's side as state machines without I/O. You tell them what arrived and what time it is, and they say what to do
+//! next. Time is a count of nanoseconds from any origin.
 //!
-//! * [`Transaction`] takes one request to its response: time-outs, echoes, late interrupts, all checks.
-//! * [`Reset`], [`SingleTurnZero`], [`MultiTurnZero`], [`EepromAccess`] and [`Detection`] are made of several transactions and drive them
-//!   by [`Step`].
-//! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
+//! * [`Transaction`] handles one request and its response: time-outs, echoes, late interrupts, all checks.
+//! * [`Reset`], [`SingleTurnZero`], [`MultiTurnZero`], [`EepromAccess`] and [`Detection`] consist of several transactions and
+//! drive them by [`Step`].
+//! * [`Counters`] and [`ErrorRate`] keep track of what was refused.
 //!
 //! ```
 //! use tformat::master::{Line, Progress, Transaction};
@@ -47,7 +47,7 @@ pub use transaction::{DriverOff, Exchange, Progress, Transaction, Transmission, 
 pub use turns::MultiTurnZero;
 pub use zero::SingleTurnZero;
 
-/// What a procedure of several transactions wants next.
+/// What a procedure of several transactions asks for next.
 pub type Step<T> = servowire_core::Step<Request, T, Error>;
 
 servowire_core::procedures!(Request => Response, Error {

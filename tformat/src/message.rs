@@ -1,4 +1,4 @@
-//! What the responses carry.
+//! The contents of the responses.
 
 use nrz_line::{BitOrder, Window};
 
@@ -17,7 +17,7 @@ use crate::status::{Almc, StatusField};
 pub struct SingleTurn {
     /// SF.
     pub sf: StatusField,
-    /// ABS0..ABS2: position in the turn; its width is the encoder's, see [`Resolution`](crate::Resolution).
+    /// ABS0..ABS2: position within the turn; its width depends on the encoder, see [`Resolution`](crate::Resolution).
     pub abs: Abs,
 }
 
@@ -43,7 +43,7 @@ pub struct Identification {
     pub enid: u8,
 }
 
-/// The response to ID 3: everything that an encoder knows, and also its answer to a damaged request.
+/// The response to ID 3: everything that an encoder reports, and also its answer to a damaged request.
 ///
 /// ```text
 ///  field  0    1    2    3    4    5     6    7    8    9     10
@@ -56,7 +56,7 @@ pub struct Identification {
 pub struct AllData {
     /// SF.
     pub sf: StatusField,
-    /// ABS0..ABS2: position in the turn.
+    /// ABS0..ABS2: position within the turn.
     pub abs: Abs,
     /// ENID.
     pub enid: u8,
@@ -73,7 +73,7 @@ pub struct AllData {
 pub struct Memory {
     /// ADF: address, and whether the memory was busy.
     pub adf: Adf,
-    /// EDF: the byte read, or the written one repeated. Meaningless while the memory is busy.
+    /// EDF: the byte that was read, or a repetition of the byte written. Meaningless while the memory is busy.
     pub edf: u8,
 }
 
@@ -92,7 +92,7 @@ impl AllData {
     /// Fields of the response.
     pub const FIELDS: usize = 11;
 
-    /// Decodes the response to ID 3 from the front of UART bytes; what follows it is left alone.
+    /// Decodes the response to ID 3 from the start of UART bytes; bytes after it are ignored.
     ///
     /// # Errors
     /// As [`Response::parse`](crate::Response::parse) for ID 3.
@@ -104,7 +104,7 @@ impl AllData {
         }
     }
 
-    /// Decodes the response to ID 3 from its 110 line bits, the first of them at the beginning of `line`.
+    /// Decodes the response to ID 3 from its 110 line bits, the first one at the start of `line`.
     ///
     /// For a window at another bit offset see [`Response::parse_line`](crate::Response::parse_line).
     ///
@@ -122,7 +122,7 @@ impl AllData {
         if faults11(line) | u32::from(cf ^ CF3) == 0 { Ok(Self::of(&b)) } else { Err(line_refusal(line)) }
     }
 
-    /// The fields as UART bytes.
+    /// Returns the fields as UART bytes.
     pub const fn emit(self) -> [u8; Self::FIELDS] {
         let ([a0, a1, a2], [m0, m1, m2]) = (self.abs.to_le_bytes(), self.abm.to_le_bytes());
         let (sf, enid, almc) = (self.sf.bits(), self.enid, self.almc.bits());
@@ -130,7 +130,7 @@ impl AllData {
         [CF3, sf, a0, a1, a2, enid, m0, m1, m2, almc, crc]
     }
 
-    /// The 110 line bits in 14 bytes; the two bits after them are 0.
+    /// Returns the 110 line bits in 14 bytes; the two bits after them are 0.
     pub const fn emit_line(self, order: BitOrder) -> [u8; Frame::MAX_LINE_BYTES] {
         let line = pack(&self.emit());
         let word = match order {
@@ -156,7 +156,7 @@ impl AllData {
     }
 }
 
-/// Whether eleven fields are an ID 3 frame with a good check field: the whole good path in four loads.
+/// Returns whether eleven fields are an ID 3 frame with a good check field: the whole good path in four loads.
 const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10] = *b;
     let sum = u32::from_le_bytes([b0, b1, b2, b3])
@@ -166,7 +166,7 @@ const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     (sum ^ sum >> 8) & 0xff == 0 && b0 == CF3
 }
 
-/// Control field, length and check field of a response to `id`.
+/// Checks control field, length and check field of a response to `id`.
 fn checked(id: DataId, bytes: &[u8]) -> Result<(), Error> {
     let want = id.response_fields();
     let truncated = Error::Truncated { got: count(bytes), want: want.into() };
@@ -179,7 +179,7 @@ fn checked(id: DataId, bytes: &[u8]) -> Result<(), Error> {
     check(bytes.get(..usize::from(want)).ok_or(truncated)?)
 }
 
-/// What an ID 3 frame that was not asked for means.
+/// Returns the error that an unrequested ID 3 frame stands for.
 #[cold]
 fn rejection(bytes: &[u8]) -> Error {
     match AllData::parse(bytes) {
@@ -188,9 +188,9 @@ fn rejection(bytes: &[u8]) -> Error {
     }
 }
 
-/// Off the hot path: why the line bits of a response to ID 3 are refused.
+/// Returns why the line bits of a response to ID 3 are refused; off the hot path.
 ///
-/// It takes the bits and not the fields, or the good path would have to write the fields down.
+/// It takes the bits rather than the fields, so that the good path need not store the fields.
 #[cold]
 #[inline(never)]
 fn line_refusal(line: u128) -> Error {
@@ -200,7 +200,7 @@ fn line_refusal(line: u128) -> Error {
     }
 }
 
-/// Off the hot path: why a response to `id` is refused.
+/// Returns why a response to `id` is refused; off the hot path.
 #[cold]
 #[inline(never)]
 pub(crate) fn refusal(id: DataId, bytes: &[u8]) -> Error {

@@ -56,12 +56,12 @@ impl Request {
         Self::WriteEeprom { adf: Adf::of(address), edf }
     }
 
-    /// A request that a response would fit, from the response itself: for tools that did not see the request.
+    /// Derives a request that the response would fit, for tools that did not see the request.
     ///
-    /// An EEPROM response repeats address and data; fields that are missing count as 0.
+    /// An EEPROM response repeats address and data; missing fields count as 0.
     ///
     /// # Errors
-    /// Those of the control field: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
+    /// The errors of the control field: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
     /// [`Error::UnknownDataId`].
     pub fn answered_by(answer: &[u8]) -> Result<Self, Error> {
         let Some(&cf) = answer.first() else { return Err(Error::Truncated { got: 0, want: 1 }) };
@@ -70,7 +70,7 @@ impl Request {
         Ok(Self::of(ControlField::parse(cf)?.data_id()?, adf, field(2)))
     }
 
-    /// The request with this data ID; `adf` and `edf` are used if it has them.
+    /// Creates the request with this data ID; `adf` and `edf` are used if it has them.
     pub const fn of(id: DataId, adf: Adf, edf: u8) -> Self {
         match id {
             DataId::ReadSingleTurn => Self::ReadSingleTurn,
@@ -100,7 +100,7 @@ impl Request {
         }
     }
 
-    /// The fields to send.
+    /// Returns the fields to send.
     pub const fn emit(self) -> Frame {
         let cf = self.data_id().control_field().get();
         match self {
@@ -110,7 +110,7 @@ impl Request {
         }
     }
 
-    /// Decodes received fields as an encoder does: the request at the front; fields after it are left alone.
+    /// Decodes received fields as an encoder does; fields after the request are ignored.
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
@@ -192,7 +192,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Every single-bit flip is refused, by the check that covers the field it is in.
+    /// Every single-bit flip is refused by the check that covers its field.
     #[test]
     fn single_flips_and_truncations() {
         for request in every(0x35, 0xc6) {

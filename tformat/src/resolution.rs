@@ -4,16 +4,16 @@ use crate::address::{Address, Page};
 use crate::count::{Abm, Abs};
 use crate::error::Error;
 
-/// The widths of an encoder's data, and the size of its memory: what the wire does not say.
+/// The widths of an encoder's data and the size of its memory, which are not transmitted.
 ///
 /// ```text
 ///  ABS  |23 ... abs_bits| abs_bits-1 ... 0|      upper bits 0, position in the turn
 ///  ABM  |23 ... abm_bits| abm_bits-1 ... 0|      upper bits 0, turns, as two's complement if signed
 /// ```
 ///
-/// The check field does not protect against a wrong width; the upper bits do, so a set one is refused.
+/// The check field does not protect against a wrong width; the upper bits do, so a value with one of them set is refused.
 ///
-/// It prints as the widths: `23 + 16 bits`.
+/// It is displayed as the widths: `23 + 16 bits`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "serde",
@@ -37,16 +37,17 @@ servowire_core::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + 
 pub struct Hint {
     /// The widths.
     pub resolution: Resolution,
-    /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they follow from
-    /// the rule that all known IDs obey.
+    /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they follow from the rule that
+    /// all known IDs follow.
     pub documented: bool,
 }
 
 impl Resolution {
-    /// Widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the EEPROM has six pages.
+    /// Creates a resolution with the widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the
+    /// EEPROM has six pages.
     ///
     /// # Errors
-    /// [`OutOfRange`] with the limit that a width passes.
+    /// [`OutOfRange`] with the limit that a width exceeds.
     pub const fn new(abs_bits: u8, abm_bits: u8) -> Result<Self, OutOfRange> {
         match (within(abs_bits, 1, 24), within(abm_bits, 0, 24)) {
             (Ok(abs_bits), Ok(abm_bits)) => {
@@ -56,19 +57,19 @@ impl Resolution {
         }
     }
 
-    /// With turns counted from 0 up.
+    /// Counts turns from 0 up, unsigned.
     #[must_use]
     pub const fn with_unsigned_turns(self) -> Self {
         Self { signed_turns: false, ..self }
     }
 
-    /// For an encoder that puts something else into the upper bits: they are cut off, not checked.
+    /// Cuts off the upper bits unchecked, for an encoder that uses them for something else.
     #[must_use]
     pub const fn with_upper_bits_ignored(self) -> Self {
         Self { checks_upper_bits: false, ..self }
     }
 
-    /// With another number of EEPROM pages, 1..=8: six in Tamagawa's encoders, eight in a compatible one.
+    /// Sets the number of EEPROM pages, 1..=8: six in Tamagawa's encoders, eight in one compatible encoder.
     ///
     /// ```
     /// # use tformat::Resolution;
@@ -86,7 +87,7 @@ impl Resolution {
         }
     }
 
-    /// What ENID suggests. In all known cases it is the number of single-turn bits.
+    /// Returns the widths that ENID suggests. In all known cases ENID is the number of single-turn bits.
     ///
     /// | ENID | ABS | ABM | known from |
     /// |------|-----|-----|------------|
@@ -97,8 +98,8 @@ impl Resolution {
     /// | 0x14 | 20 | 16 | not documented: the same rule |
     /// | 0x18 | 24 | 16 | not documented: the same rule |
     ///
-    /// `None` for all others. A model name says nothing: TIDM-1011 gives the TS5700N8501 24 bits, a motor
-    /// controller in wide use 17.
+    /// `None` for all other IDs. A model name says nothing: TIDM-1011 gives the TS5700N8501 24 bits, a widely used motor
+    /// controller 17.
     pub const fn from_enid(enid: u8) -> Option<Hint> {
         let (abm_bits, documented) = match enid {
             0x0b => (13, true),
@@ -133,17 +134,17 @@ impl Resolution {
         self.pages
     }
 
-    /// The page with this number; `None` if the encoder does not have it.
+    /// Returns the page with this number; `None` if the encoder does not have it.
     pub const fn page(self, number: u8) -> Option<Page> {
         if number < self.pages { Page::new(number) } else { None }
     }
 
-    /// Page and address of the byte `index` of the whole EEPROM; `None` after its end.
+    /// Returns page and address of the byte `index` of the whole EEPROM; `None` after its end.
     pub const fn locate(self, index: u16) -> Option<(Page, Address)> {
         Page::locate(index, self.pages)
     }
 
-    /// Counts in a turn.
+    /// Counts per turn.
     pub const fn counts_per_turn(self) -> u32 {
         1_u32.wrapping_shl(self.abs_bits as u32)
     }
@@ -163,7 +164,7 @@ impl Resolution {
         }
     }
 
-    /// Whether an encoder with this ID has another number of single-turn bits, as far as the ID says.
+    /// Returns whether the ID says that the encoder has another number of single-turn bits.
     pub(crate) const fn contradicts(self, enid: u8) -> bool {
         match Self::from_enid(enid) {
             Some(hint) => self.checks_upper_bits && hint.resolution.abs_bits != self.abs_bits,
@@ -171,13 +172,13 @@ impl Resolution {
         }
     }
 
-    /// The shorter path from one single-turn position to another in counts, across the zero point if necessary:
+    /// Returns the shorter path from one single-turn position to another in counts, across the zero point if necessary:
     /// -2^(abs_bits-1)..2^(abs_bits-1).
     pub const fn difference(self, from: u32, to: u32) -> i32 {
         sign_extend(to.wrapping_sub(from), self.abs_bits)
     }
 
-    /// The shorter way from one number of turns to another, over the overflow if need be.
+    /// Returns the shorter path from one number of turns to another, across the overflow if necessary.
     pub(crate) const fn turns_between(self, from: u32, to: u32) -> i32 {
         sign_extend(to.wrapping_sub(from), self.abm_bits)
     }
@@ -192,7 +193,7 @@ impl Resolution {
     }
 }
 
-/// A setting, if it lies in its range.
+/// Returns a setting if it lies in its range.
 const fn within(value: u8, min: u8, max: u8) -> Result<u8, OutOfRange> {
     if value < min || value > max {
         let limit = if value < min { min } else { max };
@@ -201,7 +202,7 @@ const fn within(value: u8, min: u8, max: u8) -> Result<u8, OutOfRange> {
     Ok(value)
 }
 
-/// The low `bits` (0..=24) of `value` as two's complement.
+/// Returns the low `bits` (0..=24) of `value` as two's complement.
 #[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
 const fn sign_extend(value: u32, bits: u8) -> i32 {
     if bits == 0 {
@@ -211,7 +212,7 @@ const fn sign_extend(value: u32, bits: u8) -> i32 {
     (value.wrapping_shl(unused) as i32).wrapping_shr(unused)
 }
 
-/// A resolution as it is written down. The number of pages may be missing: then it is six.
+/// A resolution in its serialised form. The number of pages may be missing; it is then six.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Widths {

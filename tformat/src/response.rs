@@ -9,7 +9,7 @@ use crate::message::{AllData, CF3, Identification, Memory, MultiTurn, SingleTurn
 use crate::request::Request;
 use crate::status::StatusField;
 
-/// What an encoder sends, by the data ID it answers.
+/// What an encoder sends, by the data ID that it answers.
 ///
 /// ```text
 ///  ID 0, 7, 8, C   CF  SF  ABS0 ABS1 ABS2  CRC                                       TIDM-1011,
@@ -57,13 +57,12 @@ servowire_core::one_line!(Response {
 });
 
 impl Response {
-    /// Decodes the response to `request` from the front of UART bytes; what follows it is left alone.
+    /// Decodes the response to `request` from the start of UART bytes; bytes after it are ignored.
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
     /// [`Error::CfMismatch`], [`Error::Truncated`], [`Error::Crc`], [`Error::AddressMismatch`],
-    /// [`Error::DataMismatch`]. An ID 3 frame that was not asked for has to be complete and sound, then it is
-    /// [`Error::Rejected`].
+    /// [`Error::DataMismatch`]. An ID 3 frame that was not requested is [`Error::Rejected`] if it is complete and sound.
     pub fn parse(request: Request, bytes: &[u8]) -> Result<Self, Error> {
         let id = request.data_id();
         let cf = id.control_field().get();
@@ -82,12 +81,12 @@ impl Response {
         }
     }
 
-    /// Decodes the response to `request` from the front of line bits on a fixed grid: field k begins at bit 10 k of
-    /// `line`. What follows the response is left alone.
+    /// Decodes the response to `request` from the start of line bits on a fixed grid: field k begins at bit 10 k of
+    /// `line`. Bits after the response are ignored.
     ///
     /// # Errors
-    /// [`Error::StartBit`], [`Error::Delimiter`] or [`Error::Truncated`] for the first field that is not framed,
-    /// then as [`parse`](Self::parse).
+    /// [`Error::StartBit`], [`Error::Delimiter`] or [`Error::Truncated`] for the first badly framed field, then as
+    /// [`parse`](Self::parse).
     pub fn parse_line(request: Request, line: Window) -> Result<Self, Error> {
         let (id, len, bits) = (request.data_id(), line.len(), line.bits());
         if id == DataId::ReadAll && len >= 110 {
@@ -126,7 +125,7 @@ impl Response {
         }
     }
 
-    /// The fields to send.
+    /// Returns the fields to send.
     pub const fn emit(self) -> Frame {
         let cf = self.data_id().control_field().get();
         match self {
@@ -143,7 +142,7 @@ impl Response {
         }
     }
 
-    /// SF, which all responses but those of the EEPROM carry.
+    /// SF, which all responses except those of the EEPROM carry.
     pub const fn status(self) -> Option<StatusField> {
         match self {
             Self::ReadMultiTurn(v) => Some(v.sf),
@@ -169,7 +168,7 @@ impl Response {
         }
     }
 
-    /// A response of four fields that were checked, but for what it repeats of an EEPROM request.
+    /// Creates a response from four checked fields; what it repeats of an EEPROM request is not checked yet.
     #[inline]
     fn of4(request: Request, [_, first, second, _]: [u8; 4]) -> Result<Self, Error> {
         let memory = Memory { adf: Adf::from_bits(first), edf: second };
@@ -190,7 +189,7 @@ impl Response {
         }
     }
 
-    /// A response of six fields that were checked.
+    /// Creates a response from six checked fields.
     #[inline]
     const fn of6(id: DataId, [_, sf, d0, d1, d2, _]: [u8; 6]) -> Self {
         let (sf, data) = (StatusField::from_bits_retain(sf), [d0, d1, d2]);
@@ -210,13 +209,13 @@ const fn six_fields(cf: u8, sf: StatusField, [d0, d1, d2]: [u8; 3]) -> [u8; 6] {
     [cf, sf, d0, d1, d2, cf ^ sf ^ d0 ^ d1 ^ d2]
 }
 
-/// How many fields the response to a request for `id` has when it begins with `cf`: an ID 3 frame that was not
-/// asked for is the encoder's refusal.
+/// Returns how many fields the response to a request for `id` has if it begins with `cf`: an ID 3 frame that was not requested
+/// is the encoder's refusal.
 const fn expected_fields(id: DataId, cf: u8) -> u8 {
     if cf == CF3 { DataId::ReadAll.response_fields() } else { id.response_fields() }
 }
 
-/// Off the hot path: why line bits are refused. What is sound after all gives its response.
+/// Returns why line bits are refused; off the hot path. Line bits that are sound after all are returned as the response.
 #[cold]
 #[inline(never)]
 fn line_refusal(request: Request, line: Window) -> Result<Response, Error> {
@@ -228,7 +227,7 @@ fn line_refusal(request: Request, line: Window) -> Result<Response, Error> {
     Response::parse(request, Frame::from_line(line, fields)?.as_bytes())
 }
 
-/// Whether an EEPROM response speaks of the address that was asked for.
+/// Checks that an EEPROM response is for the requested address.
 fn check_address(memory: Memory, adf: Adf) -> Result<(), Error> {
     let (got, want) = (memory.adf.address(), adf.address());
     if got == want { Ok(()) } else { Err(Error::AddressMismatch { got: got.get(), want: want.get() }) }

@@ -1,4 +1,4 @@
-//! T-Format over an SPI peripheral, the way of TI's C2000 designs: a clock generator aligns the SPI to the line.
+//! T-Format over an SPI peripheral, as in TI's C2000 designs: a clock generator aligns the SPI to the line.
 //!
 //! Two word lengths are in use. Both hold line bits most significant bit first, so a byte appears bit-reversed.
 
@@ -9,13 +9,13 @@ use crate::frame::Frame;
 use crate::request::Request;
 use crate::response::Response;
 
-/// The word that idles the transmitter while a response is received: ten idle bits.
+/// The word that keeps the transmitter idle while a response is received: ten idle bits.
 pub const SPI10_IDLE: u16 = 0x3ff;
 
-/// Most 16-bit words of a transaction that count: a refused EEPROM write, 48 bits and an 11-field response.
+/// The largest number of 16-bit words of a transaction that matter: a refused EEPROM write, with 48 bits and an 11-field response.
 pub const SPI16_MAX_WORDS: usize = 10;
 
-/// The fields of a frame as 10-bit SPI words.
+/// Returns the fields of a frame as 10-bit SPI words.
 ///
 /// ```text
 ///  bit   9                       8       7  ...  0
@@ -55,13 +55,13 @@ pub fn parse_spi10(request: Request, words: &[u16]) -> Result<Response, Error> {
     Response::parse(request, bytes.get(..fields).unwrap_or(&bytes))
 }
 
-/// The transmitted bit stream of a whole transaction in 16-bit words.
+/// Returns the transmitted bit stream of a whole transaction in 16-bit words.
 ///
 /// ```text
 ///  1 idle bit | request, 10 bits a field | 7 idle bits | idle while the response comes ...
 /// ```
 ///
-/// Gives the words that the request and its response need, filled with idle bits.
+/// It has as many words as the request and its response need, filled with idle bits.
 pub fn spi16_words(request: Request) -> impl Iterator<Item = u16> {
     let line = request.emit().line();
     let idle = u128::MAX << line.len();
@@ -81,7 +81,7 @@ pub fn spi16_words(request: Request) -> impl Iterator<Item = u16> {
 
 /// Decodes the response to `request` from the 16-bit words received over a whole transaction.
 ///
-/// The response begins at stream bit 18 (one-field request), 38 (ID D) or 48 (ID 6); what follows it is left alone.
+/// The response begins at stream bit 18 (one-field request), 38 (ID D) or 48 (ID 6); bits after it are ignored.
 ///
 /// # Errors
 /// As [`Response::parse_line`].
@@ -94,14 +94,14 @@ pub fn parse_spi16(request: Request, words: &[u16]) -> Result<Response, Error> {
     Response::parse_line(request, line)
 }
 
-/// The first 128 bits of the stream, the first of the line in bit 0.
+/// Returns the first 128 bits of the stream, the first on the line in bit 0.
 #[inline(always)]
 fn stream([a, b, c, d, e, f, g, h]: &[u16; 8]) -> u128 {
     let pair = |first: u16, second: u16| u128::from((u32::from(first) << 16 | u32::from(second)).reverse_bits());
     pair(*a, *b) | pair(*c, *d) << 32 | pair(*e, *f) << 64 | pair(*g, *h) << 96
 }
 
-/// The line from the first bit of the response on, from any number of words.
+/// Returns the line from the first bit of the response onwards, from any number of words.
 #[inline(never)]
 fn spi16_line(request: Request, words: &[u16]) -> Window {
     let mut bytes = [0; 2 * SPI16_MAX_WORDS];
@@ -116,7 +116,7 @@ fn spi16_line(request: Request, words: &[u16]) -> Window {
 
 const MAX_RESPONSE_BITS: u32 = 110;
 
-/// Bit of the 16-bit stream at which the response begins.
+/// Returns the bit of the 16-bit stream at which the response begins.
 const fn response_start(request: Request) -> u32 {
     (request.data_id().request_fields() as u32).saturating_mul(10).saturating_add(8)
 }

@@ -13,7 +13,7 @@
 /// EEPROM responses carry no status, so alarms are not reported there. Over-speed, full-absolute status and counter
 /// overflow are not in EA1. Some compatible encoders leave the field at 0.
 ///
-/// It prints as the names of the set bits: `EA1 CA0`.
+/// It is displayed as the names of the set bits: `EA1 CA0`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -45,19 +45,19 @@ servowire_core::show_flags!(StatusField);
 impl StatusField {
     /// What the encoder reports about a damaged request.
     ///
-    /// After a request for ID 3 one of them is the only sign of the damage: the response to a damaged request is an ID 3
+    /// After a request for ID 3, one of them is the only sign of damage: the response to a damaged request is an ID 3
     /// frame too.
     pub const REQUEST_DAMAGED: Self = Self::CA0.union(Self::CA1);
 
     /// Returns whether EA0 and EA1 agree with `almc`: EA0 = CE, EA1 = OH or ME or BE or BA.
     ///
-    /// A difference is worth a note in a diagnosis, not an error: compatible encoders leave SF at 0.
+    /// A difference is worth a note in a diagnosis but is not an error: some compatible encoders leave SF at 0.
     pub const fn agrees_with(self, almc: Almc) -> bool {
         let alarms = Self::EA0.union(Self::EA1);
         self.intersection(alarms).bits() == Self::of_alarms(almc).bits()
     }
 
-    /// The status that an encoder with these alarms reports, without CA0 and CA1.
+    /// Returns the status that an encoder with these alarms reports, without CA0 and CA1.
     pub const fn of_alarms(almc: Almc) -> Self {
         let ea0 = if almc.contains(Almc::CE) { Self::EA0 } else { Self(0) };
         let ea1 = if almc.intersects(Almc::IN_EA1) { Self::EA1 } else { Self(0) };
@@ -80,10 +80,9 @@ impl StatusField {
 /// ```
 ///
 /// How severe an alarm is depends on the drive: some mask the counter overflow in multi-turn use, most treat the
-/// battery alarm as a warning, and a single-turn drive ignores the battery and multi-turn bits. So none is decided
-/// here.
+/// battery alarm as a warning, and a single-turn drive ignores the battery and multi-turn bits. So nothing is decided here.
 ///
-/// It prints as the names of the set bits: `OF BE BA`.
+/// It is displayed as the names of the set bits: `OF BE BA`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -115,7 +114,7 @@ servowire_core::show_flags!(Almc);
 impl Almc {
     /// The alarms that stay until ID 7 or ID C clears them (mask 0x7d of one drive maker).
     pub const LATCHED: Self = Self(0x7d);
-    /// The alarms that encoders without a multi-turn counter (SmartInc) have too; SmartAbs has all.
+    /// The alarms that encoders without a multi-turn counter (SmartInc) also have; SmartAbs has all.
     pub const SMART_INC: Self = Self::FS.union(Self::CE);
     /// The alarms that [`StatusField::EA1`] sums up.
     pub const IN_EA1: Self = Self::OH.union(Self::ME).union(Self::BE).union(Self::BA);

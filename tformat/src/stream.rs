@@ -1,7 +1,7 @@
 //! The decoders as `nom` streaming parsers, for frames that arrive as a stream of bytes.
 //!
-//! Missing bytes give `Incomplete` with the number that is wanted; every other fault is an `Error`. With
-//! [`tformat::Error`](crate::Error) as the error type the reason is kept; any other type that implements
+//! Missing bytes return `Incomplete` with the number of bytes needed; every other fault is an `Error`. With
+//! [`tformat::Error`](crate::Error) as the error type, the reason is kept; any other type that implements
 //! `FromExternalError` works too.
 
 use nom::error::{FromExternalError, ParseError};
@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::request::Request;
 use crate::response::Response;
 
-/// Takes one request off the front, as an encoder receives it.
+/// Takes one request from the start of the input, as an encoder receives it.
 ///
 /// ```
 /// use tformat::{Error, Request, stream};
@@ -31,7 +31,7 @@ where
     finish(input, Request::parse(input), |request| request.data_id().request_fields())
 }
 
-/// Takes the response to `request` off the front.
+/// Takes the response to `request` from the start of the input.
 ///
 /// ```
 /// use nom::Parser;
@@ -55,7 +55,7 @@ where
     }
 }
 
-/// The rest of the input after a frame of `len` fields, or what `nom` calls the fault.
+/// Returns the rest of the input after a frame of `len` fields, or the fault as `nom` reports it.
 fn finish<'a, T, E>(input: &'a [u8], frame: Result<T, Error>, len: impl Fn(&T) -> u8) -> IResult<&'a [u8], T, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,

@@ -5,9 +5,9 @@ use crate::data_id::DataId;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum BitRate {
-    /// 2.5 Mbit/s, 400 ns a bit: all encoders of TIDM-1011.
+    /// 2.5 Mbit/s, 400 ns per bit: all encoders of TIDM-1011.
     Mbit2_5,
-    /// 5 Mbit/s, 200 ns a bit: a faster variant that some encoders have.
+    /// 5 Mbit/s, 200 ns per bit: a faster variant that some encoders have.
     Mbit5,
 }
 
@@ -22,10 +22,10 @@ servowire_core::one_line!(BitRate {
 pub const RESPONSE_DELAY_NS: u32 = 3_000;
 
 impl BitRate {
-    /// Both, the common one first.
+    /// Both rates, the common one first.
     pub const ALL: [Self; 2] = [Self::Mbit2_5, Self::Mbit5];
 
-    /// One bit in ns.
+    /// Duration of one bit in ns.
     pub const fn bit_ns(self) -> u32 {
         match self {
             Self::Mbit2_5 => 400,
@@ -33,7 +33,7 @@ impl BitRate {
         }
     }
 
-    /// Bits in a second.
+    /// Bits per second.
     pub const fn bits_per_second(self) -> u32 {
         match self {
             Self::Mbit2_5 => 2_500_000,
@@ -41,12 +41,12 @@ impl BitRate {
         }
     }
 
-    /// `fields` fields in ns: 4.0 or 2.0 us each.
+    /// Duration of `fields` fields in ns: 4.0 or 2.0 us each.
     pub const fn fields_ns(self, fields: u8) -> u32 {
         self.bit_ns().wrapping_mul(10).wrapping_mul(fields as u32)
     }
 
-    /// Request, [`RESPONSE_DELAY_NS`] and response in ns, without the cable (5 ns a metre each way).
+    /// Duration of request, [`RESPONSE_DELAY_NS`] and response in ns, without the cable (5 ns per metre each way).
     pub const fn transaction_ns(self, id: DataId) -> u32 {
         self.fields_ns(id.request_fields())
             .wrapping_add(RESPONSE_DELAY_NS)

@@ -3,7 +3,7 @@ use servowire_core::Tolerance;
 use crate::marks::{NO_TURNS, OBJECTIONS, WIDE_TURNS, alarms};
 use crate::status::Almc;
 
-/// Up to what age, and despite which alarms, a position may be used.
+/// The age up to which, and the alarms despite which, a position may be used.
 ///
 /// ```
 /// use tformat::{Almc, Policy, Tolerated};
@@ -13,10 +13,10 @@ use crate::status::Almc;
 /// ```
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// Despite what a position may be used. How severe an alarm is depends on the drive, see [`Almc`].
+/// The alarms despite which a position may be used. How severe an alarm is depends on the drive, see [`Almc`].
 ///
-/// Where ALMC does not come, in all responses but that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]: it
-/// is tolerated where they all are.
+/// In responses without ALMC, which are all except that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]: EA1 is
+/// tolerated if all of these are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
 pub struct Tolerated(u32);
@@ -29,9 +29,10 @@ servowire_core::one_line!(Tolerated {
 impl Tolerated {
     /// Nothing.
     pub const NOTHING: Self = Self(0);
-    /// What one drive that counts turns tolerates: an overflow of the turns is ignored, a low battery is a warning.
+    /// The alarms that one drive tolerates when it counts turns: an overflow of the turns is ignored, a low battery is a warning.
     pub const MULTI_TURN: Self = Self::NOTHING.alarms(Almc::OF.union(Almc::BA));
-    /// What the same drive tolerates where turns are not used: everything about the turns and the battery. The turns are then
+    /// The alarms that the same drive tolerates when turns are not used: everything about the turns and the battery. The turns
+    /// are then
     /// not judged, and the [`Sample`](crate::Sample) does not have them.
     pub const SINGLE_TURN: Self =
         Self(Self::MULTI_TURN.0 | NO_TURNS | WIDE_TURNS).alarms(Almc::BE.union(Almc::ME).union(Almc::OS));
@@ -42,13 +43,13 @@ impl Tolerated {
         Self(self.0 | alarms.bits() as u32)
     }
 
-    /// What of these marks is not tolerated.
+    /// Returns the marks that are not tolerated.
     #[inline]
     pub(crate) const fn objects_to(self, marks: u32) -> u32 {
         marks & OBJECTIONS & !self.0
     }
 
-    /// Whether turns may be anything, or missing: they are not used.
+    /// Returns whether turns are not used, so that they may be anything, or missing.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
         self.0 & NO_TURNS != 0
@@ -59,7 +60,7 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// What is tolerated, as it is written down.
+/// What is tolerated, in its serialised form.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {

@@ -4,11 +4,11 @@ use crate::crc::{check, crc};
 use crate::error::Error;
 use crate::frame::{Frame, count};
 
-/// The extension point for commands that are not Tamagawa's: encoders of other makers use private ones over the
-/// same fields, some even with control fields that break the layout.
+/// The extension point for commands that are not Tamagawa's: encoders of other makers use private commands over the same fields,
+/// some even with control fields that break the layout.
 ///
-/// Nothing is known of such a command but its first byte and its lengths, so nothing else is checked: the
-/// repeated control field, the number of fields, and the check field.
+/// Only its first byte and its lengths are known, so only these are checked: the repeated control field, the number of fields,
+/// and the check field.
 ///
 /// ```
 /// use tformat::{ControlField, VendorCommand};
@@ -33,9 +33,9 @@ servowire_core::one_line!(VendorCommand {
 });
 
 impl VendorCommand {
-    /// A command with this first field, in the request and in the response (see
-    /// [`ControlField::compose`](crate::ControlField::compose)), and a response of 2 to 11 fields, control and check
-    /// field included.
+    /// Creates a command with this first field in the request and in the response (see
+    /// [`ControlField::compose`](crate::ControlField::compose)), and a response of 2 to 11 fields, control and check field
+    /// included.
     ///
     /// # Errors
     /// [`OutOfRange`] for another number of fields.
@@ -57,7 +57,7 @@ impl VendorCommand {
         self.response_fields
     }
 
-    /// The request: the control field alone, or followed by `body` and the check field over both.
+    /// Returns the request: the control field alone, or followed by `body` and the check field over both.
     ///
     /// `None` if `body` has more than nine bytes.
     pub fn emit(self, body: &[u8]) -> Option<Frame> {
@@ -74,7 +74,8 @@ impl VendorCommand {
         Frame::new(bytes.get(..len)?)
     }
 
-    /// The fields of a response between control field and check field. It decodes the front of `bytes`; what follows is left alone.
+    /// Returns the fields of a response between control field and check field. It decodes the start of `bytes`; bytes after the
+    /// response are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`] without any field, [`Error::CfMismatch`], [`Error::Truncated`], [`Error::Crc`].
@@ -91,7 +92,7 @@ impl VendorCommand {
     }
 }
 
-/// A command as it is written down.
+/// A command in its serialised form.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Lengths {

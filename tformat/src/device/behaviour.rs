@@ -1,4 +1,4 @@
-/// From what instant the time between two reset requests is counted. No document says.
+/// The instant from which the time between two reset requests is counted. No document says which it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -11,7 +11,7 @@ pub enum Interval {
     EndToStart,
 }
 
-/// The effect of a write to the page register with the number of a page that does not exist.
+/// The effect of writing the number of a page that does not exist to the page register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -39,7 +39,7 @@ pub enum BusyData {
     Cell,
 }
 
-/// The points that no document decides, and the response delay. The defaults are those of the reference vectors.
+/// The points that no document settles, and the response delay. The defaults are those of the reference vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -48,21 +48,21 @@ pub enum BusyData {
 pub struct Behaviour {
     /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged.
     pub response_delay_ns: u32,
-    /// From what instant the 40 us between two resets are counted.
+    /// The instant from which the 40 us between two resets are counted.
     pub reset_interval: Interval,
-    /// Whether another request starts the count of resets again.
+    /// Whether another request restarts the count of resets.
     pub others_restart_count: bool,
-    /// Whether a damaged request starts the count of resets again.
+    /// Whether a damaged request restarts the count of resets.
     pub damage_restarts_count: bool,
-    /// Whether the response to the tenth reset shows its effect, or only the one after.
+    /// Whether the response to the tenth reset shows its effect, or only the one after it.
     pub tenth_shows_effect: bool,
     /// Whether the encoder is silent for 18 ms while it stores a single-turn zero.
     pub silent_while_storing: bool,
     /// Whether selecting a page keeps the memory busy like any write.
     pub page_select_is_busy: bool,
-    /// Selecting a page that does not exist.
+    /// What happens if a page is selected that does not exist.
     pub absent_page: AbsentPage,
-    /// Data of reads while the memory is busy.
+    /// The data byte of reads while the memory is busy.
     pub busy_data: BusyData,
     /// Whether a request with a wrong sink code is answered with ID 3.
     pub answers_wrong_sink: bool,
@@ -73,7 +73,7 @@ pub struct Behaviour {
 }
 
 impl Behaviour {
-    /// An encoder as the documents describe it; the same as [`Default`].
+    /// Returns an encoder as the documents describe it; the same as [`Default`].
     pub const fn new() -> Self {
         Self {
             response_delay_ns: 3_000,
@@ -91,8 +91,8 @@ impl Behaviour {
         }
     }
 
-    /// The combination with this number, for tests that walk through them all, starting over beyond
-    /// [`NUMBERED`](Self::NUMBERED): every switch with every other, and response delays of 3.0, 3.2, 1.7 and 9 us.
+    /// Returns the combination with this number, for tests that walk through them all: every switch with every other, and
+    /// response delays of 3.0, 3.2, 1.7 and 9 us. Numbers of [`NUMBERED`](Self::NUMBERED) and above start over.
     pub const fn numbered(number: u16) -> Self {
         const fn bit(number: u16, at: u32) -> bool {
             number >> at & 1 == 1
@@ -125,7 +125,7 @@ impl Behaviour {
         }
     }
 
-    /// Combinations that [`numbered`](Self::numbered) gives: 3 kinds of data, ten switches, 4 delays.
+    /// Number of combinations that [`numbered`](Self::numbered) returns: 3 kinds of data, ten switches, 4 delays.
     pub const NUMBERED: u16 = 3 << 12;
 
     servowire_core::builder! {

@@ -8,40 +8,40 @@ use crate::timing::BitRate;
 
 /// Finds the encoder after power-on: waits, asks for ID 3 at 5 Mbit/s, and falls back to 2.5 Mbit/s.
 ///
-/// The rate is not on the wire, and an encoder does not answer at the wrong one. Take [`line`](Self::line) for each
-/// transaction: the rate changes between them. The result is the first sound response; the rate is that of `line` then.
+/// The rate is not on the wire, and an encoder does not answer at the wrong one. Use [`line`](Self::line) for each transaction,
+/// because the rate changes between them. The result is the first sound response; its rate is then that of `line`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detection {
-    /// The one that is tried first, and the other one.
+    /// The line that is tried first, and the other one.
     lines: [Line; 2],
     second: bool,
     tries: u8,
 }
 
 impl Detection {
-    /// Time from switching on the supply to the first request.
+    /// Time from power-on to the first request.
     pub const POWER_ON_WAIT_NS: u64 = 1_500_000_000;
     /// Requests at each rate.
     const TRIES: u8 = 3;
 
-    /// 5 Mbit/s, then 2.5 Mbit/s, with the defaults of [`Line::new`].
+    /// Tries 5 Mbit/s, then 2.5 Mbit/s, with the defaults of [`Line::new`].
     pub const fn new() -> Self {
         Self::on([Line::new(BitRate::Mbit5), Line::new(BitRate::Mbit2_5)])
     }
 
-    /// Tries these two lines, in this order: for a host that hands over in blocks, or with a longer cable.
+    /// Tries these two lines, in this order, for a host that hands over in blocks or a longer cable.
     pub const fn on(lines: [Line; 2]) -> Self {
         Self { lines, second: false, tries: 0 }
     }
 
-    /// The line for the next transaction, and the encoder's own when it has been found.
+    /// Returns the line for the next transaction, and once the encoder has been found, its line.
     pub const fn line(&self) -> Line {
         let [first, second] = self.lines;
         if self.second { second } else { first }
     }
 
-    /// The first request. The supply was switched on at `power_on_ns`.
+    /// Returns the first request. The supply was switched on at `power_on_ns` (ns).
     pub const fn start(&mut self, power_on_ns: u64) -> Step<AllData> {
         *self = Self::on(self.lines);
         let not_before_ns = power_on_ns.saturating_add(Self::POWER_ON_WAIT_NS);

@@ -11,25 +11,25 @@ use crate::response::Response;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Phase {
-    /// The page register is read, before the cell is.
+    /// The page register is read before the cell.
     CheckBefore,
     /// The page is written to the register.
     Select,
     /// The byte is written.
     Write,
-    /// The byte is read: because that is what was asked for, or to see what became of a write.
+    /// The byte is read: because it was requested, or to see what became of a write.
     Read,
-    /// The register is read again: the cell was that of the page.
+    /// The register is read again, to confirm that the cell belonged to the page.
     CheckAfter,
 }
 
-/// What is known of a write that was sent, to the page register or to the cell.
+/// What is known about a write to the page register or to the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Sent {
     /// It was not sent, or reading has shown that it was not done.
     Not,
-    /// It may have been done, and nothing that was read tells.
+    /// It may have been done, and nothing that was read decides it.
     Unknown,
     /// It was answered with its own data and without the busy flag.
     Confirmed,
@@ -37,15 +37,15 @@ enum Sent {
 
 /// Reads or writes one EEPROM byte of a page, at an address below that of the page register.
 ///
-/// An encoder that has started anew is on page 0 and does not say so. So the page register is read before and after every
+/// An encoder that has restarted is on page 0 and does not say so. Therefore the page register is read before and after every
 /// access; the page is selected if the register holds another one. A written byte is read back, and the access waits while
 /// the memory is busy. The result is the byte read.
 ///
-/// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, to the
-/// page register too, the cell is read: only if it holds another value, on the page that was named, is it written again. A
-/// memory that says that it is busy is asked by reading. It ends with [`Error::EffectUnknown`] if nothing can be read after a
-/// write has been sent, or if the register then holds another page: the write may have gone there. A response that is for
-/// another address is refused like one of another kind. Once done or failed it stays so, until it is started again.
+/// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, including one to
+/// the page register, the cell is read. It is written again only if it holds another value on the page that was named. A memory
+/// that reports busy is polled by reading. It ends with [`Error::EffectUnknown`] if nothing can be read after a
+/// write has been sent, or if the register then holds another page: the write may have gone there. A response for another
+/// address is refused, like a response of another kind. Once done or failed it stays so, until it is started again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
@@ -54,13 +54,13 @@ pub struct EepromAccess {
     write: Option<u8>,
     polling: Polling,
     phase: Phase,
-    /// Requests without success since the page was found for the first time, or the write was taken.
+    /// Failed requests since the page was first found, or since the write was accepted.
     tries: u16,
     /// The register has held the page.
     on_page: bool,
     selection: Sent,
     written: Sent,
-    /// What the cell held.
+    /// The value that the cell held.
     value: u8,
     end: Option<Step<u8>>,
 }
@@ -73,7 +73,7 @@ impl EepromAccess {
 
     /// Writes `data` to `address` of `page`, then reads it back.
     ///
-    /// Motor makers keep name plate and commutation data in this memory: know what is at the address.
+    /// Motor makers keep name plate and commutation data in this memory: make sure you know what is at the address.
     pub const fn write(page: Page, address: Address, data: u8, polling: Polling) -> Self {
         Self::new(page, address, Some(data), polling)
     }
@@ -94,7 +94,7 @@ impl EepromAccess {
         }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u8> {
         *self = Self::new(self.page, self.address, self.write, self.polling);
         self.enter(Phase::CheckBefore, now_ns)
@@ -131,7 +131,7 @@ impl EepromAccess {
         )
     }
 
-    /// The response to the request that was sent last; anything else does not count.
+    /// Takes the response to the last request; anything else does not count.
     fn memory(&self, outcome: Result<Response, Error>) -> Result<Memory, Error> {
         let memory = match (outcome?, self.phase) {
             (Response::WriteEeprom(memory), Phase::Select | Phase::Write)
@@ -185,7 +185,7 @@ impl EepromAccess {
         }
     }
 
-    /// The cell of the page holds the value that was read.
+    /// Judges the value that was read, which the cell of the page holds.
     fn judge(&mut self, ready_ns: u64) -> Step<u8> {
         let Self { value, .. } = *self;
         match self.write {
@@ -197,7 +197,7 @@ impl EepromAccess {
         }
     }
 
-    /// A write was not done: it shows. It is sent again unless the encoder had said that it took it.
+    /// Handles a write that evidently was not done. It is sent again unless the encoder had confirmed it.
     fn differs(&mut self, error: Error, confirmed: bool, again: Phase, ready_ns: u64) -> Step<u8> {
         if confirmed || self.is_given_up() {
             return self.failed(error, ready_ns);
@@ -235,7 +235,7 @@ impl EepromAccess {
         }
     }
 
-    /// What the request of this phase is about.
+    /// Returns what the request of this phase is about.
     const fn cell(&self) -> Address {
         match self.phase {
             Phase::CheckBefore | Phase::Select | Phase::CheckAfter => Address::PAGE_REGISTER,

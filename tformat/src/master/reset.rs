@@ -6,21 +6,21 @@ use crate::request::Request;
 use crate::response::Response;
 use crate::status::StatusField;
 
-/// A reset: the same one-field request ten times, at least 40 us apart, with no other request in between.
+/// Runs a reset: sends the same one-field request ten times, at least 40 us apart, with no other request in between.
 ///
-/// The documents give the number and the spacing. Whether the spacing counts from start to start or from the end of
-/// the response is not said; this takes the longer one, 40 us of idle line after every response. Whether another request
-/// or a damaged one starts the count again is not said either.
+/// The documents give the number and the spacing. They do not say whether the spacing counts from start to start or from the end
+/// of the response; this takes the longer one, 40 us of idle line after every response. Nor do they say whether another request
+/// or a damaged one restarts the count.
 ///
-/// The ten requests are one act. Clearing errors (ID 7) can do no harm twice: a refused response starts the count again,
-/// and the third ends it. ID 8 and ID C are **never sent again by themselves**: a refused or lost response ends them with
-/// [`Error::EffectUnknown`], for the encoder counts requests, whoever sent them and whenever. Nine that were left in it by an
-/// attempt that was broken off, and one more, are ten.
+/// The ten requests are one operation. Clearing errors twice (ID 7) does no harm: a refused response restarts the count, and the
+/// third one ends the reset. ID 8 and ID C are **never sent again by themselves**: a refused or lost response ends them with
+/// [`Error::EffectUnknown`], because the encoder counts requests no matter who sent them and when. Nine requests from an
+/// abandoned attempt plus one more make ten.
 ///
-/// A response whose CA0 or CA1 says that the request was damaged is a refused one: the encoder has not counted it.
+/// A response whose CA0 or CA1 says that the request was damaged counts as refused: the encoder has not counted the request.
 ///
 /// Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero) does it for ID 8 and
-/// [`MultiTurnZero`](super::MultiTurnZero) for ID C, after whatever has happened before.
+/// [`MultiTurnZero`](super::MultiTurnZero) for ID C, whatever happened before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reset {
@@ -37,10 +37,10 @@ impl Reset {
     pub const SPACING_NS: u32 = 40_000;
     /// Wait after the last response to ID 8, while the encoder stores the offset.
     pub const ZERO_WAIT_NS: u32 = 18_000_000;
-    /// Refused responses that end clearing errors.
+    /// Number of refused responses that ends clearing errors.
     pub const MAX_REFUSED: u8 = 3;
 
-    /// ID 7: clears all latched errors. Position and turns stay.
+    /// ID 7: clears all latched errors. Position and turns are unchanged.
     pub const fn clear_errors() -> Self {
         Self::of(Request::ResetErrors)
     }
@@ -53,7 +53,7 @@ impl Reset {
     /// ID 8: makes the present position the zero of the turn. **This shifts the commutation angle of the motor.**
     ///
     /// A drive that uses the encoder for commutation will then drive the current into the wrong phases; drive manuals
-    /// forbid it on a motor in service. It is for encoders that are being fitted.
+    /// forbid it on a motor in service. It is meant for encoders that are being fitted.
     pub const fn set_single_turn_zero_and_shift_commutation_angle() -> Self {
         Self::of(Request::SetSingleTurnZero)
     }
@@ -72,7 +72,7 @@ impl Reset {
         self.answered
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
         self.answered = 0;
         self.refused = 0;
@@ -127,7 +127,7 @@ impl Reset {
     }
 }
 
-/// What a response of another kind means: the caller handed in the outcome of another request.
+/// Returns the error for a response of another kind: the caller handed in the outcome of another request.
 pub(super) fn mismatch(response: Response, request: Request) -> Error {
     let (got, want) = (response.data_id().control_field().get(), request.data_id().control_field().get());
     Error::CfMismatch { got, want }

@@ -9,7 +9,7 @@ use crate::resolution::Resolution;
 use crate::response::Response;
 use crate::timing::BitRate;
 
-/// A response with all checks passed, and when its position was taken.
+/// A response that has passed all checks, and when its position was sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchange {
@@ -18,14 +18,14 @@ pub struct Exchange {
     /// The instant of sampling by [`Line::sampling_ns`], for extrapolation: it lies between the end of the request and
     /// the start of the response. Its age counts from here.
     pub sampled_ns: u64,
-    /// When the first start bit of the response was on the line at the latest, in ns: by then the position had been taken.
+    /// When the first start bit of the response was on the line at the latest, in ns: by then the position had been sampled.
     pub began_ns: u64,
 }
 
 servowire_core::one_line!(Exchange { Self { response, sampled_ns, .. } => "{}, sampled at {} ns", response, sampled_ns; });
 
 impl Exchange {
-    /// What it says of the position of an encoder with these widths, to be judged where it is used.
+    /// Returns what it says about the position of an encoder with these widths, to be judged where it is used.
     pub const fn evidence(&self, resolution: Resolution) -> Evidence {
         Evidence::of(self.response, resolution, self.sampled_ns)
     }
@@ -41,13 +41,13 @@ pub struct Transmission {
     pub start_ns: u64,
     /// When the last bit ends, in ns.
     pub end_ns: u64,
-    /// When the driver is to be switched on, in ns: [`Line::driver_lead_ns`] before the start bit.
+    /// When to enable the driver, in ns: [`Line::driver_lead_ns`] before the start bit.
     pub driver_on_ns: u64,
-    /// When the driver is to be switched off.
+    /// When to disable the driver.
     pub driver_off: DriverOff,
 }
 
-/// The time in which the driver is to be switched off after a request.
+/// The interval in which the driver is to be disabled after a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DriverOff {
@@ -57,20 +57,20 @@ pub struct DriverOff {
     pub latest_ns: u64,
 }
 
-/// The state of a transaction. `ready_ns` of a failure is the time at which the longest response to the request is over,
-/// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge
-/// that pauses between fields, also wait for a silent line.
+/// The state of a transaction. `ready_ns` of a failure is the end of the longest response to the request, however late within
+/// the time-out it began: eleven fields without gaps, as encoders send them. Behind a bridge that pauses between fields, also
+/// wait until the line is silent.
 pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// One request and its response, as a UART receives them: byte by byte, or in blocks.
 ///
-/// Every byte of a block is placed by counting back from its end. No byte that began before the request had left the line is
-/// ever part of the response, as long as the end times that the machine is told are late by less than the
-/// [latency budget](Line::latency_budget_ns). An echo of the request is known by its time, and where that does not tell, by its
-/// content. What stands before or after a sound response costs nothing; two sound responses in one block are
-/// [`Error::TwoResponses`].
+/// The time of every byte of a block is found by counting back from the end of the block. No byte that began before the request
+/// had left the line is
+/// ever part of the response, as long as the end times passed to the machine are late by less than the [latency
+/// budget](Line::latency_budget_ns). An echo of the request is recognised by its time, and if that is not conclusive, by its
+/// content. Anything before or after a sound response is harmless; two sound responses in one block are [`Error::TwoResponses`].
 ///
-/// Once done or failed it stays so: until `ready_ns` go on to give it what arrives, and it is thrown away.
+/// A transaction that is done or has failed stays so. Keep handing over what arrives until `ready_ns`; it is discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
@@ -82,26 +82,26 @@ pub struct Transaction {
     start_ns: u64,
     /// The end of the request's last bit.
     asked_ns: u64,
-    /// When the first field of a response has ended at the earliest.
+    /// The earliest end of the first field of a response.
     earliest_ns: u64,
-    /// What may be the response.
+    /// The bytes that may be the response.
     received: [u8; Frame::MAX_FIELDS],
     len: u8,
-    /// Bytes of the own request that came back, and the first that came back as another.
+    /// Bytes of the own request that came back, and the first one that came back changed.
     echoed: u8,
     echo_fault: Option<u8>,
-    /// Why the first bytes of a response's length were not a response.
+    /// Why the first run of bytes with the length of a response was not one.
     refused: Option<Error>,
     /// A framing error came where a response might have begun.
     broken: bool,
     /// End of the last byte.
     heard_ns: u64,
-    /// Until the end its time-out, afterwards from when on the line is free.
+    /// Its time-out until it ends; afterwards, when the line is free.
     until_ns: u64,
     end: Option<Result<Exchange, Error>>,
 }
 
-/// Begins a transaction where it is to be: what a function gives back is copied there.
+/// Begins a transaction in place, because a returned value would be copied.
 macro_rules! begin {
     ($place:expr, $request:ident, $line:ident, $start_ns:ident) => {
         let frame = $request.emit();
@@ -132,8 +132,8 @@ macro_rules! begin {
 }
 
 impl Transaction {
-    /// No request and no response: a place for [`restart`](Self::restart). It counts as a transaction that ended with
-    /// [`Error::NoResponse`], and its line is free at any time.
+    /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that ended
+    /// with [`Error::NoResponse`], and its line is free at any time.
     pub const IDLE: Self = Self {
         request: Request::ReadAll,
         frame: Request::ReadAll.emit(),
@@ -155,19 +155,19 @@ impl Transaction {
 
     /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
     ///
-    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
+    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing may be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
         let it;
         begin!(it, request, line, start_ns);
         it
     }
 
-    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, whatever the state of this one: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, line: Line, start_ns: u64) {
         begin!(*self, request, line, start_ns);
     }
 
-    /// The fields to send, and when.
+    /// Returns the fields to send, and when.
     pub const fn transmission(&self) -> Transmission {
         let Self { frame, line, start_ns, asked_ns: end_ns, .. } = *self;
         Transmission {
@@ -179,17 +179,17 @@ impl Transaction {
         }
     }
 
-    /// Takes bytes that were received back to back, the delimiter of the last one at `end_ns` or, within the latency budget,
-    /// before.
+    /// Takes bytes that were received back to back; the delimiter of the last one ended at `end_ns` or, within the latency
+    /// budget, before.
     ///
-    /// A pause in a block shifts what stands before it: hand over separately what a pause as long as the request and four
-    /// fields divides, 20 us at 2.5 Mbit/s.
+    /// A pause within a block shifts the times of the bytes before it. Hand over separately the parts on either side of a pause
+    /// as long as the request and four fields (20 us at 2.5 Mbit/s).
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
         self.push(bytes, end_ns);
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear), for an interrupt: it does not copy the response; ask for the [outcome](Self::outcome).
+    /// Does the same as [`hear`](Self::hear) without copying the response, for an interrupt; ask for the [outcome](Self::outcome).
     pub fn push(&mut self, bytes: &[u8], end_ns: u64) -> Option<&Result<Exchange, Error>> {
         if self.end.is_none() && !bytes.is_empty() && !self.is_whole(bytes, end_ns) {
             self.take_all(bytes, end_ns);
@@ -197,7 +197,7 @@ impl Transaction {
         self.outcome()
     }
 
-    /// A block that is the response and nothing else, as a DMA controller hands it over: taken at one go.
+    /// Takes a block that is exactly the response, as a DMA controller hands it over, in one go.
     fn is_whole(&mut self, bytes: &[u8], end_ns: u64) -> bool {
         let [first, second, ..] = bytes else { return false };
         let fits = self.len == 0 && bytes.len() == usize::from(self.fields) && !self.contradicts(*first, *second);
@@ -230,7 +230,8 @@ impl Transaction {
         }
     }
 
-    /// The next field is due, but a line that does not fall silent is listened to no longer than the longest response takes.
+    /// Sets the time by which the next field is due; a line that does not fall silent is listened to no longer than the longest
+    /// response takes.
     fn wait_longer(&mut self, end_ns: u64) {
         let Line { response_timeout_ns, field_timeout_ns, hand_over_ns, .. } = self.line;
         let fields_ns = u64::from(field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
@@ -240,9 +241,10 @@ impl Transaction {
         self.until_ns = end_ns.saturating_add(longest_gap_ns).min(latest_ns).max(self.until_ns);
     }
 
-    /// The UART reports a framing error for the byte that ended at `end_ns`.
+    /// Takes the UART's report of a framing error in the byte that ended at `end_ns`.
     ///
-    /// In a response it ends the transaction with [`Error::Delimiter`]. Before one it is only remembered: the response may
+    /// Within a response it ends the transaction with [`Error::Delimiter`]. Before a response it is only remembered: the
+    /// response may
     /// still come.
     pub fn framing_error(&mut self, end_ns: u64) -> Progress {
         if self.end.is_none() {
@@ -260,7 +262,7 @@ impl Transaction {
         self.progress()
     }
 
-    /// Ends the transaction if its time is over.
+    /// Ends the transaction if its time has run out.
     pub fn poll(&mut self, now_ns: u64) -> Progress {
         if self.end.is_none() && now_ns > self.until_ns {
             self.give_up();
@@ -277,12 +279,12 @@ impl Transaction {
         }
     }
 
-    /// How it ended; `None` while it is pending.
+    /// Returns how it ended; `None` while it is pending.
     pub const fn outcome(&self) -> Option<&Result<Exchange, Error>> {
         self.end.as_ref()
     }
 
-    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
     pub const fn until_ns(&self) -> u64 {
         if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.until_ns }
     }
@@ -291,7 +293,7 @@ impl Transaction {
         u64::from(self.line.rate.fields_ns(1)).saturating_mul(fields as u64)
     }
 
-    /// One byte more, which ended at `ended_ns` at the latest; these came after it in the same block.
+    /// Takes one more byte, which ended at `ended_ns` at the latest; these came after it in the same block.
     fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8]) {
         if ended_ns < self.earliest_ns {
             return self.early(byte);
@@ -309,7 +311,7 @@ impl Transaction {
         }
     }
 
-    /// What began before a response can begin: the echo, and what was on the line before.
+    /// Handles bytes that began before a response can begin: the echo, and what was on the line before.
     fn early(&mut self, got: u8) {
         self.len = 0;
         match self.frame.as_bytes().get(usize::from(self.echoed)) {
@@ -319,7 +321,7 @@ impl Transaction {
         }
     }
 
-    /// Fields of the response that begins with the first byte there is.
+    /// Returns the number of fields of the response that begins with the first byte held.
     const fn expected(&self) -> u8 {
         let [cf, ..] = self.received;
         if cf == CF3 { DataId::ReadAll.response_fields() } else { self.fields }
@@ -329,14 +331,14 @@ impl Transaction {
         byte == self.frame.first() || byte == CF3
     }
 
-    /// Whether the byte after the first shows that the first was the end of an echo: in place of SF there is a control field,
-    /// whose low bits are never 0 as the information bits of SF are.
+    /// Returns whether the second byte shows that the first was the end of an echo: in place of SF there is a control field,
+    /// whose low bits are never 0, while the information bits of SF always are.
     const fn contradicts(&self, first: u8, second: u8) -> bool {
         let eeprom = matches!(self.request, Request::ReadEeprom { .. } | Request::WriteEeprom { .. });
         (first == CF3 || !eeprom) && self.begins_a_response(second)
     }
 
-    /// The first byte was the last one of the own request.
+    /// Handles a first byte that was the last one of the own request.
     fn forget_echo(&mut self) {
         let [first, ..] = self.received;
         if self.frame.as_bytes().last() == Some(&first) {
@@ -345,7 +347,7 @@ impl Transaction {
         self.len = 0;
     }
 
-    /// The bytes are as many as a response has.
+    /// Judges the bytes as a response once there are enough of them.
     fn judge(&mut self, ended_ns: u64, after: &[u8]) {
         while self.len > 0 && self.len >= self.expected() {
             let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
@@ -369,7 +371,8 @@ impl Transaction {
         }
     }
 
-    /// The length in fields of a valid response, or of a refusal. Out of line: a block and a byte come here.
+    /// Returns the length in fields of a valid response or of a refusal. Kept out of line, because blocks and single bytes both
+    /// come here.
     #[inline(never)]
     fn found(&mut self, outcome: &Result<Response, Error>, ended_ns: u64, fields: usize) {
         self.len = 0;
@@ -384,7 +387,7 @@ impl Transaction {
         });
     }
 
-    /// Drops the first byte, and all up to the next with which a response may begin.
+    /// Drops the first byte and all bytes up to the next one with which a response may begin.
     #[cold]
     fn drop_first(&mut self) {
         while self.len > 0 {
@@ -397,7 +400,7 @@ impl Transaction {
         }
     }
 
-    /// Nothing more will come.
+    /// Handles the end of reception: nothing more will come.
     #[cold]
     fn give_up(&mut self) {
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
@@ -422,8 +425,8 @@ impl Transaction {
         self.finish();
     }
 
-    /// It has ended. After an error the line is free when the longest response, begun as late as it may, is over. Out of line: all
-    /// ends but that of a whole block come here.
+    /// It has ended. After an error the line is free when the longest response would have ended if it had begun as late as it
+    /// may. Kept out of line, because all endings except that of a whole block come here.
     #[inline(never)]
     fn finish(&mut self) {
         self.until_ns = self.heard_ns;
@@ -434,20 +437,20 @@ impl Transaction {
     }
 }
 
-/// Whether a response came whole, a refusal too.
+/// Returns whether a response, or a refusal, came whole.
 const fn is_sound(outcome: &Result<Response, Error>) -> bool {
     matches!(outcome, Ok(_) | Err(Error::Rejected { .. }))
 }
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
-/// Decodes everything that a UART received since the request began, with the receiver always on: our own request, then the
-/// response. For buffers without times; what follows the response is left alone.
+/// Decodes everything that a UART received since the request began, with the receiver always on: the own request, then the
+/// response. For buffers without times; bytes after the response are ignored.
 ///
 /// # Errors
 /// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;
-/// [`Error::Truncated`] in the middle of the echo; [`Error::NoResponse`] with `echo` set if nothing follows it: no
-/// encoder is there, or the wires A and B are exchanged; then as [`Response::parse`].
+/// [`Error::Truncated`] in the middle of the echo; [`Error::NoResponse`] with `echo` set if nothing follows it: no encoder is
+/// there, or the wires A and B are swapped; then as [`Response::parse`].
 pub fn parse_echoed(request: Request, bytes: &[u8]) -> Result<Response, Error> {
     let sent = request.emit();
     for (at, (&want, &got)) in (0..).zip(sent.as_bytes().iter().zip(bytes)) {

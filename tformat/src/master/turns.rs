@@ -10,20 +10,20 @@ use crate::response::Response;
 /// waits 18 ms, and reads the turns again. **The multi-turn reference of the machine is lost**, see
 /// [`Reset::clear_turns_and_lose_multi_turn_reference`].
 ///
-/// Documents of the vendors say that the effect is to be confirmed by reading, and name no wait after ID C. This takes the
-/// only time for storing that any of them gives, so that a count that comes late is not taken for one that was not reset.
+/// The vendors' documents say that the effect is to be confirmed by reading, and specify no wait after ID C. This uses the only
+/// storage time that any of them states, so that a count that is updated late is not taken for one that was not reset.
 ///
-/// A shaft that stands on the boundary of a turn counts a turn more or less when it trembles: `tolerance` says how many, 1
-/// in general and 0 if the shaft is known to stand elsewhere. The result is the count read afterwards, within the tolerance
+/// A shaft at rest on the boundary of a turn may count a turn more or less when it trembles. `tolerance` says how many turns are
+/// allowed: 1 in general, 0 if the shaft is known to rest elsewhere. The result is the count read afterwards, within the tolerance
 /// of 0. Otherwise it ends with
 ///
 /// * [`Error::NotDone`]: the count is what it was before;
-/// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it says nothing: it was at 0 before, or near it, or is
-///   neither there nor where it was;
+/// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it is inconclusive: it was at or near 0 before, or is
+/// now neither there nor where it was;
 /// * the error of the exchange, if the count could not be read before: nothing was sent.
 ///
-/// It judges only by the two counts, so it may follow any history. ID C is sent at most ten times. Once done or failed it
-/// stays so, until it is started again. Whether the errors are gone is to be seen by ID 3.
+/// The result is judged only by the two counts, so the procedure may follow any history. ID C is sent at most ten times. A
+/// procedure that is done or has failed stays so until it is restarted. Read ID 3 to see whether the errors are gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MultiTurnZero {
@@ -34,14 +34,14 @@ pub struct MultiTurnZero {
 }
 
 impl MultiTurnZero {
-    /// `tolerance`: how far from 0, in turns, the count may be afterwards.
+    /// Creates the procedure. `tolerance` is how far from 0, in turns, the count may be afterwards.
     pub const fn set_and_lose_multi_turn_reference(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::clear_turns_and_lose_multi_turn_reference();
         let witness = Witness::new(reset, Request::ReadMultiTurn);
         Self { resolution, tolerance, witness, end: None }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<MultiTurn> {
         self.end = None;
         self.witness.start(now_ns)

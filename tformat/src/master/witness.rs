@@ -9,16 +9,16 @@ use crate::status::StatusField;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Phase {
-    /// The value before.
+    /// Reads the value before the reset.
     Before,
-    /// Ten requests of the reset.
+    /// Sends the ten requests of the reset.
     Act,
-    /// The value after; how the ten ended.
+    /// Reads the value afterwards; holds how the ten requests ended.
     After(Result<(), ErrorClass>),
 }
 
-/// A reset that makes a value 0, between two readings of the value that tell what became of it. How many requests were sent and
-/// answered tells nothing: the encoder may have counted some before, or have begun anew.
+/// A reset that sets a value to 0, between two readings that show what became of the value. The number of requests sent and
+/// answered proves nothing: the encoder may have counted some before, or have restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Witness {
@@ -32,21 +32,21 @@ pub(super) struct Witness {
 }
 
 impl Witness {
-    /// Times that the value is read before it is given up.
+    /// How many times the value is read before giving up.
     pub(super) const MAX_READS: u8 = 3;
 
     pub(super) const fn new(reset: Reset, request: Request) -> Self {
         Self { reset, request, phase: Phase::Before, before: 0, sent: 0, tries: 0 }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub(super) const fn start<T>(&mut self, now_ns: u64) -> Step<T> {
         self.sent = 0;
         self.enter(Phase::Before, now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. `value` takes the message and the value
-    /// out of a response, and `near` tells whether two values may be the same.
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. `value` extracts the message and the value
+    /// from a response, and `near` says whether two values may be the same.
     pub(super) fn receive<T>(
         &mut self,
         outcome: Result<Response, Error>,
@@ -77,7 +77,8 @@ impl Witness {
         }
     }
 
-    /// What the reset wants, and the second reading however it ends: 18 ms later, as long as an encoder may store.
+    /// Takes the next step of the reset, and begins the second reading however the reset ends: 18 ms later, the time for which
+    /// an encoder may be storing.
     fn act<T>(&mut self, step: Step<SingleTurn>, ready_ns: u64) -> Step<T> {
         let act = match step {
             Step::Send { request, not_before_ns } => {
@@ -101,7 +102,7 @@ impl Witness {
         Step::Send { request: self.request, not_before_ns }
     }
 
-    /// The value could not be read. Before the act the encoder may be storing what an earlier one has set.
+    /// Handles a value that could not be read. Before the reset, the encoder may still be storing the result of an earlier one.
     fn unread<T>(&mut self, error: Error, ready_ns: u64) -> Step<T> {
         self.tries = self.tries.saturating_add(1);
         let before = self.phase == Phase::Before;
@@ -112,7 +113,7 @@ impl Witness {
         Step::Failed { error, ready_ns }
     }
 
-    /// What the value after the requests says of them.
+    /// Returns what the value after the requests says about them.
     fn judge(&self, act: Result<(), ErrorClass>, now: u32, near: impl Fn(u32, u32) -> bool) -> Result<(), Error> {
         let because = act.err().unwrap_or(ErrorClass::DataMismatch);
         let unmoved = near(self.before, now);

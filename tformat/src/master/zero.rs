@@ -10,16 +10,17 @@ use crate::response::Response;
 /// the position again. **This shifts the commutation angle of the motor**, see
 /// [`Reset::set_single_turn_zero_and_shift_commutation_angle`].
 ///
-/// The shaft has to stand still. The result is the position read afterwards, within the tolerance of 0. Otherwise it
+/// The shaft must stand still. The result is the position read afterwards, within the tolerance of 0. Otherwise it
 /// ends with
 ///
 /// * [`Error::NotDone`]: the position is what it was before;
-/// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it says nothing: it was at zero before, or is
-///   neither there nor where it was;
+/// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it is inconclusive: it was at zero before, or is
+/// now neither there nor where it was;
 /// * the error of the exchange, if the position could not be read before: nothing was sent.
 ///
-/// It judges by the two positions alone, so it may begin after any past: an attempt that was broken off, a controller that has
-/// started anew, another master. ID 8 is sent at most ten times. Once done or failed it stays so, until it is started again.
+/// The result is judged by the two positions alone, so the procedure may follow any history: an abandoned attempt, a controller
+/// that has restarted, another master. ID 8 is sent at most ten times. A procedure that is done or has failed stays so until it
+/// is restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SingleTurnZero {
@@ -30,13 +31,13 @@ pub struct SingleTurnZero {
 }
 
 impl SingleTurnZero {
-    /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
+    /// Creates the procedure. `tolerance` is how far from zero, in counts, the shaft may appear to be afterwards.
     pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
         Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn), end: None }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
         self.end = None;
         self.witness.start(now_ns)
