@@ -46,6 +46,9 @@ impl Frame {
     /// Bytes that hold the line bits of the longest frame: 110 bits in 14 bytes.
     pub const MAX_LINE_BYTES: usize = 14;
 
+    /// No field at all, which no frame of a line has.
+    pub(crate) const NONE: Self = Self { bytes: [0; Self::MAX_FIELDS], len: 0 };
+
     /// A frame of 1 field.
     pub(crate) const fn of1(a: u8) -> Self {
         Self { bytes: [a, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], len: 1 }
@@ -82,6 +85,11 @@ impl Frame {
     /// The data bytes as a UART sends and receives them, in line order.
     pub fn as_bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
+    }
+
+    /// All eleven bytes: the data bytes, then zeros. A copy of constant length, for firmware.
+    pub const fn to_array(self) -> [u8; Self::MAX_FIELDS] {
+        self.bytes
     }
 
     /// The first data byte: the control field.

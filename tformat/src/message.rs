@@ -144,7 +144,7 @@ impl AllData {
         }
     }
 
-    const fn of(b: &[u8; Self::FIELDS]) -> Self {
+    pub(crate) const fn of(b: &[u8; Self::FIELDS]) -> Self {
         let [_, sf, a0, a1, a2, enid, m0, m1, m2, almc, _] = *b;
         Self {
             sf: StatusField::from_bits_retain(sf),
@@ -157,7 +157,7 @@ impl AllData {
 }
 
 /// Returns whether eleven fields are an ID 3 frame with a good check field: the whole good path in four loads.
-const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
+pub(crate) const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10] = *b;
     let sum = u32::from_le_bytes([b0, b1, b2, b3])
         ^ u32::from_le_bytes([b4, b5, b6, b7])

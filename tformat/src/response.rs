@@ -5,7 +5,7 @@ use crate::count::{Abm, Abs};
 use crate::data_id::DataId;
 use crate::error::Error;
 use crate::frame::{Frame, faults4, faults6, unpack};
-use crate::message::{AllData, CF3, Identification, Memory, MultiTurn, SingleTurn, refusal};
+use crate::message::{AllData, CF3, Identification, Memory, MultiTurn, SingleTurn, is_sound, refusal};
 use crate::request::Request;
 use crate::status::StatusField;
 
@@ -67,7 +67,10 @@ impl Response {
         let id = request.data_id();
         let cf = id.control_field().get();
         match id {
-            DataId::ReadAll => AllData::parse(bytes).map(Self::ReadAll),
+            DataId::ReadAll => match bytes.first_chunk() {
+                Some(b) if is_sound(b) => Ok(Self::ReadAll(AllData::of(b))),
+                _ => Err(refusal(id, bytes)),
+            },
             DataId::ReadEncoderId | DataId::WriteEeprom | DataId::ReadEeprom => match bytes.first_chunk() {
                 Some(&b @ [b0, b1, b2, b3]) if b0 == cf && b0 ^ b1 ^ b2 ^ b3 == 0 => Self::of4(request, b),
                 _ => Err(refusal(id, bytes)),

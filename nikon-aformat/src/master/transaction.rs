@@ -77,18 +77,21 @@ pub struct Transaction {
 impl Transaction {
     /// No request and no response: a place for [`restart`](Self::restart). It counts as a transaction that ended with
     /// [`Error::NoResponse`], and its line is free at any time.
-    pub const IDLE: Self = Self {
-        request: NOTHING,
-        expected: Expected::new(Layout::Abs40, Command::Abs40),
-        line: Line::new(BitRate::Mbit2_5),
-        hunt: Hunt::new(0),
-        start_ns: 0,
-        asked_ns: 0,
-        until_ns: 0,
-        refused: None,
-        end: Some(Err(Error::NoResponse)),
-        ready_ns: 0,
-    };
+    #[inline]
+    pub const fn idle() -> Self {
+        Self {
+            request: NOTHING,
+            expected: Expected::new(Layout::Abs40, Command::Abs40),
+            line: Line::new(BitRate::Mbit2_5),
+            hunt: Hunt::new(0),
+            start_ns: 0,
+            asked_ns: 0,
+            until_ns: 0,
+            refused: None,
+            end: Some(Err(Error::NoResponse)),
+            ready_ns: 0,
+        }
+    }
 
     /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `start_ns`.
     ///
@@ -225,7 +228,8 @@ pub struct BusTransaction {
 
 impl BusTransaction {
     /// Nobody was asked: a place for [`restart`](Self::restart). It counts as one that has ended, and its line is free at any time.
-    pub const IDLE: Self = {
+    #[inline]
+    pub const fn idle() -> Self {
         let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
         Self {
             request: NOTHING,
@@ -241,7 +245,7 @@ impl BusTransaction {
             refused: None,
             ready_ns: 0,
         }
-    };
+    }
 
     /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `start_ns`.
     ///

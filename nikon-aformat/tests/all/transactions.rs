@@ -399,7 +399,7 @@ fn cycles() {
 fn a_transaction_begins_anew_in_its_place() {
     let (resolution, line) = (Resolution::default(), Line::new(BitRate::Mbit4));
     let one = Request::new(ea(0), Operation::Abs40);
-    let mut place = Transaction::IDLE;
+    let mut place = Transaction::idle();
     assert_eq!(place.poll(u64::MAX), Progress::Failed { error: Error::NoResponse, ready_ns: 0 });
     let data = Data::Abs40 { abs: U40::truncate(77) };
     let answer = Response::new(ea(0), Command::Abs40, EncoderStatus::empty(), data).emit().units();
@@ -413,7 +413,7 @@ fn a_transaction_begins_anew_in_its_place() {
         assert_eq!((heard, place.until_ns(), place), (Some(Ok(value)), ready_ns, new));
     }
     let all = Request::new(EncoderAddress::truncate(1), Operation::Abs40Mt);
-    let mut place = BusTransaction::IDLE;
+    let mut place = BusTransaction::idle();
     assert_eq!(place.poll(u64::MAX), Progress::Done { value: (), ready_ns: 0 });
     for start_ns in [0, 1_000_000] {
         place.restart(all, resolution, Addresses::first(2), line, start_ns);

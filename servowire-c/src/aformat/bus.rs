@@ -103,7 +103,7 @@ pub extern "C" fn sw_aformat_init(
         let state = Master {
             line,
             resolution,
-            transaction: BusTransaction::IDLE,
+            transaction: BusTransaction::idle(),
             asked: false,
             evidence: [Evidence::NEVER; 8],
         };

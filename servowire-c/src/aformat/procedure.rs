@@ -97,7 +97,7 @@ fn begin(
 ) -> Result<sw_result_t, Refused> {
     let (now_ns, (line, resolution)) = (time(now_ns)?, sw_aformat_t::look(m)?.idle()?);
     let next = Step::Done { value: 0, ready_ns: now_ns };
-    let transaction = Transaction::IDLE;
+    let transaction = Transaction::idle();
     let mut procedure = Procedure { kind, line, resolution, transaction, next, asked: false, found: None };
     procedure.start(now_ns);
     sw_aformat_procedure_t::start(p, procedure)?;

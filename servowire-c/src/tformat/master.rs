@@ -113,16 +113,14 @@ impl Master {
             return Err(error(*refusal));
         }
         let transmission = self.transaction.transmission();
-        let mut bytes = [0; 4];
-        for (to, from) in bytes.iter_mut().zip(transmission.frame.as_bytes()) {
-            *to = *from;
-        }
+        // A request has four fields at most.
+        let [a, b, c, d, ..] = transmission.frame.to_array();
         to_send.write(sw_tformat_transmission_t {
             start_ns: transmission.start_ns,
             end_ns: transmission.end_ns,
             driver_on_ns: transmission.driver_on_ns,
             driver_off_ns: transmission.driver_off.latest_ns,
-            bytes,
+            bytes: [a, b, c, d],
             len: transmission.frame.fields(),
         });
         Ok(sw_code_t::SW_SEND as sw_result_t)
@@ -132,6 +130,13 @@ impl Master {
     #[inline(always)]
     fn told(&mut self) -> Result<&mut Transaction, Refused> {
         if self.asked { Ok(&mut self.transaction) } else { Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) }
+    }
+
+    /// Out of line: what the caller is refused for costs no frame on the stack.
+    #[inline(never)]
+    fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Result<sw_result_t, Refused> {
+        self.told()?.push(bytes, end_ns);
+        self.result()
     }
 
     /// What became of it, and the position that came of it. Out of line: three functions need it.
@@ -174,7 +179,7 @@ pub extern "C" fn sw_tformat_init(
             line,
             resolution,
             tolerated: Almc::empty(),
-            transaction: Transaction::IDLE,
+            transaction: Transaction::idle(),
             asked: false,
             evidence: Evidence::NEVER,
         };
@@ -305,9 +310,7 @@ pub unsafe extern "C" fn sw_tformat_hear(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let end_ns = time(end_ns)?;
-        let m = sw_tformat_t::get(m)?;
-        m.told()?.push(bytes, end_ns);
-        m.result()
+        sw_tformat_t::get(m)?.hear(bytes, end_ns)
     })
 }
 

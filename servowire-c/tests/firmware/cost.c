@@ -79,8 +79,8 @@ int main(void)
     (void)sw_clock_start(&clk, 170000000, 0);
     cost("typed parse of ID 3", parse_all, 58);
     cost("typed parse of ID 0", parse_single, 46);
-    cost("generic parse of ID 3", parse_any, 132);
-    cost("exchange: read and hear", exchange, 600);
+    cost("generic parse of ID 3", parse_any, 126);
+    cost("exchange: read and hear", exchange, 540);
     cost("angle, judged", judged, 64);
     cost("clock", clock_ns, 34);
     return worst | (all_data.abs != 3915817) | (single_data.abs != 1883572) | (sink < 0);

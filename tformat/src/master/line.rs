@@ -36,6 +36,18 @@ pub struct Line {
 }
 
 impl Line {
+    /// No line: the settings of a transaction that has not begun.
+    pub(super) const NONE: Self = Self {
+        rate: BitRate::Mbit2_5,
+        echo: false,
+        response_timeout_ns: 0,
+        field_timeout_ns: 0,
+        turn_around_ns: 0,
+        hand_over_ns: 0,
+        driver_lead_ns: 0,
+        sampling_ns: 0,
+    };
+
     /// Creates a line without echo and with the default times.
     pub const fn new(rate: BitRate) -> Self {
         let turn_around_ns = rate.bit_ns().saturating_mul(4);

@@ -7,7 +7,7 @@ use crate::message::{CF3, refusal};
 use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
-use crate::timing::BitRate;
+use crate::status::StatusField;
 
 /// A response that has passed all checks, and when its position was sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,6 +79,8 @@ pub struct Transaction {
     line: Line,
     /// Fields of the response.
     fields: u8,
+    /// A field on the line.
+    field_ns: u32,
     start_ns: u64,
     /// The end of the request's last bit.
     asked_ns: u64,
@@ -106,18 +108,20 @@ macro_rules! begin {
     ($place:expr, $request:ident, $line:ident, $start_ns:ident) => {
         let frame = $request.emit();
         let asked_ns = $start_ns.saturating_add($line.rate.fields_ns(frame.fields()).into());
-        let field_ns = u64::from($line.rate.fields_ns(1));
+        let field_ns = $line.rate.fields_ns(1);
+        // Sums of a few u32 first: one addition that may saturate, not several.
         let wait_ns = u64::from($line.response_timeout_ns).saturating_add($line.hand_over_ns.into());
-        let waited_ns = asked_ns.saturating_add(wait_ns);
-        let ends = !$line.leaves_time();
+        let waited_ns = asked_ns.saturating_add(wait_ns.saturating_add(field_ns.into()));
+        let begins_ns = u64::from($line.turn_around_ns).saturating_add(field_ns.into());
         $place = Transaction {
             request: $request,
             frame,
             line: $line,
             fields: $request.data_id().response_fields(),
+            field_ns,
             start_ns: $start_ns,
             asked_ns,
-            earliest_ns: asked_ns.saturating_add($line.turn_around_ns.into()).saturating_add(field_ns),
+            earliest_ns: asked_ns.saturating_add(begins_ns),
             received: [0; Frame::MAX_FIELDS],
             len: 0,
             echoed: 0,
@@ -125,39 +129,49 @@ macro_rules! begin {
             refused: None,
             broken: false,
             heard_ns: asked_ns,
-            until_ns: if ends { $start_ns } else { waited_ns.saturating_add(field_ns) },
-            end: if ends { Some(Err(Error::Line)) } else { None },
+            until_ns: waited_ns,
+            end: None,
         };
+        if !$line.leaves_time() {
+            $place.until_ns = $start_ns;
+            $place.end = Some(Err(Error::Line));
+        }
     };
 }
 
 impl Transaction {
     /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that ended
     /// with [`Error::NoResponse`], and its line is free at any time.
-    pub const IDLE: Self = Self {
-        request: Request::ReadAll,
-        frame: Request::ReadAll.emit(),
-        line: Line::new(BitRate::Mbit2_5),
-        fields: 11,
-        start_ns: 0,
-        asked_ns: 0,
-        earliest_ns: 0,
-        received: [0; Frame::MAX_FIELDS],
-        len: 0,
-        echoed: 0,
-        echo_fault: None,
-        refused: None,
-        broken: false,
-        heard_ns: 0,
-        until_ns: 0,
-        end: Some(Err(Error::NoResponse { echo: false })),
-    };
+    ///
+    /// Nearly all of it is 0. It is a function and not a constant, so that firmware clears the memory and keeps no copy in flash.
+    #[inline]
+    pub const fn idle() -> Self {
+        Self {
+            request: Request::ReadSingleTurn,
+            frame: Frame::NONE,
+            line: Line::NONE,
+            fields: 0,
+            field_ns: 0,
+            start_ns: 0,
+            asked_ns: 0,
+            earliest_ns: 0,
+            received: [0; Frame::MAX_FIELDS],
+            len: 0,
+            echoed: 0,
+            echo_fault: None,
+            refused: None,
+            broken: false,
+            heard_ns: 0,
+            until_ns: 0,
+            end: Some(Err(Error::NoResponse { echo: false })),
+        }
+    }
 
     /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
     ///
     /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing may be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
-        let it;
+        let mut it;
         begin!(it, request, line, start_ns);
         it
     }
@@ -204,11 +218,8 @@ impl Transaction {
         if !fits || end_ns.saturating_sub(self.fields_ns(bytes.len().saturating_sub(1))) < self.earliest_ns {
             return false;
         }
-        let outcome = Response::parse(self.request, bytes);
-        if outcome.is_err() {
-            return false;
-        }
-        self.found(&outcome, end_ns, bytes.len());
+        let Ok(response) = Response::parse(self.request, bytes) else { return false };
+        self.found(&response, end_ns, bytes.len());
         self.until_ns = end_ns;
         true
     }
@@ -220,8 +231,8 @@ impl Transaction {
             self.take(*byte, end_ns.saturating_sub(self.fields_ns(after.len())), after);
         }
         self.heard_ns = end_ns;
-        if self.end.is_none() && self.len == 0 {
-            self.end = self.refused.map(Err);
+        if self.len == 0 {
+            self.refuse();
         }
         if self.end.is_some() {
             self.finish();
@@ -290,7 +301,7 @@ impl Transaction {
     }
 
     fn fields_ns(&self, fields: usize) -> u64 {
-        u64::from(self.line.rate.fields_ns(1)).saturating_mul(fields as u64)
+        u64::from(self.field_ns).saturating_mul(fields as u64)
     }
 
     /// Takes one more byte, which ended at `ended_ns` at the latest; these came after it in the same block.
@@ -333,6 +344,7 @@ impl Transaction {
 
     /// Returns whether the second byte shows that the first was the end of an echo: in place of SF there is a control field,
     /// whose low bits are never 0, while the information bits of SF always are.
+    #[inline(never)]
     const fn contradicts(&self, first: u8, second: u8) -> bool {
         let eeprom = matches!(self.request, Request::ReadEeprom { .. } | Request::WriteEeprom { .. });
         (first == CF3 || !eeprom) && self.begins_a_response(second)
@@ -359,32 +371,39 @@ impl Transaction {
             }
             let fields = heard.len();
             let fresh = ended_ns.saturating_sub(self.fields_ns(fields.saturating_sub(1))) >= self.earliest_ns;
-            let outcome = Response::parse(self.request, heard);
-            if fresh && is_sound(&outcome) {
-                self.found(&outcome, ended_ns, fields);
-                return;
-            }
-            if let (Err(error), None) = (outcome, self.refused) {
-                self.refused = Some(error);
+            match Response::parse(self.request, heard) {
+                Ok(response) if fresh => return self.found(&response, ended_ns, fields),
+                Err(Error::Rejected { sf }) if fresh => return self.rejected(sf),
+                Err(error) if self.refused.is_none() => self.refused = Some(error),
+                _ => {}
             }
             self.drop_first();
         }
     }
 
-    /// Returns the length in fields of a valid response or of a refusal. Kept out of line, because blocks and single bytes both
-    /// come here.
+    /// Takes a valid response of this many fields. Kept out of line, because blocks and single bytes both come here.
     #[inline(never)]
-    fn found(&mut self, outcome: &Result<Response, Error>, ended_ns: u64, fields: usize) {
+    fn found(&mut self, response: &Response, ended_ns: u64, fields: usize) {
         self.len = 0;
-        self.end = Some(match *outcome {
-            _ if self.end.is_some() => Err(Error::TwoResponses),
-            Ok(response) => Ok(Exchange {
-                response,
-                sampled_ns: self.asked_ns.saturating_add(self.line.sampling_ns.into()),
-                began_ns: ended_ns.saturating_sub(self.fields_ns(fields)),
-            }),
-            Err(error) => Err(error),
-        });
+        if self.end.is_some() {
+            return self.end = Some(Err(Error::TwoResponses));
+        }
+        self.end = Some(Ok(Exchange {
+            response: *response,
+            sampled_ns: self.asked_ns.saturating_add(self.line.sampling_ns.into()),
+            began_ns: ended_ns.saturating_sub(self.fields_ns(fields)),
+        }));
+    }
+
+    /// A whole refusal by the encoder.
+    #[cold]
+    #[inline(never)]
+    fn rejected(&mut self, sf: StatusField) {
+        self.len = 0;
+        if self.end.is_some() {
+            return self.end = Some(Err(Error::TwoResponses));
+        }
+        self.end = Some(Err(Error::Rejected { sf }));
     }
 
     /// Drops the first byte and all bytes up to the next one with which a response may begin.
@@ -403,26 +422,37 @@ impl Transaction {
     /// Handles the end of reception: nothing more will come.
     #[cold]
     fn give_up(&mut self) {
-        let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-        let error = match (self.refused, heard, self.echo_fault) {
-            (Some(error), ..) => error,
-            _ if self.broken => Error::Delimiter { field: 0 },
-            (None, [], Some(got)) if self.line.echo => {
-                let want = self.frame.as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
-                Error::EchoMismatch { at: self.echoed, got, want }
-            }
-            (None, [], _) => Error::NoResponse { echo: self.echoed == self.frame.fields() },
-            // There are fewer bytes than a response has.
-            (None, heard, _) => refusal(self.request.data_id(), heard),
-        };
+        if self.refused.is_none() {
+            self.refused = Some(self.reason());
+        }
         while self.len > 0 && self.end.is_none() {
             self.drop_first();
             self.judge(self.heard_ns, &[]);
         }
-        if self.end.is_none() {
+        self.refuse();
+        self.finish();
+    }
+
+    /// Why what was heard until the time was over is no response.
+    fn reason(&self) -> Error {
+        let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
+        match (heard, self.echo_fault) {
+            _ if self.broken => Error::Delimiter { field: 0 },
+            ([], Some(got)) if self.line.echo => {
+                let want = self.frame.as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
+                Error::EchoMismatch { at: self.echoed, got, want }
+            }
+            ([], _) => Error::NoResponse { echo: self.echoed == self.frame.fields() },
+            // There are fewer bytes than a response has.
+            _ => refusal(self.request.data_id(), heard),
+        }
+    }
+
+    /// Ends with what was refused, if nothing else was found.
+    fn refuse(&mut self) {
+        if let (Some(error), None) = (self.refused, self.end) {
             self.end = Some(Err(error));
         }
-        self.finish();
     }
 
     /// It has ended. After an error the line is free when the longest response would have ended if it had begun as late as it
@@ -431,8 +461,8 @@ impl Transaction {
     fn finish(&mut self) {
         self.until_ns = self.heard_ns;
         if let Some(Err(_)) = self.end {
-            let over_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
-            self.until_ns = over_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS)).max(self.heard_ns);
+            let longest_ns = u64::from(self.line.response_timeout_ns).saturating_add(self.fields_ns(Frame::MAX_FIELDS));
+            self.until_ns = self.asked_ns.saturating_add(longest_ns).max(self.heard_ns);
         }
     }
 }

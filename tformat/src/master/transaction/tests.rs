@@ -169,7 +169,7 @@ fn a_whole_block_ends_as_its_bytes_do() {
 /// In the same place as in a new one, after whatever was before; nothing was asked before the first.
 #[test]
 fn a_transaction_begins_anew_in_its_place() {
-    let mut place = Transaction::IDLE;
+    let mut place = Transaction::idle();
     let free = Progress::Failed { error: Error::NoResponse { echo: false }, ready_ns: 0 };
     assert_eq!((place.hear(&RESPONSE, 31_000), place.poll(u64::MAX)), (free, free));
     for (begin_ns, line) in [(0, LINE), (100_000, LINE.with_echo()), (200_000, LINE.with_turn_around_ns(10_001))] {
