@@ -9,7 +9,8 @@ use crate::raw_response::RawResponse;
 use crate::response::refusal;
 use crate::status::EncoderStatus;
 
-/// The response with the whole position, decoded from its line bits in the fewest instructions: for the interrupt of a drive.
+/// The response with the whole position, decoded from its line bits in the fewest instructions, for use in the interrupt of a
+/// drive.
 ///
 /// ```text
 ///  line bits  0 ........ 17 | 18 ....... 35 | 36 ....... 53 | 54 ....... 71
@@ -19,7 +20,7 @@ use crate::status::EncoderStatus;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Abs40 {
-    /// EA: who answers.
+    /// EA: the encoder that answers.
     pub ea: EncoderAddress,
     /// ES.
     pub es: EncoderStatus,
@@ -31,10 +32,10 @@ impl Abs40 {
     /// Bytes that hold the line bits of the response.
     pub const LINE_BYTES: usize = 9;
 
-    /// Decodes the response from its 72 line bits, the first of them at the beginning of `line`. `expected` is of layout
+    /// Decodes the response from its 72 line bits, the first one at the start of `line`. `expected` is of layout
     /// [`Layout::Abs40`]; its address and command are checked.
     ///
-    /// For a window at another bit offset see [`Response::parse_line`](crate::Response::parse_line), which gives the same.
+    /// For a window at another bit offset see [`Response::parse_line`](crate::Response::parse_line), which returns the same.
     ///
     /// # Errors
     /// As [`Response::parse_line`](crate::Response::parse_line).
@@ -46,7 +47,8 @@ impl Abs40 {
         }
     }
 
-    /// Decodes the response from its four frames, the 16 content bits of each in a word; words after them are left alone. `expected` is of layout
+    /// Decodes the response from its four frames, the 16 content bits of each in a word; words after them are ignored.
+    /// `expected` is of layout
     /// [`Layout::Abs40`]; its address and command are checked.
     ///
     /// # Errors
@@ -58,7 +60,7 @@ impl Abs40 {
         }
     }
 
-    /// From four words of line bits, the first bit in bit 0 of the first; `None` if any check fails.
+    /// Decodes four words of line bits, the first bit in bit 0 of the first word; `None` if any check fails.
     #[inline(always)]
     fn of_line(expected: &Expected, line: u128) -> Option<Self> {
         let (contents, wrong) = sound_four(line);
@@ -77,7 +79,7 @@ impl Abs40 {
         Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) }
     }
 
-    /// The 72 line bits of the response to the command that `expected` names.
+    /// The 72 line bits of the response to the command in `expected`.
     ///
     /// ```
     /// use nikon_aformat::{Abs40, BitOrder, Command, EncoderAddress, EncoderStatus, Expected, Layout, U40};
@@ -116,7 +118,7 @@ const fn low_byte(word: u32) -> u8 {
     word as u8
 }
 
-/// Off the hot path: why a response is refused.
+/// Returns why a response is refused; off the hot path.
 #[cold]
 #[inline(never)]
 fn line_refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> Error {

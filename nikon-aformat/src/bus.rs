@@ -4,9 +4,9 @@
 //!  line, time →   request | response of encoder 0 | gap | response of encoder 1 | gap | ...
 //! ```
 //!
-//! Every encoder sends a whole response with a CRC-8 of its own, one after the other. Ascending order is what everybody
-//! assumes and no document says, so a response is taken for the encoder that its information field names. A response
-//! that is missing, damaged, doubled or uncalled for is reported and costs nothing but itself.
+//! The encoders send their responses one after the other, each with its own CRC-8. All known masters assume ascending order, but
+//! no document says so; a response is therefore assigned to the encoder that its information field names. A response that is
+//! missing, damaged, duplicated or unrequested is reported and affects no other response.
 //!
 //! ```
 //! use nikon_aformat::bus::{Addresses, Outcome, Bus};
@@ -31,7 +31,7 @@ use crate::number::EncoderAddress;
 use crate::raw_response::RawResponse;
 use crate::response::Response;
 
-/// A set of encoder addresses. It prints as a list: `0 2 7`, `-` for none.
+/// A set of encoder addresses. It is displayed as a list: `0 2 7`, or `-` for the empty set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -44,17 +44,17 @@ impl Addresses {
     /// All eight.
     pub const ALL: Self = Self(0xff);
 
-    /// A set from its bits, address 0 in bit 0.
+    /// Creates a set from its bits, address 0 in bit 0.
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
     }
 
-    /// The bits, address 0 in bit 0.
+    /// Returns the bits, address 0 in bit 0.
     pub const fn bits(self) -> u8 {
         self.0
     }
 
-    /// The `count` lowest addresses; all eight above 7.
+    /// Creates a set of the `count` lowest addresses; all eight if `count` is above 7.
     pub const fn first(count: u8) -> Self {
         match 1_u8.checked_shl(count as u32) {
             Some(bit) => Self(bit.wrapping_sub(1)),
@@ -67,17 +67,17 @@ impl Addresses {
         self.0 >> ea.get() & 1 == 1
     }
 
-    /// With the address.
+    /// Adds an address.
     pub const fn with(self, ea: EncoderAddress) -> Self {
         Self(self.0 | 1_u8.wrapping_shl(ea.get() as u32))
     }
 
-    /// Without the addresses of another set.
+    /// Removes the addresses of another set.
     pub const fn without(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
 
-    /// How many there are.
+    /// The number of addresses.
     #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
     pub const fn len(self) -> u8 {
         self.0.count_ones() as u8
@@ -97,7 +97,7 @@ impl Addresses {
         }
     }
 
-    /// The addresses from the lowest up.
+    /// Iterates over the addresses in ascending order.
     pub fn iter(self) -> impl Iterator<Item = EncoderAddress> {
         EncoderAddress::ALL.into_iter().filter(move |ea| self.contains(*ea))
     }
@@ -109,18 +109,18 @@ servowire_core::listed!(Addresses { |addresses| addresses.iter() => "{}" });
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
-    /// Nothing good, and nothing was asked for.
+    /// No good response, and none was requested.
     NotAsked,
     /// One good response.
     Good(Response),
-    /// A good response from an address that was not asked.
+    /// A good response from an address that was not requested.
     Extra(Response),
-    /// Two good responses or more: two encoders have the same address, or one has been given a wrong one.
+    /// Two or more good responses: two encoders have the same address, or one has been given the wrong address.
     Duplicate {
-        /// The first of them.
+        /// The first one.
         first: Response,
     },
-    /// No good response. If damaged ones came, one of them may have been this encoder's: see [`Bus::damaged`].
+    /// No good response. If damaged responses came, one of them may have come from this encoder: see [`Bus::damaged`].
     Missing,
 }
 
@@ -137,11 +137,11 @@ servowire_core::one_line!(Outcome {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Verdict {
-    /// The response, all checks passed, or why it was refused.
+    /// The response with all checks passed, or why it was refused.
     pub outcome: Result<Response, Error>,
     /// Whether a good response from this address came before.
     pub duplicate: bool,
-    /// Whether this address was not asked.
+    /// Whether this address was not requested.
     pub extra: bool,
 }
 
@@ -154,7 +154,7 @@ pub struct Bus {
     good: [Option<Response>; 8],
     heard: Addresses,
     doubled: Addresses,
-    /// Good responses from addresses that had been heard already.
+    /// Number of good responses from addresses that had already been heard.
     repeated: u8,
     damaged: u8,
 }
@@ -165,7 +165,7 @@ impl Bus {
         &self.expected
     }
 
-    /// Responses of this kind are expected from these addresses.
+    /// Expects responses of this kind from these addresses.
     pub const fn new(expected: Expected, asked: Addresses) -> Self {
         let expected = expected.any_address();
         Self {
@@ -179,26 +179,26 @@ impl Bus {
         }
     }
 
-    /// A response has arrived, or was cut or broken.
+    /// Takes a response that has arrived, or the fault of one that was cut off or broken.
     pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Verdict {
         self.take(raw.and_then(|raw| Response::parse(&self.expected, &raw)))
     }
 
-    /// A response has arrived as words, the content bits of one frame each.
+    /// Takes a response as words, each with the content bits of one frame.
     #[inline(always)]
     pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         self.take(Response::parse_words(&self.expected, words, order))
     }
 
-    /// The words of a response that [`Abs40`] decodes, for a bus on which only positions are requested: it costs less flash than
-    /// [`push_words`](Self::push_words), which knows all layouts.
+    /// Takes the words of a response that [`Abs40`] decodes, for a bus on which only positions are requested: it takes less
+    /// flash than [`push_words`](Self::push_words), which knows all layouts.
     pub fn push_abs40(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         let outcome = Abs40::parse_words(&self.expected, words, order);
         let command = self.expected.command();
         self.take(outcome.map(|Abs40 { ea, es, abs }| Response::new(ea, command, es, Data::Abs40 { abs })))
     }
 
-    /// A response that was judged already.
+    /// Takes a response that has already been judged.
     #[inline(always)]
     pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Verdict {
         let (mut duplicate, mut extra) = (false, false);
@@ -219,7 +219,8 @@ impl Bus {
         Verdict { outcome, duplicate, extra }
     }
 
-    /// The good response of this address was not one: it was made of frames of two, with a CRC-8 that was right by chance.
+    /// Withdraws the good response of this address: it was made up of frames of two responses, with a CRC-8 that was right by
+    /// chance.
     pub(crate) fn withdraw(&mut self, ea: EncoderAddress) {
         if let Some(place) = self.good.get_mut(usize::from(ea.get() & 7)) {
             *place = None;
@@ -228,7 +229,7 @@ impl Bus {
         }
     }
 
-    /// What came from this address.
+    /// What arrived from this address.
     pub fn of(&self, ea: EncoderAddress) -> Outcome {
         match self.good.get(usize::from(ea.get())).copied().flatten() {
             Some(first) if self.doubled.contains(ea) => Outcome::Duplicate { first },
@@ -239,7 +240,7 @@ impl Bus {
         }
     }
 
-    /// The good response of this address, if there is exactly one and it was asked for.
+    /// Returns the good response of this address, if there is exactly one and it was requested.
     pub fn response(&self, ea: EncoderAddress) -> Option<Response> {
         match self.of(ea) {
             Outcome::Good(response) => Some(response),
@@ -247,47 +248,47 @@ impl Bus {
         }
     }
 
-    /// The addresses that were asked.
+    /// The addresses that were requested.
     pub const fn asked(&self) -> Addresses {
         self.asked
     }
 
-    /// The addresses that sent a good response, asked or not.
+    /// The addresses that sent a good response, requested or not.
     pub(crate) const fn heard(&self) -> Addresses {
         self.heard
     }
 
-    /// The addresses that were asked and sent no good response.
+    /// The addresses that were requested and sent no good response.
     pub const fn missing(&self) -> Addresses {
         self.asked.without(self.heard)
     }
 
-    /// The addresses that sent two good responses or more.
+    /// The addresses that sent two or more good responses.
     pub const fn duplicates(&self) -> Addresses {
         self.doubled
     }
 
-    /// The addresses that sent a good response and were not asked.
+    /// The addresses that sent a good response but were not requested.
     pub const fn extra(&self) -> Addresses {
         self.heard.without(self.asked)
     }
 
-    /// Responses that arrived, good or not.
+    /// Number of responses that arrived, good or not.
     pub const fn arrived(&self) -> u8 {
         self.heard.len().saturating_add(self.repeated).saturating_add(self.damaged)
     }
 
-    /// Responses that were refused; their address cannot be trusted.
+    /// Number of responses that were refused; their addresses cannot be trusted.
     pub const fn damaged(&self) -> u8 {
         self.damaged
     }
 
-    /// How many fewer responses arrived than were requested, good or not: this many never started.
+    /// How many fewer responses, good or not, arrived than were requested: this many never started.
     pub const fn not_started(&self) -> u8 {
         self.asked.len().saturating_sub(self.arrived())
     }
 
-    /// Returns whether every address that was asked has sent a good response.
+    /// Returns whether every requested address has sent a good response.
     pub(crate) const fn heard_all(&self) -> bool {
         self.missing().is_empty()
     }

@@ -1,9 +1,10 @@
 use crate::layout::Layout;
 
 servowire_core::codes! {
-    /// What a request asks for: the command codes (CC) 0 to 30. Code 31 is unassigned.
+    /// The command codes (CC) 0 to 30, which say what a request asks for. Code 31 is unassigned.
     ///
-    /// MT in the names is "multiple transmission", several encoders answer one request; it has nothing to do with turns.
+    /// MT in the names stands for "multiple transmission", where several encoders answer one request; it has nothing to do with
+    /// turns.
     #[non_exhaustive]
     pub enum Command: u8 {
         /// Reads the whole position, single turn and turns.
@@ -86,7 +87,7 @@ impl Command {
         }
     }
 
-    /// Returns whether several encoders answer one request, each with a response of its own.
+    /// Returns whether several encoders answer one request, each with its own response.
     pub const fn is_multi_response(self) -> bool {
         matches!(
             self,
@@ -114,12 +115,12 @@ impl Command {
         )
     }
 
-    /// How often the request is sent: 8 for the resets, else 1.
+    /// How many times the request is sent: 8 for resets, otherwise 1.
     pub const fn repeats(self) -> u8 {
         if self.is_reset() { 8 } else { 1 }
     }
 
-    /// What a reset does to the encoder, in words for a log.
+    /// Describes what a reset does to the encoder, for a log.
     pub const fn effect(self) -> Option<&'static str> {
         match self {
             Self::ClearStatus => Some("clears alarms"),
@@ -133,20 +134,20 @@ impl Command {
 
     /// Returns whether the response comes from the encoder that the request addresses.
     ///
-    /// Not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), and
-    /// for those that change the address (11, 20): whether their response shows the old or the new one is not documented.
+    /// This is not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), or for
+    /// those that change the address (11, 20): it is not documented whether their response shows the old or the new one.
     pub const fn answers_with_own_address(self) -> bool {
         !self.is_multi_response()
             && !matches!(self, Self::SetAddress1 | Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2)
     }
 
-    /// Whether the response carries neither the command code nor the four status bits: commands 21 and 22.
+    /// Returns whether the response carries neither the command code nor the four status bits, as for commands 21 and 22.
     pub const fn has_short_information(self) -> bool {
         matches!(self, Self::Abs17 | Self::Abs17Mt)
     }
 
-    /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
-    /// no resolution at hand. Both are the same if there is only one.
+    /// Returns the two layouts in which the command may be answered, that of version 2.1 first, for tools that know neither the
+    /// request nor the resolution. Both are the same if there is only one.
     pub const fn layouts(self) -> [Layout; 2] {
         let only = match self {
             Self::Abs24Low | Self::Abs24LowMt => return [Layout::Abs24, Layout::Abs40Vel],
@@ -172,10 +173,10 @@ impl Command {
     }
 }
 
-/// Version of the protocol that an encoder speaks.
+/// The protocol version of an encoder.
 ///
-/// Version 3.0 adds velocity, acceleration, EEPROM banks, predictive maintenance and a second sensor unit. It is known
-/// from one vendor's driver sources alone; no capture of it was published.
+/// Version 3.0 adds velocity, acceleration, EEPROM banks, predictive maintenance and a second sensor unit. It is known only from
+/// one vendor's driver sources; no capture of it has been published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -188,7 +189,7 @@ pub enum Version {
 }
 
 impl Version {
-    /// Both, the older one first.
+    /// Both versions, the older one first.
     pub const ALL: [Self; 2] = [Self::V2_1, Self::V3_0];
 
     /// `2.1` or `3.0`.

@@ -3,12 +3,12 @@ use nrz_line::{BitOrder, Window};
 use crate::crc::next;
 use crate::layout::{DELIMITER, FRAME_BITS, MAX_FRAMES, START};
 
-/// The content bits of a response, 16 a frame and back to back, in the words of a 32-bit core: the first of the line in bit 0 of
-/// the first word. What stands after the last frame is 0.
+/// The content bits of a response, 16 per frame and back to back, in the words of a 32-bit core: the first on the line in bit 0
+/// of the first word. Everything after the last frame is 0.
 pub(crate) type Contents = [u32; 3];
 
-/// A response of `FRAMES` frames. Because the compiler knows the number, every mask and every shift is a constant and there is no
-/// loop: as fast at any level of optimisation.
+/// A response of `FRAMES` frames. Because the compiler knows the number, every mask and every shift is a constant and there is
+/// no loop, so it is equally fast at any optimisation level.
 struct Of<const FRAMES: usize>;
 
 impl<const FRAMES: usize> Of<FRAMES> {
@@ -18,8 +18,8 @@ impl<const FRAMES: usize> Of<FRAMES> {
     const FRAMING: [u32; 4] = quarters((START | DELIMITER) & Self::ALL);
     const FRAMED: [u32; 4] = quarters(DELIMITER & Self::ALL);
 
-    /// The content bits at the beginning of a piece of line, and a number that is not 0 if any start bit or delimiter is wrong;
-    /// `None` if the line is too short.
+    /// Extracts the content bits at the start of a piece of line, and a number that is non-zero if any start bit or delimiter is
+    /// wrong; `None` if the line is too short.
     #[inline(always)]
     fn from_line(line: &Window) -> Option<(Contents, u32)> {
         if line.len() < Self::LINE_BITS { None } else { Some(Self::from_bits(line.bits())) }
@@ -35,7 +35,7 @@ impl<const FRAMES: usize> Of<FRAMES> {
         (Self::cut(contents), wrong)
     }
 
-    /// The same from one word for each frame.
+    /// Does the same from one word for each frame.
     #[inline(always)]
     fn from_words(words: &[u16], order: BitOrder) -> Option<(Contents, u32)> {
         let words = words.first_chunk::<FRAMES>()?;
@@ -48,7 +48,7 @@ impl<const FRAMES: usize> Of<FRAMES> {
         Some(([both(0), both(2), both(4)], 0))
     }
 
-    /// The frames that the response has.
+    /// The number of frames of the response.
     #[inline(always)]
     const fn cut([p0, p1, p2]: Contents) -> Contents {
         match FRAMES {
@@ -60,7 +60,7 @@ impl<const FRAMES: usize> Of<FRAMES> {
         }
     }
 
-    /// The CRC-8 over all frames, check field included: 0 if it is right.
+    /// Computes the CRC-8 over all frames, check field included: 0 if it is right.
     #[inline(always)]
     fn crc([p0, p1, p2]: Contents) -> u32 {
         let two = four_bytes(0, p0);
@@ -79,7 +79,7 @@ impl<const FRAMES: usize> Of<FRAMES> {
     }
 }
 
-/// The content bits at the beginning of a piece of line, if it is long enough and all start bits and delimiters are right.
+/// Extracts the content bits at the start of a piece of line, if it is long enough and all start bits and delimiters are right.
 pub(crate) fn framed(frames: u8, line: &Window) -> Option<Contents> {
     let (contents, wrong) = match frames {
         1 => Of::<1>::from_line(line),
@@ -92,7 +92,7 @@ pub(crate) fn framed(frames: u8, line: &Window) -> Option<Contents> {
     if wrong == 0 { Some(contents) } else { None }
 }
 
-/// The content bits at the beginning of a piece of line, if it is long enough, and a number that is 0 if all start bits and
+/// Extracts the content bits at the start of a piece of line, if it is long enough, and a number that is 0 if all start bits and
 /// delimiters and the CRC-8 are right.
 #[inline(always)]
 pub(crate) fn sound_line(frames: u8, line: &Window) -> Option<(Contents, u32)> {
@@ -105,19 +105,19 @@ pub(crate) fn sound_line(frames: u8, line: &Window) -> Option<(Contents, u32)> {
     }
 }
 
-/// The same of four frames, from line bits of which the first is in bit 0.
+/// Does the same for four frames, from line bits of which the first is in bit 0.
 #[inline(always)]
 pub(crate) fn sound_four(bits: u128) -> (Contents, u32) {
     Of::<4>::checked(Of::<4>::from_bits(bits))
 }
 
-/// The same of four frames, from the content bits of each.
+/// Does the same for four frames, from the content bits of each.
 #[inline(always)]
 pub(crate) fn sound_four_words(words: &[u16], order: BitOrder) -> Option<(Contents, u32)> {
     Of::<4>::from_words(words, order).map(Of::<4>::checked)
 }
 
-/// The same from words, the content bits of a frame each.
+/// Does the same from words, each with the content bits of one frame.
 #[inline(always)]
 pub(crate) fn sound_words(frames: u8, words: &[u16], order: BitOrder) -> Option<(Contents, u32)> {
     match frames {
@@ -129,7 +129,7 @@ pub(crate) fn sound_words(frames: u8, words: &[u16], order: BitOrder) -> Option<
     }
 }
 
-/// The content bits as one word for each frame.
+/// Returns the content bits as one word for each frame.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
 pub(crate) const fn apart([p0, p1, p2]: Contents) -> [u16; MAX_FRAMES as usize] {
@@ -142,20 +142,20 @@ pub(crate) const fn together([c0, c1, c2, c3, c4, c5]: [u16; MAX_FRAMES as usize
     [pair(c0 as u32, c1 as u32), pair(c2 as u32, c3 as u32), pair(c4 as u32, c5 as u32)]
 }
 
-/// The low 16 bits of both.
+/// Packs the low 16 bits of both.
 #[inline(always)]
 const fn pair(first: u32, second: u32) -> u32 {
     first & 0xffff | second << 16
 }
 
-/// The register four bytes later.
+/// Returns the register four bytes later.
 #[inline(always)]
 fn four_bytes(register: u8, pair: u32) -> u8 {
     let [b0, b1, b2, b3] = pair.to_le_bytes();
     next(next(next(next(register ^ b0) ^ b1) ^ b2) ^ b3)
 }
 
-/// The register two bytes later.
+/// Returns the register two bytes later.
 #[inline(always)]
 fn two_bytes(register: u8, pair: u32) -> u8 {
     let [b0, b1, ..] = pair.to_le_bytes();

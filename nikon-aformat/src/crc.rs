@@ -1,20 +1,20 @@
 use crc::{Algorithm, Crc, Table};
 
-/// CRC-8 of the responses in the form that suits words whose first line bit is bit 0: everything mirrored.
+/// CRC-8 of the responses in mirrored form, which suits words whose first line bit is bit 0.
 ///
-/// The check field travels most significant bit first, all other fields least significant bit first. With the
-/// register mirrored (generator 0x1D read backwards, 0xB8) both are "first line bit in bit 0".
+/// The check field travels most significant bit first, all other fields least significant bit first. With the register mirrored
+/// (generator 0x1D reversed, 0xB8), both have their first line bit in bit 0.
 const MIRRORED: Algorithm<u8> =
     Algorithm { width: 8, poly: 0x1d, init: 0, refin: true, refout: true, xorout: 0, check: 0x56, residue: 0 };
 
 static TABLE: Crc<u8, Table<1>> = Crc::<u8, Table<1>>::new(&MIRRORED);
 
-/// The mirrored CRC-8 over bytes whose first line bit is bit 0.
+/// Computes the mirrored CRC-8 over bytes whose first line bit is bit 0.
 pub(crate) fn mirrored(bytes: &[u8]) -> u8 {
     TABLE.checksum(bytes)
 }
 
-/// The register eight bits later.
+/// Returns the register eight bits later.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "a byte indexes 256 entries")]
 pub(crate) fn next(register: u8) -> u8 {
@@ -22,21 +22,21 @@ pub(crate) fn next(register: u8) -> u8 {
     table[usize::from(register)]
 }
 
-/// The register 16 content bits later, the first line bit in bit 0.
+/// Returns the register 16 content bits later, the first line bit in bit 0.
 #[inline(always)]
 pub(crate) fn next_word(register: u8, content: u16) -> u8 {
     let [low, high] = content.to_le_bytes();
     next(next(register ^ low) ^ high)
 }
 
-/// The CRC-8 of a response, taken in as the response comes: bit by bit, byte by byte or word by word.
+/// The CRC-8 of a response, updated as the response arrives: bit by bit, byte by byte or word by word.
 ///
 /// Generator x^8 + x^4 + x^3 + x^2 + 1 (0x1D), initial value 0, no final XOR; bits enter in the order of the line.
 /// It covers all content bits of all frames, the information field with its sync code included, but neither start
 /// bits nor delimiters, and is sent most significant bit first (AM243x Motor Control SDK, "Nikon Protocol Design").
 ///
-/// The generator is primitive, of order 255. In responses of 32 to 96 content bits every error of one or two bits and
-/// every burst of up to eight content bits is seen. Of three wrong bits 0.36 to 0.50 % pass, of four 0.39 %.
+/// The generator is primitive, of order 255. In responses of 32 to 96 content bits, every error of one or two bits and every
+/// burst of up to eight content bits is detected. Of all errors of three bits 0.36 to 0.50 % pass, of four bits 0.39 %.
 ///
 /// ```
 /// use nikon_aformat::Crc8;
@@ -52,7 +52,7 @@ pub struct Crc8(u8);
 impl Crc8 {
     const GENERATOR: u8 = 0x1d;
 
-    /// Before the first bit.
+    /// Creates the register before the first bit.
     pub const fn new() -> Self {
         Self(0)
     }
@@ -63,24 +63,24 @@ impl Crc8 {
         Self((self.0 << 1) ^ if out == bit { 0 } else { Self::GENERATOR })
     }
 
-    /// Takes eight content bits, the first of the line in bit 7.
+    /// Takes eight content bits, the first on the line in bit 7.
     pub fn byte(self, byte: u8) -> Self {
         Self(mirrored(&[(self.0 ^ byte).reverse_bits()]).reverse_bits())
     }
 
-    /// Takes the 16 content bits of a frame, the first of the line in bit 15.
+    /// Takes the 16 content bits of a frame, the first on the line in bit 15.
     pub fn word(self, word: u16) -> Self {
         let [first, second] = word.to_be_bytes();
         self.byte(first).byte(second)
     }
 
-    /// The check value. Over a whole response with its check field it is 0.
+    /// The check value. Over a whole response including its check field, it is 0.
     pub const fn get(self) -> u8 {
         self.0
     }
 }
 
-/// The CRC-8 over whole bytes, the first line bit in bit 7 of the first.
+/// Computes the CRC-8 over whole bytes, the first line bit in bit 7 of the first byte.
 ///
 /// ```
 /// assert_eq!(nikon_aformat::crc8(b"123456789"), 0x37);
@@ -89,19 +89,19 @@ pub fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(Crc8::new(), |crc, byte| crc.byte(*byte)).get()
 }
 
-/// The CRC-3 of request frames, taken in bit by bit.
+/// The CRC-3 of request frames, updated bit by bit.
 ///
-/// Generator x^3 + x + 1 (0x3), initial value 0, no final XOR (CRC-3/GSM inverts its result and is another check).
+/// Generator x^3 + x + 1 (0x3), initial value 0, no final XOR (CRC-3/GSM inverts its result and is a different check).
 /// It covers the ten bits between sync code and check field and is sent most significant bit first.
 ///
-/// A frame has 13 covered bits with the check and the generator has order 7, so two wrong bits exactly seven
-/// positions apart are not seen: six pairs. Single bits and bursts of up to three are.
+/// A frame has 13 covered bits including the check, and the generator has order 7, so two wrong bits exactly seven positions
+/// apart are not detected: six pairs. Single wrong bits and bursts of up to three are detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crc3(u8);
 
 impl Crc3 {
-    /// Before the first bit.
+    /// Creates the register before the first bit.
     pub const fn new() -> Self {
         Self(0)
     }
@@ -118,7 +118,7 @@ impl Crc3 {
     }
 }
 
-/// The CRC-3 over the ten covered bits of a request frame, the first of the line in bit 0; higher bits do not count.
+/// Computes the CRC-3 over the ten covered bits of a request frame, the first on the line in bit 0; higher bits are ignored.
 ///
 /// ```
 /// // command 1 to encoder 0: FC 00, EA 000, CC 10000

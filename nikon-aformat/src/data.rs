@@ -20,9 +20,9 @@ pub enum Data {
     Abs24High { abs: U24 },
     /// Alarms.
     Status { alm: Alm, pm_alm: PmAlm },
-    /// An EEPROM word and its address. Says nothing while ES0 is set.
+    /// An EEPROM word and its address. Meaningless while ES0 is set.
     Eeprom { data: u16, address: u8 },
-    /// An EEPROM word of a bank. With `bank_error` the encoder has no such bank.
+    /// An EEPROM word of a bank. If `bank_error` is set, the encoder has no such bank.
     EepromBank { data: u16, bank: u8, address: u8, bank_error: bool },
     /// Temperature.
     Temperature { temperature: Temperature },
@@ -63,7 +63,7 @@ impl Data {
         }
     }
 
-    /// The data bits, the first of the line in bit 0; unused ones are 0.
+    /// The data bits, the first on the line in bit 0; unused ones are 0.
     #[expect(clippy::cast_sign_loss, reason = "two's complement on the line")]
     pub(crate) const fn bits(self) -> u128 {
         match self {

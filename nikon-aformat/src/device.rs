@@ -1,13 +1,14 @@
-//! The encoder's side without I/O: what a simulator or a test bench runs.
+//! The encoder's side without I/O, for simulators and test benches.
 //!
-//! A [`Device`] hears a request, frame by frame or all at once, and says what it answers and when; an [`Encoders`] is several of them on
-//! one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold resets and
-//! busy times are its own. Faults can be switched on to see what a master makes of them.
+//! A [`Device`] receives a request, frame by frame or all at once, and returns what it answers and when; [`Encoders`] holds
+//! several of them on one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold
+//! resets and busy times are built in. Faults can be switched on to see how a master handles them.
 //!
-//! What the documents leave open is a [`Behaviour`]. A damaged request, a command of a later version and a write to the
+//! The points that the documents leave open are set by a [`Behaviour`]. A damaged request, a command of a later version and a
+//! write to the
 //! maker's addresses are not answered. A reset takes effect with the eighth request in succession; the responses of other
-//! encoders do not start the count again. While the encoder is busy, writes are repeated in
-//! the response but not done. The EEPROM without bank is bank 0.
+//! encoders do not restart the count. While the encoder is busy, writes are repeated in the response but not carried out. An
+//! EEPROM access without a bank uses bank 0.
 //!
 //! ```
 //! use nikon_aformat::device::Device;
@@ -49,7 +50,7 @@ use crate::temperature::Temperature;
 use crate::timing::BitRate;
 use crate::type_word::TypeWord;
 
-/// A pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
+/// The pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
 /// request; early drivers left 10 us.
 const MAX_FRAME_GAP_NS: u32 = 20_000;
 
@@ -59,7 +60,7 @@ const BUSY_NS: u32 = 30_000_000;
 /// The frames of another encoder's response follow each other within this many bits.
 const RESPONSE_PAUSE_BITS: u32 = 4;
 
-/// What the resets of an encoder have set to 0.
+/// The values that the resets of an encoder have set to 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -70,7 +71,7 @@ pub struct Zero {
     pub turns: u32,
 }
 
-/// An encoder with `BANKS` banks of 256 EEPROM words; one bank is what version 2.1 has.
+/// An encoder with `BANKS` banks of 256 EEPROM words; version 2.1 has one bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device<const BANKS: usize> {
     ea: EncoderAddress,
@@ -85,7 +86,7 @@ pub struct Device<const BANKS: usize> {
     acceleration: i16,
     coefficient: U19,
     temperature: Temperature,
-    /// Alarms that are set, and those whose cause is still there.
+    /// Alarms that are set, and alarms whose cause is still present.
     alm: Alm,
     causes: Alm,
     pm_alm: PmAlm,
@@ -96,13 +97,13 @@ pub struct Device<const BANKS: usize> {
     repeats: u8,
     received: [RequestFrame; Frames::MAX],
     len: u8,
-    /// What follows without a longer pause than this, in ns from delimiter to delimiter, is not judged.
+    /// Frames that follow without a longer pause than this, in ns from delimiter to delimiter, are not judged.
     deaf_ns: Option<u32>,
     last_frame_ns: u64,
 }
 
 impl<const BANKS: usize> Device<BANKS> {
-    /// An encoder at position 0 without alarms, at 25 degrees Celsius, with the type word of its resolution.
+    /// Creates an encoder at position 0 without alarms, at 25 degrees Celsius, with the type word of its resolution.
     pub const fn new(ea: EncoderAddress, resolution: Resolution, rate: BitRate) -> Self {
         let mut memory = Memory::new();
         memory.set(0, TypeWord::EEPROM_ADDRESS, TypeWord::of(resolution).0);
@@ -138,24 +139,24 @@ impl<const BANKS: usize> Device<BANKS> {
         self.ea
     }
 
-    /// Turns the shaft; counts and turns before the resets are applied.
+    /// Turns the shaft: sets counts and turns before the resets are applied.
     pub const fn set_position(&mut self, single_turn: u32, turns: u32) {
         self.single_turn = single_turn;
         self.turns = turns;
     }
 
-    /// Velocity and acceleration of version 3.0.
+    /// Sets velocity and acceleration of version 3.0.
     pub const fn set_motion(&mut self, velocity: i32, acceleration: i16) {
         self.velocity = velocity;
         self.acceleration = acceleration;
     }
 
-    /// The velocity coefficient of version 3.0.
+    /// Sets the velocity coefficient of version 3.0.
     pub const fn coefficient(&self) -> U19 {
         self.coefficient
     }
 
-    /// The temperature, which EEPROM word 0xf9 shows too.
+    /// Sets the temperature, which EEPROM word 0xf9 also shows.
     pub const fn set_temperature(&mut self, temperature: Temperature) {
         self.temperature = temperature;
         self.memory.set(0, Temperature::EEPROM_ADDRESS, temperature.raw());
@@ -171,39 +172,39 @@ impl<const BANKS: usize> Device<BANKS> {
         self.id = id;
     }
 
-    /// The predictive maintenance notices of version 3.0.
+    /// Sets the predictive maintenance notices of version 3.0.
     pub const fn set_pm_alm(&mut self, pm_alm: PmAlm) {
         self.pm_alm = pm_alm;
     }
 
-    /// The cause of these alarms comes: they are set.
+    /// Starts the cause of these alarms, which sets them.
     pub const fn raise_alarms(&mut self, alarms: Alm) {
         self.causes = self.causes.union(alarms);
         self.alm = self.alm.union(alarms);
     }
 
-    /// The cause of these alarms goes. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
+    /// Ends the cause of these alarms. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
     pub const fn end_alarms(&mut self, alarms: Alm) {
         self.causes = self.causes.difference(alarms);
         self.alm = self.alm.difference(alarms.intersection(Alm::BUSY.union(Alm::BUSY_S)));
     }
 
-    /// Sets what the documents leave open, from now on.
+    /// Sets the points that the documents leave open; takes effect at once.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
 
-    /// Switches a fault on or, with [`Fault::None`], off.
+    /// Switches a fault on, or off with [`Fault::None`].
     pub const fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
     }
 
-    /// The alarms as they would be answered at `now_ns`.
+    /// Returns the alarms as the encoder would answer them at `now_ns`.
     pub const fn alm(&self, now_ns: u64) -> Alm {
         if self.memory.is_busy(now_ns) { self.alm.union(Alm::MEMBUSY) } else { self.alm.difference(Alm::MEMBUSY) }
     }
 
-    /// A word of the EEPROM, for inspecting it.
+    /// Returns a word of the EEPROM, for inspecting it.
     pub const fn eeprom(&self, bank: u8, address: u8) -> Option<u16> {
         self.memory.get(bank, address)
     }
@@ -213,19 +214,19 @@ impl<const BANKS: usize> Device<BANKS> {
         self.memory.set(bank, address, data);
     }
 
-    /// What the resets have set to 0.
+    /// The values that the resets have set to 0.
     pub const fn zero(&self) -> Zero {
         self.zero
     }
 
-    /// The position as a response carries it.
+    /// Returns the position as a response carries it.
     pub const fn abs(&self) -> crate::number::U40 {
         let Zero { single_turn, turns } = self.zero;
         self.resolution.compose(self.single_turn.wrapping_sub(single_turn), self.turns.wrapping_sub(turns))
     }
 
-    /// Takes frames that were heard back to back, the last delimiter at `end_ns`: content bits, the first of the line
-    /// in bit 0, or `None` for one whose delimiter reads 0. Returns the answer once a request is complete.
+    /// Takes frames that were received back to back, the last delimiter at `end_ns`: content bits, the first on the line in bit
+    /// 0, or `None` for a frame whose delimiter reads 0. Returns the answer once a request is complete.
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Transmission> {
         let frame_ns = u64::from(self.rate.bits_ns(FRAME_BITS));
         let (mut answer, mut left) = (None, u64::try_from(frames.len()).unwrap_or(u64::MAX));
@@ -269,14 +270,14 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
-    /// A frame was heard whose delimiter, at `end_ns`, reads 0: the request is damaged.
+    /// Takes a frame whose delimiter, at `end_ns`, reads 0: the request is damaged.
     pub fn framing_error(&mut self, end_ns: u64) {
         if !self.is_deaf(end_ns) {
             self.misheard();
         }
     }
 
-    /// The rest of a damaged request is not judged, and the count of a reset starts again.
+    /// The rest of a damaged request is not judged, and the count of a reset restarts.
     fn misheard(&mut self) {
         self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS));
         if self.behaviour.restart == Restart::Any {
@@ -286,7 +287,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.len = 0;
     }
 
-    /// Whether what arrives now belongs to a part that is not judged.
+    /// Returns whether the data arriving now belong to a part that is not judged.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
         let pause_ns = now_ns.saturating_sub(self.last_frame_ns);
         self.last_frame_ns = now_ns;
@@ -370,7 +371,7 @@ impl<const BANKS: usize> Device<BANKS> {
         Some(Response::new(ea, request.command(), EncoderStatus::of_alarms(alm), data))
     }
 
-    /// Whether this encoder is asked.
+    /// Returns whether this encoder is addressed.
     fn is_meant(&self, request: Request) -> bool {
         match request.operation {
             Operation::SetAddress1 | Operation::IdRead2 | Operation::IdWrite2 { .. } => true,
@@ -380,7 +381,7 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
-    /// Counts how often the same request came in succession.
+    /// Counts how many times the same request came in succession.
     fn count(&mut self, request: Request) {
         if self.behaviour.restart == Restart::Own && !self.is_meant(request) {
             return;
@@ -392,7 +393,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.repeats = self.repeats.saturating_add(1);
     }
 
-    /// The effect of the eighth request of a reset.
+    /// Applies the effect of the eighth request of a reset.
     fn reset(&mut self, request: Request, now_ns: u64) {
         let command = request.command();
         self.repeats = 0;
@@ -410,7 +411,7 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
-    /// EEPROM, identification code, address and coefficient.
+    /// Handles EEPROM, identification code, address and coefficient.
     fn access(&mut self, operation: Operation, ea: EncoderAddress, now_ns: u64) -> Option<Data> {
         let busy = self.memory.is_busy(now_ns);
         Some(match operation {
@@ -459,7 +460,7 @@ impl<const BANKS: usize> Device<BANKS> {
         })
     }
 
-    /// The line bits of an answer with the fault that is switched on.
+    /// Returns the line bits of an answer with the fault that is switched on.
     fn send(&self, request: Request, response: Response, now_ns: u64) -> Option<Transmission> {
         let frames = response.emit();
         let good = frames.line();

@@ -1,27 +1,27 @@
 use crate::status::{Alm, EncoderStatus};
 
-/// Why a position must not be used. The raw fields of the response stay readable.
+/// Why a position must not be used. The raw fields of the response remain readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Doubt {
-    /// Nothing was heard yet.
+    /// Nothing has been received yet.
     Never,
     /// The position was sampled too long ago, or by a clock that was set back in the meantime.
     Old {
-        /// How far the instant of sampling is away, in ns.
+        /// Distance to the instant of sampling, in ns.
         age_ns: u64,
     },
-    /// The response carries no position, or only its upper bits; less than a turn of this encoder; or, where turns are used, fewer
-    /// bits of them than it counts.
+    /// The response carries no position, only its upper bits, less than a turn of this encoder or, if turns are used, fewer bits
+    /// of them than it counts.
     Absent,
     /// Bits are set above the widths of the encoder: another encoder, or a wrong [`Resolution`](crate::Resolution).
     UpperBits {
         /// Single-turn and turn bits together.
         width: u8,
     },
-    /// The one status bit of commands 21 and 22 is set; which of the four it stands for is not told.
+    /// The single status bit of commands 21 and 22 is set; it does not say which of the four it stands for.
     AnyStatus,
     /// Status bits are set that are not tolerated. With [`EncoderStatus::BUSY`] the position is being determined.
     Status {
@@ -30,7 +30,7 @@ pub enum Doubt {
     },
     /// Alarms are set that are not tolerated.
     Alarms {
-        /// Those alarms.
+        /// The alarms.
         alarms: Alm,
     },
 }

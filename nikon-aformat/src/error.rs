@@ -20,24 +20,24 @@ servowire_core::errors! {
     ///
     /// Frames count from 0, the first of the request or of the response.
     pub enum Error {
-        /// The line ends too early, or the next frame did not come in time.
+        /// The line ends too early, or the next frame did not arrive in time.
         #[error("the line ends after {got} of {want} bits")]
         Truncated = 1 {
-            /// Line bits that were there.
+            /// Number of line bits received.
             got: u16,
-            /// Line bits of the whole.
+            /// Number of line bits of the whole response or frame.
             want: u16,
         },
         /// A start bit reads 1.
         #[error("frame {frame}: the start bit is 1")]
         StartBit = 2 {
-            /// First frame with this fault.
+            /// The first frame with this fault.
             frame: u8,
         },
         /// A delimiter reads 0.
         #[error("frame {frame}: the delimiter is 0")]
         Delimiter = 3 {
-            /// First frame with this fault.
+            /// The first frame with this fault.
             frame: u8,
         },
         /// The CRC-8 of a response is wrong.
@@ -45,7 +45,7 @@ servowire_core::errors! {
         Crc = 4 {
             /// Received.
             got: u8,
-            /// Computed over the received bits.
+            /// The check value computed over the received bits.
             want: u8,
         },
         /// The CRC-3 of a request frame is wrong.
@@ -53,13 +53,13 @@ servowire_core::errors! {
         Crc3 = 5 {
             /// Received.
             got: u8,
-            /// Computed over the received bits.
+            /// The check value computed over the received bits.
             want: u8,
         },
-        /// The sync code is neither that of a request (2) nor that of a response (4), whichever was due.
+        /// The sync code is neither that of a request (2) nor that of a response (4), whichever was expected.
         #[error("the sync code is {got}: 2 begins a request, 4 a response")]
         SyncCode = 6 {
-            /// Its three bits, the first of the line in bit 0.
+            /// Its three bits, the first on the line in bit 0.
             got: u8,
         },
         /// The bit between command code and encoder status is not 0.
@@ -84,17 +84,17 @@ servowire_core::errors! {
         /// The encoder has no such EEPROM bank.
         #[error("the encoder reports a wrong EEPROM bank")]
         BankError = 10,
-        /// The response repeats another argument than was sent.
+        /// The response repeats a different argument from the one sent.
         #[error("the response repeats {field} {got:#x}, {want:#x} was sent")]
         EchoMismatch = 11 {
             /// Which argument.
             field: EchoField,
-            /// In the response.
+            /// The value in the response.
             got: u32,
-            /// In the request.
+            /// The value in the request.
             want: u32,
         },
-        /// A request frame has another frame code than its place in the request demands.
+        /// A request frame has a frame code that does not fit its place in the request.
         #[error("frame {frame} of the request has frame code {got}, expected {want}")]
         FrameCode = 12 {
             /// Index of the frame.
@@ -104,13 +104,13 @@ servowire_core::errors! {
             /// Frame code that belongs here; 0 for a command data frame.
             want: u8,
         },
-        /// Command code 31, or a number that is no command code.
+        /// Command code 31, or a number that is not a command code.
         #[error("{code} is no command code")]
         UnknownCommand = 13 {
             /// The number.
             code: u8,
         },
-        /// The command belongs to a later version of the protocol than the encoder speaks.
+        /// The command belongs to a later version of the protocol than the encoder supports.
         #[error("{command} is not in version {version}")]
         UnsupportedInVersion = 14 {
             /// The command.
@@ -136,45 +136,45 @@ servowire_core::errors! {
         /// The memory stayed busy after all tries.
         #[error("the encoder was still busy after {tries} requests")]
         Busy = 18 {
-            /// Requests made.
+            /// Number of requests sent.
             tries: u16,
         },
-        /// A plain reset was interrupted before the eighth response. Whether it was done is not known: requests that the encoder
-        /// had counted before may have made up the eight. The eight have to be sent anew.
+        /// A plain reset was interrupted before the eighth response. It is not known whether it was done: requests that the
+        /// encoder had counted before may have completed the eight. All eight have to be sent again.
         #[error("no response to the reset after {done} good responses of 8: it is not known whether it was done")]
         Interrupted = 19 {
             /// Good responses in succession so far.
             done: u8,
         },
-        /// Whether a command that cannot be undone took effect is not known: the response to its last request did not come,
-        /// or the encoder reports that it could not be stored. Find out before it is repeated.
+        /// It is not known whether a command that cannot be undone took effect: the response to its last request did not come,
+        /// or the encoder reports that it could not be stored. Find out before repeating it.
         #[error("whether a command that cannot be undone was done is not known")]
         EffectUnknown = 20,
-        /// The act was not done: reading back shows it, or fewer than eight requests of a reset were sent after the encoder had
-        /// been made to count anew.
+        /// The operation was not done: reading back shows it, or fewer than eight requests of a reset were sent after the
+        /// encoder had been made to restart its count.
         #[error("not done")]
         NotDone = 21,
         /// MEMERR is set: an access to the EEPROM failed.
         #[error("the encoder reports a failed access to its EEPROM")]
         MemoryFault = 22,
-        /// The response is sound and to something else than a procedure has asked for.
+        /// The response is sound but answers something other than the procedure's request.
         #[error("the response carries no such value")]
         NotCarried = 24,
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 25,
-        /// Two sound responses came to a request that one encoder answers: which one is its answer is not known.
+        /// Two sound responses came to a request that one encoder answers, and it is not known which one is its answer.
         #[error("two responses came to one request")]
         TwoResponses = 26,
-        /// The settings of the line leave no time for a response: nothing is to be sent.
+        /// The settings of the line leave no time for a response: nothing may be sent.
         #[error("the settings of the line leave no time for a response")]
         Line = 27,
     }
 }
 
 impl Error {
-    /// The frame in which the fault shows, 0 for the first; `None` if it is not in one frame, or depends on the length of the
-    /// response: its CRC-8 is in the last.
+    /// The frame in which the fault shows, 0 for the first. `None` if the fault is not in one frame, or if its frame depends on
+    /// the length of the response, as for the CRC-8, which is in the last.
     pub const fn frame(self) -> Option<u8> {
         match self {
             Self::StartBit { frame } | Self::Delimiter { frame } | Self::FrameCode { frame, .. } => Some(frame),
@@ -187,7 +187,7 @@ impl Error {
         }
     }
 
-    /// The first bit of the part of that [`frame`](Self::frame) that is wrong, in the order of the line: 0 is the start
+    /// The first bit of the wrong part of that [`frame`](Self::frame), in the order of the line: 0 is the start
     /// bit, 17 the delimiter.
     pub const fn bit(self) -> Option<u8> {
         match self {
@@ -222,7 +222,7 @@ pub enum EchoField {
 }
 
 impl EchoField {
-    /// The name in a sentence.
+    /// The name as used in a sentence.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Address => "EEPROM address",

@@ -9,11 +9,12 @@ use crate::status::EncoderStatus;
 use crate::tolerated::{Policy, Tolerated};
 
 servowire_core::shaft_evidence! {
-    /// What an encoder has said of its position, and when it was sampled: judged where it is used, by [`at`](Self::at).
+    /// What an encoder has reported about its position, and when it was sampled. It is judged where it is used, by
+    /// [`at`](Self::at).
     ///
-    /// Who receives the response makes it, [`Exchange::evidence`](crate::master::Exchange::evidence), and finds out what does not
-    /// depend on the user: what the response carries, whether it fits the widths. Who uses the position, in an interrupt of another
-    /// priority perhaps, with an [`EvidenceCell`] in between, says how old it may be and what he lives with.
+    /// The receiver of the response creates it with [`Exchange::evidence`](crate::master::Exchange::evidence), which checks what
+    /// does not depend on the user: what the response carries and whether it fits the widths. The user of the position, perhaps
+    /// in an interrupt of another priority with an [`EvidenceCell`] in between, decides how old it may be and what is tolerable.
     ///
     /// ```
     /// use nikon_aformat::{
@@ -38,8 +39,9 @@ servowire_core::shaft_evidence! {
 }
 
 impl Evidence {
-    /// What a response says of the position of an encoder with these widths, sampled at `sampled_ns`: for tools and buffers;
-    /// a master's [`Exchange`](crate::master::Exchange) knows when that was, and that the response is no older than its request.
+    /// Creates evidence from a response of an encoder with these widths, sampled at `sampled_ns`, for tools and buffers. A
+    /// master uses its [`Exchange`](crate::master::Exchange) instead, which knows the instant, and that the response is no older
+    /// than its request.
     pub const fn of(response: Response, resolution: Resolution, sampled_ns: u64) -> Self {
         let shown = match response.body {
             Body::Abs17 { es_any: true, .. } => SUMMED | of_status(EncoderStatus::all()),
@@ -57,7 +59,7 @@ impl Evidence {
         }
     }
 
-    /// The same of a response that [`Abs40`] has decoded.
+    /// Does the same with a response that [`Abs40`] has decoded.
     ///
     /// ```
     /// use nikon_aformat::{Abs40, EncoderAddress, EncoderStatus, Evidence, Policy, Resolution, U40};
@@ -73,7 +75,7 @@ impl Evidence {
         evidence.with_abs(response.abs.get(), 40, resolution)
     }
 
-    /// Takes the `abs_bits` lowest position bits, which are all that the response carries.
+    /// Takes the lowest `abs_bits` position bits, which are all that the response carries.
     const fn with_abs(mut self, abs: u64, abs_bits: u8, resolution: Resolution) -> Self {
         let width = resolution.st_bits().wrapping_add(resolution.mt_bits());
         self.marks |= of_bits(resolution.st_bits());
@@ -93,7 +95,7 @@ impl Evidence {
         self
     }
 
-    /// Off the hot path: the reason why it must not be used.
+    /// Returns the reason why it must not be used; off the hot path.
     #[cold]
     #[inline(never)]
     const fn doubt(&self, now_ns: u64, policy: Policy) -> Doubt {

@@ -12,7 +12,8 @@ pub(crate) const SYNC_CODE: u8 = 4;
 
 /// What is known about a response before it arrives: its layout, the command, the address, the arguments that it repeats.
 ///
-/// [`Request::expected`](crate::Request::expected) makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
+/// [`Request::expected`](crate::Request::expected) creates it from a request; [`Expected::new`] serves captures whose request is
+/// not at hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Expected {
@@ -32,7 +33,7 @@ pub struct Expected {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Echo {
-    /// None, or they are not compared.
+    /// No arguments, or they are not compared.
     #[default]
     None,
     /// EEPROM access: checked in the order address, bank, data.
@@ -51,7 +52,7 @@ pub enum Echo {
 }
 
 impl Echo {
-    /// What the response to `operation` repeats.
+    /// Returns what the response to `operation` repeats.
     pub const fn of(operation: Operation) -> Self {
         match operation {
             Operation::EepromRead { address } => Self::Eeprom { address, bank: None, data: None },
@@ -75,7 +76,7 @@ const CC: u16 = 0b1_1111 << 6;
 const FIXED: u16 = 1 << 11;
 
 impl Expected {
-    /// A response of this layout to this command, from any address.
+    /// Expects a response of this layout to this command, from any address.
     pub const fn new(layout: Layout, command: Command) -> Self {
         let sync = SYNC_CODE as u16;
         let (mask, value) = match layout {
@@ -85,17 +86,17 @@ impl Expected {
         Self { layout, command, ea: None, echo: Echo::None, mask, value }
     }
 
-    /// The same from this address only.
+    /// Expects the same from this address only.
     pub const fn from_address(self, ea: EncoderAddress) -> Self {
         Self { ea: Some(ea), mask: self.mask | EA, value: self.value & !EA | (ea.get() as u16) << 3, ..self }
     }
 
-    /// The same from any address.
+    /// Expects the same from any address.
     pub const fn any_address(self) -> Self {
         Self { ea: None, mask: self.mask & !EA, value: self.value & !EA, ..self }
     }
 
-    /// The same with these arguments repeated.
+    /// Expects the same with these arguments repeated.
     pub const fn echoing(self, echo: Echo) -> Self {
         Self { echo, ..self }
     }
@@ -115,37 +116,38 @@ impl Expected {
         self.ea
     }
 
-    /// Frames of the response.
+    /// Number of frames of the response.
     #[inline(always)]
     pub(crate) const fn frames(&self) -> u8 {
         self.layout.frames()
     }
 
-    /// The known bits of the first frame that are wrong.
+    /// Returns the known bits of the first frame that are wrong.
     #[inline(always)]
     pub(crate) const fn differs(&self, [first, ..]: Contents) -> u32 {
         first & self.mask as u32 ^ self.value as u32
     }
 
-    /// The content bits, if the CRC-8 leaves no remainder and the known bits of the first frame are right: one branch for both.
+    /// Returns the content bits, if the CRC-8 leaves no remainder and the known bits of the first frame are right: one branch
+    /// for both.
     #[inline(always)]
     pub(crate) const fn fitting(&self, contents: Contents, crc: u32) -> Option<Contents> {
         if crc | self.differs(contents) == 0 { Some(contents) } else { None }
     }
 
-    /// The same of the first frame alone.
+    /// Does the same for the first frame alone.
     #[inline(always)]
     pub(crate) const fn differs_first(&self, content: u16) -> u16 {
         content & self.mask ^ self.value
     }
 
-    /// Whether length and first frame are right.
+    /// Returns whether length and first frame are right.
     pub(crate) fn fits(&self, raw: &RawResponse) -> bool {
         raw.frames() == self.layout.frames()
             && raw.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
     }
 
-    /// Off the hot path: why a response is refused that is not sound or does not fit.
+    /// Returns why a response is refused that is not sound or does not fit; off the hot path.
     #[cold]
     pub(crate) fn refusal(&self, raw: &RawResponse) -> Error {
         let want = self.layout.line_bits();
@@ -171,8 +173,8 @@ impl Expected {
         }
     }
 
-    /// Whether an EEPROM response repeats what was sent, in the order address, bank, data. A response without bank to a
-    /// request with one has nothing to compare.
+    /// Checks that an EEPROM response repeats what was sent, in the order address, bank, data. If a response to a request with a
+    /// bank has none, there is nothing to compare.
     #[inline(always)]
     pub(crate) fn check_eeprom(&self, data: u16, bank: Option<u8>, address: u8) -> Result<(), Error> {
         let Echo::Eeprom { address: want, bank: bank_want, data: data_want } = self.echo else { return Ok(()) };
@@ -183,13 +185,13 @@ impl Expected {
         data_want.map_or(Ok(()), |want| same(EchoField::Data, data, want))
     }
 
-    /// Whether an identification code is the one that was sent.
+    /// Checks that an identification code is the one that was sent.
     #[inline(always)]
     pub(crate) fn check_id(&self, id: EncoderId) -> Result<(), Error> {
         if let Echo::Id(want) = self.echo { same(EchoField::Id, id, want) } else { Ok(()) }
     }
 
-    /// Whether a velocity coefficient is the one that was sent.
+    /// Checks that a velocity coefficient is the one that was sent.
     #[inline(always)]
     pub(crate) fn check_coefficient(&self, coefficient: U19) -> Result<(), Error> {
         if let Echo::Coefficient(want) = self.echo { same(EchoField::Coefficient, coefficient, want) } else { Ok(()) }

@@ -17,8 +17,8 @@ use crate::number::EncoderAddress;
 /// ```
 ///
 /// Frame codes: 0 CDF, 1 MDF0, 2 MDF1, 3 MDF2; in version 3.0 also 3 for a CDF that opens a bank or coefficient
-/// access, and 0 for MDF3. So only the place in the request tells what a frame is.
-/// Every field travels least significant bit first, the CRC-3 most significant bit first.
+/// access, and 0 for MDF3. So a frame can only be identified by its place in the request.
+/// Every field is sent least significant bit first, the CRC-3 most significant bit first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
 pub struct RequestFrame(u16);
@@ -55,12 +55,12 @@ impl RequestFrame {
     /// Value of the sync code that begins a request frame.
     pub const SYNC_CODE: u8 = 2;
 
-    /// A command data frame. Only the five low bits of `code` are used.
+    /// Creates a command data frame. Only the five low bits of `code` are used.
     pub const fn cdf(frame_code: FrameCode, ea: EncoderAddress, code: u8) -> Self {
         Self::of(frame_code, ea.get() | code << 3)
     }
 
-    /// A memory data frame.
+    /// Creates a memory data frame.
     pub const fn mdf(frame_code: FrameCode, byte: u8) -> Self {
         Self::of(frame_code, byte)
     }
@@ -70,7 +70,7 @@ impl RequestFrame {
         Self(Self::SYNC_CODE as u16 | covered << 3 | (mirror3(crc3(covered)) as u16) << 13)
     }
 
-    /// A frame from its 16 content bits, the first of the line in bit 0.
+    /// Decodes a frame from its 16 content bits, the first on the line in bit 0.
     ///
     /// # Errors
     /// [`Error::Crc3`], [`Error::SyncCode`].
@@ -86,7 +86,7 @@ impl RequestFrame {
         Ok(Self(content))
     }
 
-    /// A frame from its 16 content bits as a word.
+    /// Decodes a frame from its 16 content bits as a word.
     ///
     /// # Errors
     /// As [`from_content`](Self::from_content).
@@ -97,7 +97,7 @@ impl RequestFrame {
         })
     }
 
-    /// The frame at the beginning of a piece of line; bits after it are left alone.
+    /// Decodes the frame at the start of a piece of line; bits after it are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`], then as [`from_content`](Self::from_content).
@@ -106,7 +106,7 @@ impl RequestFrame {
         Self::from_content(content)
     }
 
-    /// The content bits, the first of the line in bit 0.
+    /// The content bits, the first on the line in bit 0.
     pub const fn content(self) -> u16 {
         self.0
     }
@@ -129,8 +129,8 @@ impl RequestFrame {
         }
     }
 
-    /// The frame as one 32-bit word for a shift register: twelve idle bits, the 18 line bits, two idle bits, the first
-    /// of the line in bit 31. The idle bits stand for the times t2 before and t3 after a frame.
+    /// Returns the frame as one 32-bit word for a shift register: twelve idle bits, the 18 line bits, two idle bits, the first
+    /// on the line in bit 31. The idle bits provide the times t2 before and t3 after a frame.
     pub const fn transmit_word(self) -> u32 {
         0xfff0_0007 | (self.0.reverse_bits() as u32) << 3
     }
@@ -165,7 +165,7 @@ impl RequestFrame {
 impl TryFrom<u16> for RequestFrame {
     type Error = Error;
 
-    /// From the content bits.
+    /// Creates the frame from its content bits.
     fn try_from(content: u16) -> Result<Self, Error> {
         Self::from_content(content)
     }
@@ -199,7 +199,7 @@ pub(crate) fn truncated(got: u32, want: u32) -> Error {
     Error::Truncated { got: narrow(got), want: narrow(want) }
 }
 
-/// Off the hot path: why a line does not hold `frames` frames.
+/// Returns why a line does not hold `frames` frames; off the hot path.
 #[cold]
 pub(crate) fn framing(line: Window, frames: u8) -> Error {
     let bits = u32::from(frames).wrapping_mul(FRAME_BITS);

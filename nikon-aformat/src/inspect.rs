@@ -1,8 +1,8 @@
 //! For tools: looks at a line that was refused, lists every fault and guesses the cause.
 //!
-//! Decoders stop at the first fault and give no value; that is right for a drive and unhelpful at a bench. Here all
-//! frames are read whatever their framing, and the usual mistakes (wires exchanged, wrong bit order, some bits early or
-//! late, own echo, wrong rate, other encoder, other command, other layout) are undone one by one: the one that makes the
+//! Decoders stop at the first fault and return no value, which is right for a drive and unhelpful at a bench. Here all
+//! frames are read whatever their framing, and the usual mistakes (swapped wires, wrong bit order, some bits early or late, own
+//! echo, wrong rate, other encoder, other command, other layout) are undone one by one: the one that makes the
 //! response sound is the cause.
 //!
 //! ```
@@ -37,7 +37,7 @@ pub use nrz_line::Cause as LineCause;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RawFrame {
-    /// The content bits, the first of the line in bit 0.
+    /// The content bits, the first on the line in bit 0.
     pub content: u16,
     /// Whether the start bit reads 0.
     pub start_ok: bool,
@@ -45,7 +45,7 @@ pub struct RawFrame {
     pub delimiter_ok: bool,
 }
 
-/// What a frame is by its sync code.
+/// What a frame is, judged by its sync code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -59,8 +59,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// By the content bits of a frame, the first of the line in bit 0. Later frames of a response hold anything, so ask only
-    /// where a request or a response can begin.
+    /// Classifies a frame by its content bits, the first on the line in bit 0. Later frames of a response may hold anything, so
+    /// call this only where a request or a response can begin.
     pub const fn of(content: u16) -> Self {
         match content & 7 {
             2 => Self::Request,
@@ -75,21 +75,21 @@ impl Kind {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// The line itself was damaged, or is connected or read in a wrong way.
+    /// The line itself was damaged, or is connected or read in the wrong way.
     Line(LineCause),
     /// A sound response of another encoder.
     OtherEncoder {
-        /// Who answered.
+        /// The encoder that answered.
         ea: EncoderAddress,
     },
     /// A sound response to another command.
     OtherCommand {
-        /// What was answered.
+        /// The command that was answered.
         answered: Command,
     },
     /// A sound response to this command in another layout: the resolution does not know the factory setting of the encoder.
     OtherLayout {
-        /// How it was answered.
+        /// The layout of the response.
         layout: Layout,
     },
 }
@@ -101,7 +101,7 @@ servowire_core::one_line!(Cause {
     Self::OtherLayout { layout } => "this is a sound response in layout {}: the encoder's factory setting differs", layout;
 });
 
-/// What an inspection found out about a line.
+/// The result of an inspection of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -123,7 +123,7 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// The response: as received if nothing is wrong, or as it would be without the cause. For display only.
+    /// The response as received if nothing is wrong, otherwise as it would be without the cause. For display only.
     pub const fn response(&self) -> Option<Response> {
         self.response
     }
@@ -155,7 +155,7 @@ pub fn inspect(request: Request, resolution: Resolution, line: Window) -> Report
     report
 }
 
-/// The usual mistakes: those of the line, and somebody else's response.
+/// Looks for the usual mistakes: those of the line, and somebody else's response.
 fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
     if let Some(stuck) = LineCause::stuck(line) {
         return (Some(stuck.into()), None);
@@ -176,7 +176,7 @@ fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -
     (matches!(error, Error::Crc { .. }).then_some(LineCause::Disturbed.into()), None)
 }
 
-/// A sound response from somebody else, to something else or in another layout. The CRC-8 is checked in any case.
+/// Looks for a sound response from another encoder, to something else or in another layout. The CRC-8 is checked in any case.
 fn other_party(expected: &Expected, line: Window) -> Option<(Cause, Response)> {
     let any = expected.any_address();
     if let Ok(response) = Response::parse_line(&any, line) {
@@ -208,7 +208,7 @@ fn raw_frames(line: Window, layout: Layout) -> ([RawFrame; RawResponse::MAX_FRAM
     (frames, len)
 }
 
-/// The frames as a response, whatever their framing.
+/// Returns the frames as a response, whatever their framing.
 fn whole(frames: &[RawFrame; RawResponse::MAX_FRAMES], len: u8, layout: Layout) -> Option<RawResponse> {
     let words = frames.map(|frame| frame.content);
     let words = words.get(..usize::from(len))?;

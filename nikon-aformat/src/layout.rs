@@ -3,9 +3,9 @@ use core::fmt;
 /// Bits of one frame on the line, in both directions: start bit 0, 16 content bits, delimiter 1.
 pub const FRAME_BITS: u32 = 18;
 
-/// The start bits of the longest response.
+/// Mask of the start bits of the longest response.
 pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
-/// Its delimiters.
+/// Mask of its delimiters.
 pub(crate) const DELIMITER: u128 = START << 17;
 const _: () = {
     let content = START * 0x1_fffe;
@@ -42,7 +42,7 @@ pub(crate) const MAX_FRAMES: u32 = 6;
 /// ```
 ///
 /// Which layout answers a request follows from the command, its frame code and, in version 3.0, the factory setting of
-/// the encoder; the line does not say it. See [`Request::layout`](crate::Request::layout).
+/// the encoder; the line does not say which. See [`Request::layout`](crate::Request::layout).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -123,7 +123,7 @@ impl Layout {
         (self.frames() as u32).wrapping_mul(FRAME_BITS)
     }
 
-    /// Position bits that the response carries from bit 0 up, 0 if it has none or only the upper ones.
+    /// Number of position bits that the response carries from bit 0 up; 0 if it has none or only the upper ones.
     pub const fn abs_bits(self) -> u8 {
         match self {
             Self::Abs40 | Self::Abs40Vel => 40,

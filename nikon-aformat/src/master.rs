@@ -1,14 +1,14 @@
-//! The controller's side as state machines without I/O: they are told what arrived and what time it is, and say what
-//! to do next. Time is a count of nanoseconds from any origin.
+//! The controller's side as state machines without I/O. You tell them what arrived and what time it is, and they say what to do
+//! next. Time is a count of nanoseconds from any origin.
 //!
-//! * [`Transaction`] takes one request to its response, [`BusTransaction`] to the responses of several encoders: time-outs and all
-//!   checks.
-//! * [`GuardedReset`] and [`VerifiedWrite`] do what cannot be undone, once, and end as done, not done, or with an unknown effect;
-//!   they are made of [`Reset`], [`Write`] and [`EepromRead`].
-//! * [`Detection`] finds an encoder and its widths. All of these are made of several transactions and drive them by [`Step`];
-//!   `servowire_core::run` takes any of them to its end.
+//! * [`Transaction`] handles one request and its response, [`BusTransaction`] one request and the responses of several encoders,
+//! with time-outs and all checks.
+//! * [`GuardedReset`] and [`VerifiedWrite`] do once what cannot be undone, and end as done, not done, or with an unknown effect;
+//! they are built on [`Reset`], [`Write`] and [`EepromRead`].
+//! * [`Detection`] finds an encoder and its widths. All of these consist of several transactions and drive them by [`Step`];
+//! `servowire_core::run` runs any of them to its end.
 //! * [`Cycle`] repeats a readout at a fixed period.
-//! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
+//! * [`Counters`] and [`ErrorRate`] keep track of what was refused.
 //!
 //! ```
 //! use nikon_aformat::master::{Line, Progress, Transaction};
@@ -55,7 +55,7 @@ use crate::error::{Error, ErrorClass};
 use crate::request::Request;
 use crate::response::Response;
 
-/// What a procedure of several transactions wants next.
+/// What a procedure of several transactions asks for next.
 pub type Step<T> = servowire_core::Step<Request, T, Error>;
 
 servowire_core::procedures!(Request => Response, Error {

@@ -28,38 +28,38 @@ number! {
 }
 
 number! {
-    /// The identification code of an encoder, 24 bits: what commands 16 to 20 read, write and choose an encoder by.
+    /// The identification code of an encoder, 24 bits, which commands 16 to 20 read, write or use to choose an encoder.
     pub struct EncoderId(u32, 24);
 }
 
 impl U40 {
-    /// From five bytes, the lowest first.
+    /// Creates the number from five bytes, the lowest first.
     #[inline(always)]
     pub(crate) const fn from_le_bytes([a, b, c, d, e]: [u8; 5]) -> Self {
         Self::truncate(u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]))
     }
 
-    /// Bits 0..=23, what ABS24 responses carry.
+    /// Bits 0..=23, which ABS24 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
     pub const fn low24(self) -> U24 {
         U24::truncate(self.get() as u32)
     }
 
-    /// Bits 16..=39, what the upper ABS24 responses carry.
+    /// Bits 16..=39, which the upper ABS24 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "24 bits are left")]
     pub const fn high24(self) -> U24 {
         U24::truncate((self.get() >> 16) as u32)
     }
 
-    /// Bits 0..=16, what ABS17 responses carry.
+    /// Bits 0..=16, which ABS17 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
     pub const fn low17(self) -> U17 {
         U17::truncate(self.get() as u32)
     }
 
-    /// Puts the two 24-bit halves together again, if their common bits 16..=23 agree.
+    /// Joins the two 24-bit halves, if their common bits 16..=23 agree.
     ///
-    /// The halves come from two responses; at speed the position moved in between, and the common bits may differ.
+    /// The halves come from two responses; at speed the position moves in between, and the common bits may differ.
     ///
     /// ```
     /// use nikon_aformat::U40;
@@ -87,11 +87,11 @@ impl EncoderAddress {
         Self::truncate(7),
     ];
 
-    /// Address 0, that of a single encoder as delivered.
+    /// Address 0, which a single encoder has as delivered.
     pub const ZERO: Self = Self::truncate(0);
 }
 
-/// An EEPROM address that a request without bank may write, 0x00..=0xef.
+/// An EEPROM address that a request without a bank may write, 0x00..=0xef.
 ///
 /// All 256 can be read. The last sixteen hold the maker's data, among them the
 /// [type word](crate::TypeWord) and the temperature.

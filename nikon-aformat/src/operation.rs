@@ -37,7 +37,7 @@ macro_rules! operations {
             },
             /// Gives the encoder with this identification code the address in EA.
             SetAddress2 {
-                /// Whom it concerns.
+                /// The identification code of the encoder concerned.
                 id: EncoderId,
             },
             /// Reads an EEPROM word of a bank. Version 3.0.
@@ -79,7 +79,7 @@ macro_rules! operations {
                 }
             }
 
-            /// The operation of a command that takes no argument; `None` for the five that do (13, 14, 18, 19, 20).
+            /// Returns the operation of a command that takes no argument; `None` for the five that do (13, 14, 18, 19, 20).
             pub const fn without_arguments(command: Command) -> Option<Self> {
                 match command {
                     $(Command::$plain => Some(Self::$plain),)+
@@ -97,7 +97,7 @@ operations! {
 }
 
 impl Operation {
-    /// The frame code of the command data frame: 3 for banks and the velocity coefficient, else 0.
+    /// The frame code of the command data frame: 3 for banks and the velocity coefficient, otherwise 0.
     pub const fn frame_code(self) -> FrameCode {
         match self {
             Self::EepromReadBank { .. }
@@ -113,7 +113,7 @@ impl Operation {
         matches!(self.frame_code(), FrameCode::Fc3) || matches!(self.command().min_version(), Version::V3_0)
     }
 
-    /// Whether the encoder changes something that outlives the request: EEPROM, identification code, address, zero
+    /// Returns whether the encoder changes something that outlives the request: EEPROM, identification code, address, zero
     /// point, turns, alarms.
     pub const fn writes(self) -> bool {
         self.command().is_reset()
@@ -128,7 +128,8 @@ impl Operation {
             )
     }
 
-    /// The name in capitals: that of the command, except for the four of version 3.0 that share a code with another.
+    /// The name in capitals. It is that of the command, except for the four operations of version 3.0 that share a code with
+    /// another.
     pub const fn name(self) -> &'static str {
         match self {
             Self::EepromReadBank { .. } => "EEPROM_READ_BANK",

@@ -7,7 +7,7 @@ use crate::frame::{framing, pack, truncated};
 use crate::layout::{FRAME_BITS, Layout, MAX_FRAMES};
 use crate::units::Units;
 
-/// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
+/// The 2 to 6 frames of one response: their content bits, with the framing checked and removed and nothing else judged.
 ///
 /// ```text
 ///  line, time →   0 | 16 content bits | 1 | 0 | 16 content bits | 1 | ...
@@ -26,12 +26,12 @@ pub struct RawResponse {
 pub struct Crc {
     /// As received.
     pub got: u8,
-    /// As computed over the content bits before it.
+    /// The CRC-8 computed over the content bits before it.
     pub want: u8,
 }
 
 impl RawResponse {
-    /// Most frames of a response.
+    /// Maximum number of frames of a response.
     pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
 
     /// `contents` are 0 after the frames of the layout.
@@ -39,7 +39,7 @@ impl RawResponse {
         Self { contents, frames: layout.frames() }
     }
 
-    /// The response at the beginning of a piece of line, its frames back to back; bits after it are left alone.
+    /// Takes the response at the start of a piece of line, its frames back to back; bits after it are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`].
@@ -50,7 +50,7 @@ impl RawResponse {
         }
     }
 
-    /// A response from the content bits of its frames, one word each; words after it are left alone.
+    /// Creates a response from the content bits of its frames, one word each; words after it are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`].
@@ -74,12 +74,12 @@ impl RawResponse {
         self.frames
     }
 
-    /// The content bits of the frames, the first of the line in bit 0.
+    /// The content bits of the frames, the first on the line in bit 0.
     pub fn contents(&self) -> &[u16] {
         self.contents.get(..usize::from(self.frames)).unwrap_or(&self.contents)
     }
 
-    /// The frames as a receiver hears them.
+    /// The frames as a receiver delivers them.
     pub fn units(&self) -> Units {
         self.contents().iter().map(|content| Some(*content)).collect()
     }
@@ -110,7 +110,7 @@ impl RawResponse {
         Crc { got: got.reverse_bits(), want: mirrored(covered).reverse_bits() }
     }
 
-    /// The frames of all content bits but the CRC-8, the first of the line in bit 0; the CRC-8 is added.
+    /// Creates the frames from all content bits except the CRC-8, the first on the line in bit 0, and adds the CRC-8.
     #[expect(clippy::cast_possible_truncation, reason = "each shift brings a frame to the low bits")]
     pub(crate) fn of_payload(payload: u128, layout: Layout) -> Self {
         let mut contents = [0; Self::MAX_FRAMES];
@@ -120,7 +120,7 @@ impl RawResponse {
         Self::of(contents, layout).sealed()
     }
 
-    /// The frames with the CRC-8 that their other bits demand.
+    /// Sets the CRC-8 that the other bits require.
     pub(crate) fn sealed(mut self) -> Self {
         let crc = self.crc().want;
         if let Some(last) = self.contents.get_mut(usize::from(self.frames).wrapping_sub(1)) {
@@ -129,7 +129,7 @@ impl RawResponse {
         self
     }
 
-    /// Whether the CRC-8 is right.
+    /// Returns whether the CRC-8 is right.
     pub(crate) fn is_sound(&self) -> bool {
         self.contents().iter().fold(0, |register, content| next_word(register, *content)) == 0
     }
@@ -141,7 +141,7 @@ impl RawResponse {
     }
 }
 
-/// The content bits as bytes, the first of the line in bit 0 of the first.
+/// The content bits as bytes, the first on the line in bit 0 of the first.
 const fn bytes(contents: [u16; MAX_FRAMES as usize]) -> [u8; 2 * MAX_FRAMES as usize] {
     let [c0, c1, c2, c3, c4, c5] = contents;
     let ([a, b], [c, d], [e, f]) = (c0.to_le_bytes(), c1.to_le_bytes(), c2.to_le_bytes());

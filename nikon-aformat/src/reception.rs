@@ -1,10 +1,10 @@
 //! Reception of responses from a sampled line: oversampled, or as a plain bit stream at any bit offset.
 //!
-//! Every start bit is searched anew and the clock is recovered from every edge, so the rate error counts over one frame of 18
-//! bits only. Over six frames of 108 bits one per cent would already be more than a bit.
+//! Every start bit is searched for separately and the clock is recovered from every edge, so a rate error accumulates only over
+//! one frame of 18 bits. Over six frames of 108 bits, one per cent would already amount to more than a bit.
 //!
 //! The frames of a response follow each other without idle bits, and five idle bits or more separate two responses. A frame that
-//! begins a bit or more late has lost its start bit, and its response is refused.
+//! begins one or more bits late has lost its start bit, and its response is refused.
 //!
 //! ```
 //! use nikon_aformat::reception::LineReceiver;
@@ -30,7 +30,7 @@ use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::raw_response::RawResponse;
 
-/// Receives a piece of line that holds responses of one layout in succession, as a sampler sees it.
+/// Receives a sampled piece of line that holds responses of one layout in succession.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineReceiver {
@@ -42,11 +42,11 @@ pub struct LineReceiver {
     got: u8,
     /// Index of the first sample after the last frame.
     end: u64,
-    /// A frame was broken; the rest of its response is passed over.
+    /// A frame was broken; the rest of its response is skipped.
     broken: bool,
 }
 
-/// One sample a bit.
+/// One sample per bit.
 const PLAIN_BITS: Format = match Format::new(1, 16) {
     Ok(format) => format,
     Err(_) => panic!(),
@@ -56,7 +56,7 @@ impl LineReceiver {
     /// Idle bits that separate two responses on a bus. The shortest gap that masters allow for is 7.5 bits.
     const BUS_GAP_BITS: u64 = 5;
 
-    /// A receiver of `samples_per_bit` samples per bit, 4 to 80.
+    /// Creates a receiver for 4 to 80 samples per bit.
     ///
     /// The vendor's receivers use 4, 5, 6 or 8.
     ///
@@ -69,16 +69,16 @@ impl LineReceiver {
         }
     }
 
-    /// A receiver of a plain bit stream, as a shift register packs it.
+    /// Creates a receiver for a plain bit stream, as a shift register packs it.
     pub const fn bits(layout: Layout) -> Self {
         Self::of(PLAIN_BITS, layout)
     }
 
     /// Accepts any gap between the frames of a response, for a line on which idle bits separate them.
     ///
-    /// **One wrong bit can then give a wrong position**: where the start bit of a frame is lost, a later edge is taken for it, and
-    /// one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame swallows the
-    /// first frame of the next one.
+    /// **One wrong bit can then give a wrong position**: if the start bit of a frame is lost, a later edge is mistaken for it,
+    /// and one such frame in 256 at the end of a response passes the CRC-8. A response that lost a frame also swallows the first
+    /// frame of the next one.
     ///
     /// ```
     /// use nikon_aformat::reception::LineReceiver;
@@ -113,12 +113,13 @@ impl LineReceiver {
         }
     }
 
-    /// Samples taken so far: the index of the next one.
+    /// Samples taken so far, which is the index of the next one.
     pub const fn position(&self) -> u64 {
         self.receiver.position()
     }
 
-    /// Takes one sample; returns a response when the delimiter of its last frame was sampled, or the fault that ended one.
+    /// Takes one sample; returns a response when the delimiter of its last frame has been sampled, or the fault that ended a
+    /// response.
     pub fn push(&mut self, sample: bool) -> Option<Result<RawResponse, Error>> {
         let field = self.receiver.push(sample)?;
         self.take(field)
@@ -130,7 +131,7 @@ impl LineReceiver {
         self.take(field)
     }
 
-    /// Takes samples off the front of `samples` until a response ends or none are left.
+    /// Takes samples from the front of `samples` until a response ends or none are left.
     pub fn feed(&mut self, samples: &mut Samples) -> Option<Result<RawResponse, Error>> {
         while let Some(field) = self.receiver.feed(samples) {
             let ended = self.take(field);
@@ -141,7 +142,8 @@ impl LineReceiver {
         None
     }
 
-    /// The line has ended, or the time for the response is over: the fault of a response that had begun.
+    /// Ends the reception at the end of the line, or when the time for the response has run out: returns the fault of a response
+    /// that had begun.
     pub fn finish(&mut self) -> Option<Error> {
         let begun = (self.got > 0 || self.receiver.is_receiving()) && !self.broken;
         let error = self.truncation();
@@ -150,7 +152,7 @@ impl LineReceiver {
         begun.then_some(error)
     }
 
-    /// One frame more. A gap before it ends the response that was begun, and the frame begins the next one.
+    /// Takes one more frame. A gap before it ends the response that had begun, and the frame begins the next one.
     fn take(&mut self, field: Field) -> Option<Result<RawResponse, Error>> {
         let samples = u64::from(self.receiver.format().samples_per_bit());
         // The end of a frame is known to half a bit.
@@ -184,7 +186,7 @@ impl LineReceiver {
         Some(Ok(RawResponse::of(core::mem::take(&mut self.contents), self.layout)))
     }
 
-    /// A response is given up, and its rest passed over.
+    /// Abandons a response and skips the rest of it.
     fn break_off(&mut self, error: Error) -> Error {
         self.got = 0;
         self.contents = [0; RawResponse::MAX_FRAMES];

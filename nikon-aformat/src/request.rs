@@ -15,7 +15,7 @@ use crate::units::Units;
 #[cfg(test)]
 pub(crate) mod tests;
 
-/// What a master asks one encoder for, or with a multi-response command several.
+/// A master's request to one encoder or, with a multi-response command, to several.
 ///
 /// ```text
 ///  all others                      CDF
@@ -28,19 +28,19 @@ pub(crate) mod tests;
 ///  CoefficientWrite                CDF, frame code 3   MDF0 0..=7      MDF1 8..=15     MDF2 16..=18
 /// ```
 ///
-/// In a multi-response request EA is best read as the highest address that is asked to answer; no document says it.
+/// In a multi-response request EA is best read as the highest address that is asked to answer; no document says so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Request {
     /// EA: the encoder; for [`Operation::SetAddress1`] and [`Operation::SetAddress2`] its new address.
     pub ea: EncoderAddress,
-    /// What it is to do.
+    /// What the encoder is to do.
     pub operation: Operation,
 }
 
 impl Request {
-    /// A request of `operation` to the encoder `ea`.
+    /// Creates a request for `operation` to the encoder `ea`.
     pub const fn new(ea: EncoderAddress, operation: Operation) -> Self {
         Self { ea, operation }
     }
@@ -50,7 +50,7 @@ impl Request {
         self.operation.command()
     }
 
-    /// The frames to send.
+    /// Returns the frames to send.
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, EncoderAddress, Operation, Request};
@@ -80,10 +80,10 @@ impl Request {
         }
     }
 
-    /// The number of frames in a request that begins with this command data frame.
+    /// Returns the number of frames in a request that begins with this command data frame.
     ///
     /// # Errors
-    /// [`Error::FrameCode`] for a frame code that no request with this command begins with, [`Error::UnknownCommand`].
+    /// [`Error::FrameCode`] for a frame code with which no request for this command begins, [`Error::UnknownCommand`].
     pub fn expected_frames(cdf: RequestFrame) -> Result<u8, Error> {
         let command = Command::from_code(cdf.code());
         match (cdf.frame_code(), command) {
@@ -98,7 +98,7 @@ impl Request {
         }
     }
 
-    /// Decodes received frames as an encoder does. Frames after the request are left alone.
+    /// Decodes received frames as an encoder does. Frames after the request are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::FrameCode`], [`Error::UnknownCommand`]; [`Error::AddressRange`] for a write to
@@ -136,10 +136,10 @@ impl Request {
         Ok(Self { ea, operation })
     }
 
-    /// The layout of the response, from an encoder of this resolution.
+    /// Returns the layout of the response from an encoder of this resolution.
     ///
     /// The same request can have different responses: version 3.0 encoders may be set in the factory to answer commands 1
-    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell it.
+    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell which.
     pub const fn layout(self, resolution: Resolution) -> Layout {
         match self.operation {
             Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
@@ -180,16 +180,16 @@ impl Request {
         }
     }
 
-    /// What the response of an encoder of this resolution has to be.
+    /// Returns what the response of an encoder of this resolution has to be.
     ///
-    /// The address is checked where [`Command::answers_with_own_address`] says so.
+    /// The address is checked if [`Command::answers_with_own_address`] says so.
     pub const fn expected(self, resolution: Resolution) -> Expected {
         let command = self.command();
         let expected = Expected::new(self.layout(resolution), command).echoing(Echo::of(self.operation));
         if command.answers_with_own_address() { expected.from_address(self.ea) } else { expected }
     }
 
-    /// The request itself, if encoders of this resolution understand it.
+    /// Returns the request itself, if encoders of this resolution understand it.
     ///
     /// # Errors
     /// [`Error::UnsupportedInVersion`].
@@ -218,7 +218,7 @@ const fn mdf3(byte: u8) -> RequestFrame {
     RequestFrame::mdf(FrameCode::Fc0, byte)
 }
 
-/// Whether memory frames come in the order of a request: MDF0, MDF1, MDF3, MDF2, those that it has.
+/// Checks that memory frames come in the order of a request: MDF0, MDF1, MDF3, MDF2, as far as it has them.
 fn check_order(memory: &[RequestFrame]) -> Result<(), Error> {
     let order: &[FrameCode] = match memory.len() {
         1 => &[FrameCode::Fc3],
@@ -242,7 +242,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Most frames of a request.
+    /// Maximum number of frames of a request.
     pub const MAX: usize = 5;
 
     const fn of(frames: [RequestFrame; 5], len: u8) -> Self {
@@ -259,19 +259,19 @@ impl Frames {
         self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
     }
 
-    /// The frames as a receiver hears them.
+    /// The frames as a receiver delivers them.
     pub fn units(&self) -> Units {
         self.as_slice().iter().map(|frame| Some(frame.content())).collect()
     }
 
-    /// Line bits from the first start bit to the last delimiter, with `gap_bits` idle bits between two frames.
+    /// Number of line bits from the first start bit to the last delimiter, with `gap_bits` idle bits between frames.
     pub const fn line_bits(self, gap_bits: u32) -> u32 {
         let gaps = (self.len as u32).saturating_sub(1);
         (self.len as u32).wrapping_mul(FRAME_BITS).saturating_add(gaps.saturating_mul(gap_bits))
     }
 
-    /// Writes the line bits over those of `bytes` that begin at bit `offset`, with `gap_bits` idle bits between two
-    /// frames (see [`BitRate::bits`](crate::timing::BitRate::bits)); gives the number of bits.
+    /// Overwrites the bits of `bytes` that begin at bit `offset` with the line bits, with `gap_bits` idle bits between frames
+    /// (see [`BitRate::bits`](crate::timing::BitRate::bits)); returns the number of bits.
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, BitRate, EncoderAddress, FRAME_GAP_NS, Operation, Request};

@@ -3,7 +3,7 @@ use servowire_core::OutOfRange;
 use crate::command::Version;
 use crate::number::U40;
 
-/// What the line does not say about an encoder: its widths, its version and its factory settings.
+/// The properties of an encoder that the line does not tell: its widths, its version and its factory settings.
 ///
 /// ```text
 ///  abs   |39 ... st + mt| st + mt - 1 ... st | st - 1 ... 0 |
@@ -34,8 +34,8 @@ impl Resolution {
     const NARROWEST: Self =
         Self { st_bits: 1, mt_bits: 0, version: Version::V2_1, low_with_velocity: false, resets_with_position: false };
 
-    /// Widths of the single turn (encoders have 17, 20, 22 or 24 bits) and of the turns (16, or 0 without a counter), for
-    /// an encoder of version 2.1.
+    /// Describes an encoder of version 2.1 by the widths of its single turn (encoders have 17, 20, 22 or 24 bits) and of its
+    /// turns (16, or 0 without a counter).
     ///
     /// # Errors
     /// [`OutOfRange`] for no or more than 32 single-turn bits, more than 32 bits of turns, or more than 40 together.
@@ -56,7 +56,7 @@ impl Resolution {
         Ok(Self { st_bits, mt_bits, ..Self::NARROWEST })
     }
 
-    /// The same of another version. Factory settings of version 3.0 are dropped in version 2.1.
+    /// Sets another version. Factory settings of version 3.0 are dropped in version 2.1.
     pub const fn with_version(self, version: Version) -> Self {
         match version {
             Version::V2_1 => Self { version, low_with_velocity: false, resets_with_position: false, ..self },
@@ -64,12 +64,12 @@ impl Resolution {
         }
     }
 
-    /// The same for an encoder of version 3.0 that answers commands 1 and 5 with the whole position and velocity.
+    /// Sets version 3.0, with the factory setting by which commands 1 and 5 are answered with the whole position and velocity.
     pub const fn with_velocity_in_low(self) -> Self {
         Self { version: Version::V3_0, low_with_velocity: true, ..self }
     }
 
-    /// The same for an encoder of version 3.0 that answers the resets, commands 8 to 12, with its position.
+    /// Sets version 3.0, with the factory setting by which the resets, commands 8 to 12, are answered with the position.
     pub const fn with_position_in_resets(self) -> Self {
         Self { version: Version::V3_0, resets_with_position: true, ..self }
     }
@@ -99,18 +99,18 @@ impl Resolution {
         self.resets_with_position
     }
 
-    /// Counts in a turn.
+    /// Counts per turn.
     pub const fn counts_per_turn(self) -> u64 {
         1_u64.wrapping_shl(self.st_bits as u32)
     }
 
-    /// The counts in the turn of position bits.
+    /// Returns the counts within the turn from position bits.
     #[expect(clippy::cast_possible_truncation, reason = "masked to 32 bits at most")]
     pub(crate) const fn single_turn(self, abs: u64) -> u32 {
         (abs & self.counts_per_turn().wrapping_sub(1)) as u32
     }
 
-    /// The turns of a whole position; their uppermost bit is the sign.
+    /// Returns the turns of a whole position; their highest bit is the sign.
     #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "the wrap is the sign")]
     pub(crate) const fn turns(self, abs: u64) -> i32 {
         let turns = abs.wrapping_shr(self.st_bits as u32) as u32;
@@ -120,40 +120,40 @@ impl Resolution {
         }
     }
 
-    /// The position bits of single turn and turns together.
+    /// Joins single turn and turns to position bits.
     pub const fn compose(self, single_turn: u32, turns: u32) -> U40 {
         let single = single_turn as u64 & self.counts_per_turn().wrapping_sub(1);
         let turns = turns as u64 & 1_u64.wrapping_shl(self.mt_bits as u32).wrapping_sub(1);
         U40::truncate(single | turns.wrapping_shl(self.st_bits as u32))
     }
 
-    /// A single-turn position as a fraction of a turn: 2^32 is a whole one.
+    /// Converts a single-turn position to a fraction of a turn: 2^32 is a whole turn.
     #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are meant")]
     pub const fn fraction(self, single_turn: u32) -> u32 {
         (single_turn as u64).wrapping_shl(32_u32.saturating_sub(self.st_bits as u32)) as u32
     }
 
-    /// A single-turn position in thousandths of a degree, rounded down.
+    /// Converts a single-turn position to thousandths of a degree, rounded down.
     #[expect(clippy::cast_possible_truncation, reason = "below 360 000")]
     pub const fn milli_degrees(self, single_turn: u32) -> u32 {
         let scaled = (single_turn as u64).wrapping_mul(360_000);
         scaled.wrapping_shr(self.st_bits as u32) as u32
     }
 
-    /// A single-turn position in degrees.
+    /// Converts a single-turn position to degrees.
     #[expect(clippy::cast_precision_loss, reason = "a power of two")]
     pub fn degrees(self, single_turn: u32) -> f64 {
         f64::from(single_turn) / self.counts_per_turn() as f64 * 360.0
     }
 
-    /// A single-turn position in degrees in the arithmetic of the AM243x Motor Control SDK, bit by bit: each operand
+    /// Converts a single-turn position to degrees with the arithmetic of the AM243x Motor Control SDK, bit for bit: each operand
     /// rounded to `f32`, divided, then multiplied.
     #[expect(clippy::cast_precision_loss, reason = "the loss is what is asked for")]
     pub fn degrees_f32(self, single_turn: u32) -> f32 {
         single_turn as f32 / self.counts_per_turn() as f32 * 360.0
     }
 
-    /// The shorter path from one single-turn position to another in counts, across the zero point if necessary.
+    /// Returns the shorter path from one single-turn position to another in counts, across the zero point if necessary.
     #[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
     pub const fn difference(self, from: u32, to: u32) -> i32 {
         let unused = 32_u32.saturating_sub(self.st_bits as u32);
@@ -161,7 +161,7 @@ impl Resolution {
     }
 }
 
-/// A resolution as it is written down.
+/// A resolution in its serialised form.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {

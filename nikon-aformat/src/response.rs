@@ -28,13 +28,13 @@ pub(crate) mod tests;
 ///  then the data of the layout, and in the last eight content bits the CRC-8
 /// ```
 ///
-/// Every field travels least significant bit first, the CRC-8 most significant bit first. Bits that a layout leaves
-/// unused are ignored in reception and sent as 0.
+/// Every field is sent least significant bit first, the CRC-8 most significant bit first. Bits that a layout leaves unused are
+/// ignored on reception and sent as 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Response {
-    /// EA: who answers.
+    /// EA: the encoder that answers.
     pub ea: EncoderAddress,
     /// The rest.
     pub body: Body,
@@ -46,7 +46,7 @@ pub struct Response {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Body {
-    /// The short form of commands 21 and 22, without repetition of the command.
+    /// The short form of commands 21 and 22, which does not repeat the command.
     Abs17 {
         /// Whether any of ES0 to ES3 is set.
         es_any: bool,
@@ -68,17 +68,17 @@ impl Response {
     /// Value of the sync code that begins a response.
     pub const SYNC_CODE: u8 = SYNC_CODE;
 
-    /// A response with full information field.
+    /// Creates a response with a full information field.
     pub const fn new(ea: EncoderAddress, command: Command, es: EncoderStatus, data: Data) -> Self {
         Self { ea, body: Body::Full { command, es, data } }
     }
 
-    /// The response to commands 21 and 22.
+    /// Creates the response to commands 21 and 22.
     pub const fn abs17(ea: EncoderAddress, es: EncoderStatus, abs: U17) -> Self {
         Self { ea, body: Body::Abs17 { es_any: !es.is_empty(), abs } }
     }
 
-    /// Decodes a response whose frames are at hand.
+    /// Decodes a response from its frames.
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`], [`Error::Crc`], [`Error::SyncCode`], [`Error::FixedBit`],
@@ -91,7 +91,8 @@ impl Response {
         Self::of_contents(expected, contents)
     }
 
-    /// What the content bits say, after the checks that do not need to know it. On a 32-bit core each field is a shift or two.
+    /// Decodes the content bits after the checks that do not depend on their meaning. On a 32-bit core each field takes one or
+    /// two shifts.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "fields are cut out of words")]
     fn of_contents(expected: &Expected, [p0, p1, p2]: Contents) -> Result<Self, Error> {
@@ -150,7 +151,7 @@ impl Response {
         }
     }
 
-    /// Decodes a response from 16-bit words, the content bits of one frame each; words after it are left alone.
+    /// Decodes a response from 16-bit words, each with the content bits of one frame; words after it are ignored.
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, Command, Expected, Layout, Response};
@@ -172,9 +173,9 @@ impl Response {
         Self::of_contents(expected, contents)
     }
 
-    /// Decodes the response at the beginning of a piece of line, its frames back to back; bits after it are left alone.
+    /// Decodes the response at the start of a piece of line, its frames back to back; bits after it are ignored.
     ///
-    /// Take the piece out of a packed buffer at any bit offset with [`Window::read`].
+    /// Use [`Window::read`] to take the piece from any bit offset of a packed buffer.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`] and [`Error::Delimiter`] frame by frame, then as
@@ -187,7 +188,7 @@ impl Response {
         Self::of_contents(expected, contents)
     }
 
-    /// The frames to send.
+    /// Returns the frames to send.
     pub fn emit(self) -> RawResponse {
         let head = u128::from(Self::SYNC_CODE) | u128::from(self.ea.get()) << 3;
         let (payload, layout) = match self.body {
@@ -240,7 +241,7 @@ impl Response {
         }
     }
 
-    /// The whole position, where the response carries it.
+    /// The whole position, if the response carries it.
     pub const fn abs40(self) -> Option<U40> {
         match self.data() {
             Some(Data::Abs40 { abs } | Data::Abs40Vel { abs, .. }) => Some(abs),
@@ -248,7 +249,7 @@ impl Response {
         }
     }
 
-    /// The position from bit 0 up, as far as the response carries it: see [`Layout::abs_bits`].
+    /// The position from bit 0 up, as many bits as the response carries: see [`Layout::abs_bits`].
     pub const fn abs(self) -> Option<u64> {
         match self.body {
             Body::Abs17 { abs, .. } => Some(abs.get() as u64),
@@ -264,7 +265,7 @@ impl Response {
         }
     }
 
-    /// The alarms, where the response carries them.
+    /// The alarms, if the response carries them.
     pub const fn alm(self) -> Option<Alm> {
         match self.data() {
             Some(Data::Status { alm, .. } | Data::Abs24Status { alm, .. }) => Some(alm),
@@ -272,7 +273,7 @@ impl Response {
         }
     }
 
-    /// The temperature, where the response carries it.
+    /// The temperature, if the response carries it.
     pub const fn temperature(self) -> Option<Temperature> {
         match self.data() {
             Some(Data::Temperature { temperature } | Data::Abs24Temp { temperature, .. }) => Some(temperature),
@@ -280,7 +281,7 @@ impl Response {
         }
     }
 
-    /// The velocity, where the response carries it.
+    /// The velocity, if the response carries it.
     pub const fn velocity(self) -> Option<i32> {
         match self.data() {
             Some(
@@ -291,7 +292,7 @@ impl Response {
     }
 }
 
-/// Off the hot path: why a response is refused.
+/// Returns why a response is refused; off the hot path.
 #[cold]
 #[inline(never)]
 pub(crate) fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {

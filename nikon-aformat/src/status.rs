@@ -3,22 +3,22 @@ use servowire_core::OutOfRange;
 
 use crate::command::Version;
 
-/// ES, the four status bits of every information field but those of commands 21 and 22.
+/// ES, the four status bits of every information field except those of commands 21 and 22.
 ///
 /// ```text
 ///  line, time →  ES0                ES1      ES2                        ES3
 ///                BUSY or MEMBUSY    BATT     OVSPD, MEMERR or OVTEMP    STERR, PSERR, MTERR or INCERR
 /// ```
 ///
-/// ES0 is sent first; release 9.2 of the AM243x Motor Control SDK shows the four bits in reverse.
-/// Where OVFLOW goes is not documented: no bit follows it here.
+/// ES0 is sent first; release 9.2 of the AM243x Motor Control SDK shows the four bits in reverse order.
+/// It is not documented which bit OVFLOW sets; here it sets none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
 pub struct EncoderStatus(u8);
 
 bitflags! {
     impl EncoderStatus: u8 {
-        /// ES0: the position is being determined, or the EEPROM is at work.
+        /// ES0: the position is being determined, or the EEPROM is busy.
         const BUSY = 1 << 0;
         /// ES1: the battery is low.
         const BATT = 1 << 1;
@@ -30,9 +30,9 @@ bitflags! {
 }
 
 impl EncoderStatus {
-    /// What an encoder with these alarms shows.
+    /// Returns the status that an encoder with these alarms shows.
     ///
-    /// The alarms of a second sensor unit (version 3.0) feed no bit: whether they should is not documented.
+    /// The alarms of a second sensor unit (version 3.0) set no bit; it is not documented whether they should.
     pub const fn of_alarms(alm: Alm) -> Self {
         const WARNING: Alm = Alm::OVSPD.union(Alm::MEMERR).union(Alm::OVTEMP);
         const ERROR: Alm = Alm::MTERR.union(Alm::STERR).union(Alm::PSERR).union(Alm::INCERR);
@@ -76,23 +76,23 @@ bitflags! {
         const BATT = 1 << 0;
         /// Back-up capacitor or battery at or below 2.45 V; the turns cannot be trusted.
         const MTERR = 1 << 1;
-        /// The turns, read as a signed number, left -32768..=32767.
+        /// The turns, read as a signed number, exceeded -32768..=32767.
         const OVFLOW = 1 << 2;
         /// Over-speed of the optical or the multi-turn part.
         const OVSPD = 1 << 3;
         /// An access to the EEPROM failed.
         const MEMERR = 1 << 4;
-        /// Absolute and incremental part disagree.
+        /// The absolute and the incremental part disagree.
         const STERR = 1 << 5;
-        /// Single-turn and multi-turn calculation disagree by a turn or more.
+        /// The single-turn and the multi-turn calculation disagree by a turn or more.
         const PSERR = 1 << 6;
         /// The single-turn position is being determined.
         const BUSY = 1 << 7;
-        /// The EEPROM is at work.
+        /// The EEPROM is busy.
         const MEMBUSY = 1 << 8;
-        /// The temperature sensor is over its limit.
+        /// The temperature sensor is above its limit.
         const OVTEMP = 1 << 9;
-        /// Amplitude or level of the incremental signals is bad.
+        /// The amplitude or level of the incremental signals is bad.
         const INCERR = 1 << 10;
         /// OVSPD of the second unit. Version 3.0.
         const OVSPD_S = 1 << 11;

@@ -2,8 +2,8 @@
 //!
 //! [`response`] and [`request`] read words of two bytes, as a shift register with hardware framing delivers them.
 //! [`line_response`] reads a packed line bit by bit, from any offset, in the `(bytes, bit offset)` form of `nom`.
-//! Missing input gives `Incomplete`; every other fault is an `Error`. With [`nikon_aformat::Error`](crate::Error) as the error
-//! type the reason is kept.
+//! Missing input returns `Incomplete`; every other fault is an `Error`. With [`nikon_aformat::Error`](crate::Error) as the error
+//! type, the reason is kept.
 
 use core::num::NonZeroUsize;
 
@@ -19,7 +19,7 @@ use crate::raw_response::RawResponse;
 use crate::request::{Frames, Request};
 use crate::response::Response;
 
-/// Takes one request off the front, as an encoder receives it: two bytes per frame.
+/// Takes one request from the start of the input, as an encoder receives it: two bytes per frame.
 ///
 /// # Errors
 /// As [`RequestFrame::from_word`] and [`Request::parse`], with `Incomplete` for missing bytes.
@@ -42,7 +42,7 @@ where
     }
 }
 
-/// Takes an expected response off the front: two bytes per frame, 16 content bits in the given order.
+/// Takes an expected response from the start of the input: two bytes per frame, 16 content bits in the given order.
 ///
 /// ```
 /// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, stream};
@@ -78,7 +78,7 @@ where
 /// A packed line and the bit at which to begin.
 pub type Bits<'a> = (&'a [u8], usize);
 
-/// Skips idle bits and takes an expected response off the front of a packed line; `Incomplete` counts bits.
+/// Skips idle bits and takes an expected response from the start of a packed line; `Incomplete` counts bits.
 ///
 /// ```
 /// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, RawResponse, stream};
@@ -94,7 +94,7 @@ pub type Bits<'a> = (&'a [u8], usize);
 /// ```
 ///
 /// # Errors
-/// As [`Response::parse_line`], with `Incomplete` for a line that ends in the response or before it.
+/// As [`Response::parse_line`], with `Incomplete` for a line that ends within or before the response.
 pub fn line_response<'a, E>(expected: Expected, order: BitOrder) -> impl Parser<Bits<'a>, Output = Response, Error = E>
 where
     E: ParseError<Bits<'a>> + FromExternalError<Bits<'a>, Error>,

@@ -2,8 +2,8 @@ use crate::number::U10;
 
 /// A temperature, 10 bits of 0.25 degrees Celsius.
 ///
-/// The vendor's drivers read it as unsigned. Whether encoders send negative numbers below 0 is not documented, so the
-/// two readings are kept apart and the caller chooses. The same ten bits are the first ten of EEPROM word 0xf9.
+/// The vendor's drivers read it as unsigned. It is not documented whether encoders send negative numbers below 0, so the two
+/// readings are separate and the caller chooses. The same ten bits are the lowest ten of EEPROM word 0xf9.
 ///
 /// ```
 /// use nikon_aformat::{Temperature, U10};
@@ -19,7 +19,7 @@ impl Temperature {
     /// EEPROM address of the temperature.
     pub const EEPROM_ADDRESS: u8 = 0xf9;
 
-    /// From EEPROM word 0xf9.
+    /// Creates the temperature from EEPROM word 0xf9.
     pub(crate) const fn from_eeprom(word: u16) -> Self {
         Self(U10::truncate(word))
     }

@@ -8,15 +8,15 @@ use crate::layout::Layout;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum BitRate {
-    /// 2.5 Mbit/s, 400 ns a bit.
+    /// 2.5 Mbit/s, 400 ns per bit.
     Mbit2_5,
-    /// 4 Mbit/s, 250 ns a bit.
+    /// 4 Mbit/s, 250 ns per bit.
     Mbit4,
-    /// 6.67 Mbit/s, exactly 20/3, 150 ns a bit.
+    /// 6.67 Mbit/s, exactly 20/3, 150 ns per bit.
     Mbit6_67,
-    /// 8 Mbit/s, 125 ns a bit.
+    /// 8 Mbit/s, 125 ns per bit.
     Mbit8,
-    /// 16 Mbit/s, 62.5 ns a bit.
+    /// 16 Mbit/s, 62.5 ns per bit.
     Mbit16,
 }
 
@@ -26,7 +26,7 @@ pub enum BitRate {
 /// not documented.
 pub const FRAME_GAP_NS: u32 = 1_000;
 
-/// Least time from the end of a transaction to the next request, in ns, as one drive maker has it.
+/// Least time from the end of a transaction to the next request, in ns, as used by one drive maker.
 pub const REQUEST_GAP_NS: u32 = 10_000;
 
 /// Longest time that the EEPROM is busy with a read, in ns ("Nikon Protocol Design").
@@ -39,10 +39,10 @@ pub const WRITE_BUSY_NS: u32 = 30_000_000;
 pub const POWER_UP_NS: u32 = 500_000_000;
 
 impl BitRate {
-    /// All five, the slowest first.
+    /// All five rates, the slowest first.
     pub const ALL: [Self; 5] = [Self::Mbit2_5, Self::Mbit4, Self::Mbit6_67, Self::Mbit8, Self::Mbit16];
 
-    /// One bit in ps.
+    /// Duration of one bit in ps.
     pub const fn bit_ps(self) -> u32 {
         match self {
             Self::Mbit2_5 => 400_000,
@@ -53,7 +53,7 @@ impl BitRate {
         }
     }
 
-    /// Bits in a second, rounded.
+    /// Bits per second, rounded.
     pub const fn bits_per_second(self) -> u32 {
         match self {
             Self::Mbit2_5 => 2_500_000,
@@ -64,13 +64,13 @@ impl BitRate {
         }
     }
 
-    /// `bits` bits in ns, rounded up.
+    /// Duration of `bits` bits in ns, rounded up.
     pub const fn bits_ns(self, bits: u32) -> u32 {
         let ps = (self.bit_ps() as u64).wrapping_mul(bits as u64).saturating_add(999);
         narrow(ps / 1000)
     }
 
-    /// How many bits last at least `ns`.
+    /// Number of bits that last at least `ns`.
     pub const fn bits(self, ns: u32) -> u32 {
         let ps = (ns as u64).wrapping_mul(1000);
         // One division a rate: the compiler makes a multiplication of each.
@@ -85,7 +85,7 @@ impl BitRate {
 
     /// The gap between the responses of two encoders to a multi-response request, in ns.
     ///
-    /// The value that the AM243x Motor Control SDK waits before it looks for the next start bit, so a lower bound.
+    /// This is the time that the AM243x Motor Control SDK waits before it looks for the next start bit, so it is a lower bound.
     pub const fn response_gap_ns(self) -> u32 {
         match self {
             Self::Mbit2_5 => 3_000,
@@ -100,7 +100,7 @@ impl BitRate {
     }
 
     /// Line time of a request of one frame, `encoders` responses and the gaps between them, in ns, rounded up. The
-    /// turn-around of the encoders and the cable (5 ns a metre each way) come on top.
+    /// turn-around of the encoders and the cable (5 ns per metre each way) come on top.
     pub const fn transaction_ns(self, layout: Layout, encoders: u8) -> u32 {
         let bits = layout.line_bits().wrapping_mul(encoders as u32).wrapping_add(FRAME_BITS);
         let gaps = (encoders as u32).saturating_sub(1);

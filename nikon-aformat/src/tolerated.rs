@@ -3,7 +3,7 @@ use servowire_core::Tolerance;
 use crate::marks::{NO_TURNS, OBJECTIONS, alarms, of_alarms, of_status, status};
 use crate::status::{Alm, EncoderStatus};
 
-/// Up to what age, and despite what, a position may be used.
+/// The age up to which, and the faults despite which, a position may be used.
 ///
 /// ```
 /// use nikon_aformat::{EncoderStatus, Policy, Tolerated};
@@ -13,7 +13,7 @@ use crate::status::{Alm, EncoderStatus};
 /// ```
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// Despite what a position may be used: status bits, and alarms if a response carries them.
+/// The faults despite which a position may be used: status bits, and alarms if a response carries them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
 pub struct Tolerated(u32);
@@ -25,7 +25,8 @@ impl Tolerated {
     #[cfg(test)]
     pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
-    /// What one drive tolerates where turns are not used: an encoder without its battery shows BATT. The turns are then not
+    /// The faults that one drive tolerates when turns are not used: an encoder without its battery shows BATT. The turns are
+    /// then not
     /// judged, and
     /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
     /// is about to fail.
@@ -43,13 +44,13 @@ impl Tolerated {
         Self(self.0 | of_alarms(alarms))
     }
 
-    /// What of these marks is not tolerated.
+    /// Returns the marks that are not tolerated.
     #[inline]
     pub(crate) const fn objects_to(self, marks: u32) -> u32 {
         marks & OBJECTIONS & !self.0
     }
 
-    /// Whether turns may be anything, or missing: they are not used.
+    /// Returns whether turns are not used, so that they may be anything, or missing.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
         self.0 & NO_TURNS != 0
@@ -65,7 +66,7 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// What is tolerated, as it is written down.
+/// What is tolerated, in its serialised form.
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[cfg(any(feature = "serde", feature = "arbitrary"))]

@@ -11,7 +11,7 @@ use crate::resolution::Resolution;
 ///                |            |             | 3  24 bits
 /// ```
 ///
-/// Known from one drive maker's firmware alone; other codes have no known meaning.
+/// Known only from one drive maker's firmware; other codes have no known meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -29,7 +29,7 @@ pub enum Multiturn {
     Magnetic,
     /// Optically, 16 bits.
     Optical,
-    /// A code without known meaning.
+    /// A code without a known meaning.
     Unknown(u8),
 }
 
@@ -39,13 +39,13 @@ pub enum Multiturn {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Battery {
-    /// There is none.
+    /// There is no battery.
     None,
-    /// By a line of its own.
+    /// By its own line.
     Separate,
-    /// By a line that several encoders share.
+    /// By a line shared by several encoders.
     Common,
-    /// A code without known meaning.
+    /// A code without a known meaning.
     Unknown(u8),
 }
 
@@ -53,7 +53,7 @@ impl TypeWord {
     /// Its EEPROM address.
     pub const EEPROM_ADDRESS: u8 = 0xf6;
 
-    /// The type word of an encoder with these widths; for widths that have no code, an unknown one.
+    /// Returns the type word of an encoder with these widths; for widths that have no code, an unknown type word.
     pub(crate) const fn of(resolution: Resolution) -> Self {
         let code = match resolution.st_bits() {
             17 => 0,
@@ -75,7 +75,7 @@ impl TypeWord {
         (self.0 & 7) as u8
     }
 
-    /// Single-turn bits; `None` for a code without known meaning.
+    /// Single-turn bits; `None` for a code without a known meaning.
     pub const fn st_bits(self) -> Option<u8> {
         match self.resolution_code() {
             0 => Some(17),
@@ -96,7 +96,7 @@ impl TypeWord {
         }
     }
 
-    /// Bits of the turns; `None` for a code without known meaning.
+    /// Bits of the turns; `None` for a code without a known meaning.
     pub const fn mt_bits(self) -> Option<u8> {
         match self.multiturn() {
             Multiturn::None => Some(0),
@@ -115,7 +115,7 @@ impl TypeWord {
         }
     }
 
-    /// The widths as a resolution of version 2.1; `None` for codes without known meaning. The word does not tell the version.
+    /// The widths as a resolution of version 2.1; `None` for codes without a known meaning. The word does not tell the version.
     pub const fn resolution(self) -> Option<Resolution> {
         match (self.st_bits(), self.mt_bits()) {
             (Some(st_bits), Some(mt_bits)) => match Resolution::new(st_bits, mt_bits) {

@@ -1,9 +1,9 @@
 use crate::layout::MAX_FRAMES;
 
-/// Frames as a receiver with hardware framing hears them: what [`Transaction::hear`](crate::master::Transaction::hear) and
-/// [`Device::hear`](crate::device::Device::hear) take.
+/// Frames as a receiver with hardware framing delivers them, for [`Transaction::hear`](crate::master::Transaction::hear) and
+/// [`Device::hear`](crate::device::Device::hear).
 ///
-/// Each is the 16 content bits, the first of the line in bit 0, or `None` if the delimiter reads 0.
+/// Each is the 16 content bits, the first on the line in bit 0, or `None` if the delimiter reads 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Units {
@@ -18,7 +18,7 @@ impl Units {
     }
 }
 
-/// The first six.
+/// The first six frames.
 impl FromIterator<Option<u16>> for Units {
     fn from_iter<I: IntoIterator<Item = Option<u16>>>(frames: I) -> Self {
         let mut all = Self::default();

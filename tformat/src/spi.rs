@@ -19,7 +19,7 @@ pub const SPI16_MAX_WORDS: usize = 10;
 ///
 /// ```text
 ///  bit   9                       8       7  ...  0
-///        delimiter of the field  start   data bits, first of the line
+///        delimiter of the field  start   data bits, first on the line
 ///        before, or idle: 1      0       in bit 7
 /// ```
 ///

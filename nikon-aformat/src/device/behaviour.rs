@@ -1,27 +1,27 @@
-/// What this encoder does where the documents leave it open. The default is the most likely reading.
+/// What this encoder does at the points that the documents leave open. The default is the most likely reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
-    /// From the last delimiter of a request to the first start bit of the response, in ns. Default 2800, as one vendor's
+    /// Time from the last delimiter of a request to the first start bit of the response, in ns. Default 2800, as one vendor's
     /// simulated encoder waits.
     pub response_delay_ns: u32,
     /// What ES0 shows in the first response to an EEPROM read. Default [`FirstRead::Busy`].
     pub first_read: FirstRead,
-    /// EEPROM data while they are not determined.
+    /// EEPROM data while they are undetermined.
     pub undetermined: u16,
-    /// The response that shows the effect of a reset first. Default [`Shows::Ninth`] ("Nikon Protocol Design").
+    /// The first response that shows the effect of a reset. Default [`Shows::Ninth`] ("Nikon Protocol Design").
     pub reset_shows: Shows,
-    /// What EA of a multi-response request means. Default [`Ea::Highest`].
+    /// The meaning of EA in a multi-response request. Default [`Ea::Highest`].
     pub ea: Ea,
-    /// Place among the responses to a multi-response request, 0..=7; `None` is its own address, regardless of the other
-    /// encoders. Give other numbers if the responses close up.
+    /// Place among the responses to a multi-response request, 0..=7; `None` stands for its own address, regardless of the other
+    /// encoders. Set other numbers if the responses close up.
     pub place: Option<u8>,
     /// Which address the responses to commands 11 and 20 show. Default [`ShownAddress::New`].
     pub shown_address: ShownAddress,
-    /// What starts the count of a reset again. Default [`Restart::Any`].
+    /// What restarts the count of a reset. Default [`Restart::Any`].
     pub restart: Restart,
 }
 
@@ -31,7 +31,7 @@ pub struct Behaviour {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum FirstRead {
-    /// That the memory is at work.
+    /// The memory is busy.
     Busy,
     /// Nothing.
     Ready,
@@ -49,7 +49,7 @@ pub enum ShownAddress {
     Old,
 }
 
-/// What starts the count of a reset again, besides another request to the same encoder.
+/// What restarts the count of a reset, besides another request to the same encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -61,19 +61,19 @@ pub enum Restart {
     Own,
 }
 
-/// Which response shows the effect of a reset first.
+/// The first response that shows the effect of a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Shows {
-    /// That to the eighth request.
+    /// The response to the eighth request.
     Eighth,
-    /// That to the next request.
+    /// The response to the next request.
     Ninth,
 }
 
-/// What EA of a multi-response request means.
+/// The meaning of EA in a multi-response request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

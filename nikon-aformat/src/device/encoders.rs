@@ -8,7 +8,7 @@ pub struct Encoders<const N: usize, const BANKS: usize> {
 }
 
 impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
-    /// Lets all of them hear frames, like [`Device::hear`]; returns what each answers.
+    /// Passes frames to all of them, like [`Device::hear`]; returns what each answers.
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> [Option<Transmission>; N] {
         let mut answers = [None; N];
         for (answer, device) in answers.iter_mut().zip(&mut self.all) {
@@ -17,7 +17,7 @@ impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
         answers
     }
 
-    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    /// Takes a frame whose delimiter, at `end_ns`, reads 0.
     pub fn framing_error(&mut self, end_ns: u64) {
         for device in &mut self.all {
             device.framing_error(end_ns);

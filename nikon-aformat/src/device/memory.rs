@@ -7,7 +7,7 @@ const WRITE_BUSY_NS: u32 = 30_000_000;
 pub(super) struct Memory<const BANKS: usize> {
     words: [[u16; 256]; BANKS],
     busy_until_ns: u64,
-    /// The word that is being fetched.
+    /// The word being fetched.
     reading: Option<(u8, u8)>,
 }
 
@@ -40,7 +40,7 @@ impl<const BANKS: usize> Memory<BANKS> {
         self.busy_until_ns = now_ns.saturating_add(time_ns as u64);
     }
 
-    /// The word, if the same one was asked for before and has been fetched meanwhile; else it is being fetched now.
+    /// Returns the word, if it was requested before and has been fetched since; otherwise starts fetching it.
     pub(super) fn read(&mut self, bank: u8, address: u8, now_ns: u64) -> Option<u16> {
         if self.is_busy(now_ns) || !Self::has(bank) {
             return None;

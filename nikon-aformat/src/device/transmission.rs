@@ -4,7 +4,7 @@ use crate::layout::FRAME_BITS;
 use crate::raw_response::RawResponse;
 use crate::units::Units;
 
-/// A fault that the encoder or its line can be given.
+/// A fault that the encoder or its line can be made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -14,7 +14,7 @@ pub enum Fault {
     /// None.
     #[default]
     None,
-    /// It does not answer.
+    /// The encoder does not answer.
     Silent,
     /// Bit `at` of the response's line bits is inverted; nothing happens if the response is shorter.
     FlipBit {
@@ -23,7 +23,7 @@ pub enum Fault {
     },
     /// The line ends after this many bits of the response.
     CutAfter {
-        /// Bits that are sent.
+        /// Number of bits that are sent.
         bits: u8,
     },
     /// The CRC-8 of the response is inverted.
@@ -45,8 +45,8 @@ pub struct Transmission {
 }
 
 impl Transmission {
-    /// The whole frames of the line as a receiver on their grid hears them, the fault included: one whose start bit or delimiter
-    /// is wrong is a framing error.
+    /// Returns the whole frames of the line as a receiver on their grid sees them, the fault included: a wrong start bit or
+    /// delimiter makes a framing error.
     #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
     pub fn units(&self) -> Units {
         let frame = |at: u32| {

@@ -1,7 +1,6 @@
-/// When a readout that is repeated at a fixed period is due: continuous mode.
+/// Tells when a readout that is repeated at a fixed period is due (continuous mode).
 ///
-/// The grid does not move: a start that comes late does not shift those after it, and starts that were missed are
-/// counted and not made up for.
+/// The grid does not move: a late start does not shift the starts after it, and missed starts are counted but not made up for.
 ///
 /// ```
 /// use nikon_aformat::master::{Cycle, Line};
@@ -28,15 +27,15 @@ pub struct Cycle {
     missed: u32,
 }
 
-/// A period in which the transaction does not fit.
+/// The period is too short for the transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("a period of {period_ns} ns is too short: the transaction needs {min_ns} ns")]
 pub struct PeriodTooShort {
-    /// Period asked for.
+    /// Requested period, in ns.
     pub period_ns: u32,
-    /// Shortest possible one.
+    /// Shortest possible period, in ns.
     pub min_ns: u32,
 }
 
@@ -69,7 +68,7 @@ impl Cycle {
         self.next_ns
     }
 
-    /// Starts that were missed so far.
+    /// Number of starts missed so far.
     pub const fn missed(&self) -> u32 {
         self.missed
     }

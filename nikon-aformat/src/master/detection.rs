@@ -10,12 +10,12 @@ use crate::type_word::TypeWord;
 
 /// Finds an encoder and its widths: command 4, then the type word of the EEPROM.
 ///
-/// The bit rate is part of the encoder's order code and has to be tried out by the caller: no response means another rate.
+/// The bit rate is part of the encoder's order code and the caller has to try the rates: no response means that it is another one.
 /// One drive maker tries 4 Mbit/s first, then 2.5.
 ///
-/// After its supply has been switched on an encoder needs [`POWER_UP_NS`](crate::POWER_UP_NS) before the first request.
+/// After power-on, an encoder needs [`POWER_UP_NS`](crate::POWER_UP_NS) before the first request.
 ///
-/// On a line with several encoders ask each by its address with [`Detection::of`].
+/// On a line with several encoders, query each by its address with [`Detection::of`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detection {
@@ -24,7 +24,7 @@ pub struct Detection {
     end: Option<Step<Detected>>,
 }
 
-/// An encoder that was found.
+/// The encoder that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Detected {
@@ -32,8 +32,7 @@ pub struct Detected {
     pub ea: EncoderAddress,
     /// Its type word.
     pub type_word: TypeWord,
-    /// Its widths, if the type word is one of the known ones, in a resolution of version 2.1: nothing on the line tells the
-    /// version.
+    /// Its widths, if the type word is a known one, in a resolution of version 2.1, because nothing on the line tells the version.
     pub resolution: Option<Resolution>,
 }
 
@@ -45,12 +44,13 @@ impl Detection {
         Self { ea: None, reading: None, end: None }
     }
 
-    /// Asks the encoder with this address.
+    /// Queries the encoder with this address.
     pub const fn of(ea: EncoderAddress) -> Self {
         Self { ea: Some(ea), reading: None, end: None }
     }
 
-    /// The first request, at once: command 4 to the highest address, which any encoder answers, or the type word.
+    /// Returns the first request, to be sent at once: command 4 to the highest address, which any encoder answers, or the read
+    /// of the type word.
     pub const fn start(&mut self, now_ns: u64) -> Step<Detected> {
         self.reading = None;
         self.end = None;

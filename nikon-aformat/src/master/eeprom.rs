@@ -11,21 +11,21 @@ use crate::response::Response;
 use crate::status::{Alm, EncoderStatus};
 use crate::timing::READ_BUSY_NS;
 
-/// For reads: every 300 us, the longest time that a read takes, ten times.
+/// Polling of reads: every 300 us, the longest time that a read takes, ten times.
 pub const READ_POLLING: Polling = Polling { interval_ns: READ_BUSY_NS, max_tries: 10 };
 
-/// For the status after a write: every millisecond, ten times, on top of the 30 ms that a write takes.
+/// Polling of the status after a write: every millisecond, ten times, on top of the 30 ms that a write takes.
 pub const WRITE_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 10 };
 
-/// Until an encoder is ready: every millisecond, forty times, longer than any access lasts.
+/// Polling until an encoder is ready: every millisecond, forty times, which is longer than any access.
 pub(super) const READY_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 40 };
 
-/// Whether ES0 is set.
+/// Returns whether ES0 is set.
 pub(super) fn is_busy(response: Response) -> bool {
     response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY))
 }
 
-/// The alarms of a response to STATUS from this encoder; all else is no answer to it.
+/// Returns the alarms of a response to STATUS from this encoder; nothing else is an answer to it.
 pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) -> Result<(Response, Alm), Error> {
     let response = outcome?;
     match (response.command(), response.alm()) {
@@ -37,11 +37,10 @@ pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) ->
 /// Reads one EEPROM word.
 ///
 /// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
-/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. Which response is the
-/// first is not known where a read was broken off, by this controller before it started again or by another: then the
-/// response to the next request has the data of the old read, and that to the one after it is undetermined. And a busy memory
-/// does not start a read. So another address is read before, until ES0 is clear: at the beginning and after a
-/// response that is missing or refused.
+/// whole request is sent again, and the data of the second response are used if ES0 is clear in it. If a read was abandoned, by
+/// this controller before a restart or by another one, it is not known which response is the first: the response to the next
+/// request then has the data of the old read, and the response after it is undetermined. A busy memory does not start a read
+/// either. So another address is read first, until ES0 is clear: at the beginning and after a response that is missing or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromRead {
@@ -49,7 +48,7 @@ pub struct EepromRead {
     polling: Polling,
     /// The data of the first response are never used.
     discard_first: bool,
-    /// The caller knows that no read of this address was broken off, and that the memory is not busy.
+    /// The caller knows that no read of this address was abandoned and that the memory is not busy.
     known: bool,
     started: bool,
     next: Next,
@@ -61,7 +60,7 @@ pub struct EepromRead {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Next {
-    /// That of another address.
+    /// The response for another address.
     Other,
     First,
     Second,
@@ -91,37 +90,37 @@ impl EepromRead {
         }
     }
 
-    /// With another interval or number of tries; a read takes at least three requests. After another address was read,
+    /// Sets another interval or number of tries; a read takes at least three requests. After another address was read,
     /// the memory is left alone for 300 us regardless of the interval.
     pub const fn with_polling(self, polling: Polling) -> Self {
         Self { polling, ..self }
     }
 
-    /// Begins with the address itself, because it is known that no read of it was broken off and that the memory is not busy: two
-    /// requests instead of three or four. Once a read has failed or was started again before its end, that is forgotten.
+    /// Begins with the address itself, if it is known that no read of it was abandoned and that the memory is not busy: this
+    /// takes two requests instead of three or four. This setting is dropped once a read has failed or was restarted before its end.
     pub const fn knowing_that_none_was_broken_off(self) -> Self {
         Self { known: true, ..self }
     }
 
     /// Uses the data of the first response if ES0 is clear in it.
     ///
-    /// "Nikon Protocol Design" says that they are undetermined, and not that ES0 tells it: only for an encoder whose ES0 is
-    /// known to be set in its first response.
+    /// "Nikon Protocol Design" says that they are undetermined, but not that ES0 shows it, so use this only for an encoder whose
+    /// ES0 is known to be set in its first response.
     pub const fn trusting_es0_of_the_first_response(self) -> Self {
         Self { discard_first: false, ..self }
     }
 
-    /// The encoder that is asked.
+    /// The encoder that is queried.
     pub const fn ea(&self) -> EncoderAddress {
         self.request.ea
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
         Step::Send { request: self.begin(), not_before_ns: now_ns }
     }
 
-    /// The first request.
+    /// Returns the first request.
     pub(super) const fn begin(&mut self) -> Request {
         // A read that was started and has not ended is broken off by this.
         self.known = self.known && (!self.started || self.end.is_some());
@@ -187,7 +186,7 @@ impl EepromRead {
         Request::new(self.request.ea, operation)
     }
 
-    /// The word in a response to the request that was sent last, and whether the memory is busy.
+    /// Returns the word in a response to the last request, and whether the memory is busy.
     fn word(&self, response: Response) -> Result<(u16, bool), Error> {
         let fits = match (self.next_request().operation, response.data()) {
             (Operation::EepromRead { address: want }, Some(Data::Eeprom { data, address })) if address == want => {

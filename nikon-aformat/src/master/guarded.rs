@@ -8,13 +8,13 @@ use crate::timing::REQUEST_GAP_NS;
 
 /// A [`Reset`] that ends as done, not done, or with an unknown effect.
 ///
-/// An encoder counts equal requests, whoever sends them and whenever: after seven of an interrupted reset the first of a new
-/// one takes effect. So another command is sent first, which starts the count again, until it is answered and ES0 is
-/// clear. Then the eight requests follow, one act that is never repeated in part. Before a zero preset MEMERR has to be clear
-/// too, so that it tells about this one afterwards.
+/// An encoder counts equal requests, no matter who sends them and when: after seven requests of an interrupted reset, the first
+/// request of a new one takes effect. So another command, which restarts the count, is sent first until it is answered and ES0
+/// is clear. Then the eight requests follow, as one operation that is never repeated in part. Before a zero preset, MEMERR has
+/// to be clear too, so that afterwards it tells about this preset.
 ///
-/// `Done` rests on the eight responses. An encoder that hears something else in between, as noise on its end of the line, may
-/// start its count again and answer all the same: where a wrong zero is dangerous, compare the position before and after.
+/// `Done` rests on the eight responses. An encoder that hears something else in between, such as noise at its end of the line,
+/// may restart its count and answer all the same. If a wrong zero is dangerous, compare the position before and after.
 ///
 /// | it ends with | the encoder |
 /// |---|---|
@@ -23,7 +23,7 @@ use crate::timing::REQUEST_GAP_NS;
 /// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::NoResponse`] and other faults of the first response | was not asked to |
 /// | [`Error::EffectUnknown`] | may have done it; it may be busy until `ready_ns` |
 ///
-/// So it may begin after any past: an attempt that was broken off, a controller that has started anew.
+/// So it may follow any history: an abandoned attempt, a controller that has restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardedReset {
@@ -34,12 +34,12 @@ pub struct GuardedReset {
 }
 
 impl GuardedReset {
-    /// Guards this reset.
+    /// Creates the guard for this reset.
     pub const fn new(reset: Reset) -> Self {
         Self { reset, started: false, tries: 0, end: None }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.started = false;
         self.tries = 0;

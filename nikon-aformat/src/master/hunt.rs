@@ -9,36 +9,36 @@ use crate::response::Response;
 
 /// Finds responses among the frames that arrive.
 ///
-/// The frames received last are kept, as many as a response has. They are taken for one if they pass all checks and cannot
-/// have begun before the request had left the line; else the oldest one is dropped. So a good response is found whatever
-/// came before it: the own request, an older answer, noise, the rest of a damaged one.
+/// It keeps the last received frames, as many as a response has. They are taken as a response if they pass all checks and cannot
+/// have begun before the request had left the line; otherwise the oldest one is dropped. So a good response is found whatever
+/// came before it: the own request, an older answer, noise, the rest of a damaged response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Hunt {
     /// End of the request.
     from_ns: u64,
     contents: [u16; RawResponse::MAX_FRAMES],
-    /// When each began at the earliest.
+    /// The earliest time at which each began.
     begun_ns: [u64; RawResponse::MAX_FRAMES],
     got: usize,
-    /// End of the last one, by its stamp.
+    /// End of the last one, by its time stamp.
     end_ns: u64,
     /// How many of the first frames belong to a valid response of this encoder that was already reported.
     given: usize,
     giver: EncoderAddress,
 }
 
-/// What was found.
+/// The result of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Found {
     /// A response, or why something that began like one was refused.
     pub(super) outcome: Result<Response, Error>,
-    /// Its first start bit, by the stamps.
+    /// Its first start bit, by the time stamps.
     pub(super) began_ns: u64,
-    /// Its last delimiter, by the stamps.
+    /// Its last delimiter, by the time stamps.
     pub(super) end_ns: u64,
-    /// It begins inside a response of this encoder that was given, and behind that nothing began: that one had lost frames, and
-    /// its CRC-8 was right by chance.
+    /// It begins inside a response of this encoder that was already reported, and nothing began after that one: that one had
+    /// lost frames, and its CRC-8 was right by chance.
     pub(super) instead_of: Option<EncoderAddress>,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Block<'a> {
 }
 
 impl Hunt {
-    /// What began before `from_ns` is no answer.
+    /// Anything that began before `from_ns` is not an answer.
     pub(super) const fn new(from_ns: u64) -> Self {
         Self {
             from_ns,
@@ -94,7 +94,7 @@ impl Hunt {
         }
     }
 
-    /// The time is over: the fault of a response that had begun.
+    /// Ends the search when the time has run out: reports the fault of a response that had begun.
     pub(super) fn finish(&mut self, expected: &Expected, mut found: impl FnMut(Found)) {
         self.cut(expected, &mut found);
     }
@@ -106,7 +106,7 @@ impl Hunt {
         }
     }
 
-    /// The frames are as many as a response has, the last of them number `at` of its block.
+    /// Judges the frames once there are as many as a response has; the last one has index `at` in its block.
     fn judge(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
         let [first, ..] = self.contents;
         let [begun_ns, ..] = self.begun_ns;
@@ -130,9 +130,10 @@ impl Hunt {
         self.drop_first();
     }
 
-    /// Whether a sound response begins inside the frames at hand and goes on in the block: then the first of these frames has
-    /// lost those that followed it, and that the CRC-8 is right is chance. Not so where the next response begins right after
-    /// the frames at hand, as on a line that lost nothing: then the other one is chance, which a shaft at rest repeats for ever.
+    /// Returns whether a sound response begins inside the frames at hand and continues in the block. If so, the first of these
+    /// frames has lost those that followed it, and the CRC-8 is right by chance. This is not so if the next response begins
+    /// right after the frames at hand, as on a line that lost nothing: then the other one is a coincidence, which a shaft at
+    /// rest repeats for ever.
     fn is_overtaken(&self, expected: &Expected, times: &Times<'_>, at: usize) -> bool {
         let next = at.saturating_add(1);
         let begins = |at: usize| {
@@ -165,7 +166,7 @@ impl Hunt {
         self.given = self.given.saturating_sub(1);
     }
 
-    /// A pause: what was begun is not continued.
+    /// Handles a pause: a response that had begun is not continued.
     fn cut(&mut self, expected: &Expected, found: &mut impl FnMut(Found)) {
         self.forget_given();
         let ([first, ..], [begun_ns, ..]) = (self.contents, self.begun_ns);
@@ -178,7 +179,7 @@ impl Hunt {
         self.clear();
     }
 
-    /// A delimiter read 0.
+    /// Handles a delimiter that reads 0.
     fn broken(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
         self.forget_given();
         let last_of_block = at.saturating_add(1) == times.count;
@@ -192,7 +193,7 @@ impl Hunt {
         self.clear();
     }
 
-    /// Nothing follows any more on the response that was given.
+    /// Drops the response that was already reported, because nothing more follows it.
     fn forget_given(&mut self) {
         while self.given != 0 {
             self.drop_first();
@@ -205,12 +206,13 @@ impl Hunt {
     }
 }
 
-/// Whether a frame has the sync code of a response. The frames of the own request, heard as an echo, have another.
+/// Returns whether a frame has the sync code of a response. The frames of the own request, received as an echo, have a different
+/// one.
 const fn begins_a_response(content: u16) -> bool {
     content & 7 == SYNC_CODE as u16
 }
 
-/// What is known of the times of a block's frames.
+/// What is known about the times of a block's frames.
 struct Times<'a> {
     line: &'a Line,
     block: Block<'a>,
@@ -222,17 +224,17 @@ impl Times<'_> {
         u64::try_from(frames).unwrap_or(u64::MAX).saturating_mul(self.line.frame_ns())
     }
 
-    /// The end of frame `at`, at the latest.
+    /// The latest end of frame `at`.
     fn end(&self, at: usize) -> u64 {
         self.block.end_ns.saturating_sub(self.frames_ns(self.count.saturating_sub(at).saturating_sub(1)))
     }
 
-    /// When frame `at` began at the earliest, whatever pauses the block holds.
+    /// The earliest start of frame `at`, whatever pauses the block holds.
     fn begun(&self, at: usize) -> u64 {
         self.block.since_ns.saturating_add(self.frames_ns(at))
     }
 
-    /// When a frame with `left` frames between it and the end of the block began at the earliest, if these belong to the same
+    /// The earliest start of a frame with `left` frames between it and the end of the block, if these belong to the same
     /// response. Idle time between them does not count: had they begun so much earlier, they would have met the request on the
     /// line.
     fn begun_of_tail(&self, left: usize) -> u64 {
@@ -240,7 +242,7 @@ impl Times<'_> {
         self.block.end_ns.saturating_sub(frames.saturating_add(self.line.early_ns()))
     }
 
-    /// When the first frame began at the earliest. Where no other response begins in the block, its frames follow each other.
+    /// The earliest start of the first frame. If no other response begins in the block, its frames follow each other.
     fn earliest_start(&self, expected: &Expected) -> u64 {
         let begins = |frame: &Option<u16>| frame.is_some_and(|content| expected.differs_first(content) == 0);
         if self.block.frames.iter().skip(1).any(begins) {

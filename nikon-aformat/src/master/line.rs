@@ -5,7 +5,7 @@ use crate::number::EncoderAddress;
 use crate::request::Request;
 use crate::timing::{BitRate, FRAME_GAP_NS, REQUEST_GAP_NS};
 
-/// How a controller is connected, and how long it waits.
+/// How a controller is connected and how long it waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,29 +19,30 @@ pub struct Line {
     /// answer.
     /// Default 0, because the turn-around time is not documented.
     pub turn_around_ns: u32,
-    /// Longest time from the end of the request to the *start bit* of the response, in ns. Default 1000 bits, as one maker's
-    /// master has it. Others wait 3 ms and 35 ms.
+    /// Longest time from the end of the request to the *start bit* of the response, in ns. Default 1000 bits, as in one maker's
+    /// master. Others wait 3 ms and 35 ms.
     pub response_timeout_ns: u32,
     /// Longest idle time between two frames of a response, in ns. Default a quarter of [`BitRate::response_gap_ns`].
     pub idle_in_response_ns: u32,
     /// Longest idle time between two responses on a bus, in ns. Default twice [`BitRate::response_gap_ns`].
     pub idle_between_responses_ns: u32,
-    /// Longest time from the end of a frame on the line to its hand-over to the master, where that is taken for its end, in ns:
+    /// Longest time from the end of a frame on the line to its hand-over to the master, if the hand-over is taken as its end, in
+    /// ns:
     /// the [latency budget](Self::latency_budget_ns). A response that begins sooner than this after the request is not taken,
-    /// because it may have begun before.
+    /// because it may have begun before it.
     ///
     /// Default a quarter of [`BitRate::response_gap_ns`], 375 ns to 750 ns, which is below seven bits, the turn-around time of
     /// one vendor's simulated encoder.
     pub hand_over_ns: u32,
     /// Least time from the end of a transaction to the next request, in ns. Default [`REQUEST_GAP_NS`].
     pub request_gap_ns: u32,
-    /// The highest address on the line, asked or not. What EA of a multi-response request means is not documented, and
-    /// encoders that were not asked may answer; the line is free when this one can no longer speak. Default 7.
+    /// The highest address on the line, requested or not. The meaning of EA in a multi-response request is not documented, so
+    /// encoders that were not requested may answer; the line is free when this address can no longer answer. Default 7.
     pub highest: EncoderAddress,
 }
 
 impl Line {
-    /// A line with the default time-outs.
+    /// Creates a line with the default time-outs.
     pub const fn new(rate: BitRate) -> Self {
         let gap_ns = rate.response_gap_ns();
         Self {
@@ -68,27 +69,27 @@ impl Line {
         with_highest: highest, EncoderAddress;
     }
 
-    /// By how much the end time that the master is told may lie after the end of a frame on the line, in ns. Frames may be
-    /// handed over at any later time, as long as it is told when they ended.
+    /// By how much the end time passed to the master may lie after the end of a frame on the line, in ns. Frames may be handed
+    /// over at any later time, as long as the master is told when they ended.
     pub const fn latency_budget_ns(&self) -> u32 {
         self.hand_over_ns
     }
 
-    /// Line time of a request in ns, its gaps included.
+    /// Line time of a request in ns, including its gaps.
     pub fn request_ns(&self, request: Request) -> u32 {
         self.rate.bits_ns(request.emit().line_bits(self.rate.bits(self.frame_gap_ns)))
     }
 
-    /// Longest line time of a response, idle time between its frames included, in ns.
+    /// Longest line time of a response in ns, including idle time between its frames.
     pub const fn response_ns(&self, layout: Layout) -> u32 {
         let gaps = (layout.frames() as u32).saturating_sub(1);
         self.rate.response_ns(layout).saturating_add(self.idle_in_response_ns.saturating_mul(gaps))
     }
 
-    /// From the end of a request to the time from which no answer to it can be on the line, in ns.
+    /// Time from the end of a request until no answer to it can be on the line any more, in ns.
     ///
-    /// The responses to a multi-response request are waited for up to the slot of [`highest`](Self::highest), however many
-    /// encoders are asked.
+    /// For a multi-response request this covers the slots up to that of [`highest`](Self::highest), however many encoders are
+    /// requested.
     pub const fn answered_ns(&self, expected: &Expected) -> u32 {
         let response = self.response_ns(expected.layout());
         let before = if expected.command().is_multi_response() { self.highest.get() as u32 } else { 0 };
@@ -99,8 +100,8 @@ impl Line {
             .saturating_add(self.latency_budget_ns())
     }
 
-    /// When nobody speaks any more who answers a multi-response request at all, in ns: these have been heard, the last of them
-    /// until `end_ns`, and every other one up to [`highest`](Self::highest) may still have its turn.
+    /// When the last answer to a multi-response request will have ended, in ns: these addresses have been heard, the last one
+    /// until `end_ns`, and every other address up to [`highest`](Self::highest) may still have its turn.
     pub(super) const fn silent_ns(&self, expected: &Expected, heard: Addresses, end_ns: u64) -> u64 {
         let others = Addresses::first(self.highest.get().saturating_add(1)).without(heard).len();
         if others == 0 {
@@ -111,34 +112,35 @@ impl Line {
         end_ns.saturating_add(turns_ns as u64)
     }
 
-    /// Whether a response can be taken at all: it has to begin, by its stamps, after the turn-around and before the time-out.
+    /// Returns whether a response can be taken at all: it has to begin, by its time stamps, after the turn-around and before the
+    /// time-out.
     pub(super) const fn leaves_time(&self) -> bool {
         self.early_ns() <= self.response_timeout_ns as u64
     }
 
-    /// The time after which a transaction is over in any case, in ns from its start.
+    /// The time after which a transaction has ended in any case, in ns from its start.
     pub fn longest_ns(&self, request: Request, expected: &Expected) -> u32 {
         self.request_ns(request).saturating_add(self.answered_ns(expected))
     }
 
-    /// Shortest period in which a request can be repeated even if nobody answers, in ns: the longest transaction and
+    /// Shortest period in which a request can be repeated even if nobody answers, in ns: the longest transaction plus
     /// [`request_gap_ns`](Self::request_gap_ns).
     pub fn min_cycle_ns(&self, request: Request, expected: &Expected) -> u32 {
         self.longest_ns(request, expected).saturating_add(self.request_gap_ns)
     }
 
-    /// Line time of a frame in ns, whole at every rate.
+    /// Line time of a frame in ns, an integer at every rate.
     pub(super) const fn frame_ns(&self) -> u64 {
         self.rate.bits_ns(FRAME_BITS) as u64
     }
 
-    /// How much later than the end of the request a frame has to begin by its stamp, in ns, to be an answer for certain.
+    /// How much later than the end of the request a frame has to begin by its time stamp to be an answer for certain, in ns.
     pub(super) const fn early_ns(&self) -> u64 {
         (if self.turn_around_ns > self.latency_budget_ns() { self.turn_around_ns } else { self.latency_budget_ns() })
             as u64
     }
 
-    /// Idle time by their stamps after which two frames do not belong together, in ns.
+    /// Idle time, by the time stamps, after which two frames do not belong together, in ns.
     pub(super) const fn pause_ns(&self) -> u64 {
         self.idle_in_response_ns.saturating_add(self.latency_budget_ns()) as u64
     }

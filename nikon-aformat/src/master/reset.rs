@@ -9,16 +9,16 @@ use crate::response::Response;
 use crate::status::Alm;
 use crate::timing::{REQUEST_GAP_NS, WRITE_BUSY_NS};
 
-/// A reset: the same request eight times in succession, a wait of 30 ms, then the status.
+/// Runs a reset: sends the same request eight times in succession, waits 30 ms, then reads the status.
 ///
-/// One good response after the other has to come: where one is missing or refused, the encoder may not have heard the request,
-/// and the count would begin anew. It is not repeated on its own; [`start`](Self::start) begins again from one.
+/// Every response has to be good: if one is missing or refused, the encoder may not have received the request, and the count
+/// would restart. The reset is not repeated on its own; [`start`](Self::start) begins again with the first request.
 ///
-/// The encoder counts requests, not procedures: seven that were interrupted and one more are eight. So no failure of it says that
-/// nothing was done. Use [`GuardedReset`](super::GuardedReset), which starts the count again before it begins.
+/// The encoder counts requests, not procedures: seven from an interrupted reset and one more make eight. So no failure proves
+/// that nothing was done. Use [`GuardedReset`](super::GuardedReset), which restarts the count before it begins.
 ///
-/// Release 9.2 of the AM243x Motor Control SDK sends the code a ninth time, which later releases call a defect. The
-/// effect shows in the response to the next request, here STATUS.
+/// Release 9.2 of the AM243x Motor Control SDK sends the command a ninth time, which later releases call a defect. The effect
+/// shows in the response to the next request, here STATUS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reset {
@@ -49,7 +49,7 @@ impl Reset {
 
     /// Gives the only encoder on the line the address `new` (command 11).
     ///
-    /// That EA carries the new address follows from the absence of any other field; no document says it.
+    /// EA carries the new address, because there is no other field for it; no document says so.
     pub const fn set_address_of_the_only_encoder(new: EncoderAddress) -> Self {
         Self::of(new, Operation::SetAddress1)
     }
@@ -78,7 +78,7 @@ impl Reset {
         self.done
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.done = 0;
         self.tries = 0;
@@ -91,7 +91,7 @@ impl Reset {
         ///
         /// Fails with [`Error::Interrupted`] if one of the first seven responses does not come, and with
         /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
-        /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR.
+        /// It also fails with the latter if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR.
         Response
     }
 
@@ -114,12 +114,12 @@ impl Reset {
         self.ask_status(ready_ns.saturating_add(WRITE_BUSY_NS.into()))
     }
 
-    /// Whether the effect is kept in the EEPROM.
+    /// Returns whether the effect is kept in the EEPROM.
     pub(super) const fn is_stored(&self) -> bool {
         matches!(self.request.operation, Operation::SetAddress1 | Operation::ZeroPreset)
     }
 
-    /// Whether this is the response to the reset. That of command 11 may show the old or the new address.
+    /// Returns whether this is the response to the reset. The response to command 11 may show the old or the new address.
     fn is_answer(&self, response: Response) -> bool {
         response.command() == Some(self.request.command())
             && (response.ea == self.request.ea || !self.request.command().answers_with_own_address())

@@ -13,8 +13,8 @@ use crate::resolution::Resolution;
 use crate::response::Response;
 use crate::timing::BitRate;
 
-/// A response with all checks passed, and when its values were sampled: not documented, but after the end of the request and
-/// before the response began.
+/// A response that has passed all checks, and when its values were sampled: the exact instant is not documented, but it lies
+/// after the end of the request and before the response began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchange {
@@ -22,7 +22,7 @@ pub struct Exchange {
     pub response: Response,
     /// The earliest instant of sampling, in ns: the end of the request. Its age counts from here.
     pub sampled_ns: u64,
-    /// The latest one, in ns: the first start bit of the response; late by at most [`Line::latency_budget_ns`].
+    /// The latest instant of sampling, in ns: the first start bit of the response; late by at most [`Line::latency_budget_ns`].
     pub began_ns: u64,
 }
 
@@ -31,7 +31,7 @@ servowire_core::one_line!(Exchange {
 });
 
 impl Exchange {
-    /// What the response says about the position, to be judged where it is used.
+    /// Returns what the response says about the position, to be judged where it is used.
     pub const fn evidence(&self, resolution: Resolution) -> Evidence {
         Evidence::of(self.response, resolution, self.sampled_ns)
     }
@@ -41,7 +41,7 @@ impl Exchange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// The frames, with [`Line::frame_gap_ns`] between two.
+    /// The frames, with [`Line::frame_gap_ns`] between them.
     pub frames: Frames,
     /// When the first start bit is on the line, in ns.
     pub start_ns: u64,
@@ -51,12 +51,12 @@ pub struct Transmission {
 
 /// One request and its response, frame by frame or in blocks.
 ///
-/// It ends with the first response that passes all checks and began after the request had left the line. What is refused
-/// meanwhile does not end it: the answer may still come. When no answer can come any more, it fails with the fault of the
-/// first refused response; then the line is free. Once done or failed it stays so.
+/// It ends with the first response that passes all checks and began after the request had left the line. Responses refused
+/// meanwhile do not end it: the answer may still come. When no answer can arrive any more, it fails with the fault of the first
+/// refused response; the line is then free. A transaction that is done or has failed stays so.
 ///
-/// Feed what was received before asking with [`poll`](Self::poll). Of a multi-response request it takes the first
-/// response; [`BusTransaction`] takes all.
+/// Hand over what was received before calling [`poll`](Self::poll). For a multi-response request it takes the first response;
+/// [`BusTransaction`] takes all of them.
 ///
 /// The own request, if the receiver hears it, needs no setting: its sync code is not that of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,8 @@ pub struct Transaction {
 }
 
 impl Transaction {
-    /// No request and no response: a place for [`restart`](Self::restart). It counts as a transaction that ended with
+    /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that ended
+    /// with
     /// [`Error::NoResponse`], and its line is free at any time.
     #[inline]
     pub const fn idle() -> Self {
@@ -97,17 +98,17 @@ impl Transaction {
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
-    /// [`Error::Line`]: it is not to be sent.
+    /// [`Error::Line`]: it must not be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         Self::begun(request, resolution, line, start_ns)
     }
 
-    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, whatever the state of this one: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, line: Line, start_ns: u64) {
         *self = Self::begun(request, resolution, line, start_ns);
     }
 
-    /// Inlined, so that it is made where it is to be.
+    /// Inlined, so that it is created in its final place.
     #[inline(always)]
     fn begun(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
@@ -126,27 +127,28 @@ impl Transaction {
         }
     }
 
-    /// What is to be sent, and when.
+    /// Returns what is to be sent, and when.
     pub const fn transmission(&self) -> Transmission {
         Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// Takes frames that were heard back to back (a single one, a DMA block, or all until the line went idle), the last
-    /// delimiter at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose
+    /// Takes frames that were received back to back (a single one, a DMA block, or all until the line went idle), the last
+    /// delimiter at `end_ns`. Each is its content bits, the first on the line in bit 0; `None` stands for a frame whose
     /// delimiter reads 0.
     ///
-    /// Nothing is known of pauses in a block, so the response has to be at its end. With pauses in it there is [`hear_since`](Self::hear_since).
+    /// Nothing is known about pauses within a block, so the response has to be at its end. For a block with pauses, use
+    /// [`hear_since`](Self::hear_since).
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<Exchange> {
         self.hear_since(frames, 0, end_ns)
     }
 
-    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    /// Takes a frame whose delimiter, at `end_ns`, reads 0.
     pub fn framing_error(&mut self, end_ns: u64) -> Progress<Exchange> {
         self.hear(&[None], end_ns)
     }
 
-    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`: the time at which the receiver
-    /// was switched on. If that is after the request, a response may stand anywhere in the block.
+    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`, for example because the
+    /// receiver was enabled at that time. If that is after the request, a response may be anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() {
             let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
@@ -166,13 +168,13 @@ impl Transaction {
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear), for an interrupt: it does not copy the response; ask for the [outcome](Self::outcome).
+    /// Does the same as [`hear`](Self::hear) without copying the response, for an interrupt; ask for the [outcome](Self::outcome).
     pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<&Result<Exchange, Error>> {
         let _ = self.hear(frames, end_ns);
         self.outcome()
     }
 
-    /// The state of the transaction at `now_ns`; it fails if no answer can arrive any longer.
+    /// Returns the state of the transaction at `now_ns`; it fails if no answer can arrive any more.
     pub fn poll(&mut self, now_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() && now_ns > self.until_ns {
             let Self { hunt, expected, refused, .. } = self;
@@ -192,12 +194,12 @@ impl Transaction {
         }
     }
 
-    /// How it ended; `None` while it is pending.
+    /// Returns how it ended; `None` while it is pending.
     pub const fn outcome(&self) -> Option<&Result<Exchange, Error>> {
         self.end.as_ref()
     }
 
-    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
     pub const fn until_ns(&self) -> u64 {
         if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.ready_ns }
     }
@@ -205,10 +207,10 @@ impl Transaction {
 
 /// A multi-response request and the responses of all encoders, frame by frame or in blocks.
 ///
-/// Each response can be used as soon as it has come, by [`exchange`](Self::exchange); a missing encoder delays nobody's. It is
-/// done when every encoder that was asked has been heard, or when those that are missing have had their turn; which they are is
-/// said by [`Bus`]. The line is free once every address up to [`Line::highest`] has been heard or has had its turn: say how many
-/// encoders there are. A response that is lost or damaged costs no other one.
+/// Each response can be used as soon as it has arrived, by [`exchange`](Self::exchange); a missing encoder delays no other
+/// response. It is done when every requested encoder has been heard, or when the missing ones have had their turn; [`Bus`] says
+/// which are missing. The line is free once every address up to [`Line::highest`] has been heard or has had its turn, so
+/// configure how many encoders there are. A lost or damaged response does not affect any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BusTransaction {
@@ -227,7 +229,8 @@ pub struct BusTransaction {
 }
 
 impl BusTransaction {
-    /// Nobody was asked: a place for [`restart`](Self::restart). It counts as one that has ended, and its line is free at any time.
+    /// Creates a transaction that asks nobody, as a place for [`restart`](Self::restart). It counts as one that has ended, and
+    /// its line is free at any time.
     #[inline]
     pub const fn idle() -> Self {
         let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
@@ -249,21 +252,21 @@ impl BusTransaction {
 
     /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `start_ns`.
     ///
-    /// What EA of the request means to the encoders is not documented. [`Addresses::highest`] of those that are asked is
-    /// the most likely reading; [`Line::highest`] covers the others.
+    /// It is not documented what EA of the request means to the encoders. [`Addresses::highest`] of the requested ones is the
+    /// most likely reading; [`Line::highest`] covers the others.
     ///
-    /// A request that encoders of this version do not understand fails at once with
-    /// [`Error::UnsupportedInVersion`] and is not to be sent.
+    /// A request that encoders of this version do not understand fails at once with [`Error::UnsupportedInVersion`] and must not
+    /// be sent.
     pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         Self::begun(request, resolution, asked, line, start_ns)
     }
 
-    /// Begins the next transaction in the same place, in whatever state this one is: like [`start`](Self::start), without a copy.
+    /// Begins the next transaction in the same place, whatever the state of this one: like [`start`](Self::start), without a copy.
     pub fn restart(&mut self, request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) {
         *self = Self::begun(request, resolution, asked, line, start_ns);
     }
 
-    /// Inlined, so that it is made where it is to be.
+    /// Inlined, so that it is created in its final place.
     #[inline(always)]
     fn begun(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
@@ -289,27 +292,28 @@ impl BusTransaction {
         }
     }
 
-    /// What is to be sent, and when.
+    /// Returns what is to be sent, and when.
     pub const fn transmission(&self) -> Transmission {
         Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// Takes frames that were heard back to back (a single one, a DMA block, or all until the line went idle), the last
-    /// delimiter at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose
+    /// Takes frames that were received back to back (a single one, a DMA block, or all until the line went idle), the last
+    /// delimiter at `end_ns`. Each is its content bits, the first on the line in bit 0; `None` stands for a frame whose
     /// delimiter reads 0.
     ///
-    /// Nothing is known of pauses in a block, so only a response at its end is taken. With pauses in it there is [`hear_since`](Self::hear_since).
+    /// Nothing is known about pauses within a block, so only a response at its end is taken. For a block with pauses, use
+    /// [`hear_since`](Self::hear_since).
     pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<()> {
         self.hear_since(frames, 0, end_ns)
     }
 
-    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    /// Takes a frame whose delimiter, at `end_ns`, reads 0.
     pub fn framing_error(&mut self, end_ns: u64) -> Progress<()> {
         self.hear(&[None], end_ns)
     }
 
-    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`: the time at which the receiver
-    /// was switched on. If that is after the request, a response may stand anywhere in the block.
+    /// Like [`hear`](Self::hear), if it is known that none of the frames began before `since_ns`, for example because the
+    /// receiver was enabled at that time. If that is after the request, a response may be anywhere in the block.
     pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
         if !self.ended {
             let Self { hunt, line, expected, bus, began_ns, until_ns, .. } = self;
@@ -333,13 +337,13 @@ impl BusTransaction {
         self.progress()
     }
 
-    /// The same as [`hear`](Self::hear), and returns the [outcome](Self::outcome).
+    /// Does the same as [`hear`](Self::hear) and returns the [outcome](Self::outcome).
     pub fn push(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Result<(), Error>> {
         let _ = self.hear(frames, end_ns);
         self.outcome()
     }
 
-    /// The state of the transaction at `now_ns`; it ends if no answer can arrive any longer.
+    /// Returns the state of the transaction at `now_ns`; it ends if no answer can arrive any more.
     pub fn poll(&mut self, now_ns: u64) -> Progress<()> {
         if !self.ended && now_ns > self.until_ns {
             let Self { hunt, expected, bus, .. } = self;
@@ -352,7 +356,7 @@ impl BusTransaction {
         self.progress()
     }
 
-    /// Encoders that were not heard may still speak.
+    /// Encoders that have not been heard may still answer.
     fn free(&mut self) {
         self.ready_ns = self.until_ns.saturating_add(self.line.request_gap_ns.into());
     }
@@ -366,7 +370,8 @@ impl BusTransaction {
         }
     }
 
-    /// How it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) tells which encoders did
+    /// Returns how it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) tells which
+    /// encoders did
     /// not answer.
     pub const fn outcome(&self) -> Option<Result<(), Error>> {
         match (self.refused, self.ended) {
@@ -376,17 +381,17 @@ impl BusTransaction {
         }
     }
 
-    /// While it is pending, when it is to be polled, in ns; afterwards, from when on the line is free.
+    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
     pub const fn until_ns(&self) -> u64 {
         if self.ended { self.ready_ns } else { self.until_ns.saturating_add(1) }
     }
 
-    /// What has come so far.
+    /// What has arrived so far.
     pub const fn bus(&self) -> &Bus {
         &self.bus
     }
 
-    /// The good response of an encoder that was asked, and when its values were sampled.
+    /// The good response of a requested encoder, and when its values were sampled.
     pub fn exchange(&self, ea: EncoderAddress) -> Option<Exchange> {
         let Outcome::Good(response) = self.bus.of(ea) else { return None };
         let began_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
@@ -394,10 +399,10 @@ impl BusTransaction {
     }
 }
 
-/// What nobody was asked.
+/// The request of a transaction that asks nobody.
 const NOTHING: Request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
 
-/// Why a request is not to be sent.
+/// Returns why a request must not be sent.
 fn refusal(request: Request, resolution: Resolution, line: &Line) -> Option<Error> {
     request.check(resolution).err().or_else(|| (!line.leaves_time()).then_some(Error::Line))
 }

@@ -12,10 +12,10 @@ use crate::status::Alm;
 /// A [`Write`] that ends as done, not done, or with an unknown effect.
 ///
 /// 1. STATUS, until ES0 is clear: a busy encoder repeats the arguments and does nothing. MEMERR must be clear, so that it tells
-///    about this write. The only encoder on a line (command 19) is asked for its address before, by command 17; where an encoder
-///    is chosen by its identification code (command 20) its address is not known, and MEMERR says nothing.
+///    about this write. The only encoder on a line (command 19) is first asked for its address with command 17. If an encoder is
+/// chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
 /// 2. The write, **once**, 30 ms, STATUS. MEMERR must still be clear.
-/// 3. What was written is read back, also if the response to the write is missing.
+/// 3. What was written is read back, even if the response to the write is missing.
 ///
 /// | it ends with | the encoder |
 /// |---|---|
@@ -46,7 +46,7 @@ enum Phase {
     ReadingBack,
 }
 
-/// How it is read back.
+/// How the written value is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Back {
@@ -55,7 +55,7 @@ enum Back {
 }
 
 impl VerifiedWrite {
-    /// Verifies this write.
+    /// Creates the verification of this write.
     pub const fn new(write: Write) -> Self {
         let Request { ea, operation } = write.request();
         let back = match operation {
@@ -70,7 +70,7 @@ impl VerifiedWrite {
         Self { write, back, ea, phase: Phase::Ready, doubtful: false, tries: 0, end: None }
     }
 
-    /// The first request, at once.
+    /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<()> {
         self.tries = 0;
         self.doubtful = false;
@@ -118,7 +118,7 @@ impl VerifiedWrite {
         Step::Send { request: self.write.request(), not_before_ns }
     }
 
-    /// Whether the address of the encoder is not known before.
+    /// Returns whether the address of the encoder is unknown beforehand.
     const fn is_chosen_by_id(&self) -> bool {
         matches!(self.write.request().operation, Operation::SetAddress2 { .. })
     }
@@ -194,7 +194,7 @@ impl VerifiedWrite {
     }
 }
 
-/// Whether a response shows what was written; `None` if it shows nothing.
+/// Returns whether a response shows what was written; `None` if it is inconclusive.
 fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
     let own = response.ea == asked.ea || !asked.command().answers_with_own_address();
     if response.command() != Some(asked.command()) || !own || is_busy(response) {
@@ -212,7 +212,7 @@ fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
     }
 }
 
-/// Whom to ask so that the count of a reset starts again, and whether it answers with this address.
+/// Returns which encoder to ask so that the count of a reset restarts, and whether it answers with this address.
 pub(super) const fn apart(request: Request) -> (Request, Option<EncoderAddress>) {
     match request.operation {
         // The address of the only encoder is not known.

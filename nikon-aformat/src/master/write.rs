@@ -9,20 +9,19 @@ use crate::response::Response;
 use crate::status::Alm;
 use crate::timing::WRITE_BUSY_NS;
 
-/// Writes something that outlasts the supply: an EEPROM word, an identification code, an address, the velocity
-/// coefficient.
+/// Writes something that survives power-off: an EEPROM word, an identification code, an address, the velocity coefficient.
 ///
-/// The request is sent **once**: repeating it wears the EEPROM. Its response repeats the arguments, which the transaction
-/// checks; then the encoder is left alone for 30 ms and its status read until it is no longer busy. If the response to the
+/// The request is sent **once**, because repeating it wears the EEPROM. Its response repeats the arguments, which the transaction
+/// checks; then the encoder is left alone for 30 ms and its status is read until it is no longer busy. If the response to the
 /// write is missing or refused, the procedure ends with [`Error::EffectUnknown`].
 ///
-/// What was written is not read back, and an encoder that was busy repeats the arguments and does nothing: use
+/// What was written is not read back, although an encoder that is busy repeats the arguments and does nothing; to be sure, use
 /// [`VerifiedWrite`](super::VerifiedWrite).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Write {
     request: Request,
-    /// Whom to ask for the status, once the write is answered.
+    /// The encoder to ask for the status, once the write has been answered.
     written: Option<EncoderAddress>,
     tries: u16,
     end: Option<Step<Response>>,
@@ -63,7 +62,7 @@ impl Write {
         Self { request: Request::new(ea, operation), written: None, tries: 0, end: None }
     }
 
-    /// The request, at once.
+    /// Returns the request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.written = None;
         self.tries = 0;
@@ -71,7 +70,7 @@ impl Write {
         Step::Send { request: self.request, not_before_ns: now_ns }
     }
 
-    /// What is written, and by whose address.
+    /// What is written, and to which address.
     pub const fn request(&self) -> Request {
         self.request
     }
@@ -115,7 +114,7 @@ impl Write {
         Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
     }
 
-    /// Whether this is the response to the write: from the encoder that was asked, with the arguments repeated.
+    /// Returns whether this is the response to the write: from the encoder that was asked, with the arguments repeated.
     fn is_answer(&self, response: Response) -> bool {
         let Request { ea, operation } = self.request;
         let repeats = match (operation, response.data()) {
