@@ -5,23 +5,22 @@ pub(crate) mod fugit;
 
 use servowire_core::{ClockError, TickRate, TimeBase};
 
-/// Looks at a clock that stands: some 30 ms of a fast processor, 0.3 s of a slow one. In a tick of 1 us it makes a hundred, but the
-/// timer of an emulator can stand for thousands while its host is busy.
+/// The number of looks at a clock that has stopped: some 30 ms on a fast processor, 0.3 s on a slow one. Within a tick of 1 us a
+/// processor makes a hundred, but the timer of an emulator can stand still for thousands while its host is busy.
 #[cfg(any(feature = "nikon", feature = "rtex", feature = "tformat"))]
 pub(crate) const MAX_LOOKS: u32 = 200_000;
 
 /// A free-running clock.
 ///
-/// Its tick has to be 1 us or shorter, better a fraction of that: an encoder answers 3 us after its request. A [`CounterClock`] is
-/// one, made of a cycle counter or a timer, and so is every closure that gives nanoseconds.
+/// Its tick has to be 1 us or shorter, preferably a fraction of that, because an encoder answers 3 us after its request. A
+/// [`CounterClock`] over a cycle counter or a timer is a clock, and so is every closure that returns nanoseconds.
 ///
-/// The drivers look twice: a clock that goes back, is ahead by more than a second within a call, or gives the same reading 200,000 times,
-/// ends the call with [`Error::Clock`](crate::Error::Clock).
+/// The drivers check every reading: a clock that goes back, is ahead by more than a second within a call, or returns the same
+/// reading 200,000 times ends the call with [`Error::Clock`](crate::Error::Clock).
 pub trait Clock {
-    /// Nanoseconds from any origin; never backwards.
+    /// Returns the time in nanoseconds from any origin; it never goes backwards.
     ///
-    /// # Errors
-    /// What the clock itself has noticed.
+    /// # Errors What the clock itself has detected.
     fn now_ns(&mut self) -> Result<u64, ClockError>;
 }
 
@@ -32,8 +31,8 @@ impl<F: FnMut() -> u64> Clock for F {
     }
 }
 
-/// A clock made of a counter of `BITS` bits that wraps, by a [`TimeBase`]: a closure reads it, and the next reading has to come
-/// within half of its range.
+/// A clock over a counter of `BITS` bits that wraps, extended by a [`TimeBase`]. A closure reads the counter, and the next
+/// reading has to follow within half of its range.
 ///
 /// ```
 /// use servowire_drivers::{Clock, CounterClock, TickRate};
@@ -51,7 +50,7 @@ pub struct CounterClock<F, const BITS: u32> {
 }
 
 impl<F: FnMut() -> u32, const BITS: u32> CounterClock<F, BITS> {
-    /// Its time is 0 now.
+    /// Creates the clock; its time is now 0.
     pub fn new(rate: TickRate, mut counter: F) -> Self {
         let time = TimeBase::new(rate, counter());
         Self { counter, time }
@@ -59,7 +58,7 @@ impl<F: FnMut() -> u32, const BITS: u32> CounterClock<F, BITS> {
 }
 
 impl<F, const BITS: u32> CounterClock<F, BITS> {
-    /// The clock has to be read again within this many ns; a driver that is not called for longer returns
+    /// The time in ns within which the clock has to be read again; a driver that is not called for longer returns
     /// [`ClockError::Backwards`].
     pub const fn read_within_ns(&self) -> u64 {
         self.time.read_within_ns()
@@ -77,8 +76,8 @@ impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
 #[cfg(feature = "async")]
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
-    /// Ends after this many ns, better later than earlier. What it is then the driver asks the clock: a wait that ends too early is
-    /// followed by another, and a clock that does not go on ends the call.
+    /// Ends after this many ns, rather later than earlier. The driver then asks the clock for the time: a wait that ended too
+    /// early is followed by another, and a clock that does not advance ends the call.
     async fn wait_ns(&mut self, ns: u64);
 }
 

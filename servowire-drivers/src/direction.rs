@@ -2,25 +2,25 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::OutputPin;
 
-/// Who switches the driver of the RS-485 transceiver.
+/// How the driver of the RS-485 transceiver is switched.
 pub trait Direction {
-    /// Why it cannot.
+    /// Why switching failed.
     type Error;
-    /// Before the first bit.
+    /// Switches the line driver on, before the first bit.
     ///
     /// # Errors
-    /// That of the pin.
+    /// The error of the pin.
     fn transmit(&mut self) -> Result<(), Self::Error>;
-    /// After the last bit, before the encoder answers.
+    /// Switches the line driver off, after the last bit and before the encoder answers.
     ///
     /// # Errors
-    /// That of the pin.
+    /// The error of the pin.
     fn receive(&mut self) -> Result<(), Self::Error>;
-    /// How inexact that is at the worst, if software does it; `None` if the hardware does, and needs no time for it.
+    /// The worst-case inaccuracy if software switches the driver; `None` if the hardware does so and takes no time.
     fn worst(&self) -> Option<Worst>;
 }
 
-/// The UART or the adapter does it: hardware driver enable. Prefer it where there is one.
+/// The UART or the adapter switches the line driver (hardware driver enable). Prefer this if available.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Automatic;
 
@@ -40,27 +40,26 @@ impl Direction for Automatic {
     }
 }
 
-/// How inaccurately software switches the line driver, in the worst case: numbers of the board, the HAL and the executor, which
-/// a library
-/// cannot know. None of them has a default.
+/// How inaccurately software switches the line driver in the worst case. The numbers depend on the board, the HAL and the
+/// executor, which a library cannot know, so none of them has a default.
 ///
-/// The driver has to go off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
-/// 2.5 Mbit/s, 0.8 us at 5) if `turn_around_ns` of the line says nothing else. `uart_start_ns + wake_ns + 2 * clock_ns` have to fit
-/// in between: the time is read once when the request begins, and once when it ends. What does not fit is refused when the
-/// [`Driver`](crate::tformat::blocking::Driver) is made, with [`PinTooSlow`].
+/// The driver has to be switched off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
+/// 2.5 Mbit/s, 0.8 us at 5) if `turn_around_ns` of the line says nothing else. `uart_start_ns + wake_ns + 2 * clock_ns` has to
+/// fit in between: the time is read once when the request begins and once when it ends. If it does not fit, creating the
+/// [`Driver`](crate::tformat::blocking::Driver) fails with [`PinTooSlow`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Worst {
-    /// From the return of `write` to the start bit on the line, ns: the UART waits for its next bit clock (up to 400 ns at 2.5 Mbit/s),
-    /// a buffered one for its interrupt, one with DMA for its set-up. Add the time by which the request lasts longer at a slow
-    /// rate: 1 % of four fields is 160 ns. If it is understated, requests are cut off.
+    /// Time from the return of `write` to the start bit on the line, in ns: a UART waits for its next bit clock (up to 400 ns at
+    /// 2.5 Mbit/s), a buffered one for its interrupt, one with DMA for its set-up. Add the time by which a request lasts longer
+    /// if the rate is too slow: 1 % of four fields is 160 ns. If it is understated, requests are cut off.
     pub uart_start_ns: u32,
-    /// From the time at which the pin is to be switched until it is, ns: the latency of interrupts that are served meanwhile, of the executor
-    /// and its timer for futures, and of the pin. If it is understated, the driver goes off while the encoder answers, which is
-    /// reported.
+    /// Time from the instant at which the pin should switch until it does, in ns: the duration of interrupts served meanwhile,
+    /// for futures the latency of the executor and its timer, and the latency of the pin. If it is understated, the driver is
+    /// switched off while the encoder answers, which is reported.
     pub wake_ns: u32,
-    /// A tick of the clock, ns: 6 for a cycle counter at 170 MHz, 1 000 for a timer of 1 MHz, which is too long. If it is
+    /// A tick of the clock, in ns: 6 for a cycle counter at 170 MHz, 1 000 for a timer of 1 MHz, which is too long. If it is
     /// understated, requests are cut off.
     pub clock_ns: u32,
 }
@@ -71,15 +70,15 @@ pub struct Worst {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("the direction pin is too slow: {missing_ns} ns are missing in a window of {window_ns} ns")]
 pub struct PinTooSlow {
-    /// By how much it has to be better, ns.
+    /// The time that is missing, in ns.
     pub missing_ns: u32,
-    /// From the end of a request to the earliest answer, ns.
+    /// Time from the end of a request to the earliest answer, in ns.
     pub window_ns: u32,
 }
 
 #[cfg(feature = "tformat")]
 impl Worst {
-    /// Whether the window is long enough for it.
+    /// Checks that the window is long enough for it.
     pub(crate) fn check(self, window_ns: u32) -> Result<(), PinTooSlow> {
         let clock_ns = self.clock_ns.saturating_mul(2);
         let needed_ns = self.uart_start_ns.saturating_add(self.wake_ns).saturating_add(clock_ns);
@@ -90,7 +89,7 @@ impl Worst {
     }
 }
 
-/// A pin at DE, or at DE and /RE tied: high while sending, switched by software.
+/// A pin connected to DE, or to DE and /RE tied together: high while sending, switched by software.
 ///
 /// ```
 /// use servowire_drivers::{DirectionPin, Worst};
@@ -107,12 +106,12 @@ pub struct DirectionPin<P> {
 }
 
 impl<P> DirectionPin<P> {
-    /// This pin, switched within these worst cases.
+    /// Creates a direction pin that switches within these worst cases.
     pub const fn new(pin: P, worst: Worst) -> Self {
         Self { pin, worst }
     }
 
-    /// Gives the pin back.
+    /// Returns the pin.
     pub fn release(self) -> P {
         self.pin
     }
@@ -134,7 +133,8 @@ impl<P: OutputPin> Direction for DirectionPin<P> {
     }
 }
 
-/// The line driver, and whether it may be on: before the first call, after a future was forgotten, and after a pin that refused.
+/// The line driver, and whether it may be on, as before the first call, after a future was forgotten, and after the pin reported
+/// an error.
 #[derive(Debug)]
 pub(crate) struct Switch<D> {
     direction: D,
@@ -152,7 +152,7 @@ impl<D> Switch<D> {
 }
 
 impl<D: Direction> Switch<D> {
-    /// Sees to it that the driver is off: before anybody listens.
+    /// Makes sure that the driver is off, before listening.
     pub(crate) fn off(&mut self) -> Result<(), D::Error> {
         if self.on {
             self.direction.receive()?;
@@ -161,7 +161,7 @@ impl<D: Direction> Switch<D> {
         Ok(())
     }
 
-    /// Switches the driver on. Whoever does has to see to it that it goes off.
+    /// Switches the driver on. The caller has to make sure that it is switched off.
     pub(crate) fn on(&mut self) -> Result<(), D::Error> {
         self.on = true;
         self.direction.transmit()
@@ -178,7 +178,7 @@ impl<D: Direction> Switch<D> {
     }
 
     #[cfg(feature = "tformat")]
-    /// Whether it can be switched within such a window.
+    /// Checks that it can be switched within this window.
     pub(crate) fn check(&self, window_ns: u32) -> Result<(), PinTooSlow> {
         self.worst().map_or(Ok(()), |worst| worst.check(window_ns))
     }
@@ -191,12 +191,12 @@ impl<D: Direction> Switch<D> {
     }
 }
 
-/// Switches the driver off when it is dropped, whatever has happened.
+/// Switches the driver off when dropped, whatever has happened.
 #[derive(Debug)]
 pub(crate) struct Guard<'a, D: Direction>(&'a mut Switch<D>);
 
 impl<D: Direction> Guard<'_, D> {
-    /// Switches the driver off and tells whether that went well; if not, it is tried once more.
+    /// Switches the driver off and returns whether that succeeded; if not, it is tried once more.
     pub(crate) fn receive(self) -> Result<(), D::Error> {
         self.0.off()
     }

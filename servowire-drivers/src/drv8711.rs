@@ -1,11 +1,11 @@
-//! The stepper driver DRV8711: registers, SPI words, the sequence that sets it up, and a [`Driver`] over an SPI.
+//! The DRV8711 stepper driver: registers, SPI words, the set-up sequence, and a [`Driver`] over an SPI.
 //!
 //! ```text
 //!  bit 15    14 13 12  11 ............ 0
 //!      read  address   data               MSB first, SPI mode 0, chip select high, taken when it falls
 //! ```
 //!
-//! From the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
+//! Based on the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
 //! section 2.1.
 //!
 //! ```

@@ -3,43 +3,44 @@ use servowire_core::ClockError;
 use crate::PinTooSlow;
 
 /// Why a call failed. `IO` is the error of the port (a UART, an SPI, the bus of an ASIC), `PIN` that of the direction pin, `P` that
-/// of the protocol, and `D` its doubts about a position. A driver that has no such thing has [`Infallible`] there.
+/// of the protocol, and `D` its doubts about a position. A driver without one of these uses [`Infallible`] in its place.
 ///
 /// [`Infallible`]: core::convert::Infallible
 ///
-/// After any of them the next call begins with a clean line: it waits until nobody can be talking any more and throws away
-/// what has come.
+/// After any of these errors the next call begins with a clean line: it waits until nobody can still be transmitting and
+/// discards what has arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Error<IO, PIN, P, D> {
-    /// The port reports a fault: a UART noise, framing or overrun, an ASIC a bus that does not answer. The exchange is lost.
+    /// The port reports a fault: noise, framing or overrun on a UART, or the bus of an ASIC that does not answer. The exchange
+    /// is lost.
     #[error("the port reports a fault")]
     Io(IO),
     /// The direction pin reports a fault.
     #[error("the direction pin reports a fault")]
     Pin(PIN),
-    /// The direction pin cannot keep the window at the rate that a search for the encoder has come to; nothing was sent.
+    /// The direction pin is too slow for the rate that a search for the encoder has reached; nothing was sent.
     #[error(transparent)]
     PinTooSlow(#[from] PinTooSlow),
-    /// There was no sound answer, and the line driver may have gone off when the encoder had begun to answer: later than
-    /// [`Worst`](crate::Worst) allows.
+    /// There was no sound answer, and the line driver may have been switched off after the encoder had begun to answer, later
+    /// than [`Worst`](crate::Worst) allows.
     #[error("the line driver went off up to {by_ns} ns too late")]
     DriverLate {
-        /// By how much at the worst, ns.
+        /// By how much in the worst case, in ns.
         by_ns: u64,
     },
-    /// The port takes or gives nothing any more.
+    /// The port no longer takes or returns anything.
     #[error("the port is closed")]
     Closed,
-    /// Somebody talks without a pause; nothing was sent.
+    /// Somebody is transmitting without a pause; nothing was sent.
     #[error("the line does not go quiet")]
     NeverQuiet,
-    /// The clock stands, was set back or has jumped; whether a request that had begun had its effect is not known.
+    /// The clock has stopped, was set back or has jumped; it is not known whether a request that had begun took effect.
     #[error("{0}")]
     Clock(#[from] ClockError),
-    /// No answer, or one that was refused; of an RTEX master the reason why its communication does not run.
+    /// No answer, or a refused one; for an RTEX master, the reason why its communication does not run.
     #[error("{0}")]
     Protocol(P),
     /// A good answer whose position must not be used.

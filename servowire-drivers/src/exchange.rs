@@ -1,12 +1,12 @@
-//! What every driver does between two exchanges of a procedure.
+//! The steps that every driver takes between two exchanges of a procedure.
 
 use servowire_core::Ended;
 
 use crate::quiet::Line;
 use crate::{Clock, Error};
 
-/// An exchange as a procedure hears of it: a fault of the port is a lost answer, and what that means is for the procedure to
-/// say. Everything else that is not of the protocol ends the procedure.
+/// Converts an exchange to what a procedure is told: a fault of the port counts as a lost answer, and the procedure decides what
+/// that means. Any other error outside the protocol ends the procedure.
 pub(crate) fn ended<T, IO, PIN, P, D>(
     exchanged: Result<T, Error<IO, PIN, P, D>>,
     lost: P,

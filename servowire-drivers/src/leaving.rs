@@ -1,14 +1,14 @@
-//! When the last bit of a request leaves, as far as software can know it: without I/O.
+//! Tracks when the last bit of a request leaves, as far as software can know it; without I/O.
 
 use crate::Worst;
 
-/// The end of the fields that were handed to a UART so far lies between two times. It is not known better: how long the processor was
-/// elsewhere before the UART took a byte, and how long the UART then waited, nobody says.
+/// The two times between which the fields handed to a UART so far end. A closer estimate is impossible, because it is not known
+/// how long the processor was elsewhere before the UART took a byte, nor how long the UART then waited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leaving {
     worst: Worst,
     field_ns: u64,
-    /// From the end of the request to the earliest answer.
+    /// Time from the end of the request to the earliest answer.
     window_ns: u64,
     ends: Option<Ends>,
 }
@@ -24,11 +24,12 @@ impl Leaving {
         Self { worst, field_ns: field_ns.into(), window_ns: window_ns.into(), ends: None }
     }
 
-    /// A `write` that was begun by the reading `before_ns` and had ended by `after_ns` has taken this many fields.
+    /// Notes that a `write`, which had begun by the reading `before_ns` and ended by `after_ns`, has taken this many fields.
     ///
-    /// The first one is not asked to take more than one field. It waits for nothing, so whatever time it took may have passed before the
-    /// UART had the field, and nothing else would keep the last bit of a request of one field from being cut off. A later one
-    /// that took a field time or more has waited for room.
+    /// The first `write` is not asked to take more than one field. It waits for nothing, so whatever time it took may have
+    /// passed before the
+    /// UART had the field, and nothing else would keep the last bit of a request of one field from being cut off. A later
+    /// `write` that took a field time or more has waited for room.
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64, after_ns: u64) {
         let fields_ns = self.field_ns.saturating_mul(fields as u64);
         let waited = self.ends.is_some() && after_ns.saturating_sub(before_ns) >= self.field_ns;
@@ -42,8 +43,8 @@ impl Leaving {
         });
     }
 
-    /// The reading at which the driver is to go off: in the middle of the time in which it is neither too early nor too late,
-    /// and if there is no such time, not too early.
+    /// The reading at which to switch the driver off: in the middle of the time in which it is neither too early nor too late,
+    /// or if there is no such time, not too early.
     pub(crate) fn off_ns(&self) -> Option<u64> {
         let Ends { earliest_ns, latest_ns } = self.ends?;
         let slack_ns = u64::from(self.worst.wake_ns).saturating_add(self.worst.clock_ns.into());
@@ -51,17 +52,17 @@ impl Leaving {
         Some(latest_ns.saturating_add(last_ns.saturating_sub(latest_ns) >> 1))
     }
 
-    /// Longer than a whole request needs to leave, with the driver on as long after it as it may be.
+    /// A time longer than a whole request needs to leave, plus the longest time for which the driver may stay on after it.
     pub(crate) const fn longest_ns(&self) -> u64 {
         self.field_ns.saturating_mul(4).saturating_add(self.window_ns.saturating_mul(2))
     }
 
-    /// Whether enough time has passed for an answer to have begun.
+    /// Returns whether enough time has passed for an answer to have begun.
     pub(crate) const fn is_late(&self, before_ns: u64, after_ns: u64) -> bool {
         after_ns.saturating_sub(before_ns) > self.window_ns
     }
 
-    /// By how much the driver may have gone off too late, if it was off by the reading `now_ns`.
+    /// By how much the driver may have been switched off too late, if it was off by the reading `now_ns`.
     pub(crate) fn late_ns(&self, now_ns: u64) -> u64 {
         let latest_ns = self.ends.map_or(u64::MAX, |ends| ends.earliest_ns.saturating_add(self.window_ns));
         now_ns.saturating_add(self.worst.clock_ns.into()).saturating_sub(latest_ns)

@@ -1,9 +1,10 @@
 //! A-format encoders: Nikon, 2.5 to 16 Mbit/s, up to eight on a line.
 //!
-//! Frames have 18 bits, which hardly any UART can do: what sends and receives them is a `FramePort`, made of a PIO, an SPI
-//! that samples ([`spi`](crate::spi)), or a FIFO in an FPGA.
+//! Frames have 18 bits, which hardly any UART can handle. They are sent and received by a `FramePort`, for example over a PIO, a
+//! sampling SPI ([`spi`](crate::spi)), or a FIFO in an FPGA.
 //!
-//! [`blocking`] spins while it waits, some tens of microseconds a call; `asynch` (feature `async`) gives the time back. Both have the same
+//! [`blocking`] spins while it waits, some tens of microseconds per call; `asynch` (feature `async`) yields to the executor.
+//! Both have the same
 //! `Driver` with the same calls.
 
 #[macro_use]
@@ -17,21 +18,21 @@ use nikon_aformat::master::Line;
 use nikon_aformat::{Error, FRAME_BITS, Request, Resolution};
 use servowire_core::{Machine, Progress};
 
-/// A frame as it came from the line.
+/// A frame as received from the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
-    /// The 16 bits between start bit and delimiter, the first of the line in bit 0.
+    /// The 16 bits between start bit and delimiter, the first on the line in bit 0.
     pub content: u16,
     /// Whether the delimiter was 1.
     pub framed: bool,
-    /// When the delimiter ended, by the clock of the driver. `None` stands for the time at which the frame is taken: the port
+    /// When the delimiter ended, by the clock of the driver. `None` stands for the time at which the frame is taken; the port
     /// then has to be asked soon enough.
     pub end_ns: Option<u64>,
 }
 
-/// What a `Driver` was made of.
+/// The parts from which a `Driver` was created.
 #[derive(Debug, Clone, Copy)]
 pub struct Released<F, C> {
     /// The port.
@@ -40,20 +41,20 @@ pub struct Released<F, C> {
     pub clock: C,
 }
 
-/// Hands a frame that came from the port at `now_ns` to a transaction, with one encoder or with all on a line.
+/// Passes a frame that came from the port at `now_ns` to a transaction, with one encoder or with all on a line.
 fn hear<M: Machine<Unit = [Option<u16>]>>(machine: &mut M, frame: Frame, now_ns: u64) -> Progress<M::Value, M::Error> {
     machine.hear(&[frame.framed.then_some(frame.content)], frame.end_ns.unwrap_or(now_ns))
 }
 
-/// How long this request and the longest answer to it take.
+/// Returns how long this request and the longest answer to it take.
 fn longest_ns(line: Line, request: Request, resolution: Resolution) -> u64 {
     line.longest_ns(request, &request.expected(resolution)).into()
 }
 
-/// The line has to be silent for two frames after something that nobody has asked for.
+/// How long the line has to be silent after unexpected data: two frames.
 const fn silence_ns(line: Line) -> u32 {
     line.rate.bits_ns(FRAME_BITS).saturating_mul(2)
 }
 
-/// What a lost answer is to a procedure.
+/// How a procedure is told of a lost answer.
 const LOST: Error = Error::NoResponse;

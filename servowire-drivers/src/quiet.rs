@@ -1,29 +1,30 @@
-//! When the line may be used again, without I/O: the rules that the blocking and the async drivers share.
+//! Decides when the line may be used again, without I/O: the rules that the blocking and the async drivers share.
 
 use servowire_core::{ClockCheck, ClockError};
 
 use crate::Clock;
 use crate::clock::MAX_LOOKS;
 
-/// So long no processor is elsewhere within a call: a clock that says so has jumped.
+/// No processor is busy elsewhere for this long within a call: a clock that says so has jumped.
 const MAX_AWAY_NS: u64 = 1_000_000_000;
 
 /// How long a driver waits for a line that does not become quiet.
 const PATIENCE_NS: u64 = 2_000_000;
 
-/// How often a clock may be set back or jump while a request leaves.
+/// How many times a clock may be set back or jump while a request leaves.
 #[cfg(feature = "tformat")]
 const CLOCK_FAULTS: u32 = 3;
 
-/// What is known of the line between two calls. It outlives a dropped future.
+/// What is known about the line between two calls. It outlives a dropped future.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Line {
     check: ClockCheck,
-    /// Somebody may be talking until then.
+    /// Somebody may be transmitting until then.
     ready_ns: u64,
-    /// How long somebody may be talking after a request that is being handed over, or was when its call ended.
+    /// How long somebody may be transmitting after a request that is being handed over, or was being handed over when its call
+    /// ended.
     leaving_ns: Option<u64>,
-    /// How long the line has to be silent after something unasked came.
+    /// How long the line has to be silent after unexpected data.
     silence_ns: u64,
     /// The clock was set back or has jumped since the last request began.
     shifted: bool,
@@ -32,7 +33,7 @@ pub(crate) struct Line {
 /// What to do before a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Settle {
-    /// Throw away what comes, and look again at the latest then.
+    /// Discard what arrives, and look again at this time at the latest.
     Until(u64),
     /// Send.
     Quiet,
@@ -57,26 +58,27 @@ impl Line {
         Self { check, ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64, shifted: false }
     }
 
-    /// The bits have another length from now on.
+    /// Sets the silence for a new bit length.
     #[cfg(feature = "tformat")]
     pub(crate) const fn set_silence_ns(&mut self, silence_ns: u32) {
         self.silence_ns = silence_ns as u64;
     }
 
-    /// A look at the clock, not long after the last one: every look goes through here or the next two, so that no wait is for ever.
+    /// Reads the clock, not long after the last reading. Every reading goes through this or the next two functions, so that no
+    /// wait lasts for ever.
     #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         self.look(clock, |check, now_ns| check.check_within(now_ns, MAX_AWAY_NS))
     }
 
-    /// The same after a wait until `until_ns`.
+    /// Reads the clock after a wait until `until_ns`.
     #[cfg(feature = "async")]
     pub(crate) fn after_ns(&mut self, clock: &mut impl Clock, until_ns: u64) -> Result<u64, ClockError> {
         let wait_ns = until_ns.saturating_sub(self.check.last_ns()).min(u64::MAX >> 2);
         self.look(clock, |check, now_ns| check.check_within(now_ns, wait_ns.saturating_add(MAX_AWAY_NS)))
     }
 
-    /// The first look of a call: nobody knows how long ago the last one was.
+    /// Reads the clock for the first time in a call, when it is not known how long ago the last reading was.
     pub(crate) fn first_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         self.look(clock, ClockCheck::check)
     }
@@ -101,7 +103,8 @@ impl Line {
         })
     }
 
-    /// The clock is wrong. If it was set back or has jumped, what the line was to be left alone for is waited for from the next look on.
+    /// Handles a faulty clock. If it was set back or has jumped, the time for which the line was to be left alone counts from
+    /// the next reading.
     #[cold]
     #[inline(never)]
     fn lost(&mut self, error: ClockError, last_ns: u64) -> ClockError {
@@ -126,8 +129,8 @@ impl Line {
         self.check.last_ns()
     }
 
-    /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock was set back or has jumped since the
-    /// request began, nothing of that has passed for certain; one that stands has been looked at for longer.
+    /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock was set back or has jumped
+    /// since the request began, none of that time has passed for certain; a clock that has stopped has been looked at for longer.
     #[cfg(feature = "tformat")]
     pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) {
         for _ in 0..CLOCK_FAULTS {
@@ -140,37 +143,38 @@ impl Line {
         }
     }
 
-    /// Call before the first byte of a request; it may keep the line busy for `longest_ns` after it leaves. A fault or a dropped
-    /// future leaves it so until the next call, because nobody has read the clock.
+    /// Call before the first byte of a request; it may keep the line busy for `longest_ns` after it leaves. After a fault or a
+    /// dropped future this remains in force until the next call, because nobody has read the clock.
     pub(crate) const fn begin(&mut self, longest_ns: u64) {
         self.leaving_ns = Some(longest_ns);
         self.shifted = false;
     }
 
-    /// The request was handed over by `now_ns`. However long that took, the worst is assumed until the end is known.
+    /// Notes that the request was handed over by `now_ns`. However long that took, the worst case is assumed until the end is
+    /// known.
     pub(crate) const fn sent(&mut self, now_ns: u64) {
         if let Some(longest_ns) = self.leaving_ns.take() {
             self.ready_ns = now_ns.saturating_add(longest_ns);
         }
     }
 
-    /// The exchange has ended, and the line is free from `ready_ns` on.
+    /// Notes that the exchange has ended and the line is free from `ready_ns`.
     pub(crate) const fn clean(&mut self, ready_ns: u64) {
         self.ready_ns = ready_ns;
     }
 
-    /// A procedure has ended, after which the line is not to be used before `ready_ns`.
+    /// Notes that a procedure has ended, after which the line must not be used before `ready_ns`.
     pub(crate) fn keep(&mut self, ready_ns: u64) {
         self.ready_ns = self.ready_ns.max(ready_ns);
     }
 
-    /// The exchange has failed at `now_ns`. The rest of an answer may still be coming, even if a UART that drops damaged bytes
-    /// shows nothing of it: so the worst stays assumed, and besides the line has to be silent for a while.
+    /// Notes that the exchange failed at `now_ns`. The rest of an answer may still be arriving, even if a UART that drops
+    /// damaged bytes shows nothing of it. So the worst case is still assumed, and the line also has to be silent for a while.
     pub(crate) fn failed(&mut self, ready_ns: u64, now_ns: u64) {
         self.ready_ns = self.ready_ns.max(ready_ns).max(now_ns.saturating_add(self.silence_ns));
     }
 
-    /// From when on the line is free.
+    /// Returns when the line is free.
     pub(crate) const fn free_ns(&mut self, now_ns: u64) -> u64 {
         self.sent(now_ns);
         if self.ready_ns > now_ns { self.ready_ns } else { now_ns }
@@ -183,7 +187,7 @@ impl Line {
 }
 
 impl Settling {
-    /// What had come by `now_ns` has been thrown away. Whether there was something that nobody has asked for, or a complaint.
+    /// Takes the result of discarding what had arrived by `now_ns`: `heard` says whether there was unexpected data or an error.
     pub(crate) const fn next(&mut self, heard: bool, now_ns: u64) -> Settle {
         let until_ns = now_ns.saturating_add(self.silence_ns);
         // A processor that was elsewhere for long has not listened for long.
@@ -202,13 +206,13 @@ impl Settling {
     }
 }
 
-/// What a wait gave, and the time after it.
+/// The result of a wait, and the time after it.
 pub(crate) struct Heard<T> {
     pub(crate) what: Option<T>,
     pub(crate) now_ns: u64,
 }
 
-/// Looks until there is something, at the latest until `until_ns`. What came while the clock was read is not late.
+/// Looks until there is something, at the latest until `until_ns`. Anything that arrived while the clock was read is not late.
 #[inline(always)]
 pub(crate) fn spin<T>(
     line: &mut Line,

@@ -1,4 +1,4 @@
-//! Waits of futures: for a time, and for the first of two, of which the first is asked first.
+//! Waits for futures: for a time, or for the earlier of two futures, the first of which is polled first.
 
 use core::future::{Future, poll_fn};
 use core::pin::pin;
@@ -8,10 +8,10 @@ use servowire_core::{ClockCheck, ClockError};
 
 use crate::Timer;
 
-/// Delays that pass on a clock that stands.
+/// Number of delays that may pass on a clock that has stopped.
 const MAX_DELAYS: u32 = 1_000;
 
-/// Waits until `until_ns` by the clock, which `look` checks.
+/// Waits until `until_ns` on the clock, which `look` checks.
 pub(crate) async fn sleep<T: Timer>(
     timer: &mut T,
     mut look: impl FnMut(&mut T) -> Result<u64, ClockError>,
@@ -27,7 +27,8 @@ pub(crate) async fn sleep<T: Timer>(
     }
 }
 
-/// What `first` gives, or `None` if the wait of `second` ends before. What is there is taken before the clock is asked.
+/// Returns the result of `first`, or `None` if the wait of `second` ends earlier. Data that has arrived is taken before the
+/// clock is read.
 pub(crate) async fn race<T>(
     first: impl Future<Output = T>,
     second: impl Future<Output = Result<(), ClockError>>,

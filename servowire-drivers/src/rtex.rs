@@ -1,8 +1,8 @@
 //! RTEX drives: the master's exchange over the memory of the communication ASIC (MNM1221).
 //!
-//! The register map of the ASIC is not public, so what is done at its bus is a [`Port`] that you write from its data sheet: a
-//! state, a table of slaves, and words to read and write. Everything else is here: phases, invalid data first, word packing, the
-//! bank rules, the exchange in every update period, late exchanges.
+//! The register map of the ASIC is not public, so access to its bus is a [`Port`] that you write from its data sheet: a state, a
+//! table of slaves, and words to read and write. Everything else is here: phases, invalid data first, word packing, the bank
+//! rules, the exchange in every update period, and late exchanges.
 //!
 //! ```text
 //!             external timer                              internal timer
@@ -13,15 +13,18 @@
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
-//! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. The counter
-//! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at [`FrameCount`] before
-//! and after, and reads once more if it was not one frame. If that fails again, each axis takes its block only if it is on time
-//! ([`Arrival`](rtex_block::master::Arrival)); where two frames have the same counter (two communications in an update period) and the
-//! bank was switched between, none is taken. System Design Guide for Master, chapters 1 and 2.
+//! internal-timer system the ASIC switches it at XSYNC if the exchange is late. Half of the blocks would then be of another
+//! frame. The counter
+//! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at
+//! [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails again, each axis
+//! takes its block only if it is on time
+//! ([`Arrival`](rtex_block::master::Arrival)); if two frames have the same counter (two communications per update period) and
+//! the bank was switched in between, none is taken. System Design Guide for Master, chapters 1 and 2.
 //!
-//! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
-//! period without an answer of that drive, as the echo watch of its axis counts them; all others are read, and every place is written
-//! whatever fails, so a servo-off reaches every drive that can be reached. What was not written is replaced in the next period.
+//! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
+//! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place
+//! is written whatever fails, so a servo-off reaches every drive that can be reached. A block that was not written is replaced
+//! in the next period.
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -39,15 +42,15 @@ use crate::{Clock, Error};
 pub use frame_count::FrameCount;
 pub use port::{Port, Word};
 
-/// Why a call of a [`Driver`] failed.
+/// Why a call to a [`Driver`] failed.
 pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
 
 /// Words of the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
-/// How often an exchange reads the blocks, if the bank is switched meanwhile.
+/// How many times an exchange reads the blocks if the bank is switched meanwhile.
 const READS: u8 = 2;
 
-/// Does it again if the port reports a fault: half a command must not go out.
+/// Repeats an access if the port reports a fault, because half a command must not be sent.
 fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
     transfer().or_else(|_| transfer())
 }
@@ -57,14 +60,14 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchanged {
-    /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
+    /// Number of communication periods by which the commands are late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
-    /// The blocks were never of one frame, however often they were read, or a drive's echo stands still: those that are not on
-    /// time were not taken.
+    /// The blocks were never of one frame, however often they were read, or the echo of a drive has stopped: those that are not
+    /// on time were not taken.
     pub torn: bool,
 }
 
-/// What a [`Driver`] was made of.
+/// The parts from which a [`Driver`] was created.
 #[derive(Debug)]
 pub struct Released<P, C, const N: usize> {
     /// The port of the ASIC.
@@ -83,7 +86,7 @@ pub struct Driver<'r, P, C, const N: usize> {
     check: ClockCheck,
     master: Master<N>,
     received: &'r FrameCount,
-    /// Frames of `received` that the master has heard of.
+    /// Frames of `received` that the master has been told of.
     frames: u32,
     late: u32,
     torn: u32,
@@ -93,7 +96,7 @@ pub struct Driver<'r, P, C, const N: usize> {
 }
 
 impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
-    /// A driver in PH_INIT. The receive interrupt has the same `received`.
+    /// Creates a driver in PH_INIT. The receive interrupt uses the same `received`.
     pub fn new(port: P, clock: C, master: Master<N>, received: &'r FrameCount) -> Self {
         Self {
             port,
@@ -109,43 +112,44 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         }
     }
 
-    /// Gives port, clock and master back.
+    /// Returns port, clock and master.
     pub fn release(self) -> Released<P, C, N> {
         Released { port: self.port, clock: self.clock, master: self.master }
     }
 
-    /// The master, for reading.
+    /// Returns the master, for reading.
     pub const fn master(&self) -> &Master<N> {
         &self.master
     }
 
-    /// The axes: set-points, requests, switching on and off.
+    /// Returns the axes, for set-points, requests, and switching on and off.
     pub const fn ring_mut(&mut self) -> &mut Ring<N> {
         self.master.ring_mut()
     }
 
-    /// Exchanges that ended after the next frame had begun.
+    /// Number of exchanges that ended after the next frame had begun.
     pub const fn late(&self) -> u32 {
         self.late
     }
 
-    /// Exchanges whose blocks were not of one frame.
+    /// Number of exchanges whose blocks were not of one frame.
     pub const fn torn(&self) -> u32 {
         self.torn
     }
 
-    /// What the COM LED shows `t_ms` after the start of a lit half-period.
+    /// Returns what the COM LED shows `t_ms` after the start of a lit half-period.
     pub fn led(&self, t_ms: u64) -> Led {
         self.master.led(t_ms)
     }
 
-    /// What is known of the actual position, speed and torque of the axis at `place`; nothing for a place that the ring does not
-    /// have. Its instant is the start of the frame that brought the last block on time, by the driver's clock.
+    /// Returns what is known about the actual position, speed and torque of the axis at `place`; nothing for a place that the
+    /// ring does not have. Its instant is the start of the frame that brought the last timely block, by the driver's clock.
     pub fn evidence(&self, place: usize) -> Evidence {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
 
-    /// One turn of the main loop. Until it gives [`ControlPhase::Running`] interrupts stay off; it writes the first transmit data itself.
+    /// Runs one turn of the main loop. Keep interrupts off until it returns [`ControlPhase::Running`]; it writes the first
+    /// transmit data itself.
     ///
     /// # Errors
     /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`]; [`Error::Clock`].
@@ -168,7 +172,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         }
     }
 
-    /// [`control`](Self::control) until the communication runs, for at most `limit_ns`; returns the phase that was reached.
+    /// Repeats [`control`](Self::control) until the communication runs, for at most `limit_ns`; returns the phase that was reached.
     ///
     /// # Errors
     /// As [`control`](Self::control).
@@ -182,13 +186,14 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         }
     }
 
-    /// The exchange of an update period, from the NC interrupt, before anything else is calculated: reads the blocks of the last
-    /// reception and writes the next commands. `began_ns` is the start of the frame that began the period, by the driver's clock:
+    /// Performs the exchange of an update period: reads the blocks of the last reception and writes the next commands. Call it
+    /// from the NC interrupt, before anything else is calculated. `began_ns` is the start of the frame that began the period, by
+    /// the driver's clock:
     /// the time of the interrupt.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::Clock`], the first of them; every block was read and written that could be, and the next exchange
-    /// goes on.
+    /// [`Error::Io`] and [`Error::Clock`], the first of them; every block that could be read or written was, and the next
+    /// exchange continues.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
         {
@@ -212,12 +217,12 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         Ok(Exchanged { frames_late: frames_late?, torn })
     }
 
-    /// Leaves the stop after a time-out, an alarm or a stop of the caller; see [`Master::clear`].
+    /// Leaves the stopped state after a time-out, an alarm or a stop by the caller; see [`Master::clear`].
     pub fn clear(&mut self) {
         self.master.clear();
     }
 
-    /// The blocks of one frame, if that can be had.
+    /// Reads the blocks of one frame, if possible.
     fn read(&mut self) -> Read<P, N> {
         let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None };
         for _ in 0..READS {
@@ -243,18 +248,19 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         read
     }
 
-    /// Frames that have begun since the one at `began_ns`.
+    /// Returns the number of frames that have begun since the one at `began_ns`.
     fn frames_since(&mut self, began_ns: u64) -> Result<u32, ClockError> {
         let past_ns = self.now_ns()?.saturating_sub(began_ns);
         Ok(self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX)))
     }
 
-    /// A look at the clock.
+    /// Reads the clock.
     fn now_ns(&mut self) -> Result<u64, ClockError> {
         self.check.check(self.clock.now_ns()?)
     }
 
-    /// Whether a block that was read has another echo by now: the bank was switched in the middle of the last block.
+    /// Returns whether a block that was read has another echo by now, which means that the bank was switched in the middle of
+    /// the last block.
     fn has_changed(&mut self, heard: &[Heard; N]) -> bool {
         let echo = |heard: &Heard| heard.response().map(|response| response.update_counter_echo);
         let first = heard.iter().enumerate().find_map(|(place, heard)| Some((place, echo(heard)?)));
@@ -268,7 +274,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         Ok(Heard::parse(size, words))
     }
 
-    /// Every place, whatever fails; the first fault.
+    /// Writes every place, whatever fails; returns the first fault.
     fn write(&mut self, commands: &[Command32; N]) -> Result<(), P::Error> {
         let (size, mut result) = (self.master.config().size, Ok(()));
         for (place, command) in commands.iter().enumerate() {
@@ -289,7 +295,7 @@ struct Read<P: Port, const N: usize> {
     fault: Option<Failure<P>>,
 }
 
-/// As many words as a block has.
+/// Returns as many words as a block has.
 fn words_of<P: Port>(size: BlockSize, words: &mut [P::Word; MOST_WORDS]) -> &mut [P::Word] {
     let count = size.bytes().checked_div(P::Word::BYTES).unwrap_or(0);
     words.get_mut(..count).unwrap_or_default()

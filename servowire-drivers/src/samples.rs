@@ -1,7 +1,8 @@
-//! A line without a fitting UART: SPI or PIO as a sampler that takes several samples a bit, and as a sender of them.
+//! Support for a line without a suitable UART: an SPI or PIO that takes several samples per bit, and sends them.
 //!
-//! MISO at the receiver's output, the clock a multiple of the bit rate, DMA into a buffer: every SPI bit is a sample. MOSI at
-//! the driver's input sends the same way. Which sample lies where in the buffer depends on the peripheral:
+//! With MISO connected to the receiver's output, a clock that is a multiple of the bit rate, and DMA into a buffer, every SPI
+//! bit is a sample. MOSI, connected to the driver's input, sends in the same way. Where each sample lies in the buffer depends
+//! on the peripheral:
 //!
 //! ```text
 //!  line, time ->        s0 s1 s2 s3 s4 s5 s6 s7 | s8 ...
@@ -34,7 +35,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// Bytes of a word.
+    /// Bytes per word.
     const fn word(self) -> usize {
         match self {
             Self::LsbFirst8 | Self::MsbFirst8 => 1,
@@ -48,8 +49,8 @@ impl Order {
     }
 }
 
-/// Brings samples from the order of a peripheral into that of the line, sample n in bit n % 8 of byte n / 8, or back: it is the
-/// same either way. Bytes after the last whole word are left as they are.
+/// Converts samples between the order of a peripheral and that of the line (sample n in bit n % 8 of byte n / 8); the conversion
+/// is the same in both directions. Bytes after the last whole word are left unchanged.
 pub(crate) fn reorder(samples: &mut [u8], order: Order) {
     if !order.is_reversed() {
         return;
@@ -62,9 +63,9 @@ pub(crate) fn reorder(samples: &mut [u8], order: Order) {
     }
 }
 
-/// Writes line bits as `per_bit` samples each, for a peripheral of this order. Ones go before them, for a bit and whole bytes,
-/// and at least a byte of them after, up to the end of a word, because the state of a data line between transfers is not defined:
-/// switch the line driver on and off inside them. Returns the bytes that were written.
+/// Writes line bits as `per_bit` samples each, for a peripheral of this order. They are preceded by ones, for one bit and up to
+/// whole bytes, and followed by at least a byte of ones up to the end of a word, because the state of a data line between
+/// transfers is undefined. Switch the line driver on and off during these ones. Returns the number of bytes written.
 ///
 /// # Errors
 /// [`TooShort`] if `out` ends earlier; it is undefined then.

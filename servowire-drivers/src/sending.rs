@@ -8,21 +8,21 @@ use crate::leaving::Leaving;
 use crate::quiet;
 use crate::{Clock, Direction, Worst};
 
-/// The line driver is on as long as this lives. Dropped, it waits until all that was handed over has left: a request of which the end is
-/// cut off may be another one.
+/// The line driver is on as long as this lives. When dropped, it waits until everything that was handed over has left, because a
+/// request whose end is cut off may be a different request.
 #[derive(Debug)]
 pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     switch: &'a mut Switch<D>,
     pub(crate) clock: &'a mut C,
     pub(crate) line: &'a mut quiet::Line,
-    /// Nothing of a driver that the hardware switches.
+    /// `None` if the hardware switches the driver.
     leaving: Option<Leaving>,
     /// Fields that a `write` has been asked to take and that may be on their way.
     asked: usize,
     start_ns: Option<u64>,
 }
 
-/// When a request began to leave, and by how much the driver went off too late after it.
+/// When a request began to leave, and by how much the driver was switched off too late after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Sent {
     pub(crate) start_ns: u64,
@@ -46,7 +46,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(sending)
     }
 
-    /// When the first field may be handed over; at once if the hardware switches.
+    /// Returns when the first field may be handed over; at once if the hardware switches the driver.
     #[inline]
     pub(crate) fn lead_until_ns(&mut self, lead_ns: u32) -> Result<Option<u64>, ClockError> {
         let Some(Worst { clock_ns, .. }) = self.switch.worst() else { return Ok(None) };
@@ -54,7 +54,8 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(Some(now_ns.saturating_add(lead_ns.into()).saturating_add(clock_ns.into())))
     }
 
-    /// How many of these fields are to be handed over at once: the time of the first one is the time of the request.
+    /// Returns the fields to hand over next. If software switches the driver, the first one goes alone, because its time is the
+    /// time of the request.
     pub(crate) const fn piece<'b>(&self, fields: &'b [u8]) -> &'b [u8] {
         match fields.split_at_checked(1) {
             Some((first, _)) if self.leaving.is_some() && self.start_ns.is_none() => first,
@@ -62,7 +63,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         }
     }
 
-    /// A `write` is about to take them; now.
+    /// Notes that a `write` is about to take these fields; returns the time.
     #[inline]
     pub(crate) fn ask(&mut self, fields: &[u8]) -> Result<u64, ClockError> {
         let now_ns = self.line.now_ns(self.clock)?;
@@ -70,7 +71,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(now_ns)
     }
 
-    /// It was asked at `before_ns` and has taken this many.
+    /// Notes that the `write` begun at `before_ns` has taken this many.
     #[inline]
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64) -> Result<(), ClockError> {
         let after_ns = self.line.now_ns(self.clock)?;
@@ -87,13 +88,13 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(())
     }
 
-    /// When the driver is to go off.
+    /// Returns when to switch the driver off.
     #[inline]
     pub(crate) fn off_ns(&self) -> Option<u64> {
         self.leaving.and_then(|leaving| leaving.off_ns())
     }
 
-    /// The request has left: switches the driver off, and tells whether that went well; if not, it is tried once more.
+    /// Ends the request, which has left: switches the driver off and returns whether that succeeded; if not, it is tried once more.
     #[inline]
     pub(crate) fn end(mut self) -> Result<Result<Sent, ClockError>, D::Error> {
         self.switch.off()?;

@@ -1,8 +1,9 @@
-//! An SPI as transmitter and sampler, where no UART fits: [`SpiUart`] for T-Format, `SpiFrames` for A-format.
+//! An SPI as transmitter and sampler, if no UART is suitable: [`SpiUart`] for T-Format, `SpiFrames` for A-format.
 //!
-//! MISO at the receiver's output, MOSI at the driver's input, SCK not connected and set to 4 to 80 times the bit rate; which sample
-//! lies where in memory says [`Order`]. A request is one transfer, in which every bit becomes several equal samples; then the line
-//! driver goes off, and a second transfer, the window, samples the line for as long as the buffer lasts. It begins after the
+//! Connect MISO to the receiver's output and MOSI to the driver's input, leave SCK open, and set it to 4 to 80 times the bit
+//! rate. [`Order`] says where each sample lies in memory. A request is one transfer, in which every bit becomes several equal
+//! samples; then the line driver is switched off, and a second transfer, the window, samples the line until the buffer is full.
+//! It begins after the
 //! request has left the line, so nothing in it can be older than the request.
 //!
 //! ```text
@@ -11,14 +12,14 @@
 //!  MISO                         window: idle | answer                | idle
 //! ```
 //!
-//! * The window has to begin before the answer does: a T-Format encoder answers after 3 us, so use DMA or a HAL with a short way
-//!   into the transfer.
-//! * The clock must run through a transfer without gaps. The RP2040's SPI pauses between words with CPHA = 0; take CPHA = 1.
+//! * The window has to begin before the answer does: a T-Format encoder answers after 3 us, so use DMA or a HAL that starts a
+//! transfer quickly.
+//! * The clock must run through a transfer without gaps. The RP2040's SPI pauses between words with CPHA = 0; use CPHA = 1.
 //! * The window has to hold the wait for the answer and the longest answer: at 2.5 Mbit/s, 8 samples a bit, T-Format needs
 //!   10 us and 110 bits, 135 bytes; [`Sampling::bytes`] counts them.
-//! * Futures need an SPI that can do both, block and wait, as those of embassy can: a request goes out without giving the time back, 4 to
-//!   16 us of T-Format and up to 45 us of A-format at 2.5 Mbit/s, so that none is cut off by a future that is dropped.
-//! * While nothing is expected the line is heard only in looks of one field or frame. So a driver takes that much longer a call.
+//! * Futures need an SPI that supports both blocking and async transfers, as those of embassy do: a request is sent without
+//! yielding (4 to 16 us for T-Format and up to 45 us for A-format at 2.5 Mbit/s), so that no dropped future cuts it off.
+//! * While nothing is expected, the line is sampled only for one field or frame at a time, so each call takes that much longer.
 
 #[cfg(feature = "nikon")]
 mod frames;
@@ -51,7 +52,8 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// `per_bit`: clocks of the SPI per bit, 4 to 80; 8 is a good choice. `content_bits`: 8 for T-Format, 16 for A-format.
+    /// Creates the setting. `per_bit` is the number of SPI clocks per bit, 4 to 80; 8 is a good choice. `content_bits` is 8 for
+    /// T-Format, 16 for A-format.
     ///
     /// # Errors
     /// [`FormatError`] for other numbers.
@@ -62,13 +64,13 @@ impl Sampling {
         }
     }
 
-    /// Bytes of memory that hold this much time on the line.
+    /// Returns the bytes of memory that hold `ns` nanoseconds of line.
     pub fn bytes(&self, ns: u32) -> usize {
         let samples = u64::from(ns).saturating_mul(self.samples_per_second()).div_ceil(8_000_000_000);
         usize::try_from(samples).unwrap_or(usize::MAX)
     }
 
-    /// When sample number `index` was taken, counted from the first, ns.
+    /// Returns when sample `index` was taken, in ns from the first.
     #[cfg(any(test, feature = "nikon"))]
     fn ns(&self, index: u64) -> u64 {
         index.saturating_mul(1_000_000_000).checked_div(self.samples_per_second()).unwrap_or(0)
@@ -85,22 +87,22 @@ impl Sampling {
     }
 }
 
-/// What a [`SpiUart`] was made of.
+/// The parts from which a [`SpiUart`] was created.
 #[derive(Debug, Clone, Copy)]
 pub struct Released<S, D> {
     /// The SPI.
     pub bus: S,
-    /// Who switches the line driver.
+    /// The direction, which switches the line driver.
     pub direction: D,
 }
 
-/// What a [`SpiFrames`] was made of.
+/// The parts from which a [`SpiFrames`] was created.
 #[cfg(feature = "nikon")]
 #[derive(Debug, Clone, Copy)]
 pub struct ReleasedFrames<S, D, C> {
     /// The SPI.
     pub bus: S,
-    /// Who switches the line driver.
+    /// The direction, which switches the line driver.
     pub direction: D,
     /// The clock.
     pub clock: C,
@@ -124,7 +126,7 @@ pub enum SpiError<S, P> {
     /// Something was on the line outside the window.
     #[error("something is on the line outside the window")]
     Noise,
-    /// The clock stands, or was set back.
+    /// The clock has stopped or was set back.
     #[error(transparent)]
     Clock(#[from] ClockError),
     /// The request does not fit the buffer.
@@ -142,7 +144,7 @@ impl<S: core::fmt::Debug, P: core::fmt::Debug> embedded_io::Error for SpiError<S
     }
 }
 
-/// What a look at the line gave.
+/// The result of a look at the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Heard {
     Field(Field),
@@ -150,7 +152,7 @@ enum Heard {
     Noise,
 }
 
-/// The machine behind both: buffers, and what the last transfer has sampled.
+/// The common core of both: the buffers, and what the last transfer has sampled.
 #[derive(Debug)]
 struct Sampler<'b, S, D> {
     bus: S,
@@ -162,7 +164,7 @@ struct Sampler<'b, S, D> {
     /// Bytes of `rx` that were sampled, and how many of them the receiver has.
     len: usize,
     at: usize,
-    /// What is left of the byte before `at`.
+    /// The remaining samples of the byte before `at`.
     samples: Samples,
 }
 
@@ -188,7 +190,7 @@ impl<'b, S, D> Sampler<'b, S, D> {
         Released { bus: self.bus, direction: self.direction.release() }
     }
 
-    /// The next field of what was sampled.
+    /// Returns the next field of the samples.
     fn field(&mut self) -> Option<Field> {
         loop {
             if let Some(field) = self.receiver.feed(&mut self.samples) {
@@ -200,14 +202,14 @@ impl<'b, S, D> Sampler<'b, S, D> {
         }
     }
 
-    /// The request as samples: bytes of `tx`.
+    /// Writes the request as samples; returns the bytes of `tx`.
     fn prepare(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<usize, TooShort> {
         self.forget();
         let per_bit = u8::try_from(self.sampling.format.samples_per_bit()).unwrap_or(u8::MAX);
         write(bits, per_bit, self.sampling.order, self.tx)
     }
 
-    /// `len` bytes to be sampled into; MOSI stays 1 meanwhile.
+    /// Returns `len` bytes to sample into, set so that MOSI stays 1 meanwhile.
     fn idle(&mut self, len: usize) -> &mut [u8] {
         self.forget();
         let len = len.min(self.rx.len());
@@ -216,7 +218,7 @@ impl<'b, S, D> Sampler<'b, S, D> {
         window
     }
 
-    /// They have been.
+    /// Notes that these bytes have been sampled.
     fn sampled(&mut self, len: usize) {
         self.len = len.min(self.rx.len());
         if let Some(window) = self.rx.get_mut(..self.len) {
@@ -224,14 +226,14 @@ impl<'b, S, D> Sampler<'b, S, D> {
         }
     }
 
-    /// What was sampled before is over.
+    /// Discards what was sampled before.
     fn forget(&mut self) {
         self.receiver = Receiver::new(self.sampling.format);
         self.samples = Samples::partial(0, 0);
         (self.len, self.at) = (0, 0);
     }
 
-    /// Whether the line was ever 0 in what was sampled; it counts as taken.
+    /// Returns whether any sample was 0, and discards the samples.
     fn is_busy(&mut self) -> bool {
         let busy = self.rx.get(..self.len).is_some_and(|window| window.iter().any(|byte| *byte != 0xff));
         self.forget();
@@ -261,13 +263,13 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
         Ok(())
     }
 
-    /// Sends, and samples the window.
+    /// Sends a request and samples the window.
     fn ask(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
         self.send(bits)?;
         self.sample(usize::MAX)
     }
 
-    /// What is there; if nothing is, a look at the line.
+    /// Returns what has been received; if there is nothing, looks at the line.
     fn hear(&mut self) -> Result<Option<Heard>, Fault<S, D>> {
         if let Some(field) = self.field() {
             return Ok(Some(Heard::Field(field)));
@@ -277,8 +279,8 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
     }
 }
 
-/// A request is sent as the blocking ones do it, in 4 to 20 us: a transfer that is dropped is cut off, and ID 0 without its end is ID 8. Only
-/// the window gives the time back.
+/// A request is sent as by the blocking ones, in 4 to 20 us, because a dropped transfer is cut off, and ID 0 without its end is
+/// ID 8. Only the window yields to the executor.
 #[cfg(feature = "async")]
 impl<S: SpiBus + AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
     /// Samples `len` bytes.
@@ -293,13 +295,13 @@ impl<S: SpiBus + AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
         Ok(())
     }
 
-    /// Sends, and samples the window.
+    /// Sends a request and samples the window.
     async fn ask_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
         self.send(bits)?;
         self.sample_asynch(usize::MAX).await
     }
 
-    /// What is there, or what comes.
+    /// Returns what has been received, or waits for it.
     async fn hear_asynch(&mut self) -> Result<Heard, Fault<S, D>> {
         loop {
             if let Some(field) = self.field() {
@@ -323,7 +325,7 @@ impl<S: SpiBus + AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
     }
 }
 
-/// Start bit, content and stop bit of each unit, with idle bits between two.
+/// Returns start bit, content and stop bit of each unit, with idle bits between units.
 fn line_bits(units: impl IntoIterator<Item = (u16, u32)>, gap_bits: u32) -> impl Iterator<Item = bool> {
     units.into_iter().enumerate().flat_map(move |(at, (content, width))| {
         let idle = if at == 0 { 0 } else { gap_bits };

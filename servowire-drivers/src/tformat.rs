@@ -1,6 +1,7 @@
-//! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, at a plain UART (8N1).
+//! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, on a plain UART (8N1).
 //!
-//! [`blocking`] spins while it waits, some tens of microseconds a call; `asynch` (feature `async`) gives the time back. Both have the same
+//! [`blocking`] spins while it waits, some tens of microseconds per call; `asynch` (feature `async`) yields to the executor.
+//! Both have the same
 //! `Driver` with the same calls.
 
 #[macro_use]
@@ -14,31 +15,31 @@ pub mod blocking;
 use tformat::master::Line;
 use tformat::{AllData, Error, Frame, Request, Response};
 
-/// What a `Driver` was made of.
+/// The parts from which a `Driver` was created.
 #[derive(Debug, Clone, Copy)]
 pub struct Released<U, D, C> {
     /// The UART.
     pub uart: U,
-    /// Who switches the line driver.
+    /// The direction, which switches the line driver.
     pub direction: D,
     /// The clock or timer.
     pub clock: C,
 }
 
-/// What a lost answer is to a procedure.
+/// How a procedure is told of a lost answer.
 const LOST: Error = Error::NoResponse { echo: false };
 
-/// Longest request and longest answer together.
+/// Bytes of the longest request and the longest answer together.
 const MAX_BYTES: usize = 16;
 
-/// How long this request and the longest answer to it take, until that is handed over.
+/// Returns how long this request and the longest answer to it take, until the answer is handed over.
 fn longest_ns(line: &Line, request: &Frame) -> u64 {
     let fields = request.fields().saturating_add(12);
     let answered_ns = u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into());
     answered_ns.saturating_add(line.hand_over_ns.into())
 }
 
-/// Why there was no answer: not for a reason of the encoder, if the line was still driven when it began to answer.
+/// Returns why there was no answer: the encoder is not to blame if the line was still driven when it began to answer.
 fn refused<IO, PIN, D>(error: Error, late_ns: u64) -> crate::Error<IO, PIN, Error, D> {
     match late_ns {
         0 => crate::Error::Protocol(error),
@@ -46,7 +47,7 @@ fn refused<IO, PIN, D>(error: Error, late_ns: u64) -> crate::Error<IO, PIN, Erro
     }
 }
 
-/// The line has to be silent for two fields after something that nobody has asked for.
+/// How long the line has to be silent after unexpected data: two fields.
 fn silence_ns(line: &Line) -> u32 {
     line.rate.fields_ns(2)
 }

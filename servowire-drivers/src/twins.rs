@@ -1,5 +1,5 @@
-//! The drivers exist twice, for those who wait by spinning and for those who give the time back, with one text: it is pasted with one
-//! of these for the calls that wait. What is decided is decided elsewhere, by functions that do not wait.
+//! The drivers exist twice, as blocking drivers that spin and as async ones that yield, from one source text. The text is
+//! expanded with one of these macros for the calls that wait. All decisions are made elsewhere, by functions that do not wait.
 
 macro_rules! spun {
     ($call:expr) => {

@@ -3,7 +3,7 @@ use servowire_core::{ClockError, TickRate};
 
 use super::{Clock, Timer};
 
-/// The clock of embassy-time. Choose a time driver of 1 MHz or more: with a slower one this does not compile.
+/// The clock of embassy-time. Choose a time driver of 1 MHz or more; with a slower one this does not compile.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct EmbassyClock;
 

@@ -3,7 +3,7 @@ use servowire_core::{ClockError, TickRate, TimeBase};
 
 use super::Clock;
 
-/// A clock made of instants of 64 bits of `fugit`, such as those of an RTIC monotonic. One whose tick is longer than 1 us does
+/// A clock based on 64-bit instants of `fugit`, such as those of an RTIC monotonic. A clock whose tick is longer than 1 us does
 /// not compile.
 ///
 /// ```
@@ -28,7 +28,7 @@ impl<F: FnMut() -> Instant<u64, NOM, DENOM>, const NOM: u32, const DENOM: u32> C
     }
 }
 
-/// The same of instants of 32 bits, which wrap: the next reading has to come within half of their range.
+/// The same for 32-bit instants, which wrap: the next reading has to follow within half of their range.
 ///
 /// ```
 /// use fugit::TimerInstantU32;
@@ -46,7 +46,7 @@ pub struct FugitClock32<F> {
 }
 
 impl<F> FugitClock32<F> {
-    /// Its time is 0 now.
+    /// Creates the clock; its time is now 0.
     pub fn new<const NOM: u32, const DENOM: u32>(mut now: F) -> Self
     where
         F: FnMut() -> Instant<u32, NOM, DENOM>,

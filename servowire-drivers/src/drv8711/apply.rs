@@ -1,10 +1,10 @@
-//! The sequence that writes a configuration and makes sure that it arrived.
+//! Writes a configuration and makes sure that it arrived.
 
 use super::error::Error;
 use super::registers::Configuration;
 use super::word::{Register, Word};
 
-/// TORQUE, OFF, BLANK, DECAY, DRIVE, STALL, and CTRL last because it holds ENBL.
+/// The order is TORQUE, OFF, BLANK, DECAY, DRIVE, STALL, and CTRL last because it holds ENBL.
 const ORDER: [Register; 7] = [
     Register::Torque,
     Register::Off,
@@ -36,14 +36,14 @@ const ORDER: [Register; 7] = [
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Apply {
     configuration: Configuration,
-    /// Registers that are written and checked.
+    /// Number of registers that are written and checked.
     done: u8,
-    /// Whether the present one is written.
+    /// Whether the current register has been written.
     written: bool,
 }
 
 impl Apply {
-    /// RSTEP is written as it is, so it should be clear: it clears itself and would not read back.
+    /// RSTEP is written unchanged, so it should be clear: it clears itself and would not read back.
     pub const fn new(configuration: Configuration) -> Self {
         Self { configuration, done: 0, written: false }
     }
@@ -52,14 +52,14 @@ impl Apply {
         ORDER.get(usize::from(self.done)).copied()
     }
 
-    /// The word to send; the two bytes that come back meanwhile go to [`hear`](Self::hear). `None` when everything is written
+    /// Returns the word to send; pass the two bytes that come back to [`hear`](Self::hear). `None` when everything is written
     /// and reads back.
     pub fn transmission(&self) -> Option<Word> {
         let register = self.register()?;
         Some(if self.written { register.read() } else { register.write(self.configuration.value(register)) })
     }
 
-    /// The two bytes that came back while the word was sent.
+    /// Takes the two bytes that came back while the word was sent.
     ///
     /// # Errors
     /// [`Error::ReadBack`]; the same register is then written again.

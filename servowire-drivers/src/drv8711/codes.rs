@@ -1,9 +1,9 @@
-//! Codes of the fields. Times and currents are the data sheet's nominal ones.
+//! Codes of the fields. Times and currents are the nominal values of the data sheet.
 
 use super::error::Error;
 use super::word::Register;
 
-/// What a field may hold.
+/// The values that a field may hold.
 pub(super) trait Code: Sized {
     fn to(self) -> u16;
     fn from(register: Register, code: u16) -> Result<Self, Error>;
@@ -30,7 +30,7 @@ impl Code for u8 {
     }
 }
 
-/// Fields of two to four bits: each value is named by what it does, and that is all its documentation.
+/// Fields of two to four bits. Each value is named after what it does, which is its only documentation.
 macro_rules! values {
     ($($(#[$doc:meta])* $name:ident { $($value:ident = $code:literal $text:literal),+ $(,)? })+) => {
         $(
@@ -54,7 +54,7 @@ macro_rules! values {
 }
 
 values! {
-    /// MODE: micro-steps for each full step.
+    /// MODE: micro-steps per full step.
     StepMode {
         Full = 0 "1", Div2 = 1 "1/2", Div4 = 2 "1/4", Div8 = 3 "1/8", Div16 = 4 "1/16", Div32 = 5 "1/32",
         Div64 = 6 "1/64", Div128 = 7 "1/128", Div256 = 8 "1/256",
@@ -72,13 +72,13 @@ values! {
         Us600 = 5 "600 us", Us800 = 6 "800 us", Us1000 = 7 "1000 us",
     }
 
-    /// DECMOD: how the current decays; of two words the first is for rising, the second for falling current.
+    /// DECMOD: how the current decays; of two words in a name, the first is for rising and the second for falling current.
     DecayMode {
         Slow = 0 "slow", SlowMixed = 1 "slow/mixed", Fast = 2 "fast", Mixed = 3 "mixed",
         SlowAutoMixed = 4 "slow/auto mixed", AutoMixed = 5 "auto mixed",
     }
 
-    /// SDCNT: steps without back EMF that make a stall.
+    /// SDCNT: number of steps without back EMF that count as a stall.
     StallCount { Steps1 = 0 "1", Steps2 = 1 "2", Steps4 = 2 "4", Steps8 = 3 "8" }
 
     /// VDIV: divider of the back EMF.

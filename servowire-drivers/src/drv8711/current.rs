@@ -2,8 +2,8 @@
 
 use super::codes::IsGain;
 
-/// Full-scale current of a winding in µA, rounded down: 2.75 V x TORQUE / (256 x ISGAIN x R). `sense_milliohm`: the
-/// sense resistor. `None` for 0 mOhm.
+/// Full-scale current of a winding in µA, rounded down: 2.75 V x TORQUE / (256 x ISGAIN x R). `sense_milliohm` is the sense
+/// resistor. `None` for 0 mOhm.
 ///
 /// ```
 /// use servowire_drivers::drv8711::{IsGain, full_scale_microamps};
@@ -20,7 +20,7 @@ pub const fn full_scale_microamps(torque: u8, gain: IsGain, sense_milliohm: u16)
     }
 }
 
-/// The largest TORQUE whose full-scale current is not above `microamps`: 0 if even 1 is too much, 255 at most. `None`
+/// Returns the largest TORQUE whose full-scale current does not exceed `microamps`: 0 if even 1 is too much, 255 at most. `None`
 /// for 0 mOhm.
 pub const fn torque_for_microamps(microamps: u32, gain: IsGain, sense_milliohm: u16) -> Option<u8> {
     if sense_milliohm == 0 {

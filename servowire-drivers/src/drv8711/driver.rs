@@ -10,7 +10,8 @@ use super::error::Error;
 use super::registers::{Configuration, Ctrl};
 use super::word::{Register, Word};
 
-/// Why a call failed: [`Io`](crate::Error::Io) is the bus, [`Protocol`](crate::Error::Protocol) what the chip answers.
+/// Why a call failed: [`Io`](crate::Error::Io) is a fault of the bus, [`Protocol`](crate::Error::Protocol) a fault in the chip's
+/// answer.
 pub type Failure<E> = crate::Error<E, Infallible, Error, Infallible>;
 
 /// A DRV8711 behind an `embedded_hal` SPI. Its chip select is active **high**, and a write takes effect when it falls.
@@ -34,17 +35,17 @@ pub type Failure<E> = crate::Error<E, Infallible, Error, Infallible>;
 #[derive(Debug)]
 pub struct Driver<S> {
     spi: S,
-    /// What was written: bit 10 of TORQUE cannot be read back.
+    /// What was written, because bit 10 of TORQUE cannot be read back.
     written: Configuration,
 }
 
 impl<S: SpiDevice> Driver<S> {
-    /// A chip in its state after power-up; nothing is sent.
+    /// Creates a driver for a chip in its state after power-up; sends nothing.
     pub fn new(spi: S) -> Self {
         Self { spi, written: Configuration::default() }
     }
 
-    /// Gives the bus back; the chip stays as it is.
+    /// Returns the bus; the chip stays as it is.
     pub fn release(self) -> S {
         self.spi
     }
@@ -69,7 +70,7 @@ impl<S: SpiDevice> Driver<S> {
         Ok(())
     }
 
-    /// Switches the motor current off and keeps all other settings. One word, not read back.
+    /// Switches the motor current off and keeps all other settings. Sends one word, which is not read back.
     ///
     /// # Errors
     /// [`Failure::Io`]
@@ -78,7 +79,7 @@ impl<S: SpiDevice> Driver<S> {
         self.transfer(Register::Ctrl.write(self.written.value(Register::Ctrl))).map(|_| ())
     }
 
-    /// The faults. All bits set may also mean that the chip is dead, so OFF is read then.
+    /// The faults. All bits set may also mean that the chip is dead, so in that case OFF is read too.
     ///
     /// # Errors
     /// [`Failure::Io`], or [`Failure::Protocol`] with [`Error::NoChip`].

@@ -20,12 +20,12 @@ impl Field {
         (1u16 << self.width).wrapping_sub(1)
     }
 
-    /// The raw code in a register's value.
+    /// Extracts the raw code from a register's value.
     pub const fn get(self, value: u16) -> u16 {
         value >> self.shift & self.mask()
     }
 
-    /// The register's value with this raw code; bits above the field's width are cut off.
+    /// Returns the register's value with this raw code; bits above the field's width are cut off.
     pub const fn set(self, value: u16, code: u16) -> u16 {
         value & !(self.mask() << self.shift) | (code & self.mask()) << self.shift
     }

@@ -32,7 +32,7 @@ macro_rules! register {
                 value
             }
 
-            /// The register from its value; bits without a field are left out.
+            /// Decodes the register from its value; bits without a field are dropped.
             ///
             /// # Errors
             /// [`Error::ReservedCode`]
@@ -64,7 +64,7 @@ register! {
 }
 
 register! {
-    /// TORQUE: current and back-EMF sampling.
+    /// TORQUE: current limit and back-EMF sampling.
     Torque {
         /// TORQUE: full-scale current, see [`full_scale_microamps`](super::full_scale_microamps).
         torque: u8 = 0,
@@ -133,7 +133,7 @@ register! {
     }
 }
 
-/// All seven registers that are set up; the default is what the chip holds after power-up.
+/// All seven set-up registers; the default is what the chip holds after power-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -156,7 +156,7 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// The value of a register; STATUS is 0.
+    /// Returns the value of a register; STATUS is 0.
     pub fn value(&self, register: Register) -> u16 {
         match register {
             Register::Ctrl => self.ctrl.value(),

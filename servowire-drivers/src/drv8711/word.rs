@@ -39,7 +39,7 @@ impl Register {
         }
     }
 
-    /// Bits that read back as written. Bit 10 of TORQUE, the top of SMPLTH, is taken but always reads 0, so a driver has
+    /// The bits that read back as written. Bit 10 of TORQUE, the top of SMPLTH, is accepted but always reads 0, so a driver has
     /// to remember what it wrote.
     pub const fn read_back_mask(self) -> u16 {
         match self {
@@ -48,17 +48,17 @@ impl Register {
         }
     }
 
-    /// The word that writes the low 12 bits of `value`.
+    /// Returns the word that writes the low 12 bits of `value`.
     pub const fn write(self, value: u16) -> Word {
         Word((self.code() as u16) << 12 | value & 0xfff)
     }
 
-    /// The word that reads it. The answer comes in the same transfer.
+    /// Returns the word that reads it. The answer comes in the same transfer.
     pub const fn read(self) -> Word {
         Word(0x8000 | (self.code() as u16) << 12)
     }
 
-    /// Returns whether `read` may be what a register that holds `written` reads.
+    /// Checks that `read` is what a register that holds `written` may return.
     ///
     /// # Errors
     /// [`Error::ReadBack`]
@@ -80,7 +80,7 @@ impl Word {
         self.0
     }
 
-    /// The bytes in the order they are sent.
+    /// The bytes in the order in which they are sent.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_be_bytes()
     }

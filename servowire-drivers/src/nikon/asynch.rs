@@ -1,5 +1,5 @@
-//! Waits by giving the time back. Every future may be dropped at any point: the next call waits until the line is free. Whether
-//! a request that changes the encoder has had its effect is not known then.
+//! Waits by yielding to the executor. Every future may be dropped at any point: the next call waits until the line is free. It
+//! is then not known whether a request that changes the encoder took effect.
 
 use nikon_aformat::RequestFrame;
 use servowire_core::run_async as run;
@@ -8,29 +8,29 @@ use super::Frame;
 use crate::Timer;
 use crate::race::{self, race};
 
-/// What sends and receives frames.
+/// A port that sends and receives frames.
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait FramePort {
-    /// Why it cannot.
+    /// Why the port failed.
     type Error;
-    /// Sends these frames with `gap_bits` idle bits between two, and begins at once. It switches the line driver on
-    /// before and off after by itself: the encoder answers some microseconds later. A request that has begun goes out whole, also when
-    /// the future is dropped.
+    /// Sends these frames with `gap_bits` idle bits between them, beginning at once. The port itself switches the line driver on
+    /// before and off after them; the encoder answers some microseconds later. A request that has begun is sent completely, even
+    /// if the future is dropped.
     ///
     /// # Errors
-    /// Those of the port.
+    /// The errors of the port.
     async fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error>;
-    /// Ends when a frame has been received, and gives it. Dropped before that it should lose none: a lost frame costs the
-    /// exchange in which it happens. Between two calls the port keeps at least the frames of a response.
+    /// Waits for a frame and returns it. If the future is dropped earlier, it should lose no frame: a lost frame costs the
+    /// exchange in which it happens. Between two calls the port must keep at least the frames of a response.
     ///
     /// # Errors
-    /// Those of the port: the exchange is lost.
+    /// The errors of the port; the exchange is lost.
     async fn take(&mut self) -> Result<Frame, Self::Error>;
 }
 
 driver!(awaited, Timer, async);
 
-/// The frame that comes until a time, or an error of the port.
+/// Waits for a frame until a given time; returns the frame or an error of the port.
 async fn take<F: FramePort>(
     port: &mut F,
     line: &mut quiet::Line,

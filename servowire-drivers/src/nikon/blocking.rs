@@ -7,26 +7,26 @@ use super::Frame;
 use crate::Clock;
 use crate::quiet::spin;
 
-/// What sends and receives frames.
+/// A port that sends and receives frames.
 pub trait FramePort {
-    /// Why it cannot.
+    /// Why the port failed.
     type Error;
-    /// Sends these frames with `gap_bits` idle bits between two, and begins at once. It switches the line driver on
-    /// before and off after by itself: the encoder answers some microseconds later.
+    /// Sends these frames with `gap_bits` idle bits between them, beginning at once. The port itself switches the line driver on
+    /// before and off after them; the encoder answers some microseconds later.
     ///
     /// # Errors
-    /// Those of the port.
+    /// The errors of the port.
     fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error>;
-    /// The next frame that was received, if there is one. Between two looks the port keeps at least the frames of a response.
+    /// Returns the next received frame, if there is one. Between two calls the port must keep at least the frames of a response.
     ///
     /// # Errors
-    /// Those of the port: the exchange is lost.
+    /// The errors of the port; the exchange is lost.
     fn take(&mut self) -> Result<Option<Frame>, Self::Error>;
 }
 
 driver!(spun, Clock);
 
-/// The frame that comes until a time, or an error of the port.
+/// Waits for a frame until a given time; returns the frame or an error of the port.
 #[inline(always)]
 fn take<F: FramePort>(
     port: &mut F,

@@ -1,4 +1,5 @@
-//! The text of both drivers. What they wait with is in [`blocking`](super::blocking) and `asynch` (feature `async`).
+//! The common source text of both drivers. How they wait is defined in [`blocking`](super::blocking) and `asynch` (feature
+//! `async`).
 
 macro_rules! driver {
     ($wait:ident, $clock:path $(, $asynch:tt)?) => {
@@ -17,7 +18,7 @@ macro_rules! driver {
         use crate::quiet::{self, Heard, Settle};
         use crate::{Error, exchange};
 
-        /// Why a call of a [`Driver`] failed.
+        /// Why a call to a [`Driver`] failed.
         pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
 
         /// The controller's end of a line with up to eight encoders of one resolution.
@@ -31,19 +32,21 @@ macro_rules! driver {
         }
 
         impl<F: FramePort, C: $clock> Driver<F, C> {
-            /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their
-            /// end, unless it gives their times: nothing but the driver may run meanwhile, or give the line a larger budget.
+            /// Creates a driver for a line with encoders of this resolution. The port must be asked for frames within
+            /// `line.latency_budget_ns()` of their end, unless it reports their times. So either nothing but the driver may run
+            /// meanwhile, or the line needs a larger budget.
             pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
                 Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
             }
 
-            /// Gives port and clock back.
+            /// Returns port and clock.
             pub fn release(self) -> Released<F, C> {
                 Released { port: self.port, clock: self.clock }
             }
 
-            /// The position of an encoder, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
-            /// judged at once by the rules of [`Evidence::at`]. The answer alone lasts 72 bits, so the position is never younger
+            /// Reads the position of an encoder, if it may be used now, and when it was sampled:
+            /// [`read_evidence`](Self::read_evidence), judged at once by the rules of [`Evidence::at`]. The answer alone lasts
+            /// 72 bits, so the position is never younger
             /// than that.
             ///
             /// # Errors
@@ -57,7 +60,7 @@ macro_rules! driver {
                 evidence.at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
             }
 
-            /// What an encoder says of its position, from command 0, to be judged where it is used.
+            /// Reads with command 0 what an encoder reports about its position, to be judged where it is used.
             ///
             /// # Errors
             /// [`Error`].
@@ -65,8 +68,8 @@ macro_rules! driver {
                 Ok($wait!(self.read_abs40(ea))?.evidence(self.resolution))
             }
 
-            /// Command 0: the field for the whole position and the encoder status, as they came. For a position that may be used take
-            /// [`read_position`](Self::read_position).
+            /// Sends command 0 and returns the field of the whole position and the encoder status as received. For a position
+            /// that may be used, call [`read_position`](Self::read_position).
             ///
             /// # Errors
             /// [`Error`].
@@ -74,11 +77,11 @@ macro_rules! driver {
                 $wait!(self.transact(Request::new(ea, Operation::Abs40)))
             }
 
-            /// A multi-response command: the answers of all encoders to one request. [`BusTransaction::exchange`] gives each of
-            /// them; a missing or damaged one does not affect the others.
+            /// Sends a multi-response command and receives the answers of all encoders to this one request.
+            /// [`BusTransaction::exchange`] returns each of them; a missing or damaged answer does not affect the others.
             ///
             /// # Errors
-            /// [`Error`]. An answer that is missing is no error.
+            /// [`Error`]. A missing answer is not an error.
             pub $($asynch)? fn read_bus(
                 &mut self,
                 operation: Operation,
@@ -92,10 +95,11 @@ macro_rules! driver {
                 Ok(transaction)
             }
 
-            /// [`read_bus`](Self::read_bus) when the cycle is due: waits for the next start and keeps to its grid.
+            /// Calls [`read_bus`](Self::read_bus) when the cycle is due: waits for the next start and keeps to its grid.
             ///
             /// # Errors
-            /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
+            /// [`Error`]. After [`Error::Clock`] create a new cycle, because the grid of this one dates from before the clock
+            /// was set back.
             pub $($asynch)? fn read_cycle(
                 &mut self,
                 cycle: &mut Cycle,
@@ -108,7 +112,7 @@ macro_rules! driver {
                 $wait!(self.read_bus(operation, asked))
             }
 
-            /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
+            /// Clears the alarms of an encoder: command 8, eight times. Position and turns are unchanged.
             ///
             /// # Errors
             /// [`Error`]; read the status to see whether they were cleared.
@@ -116,7 +120,7 @@ macro_rules! driver {
                 $wait!(self.run(&mut GuardedReset::new(Reset::clear_status(ea))))
             }
 
-            /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
+            /// Reads the word at an address of the EEPROM (command 13). Writing is a procedure for [`run`](Self::run).
             ///
             /// # Errors
             /// [`Error`].
@@ -124,12 +128,11 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromRead::new(ea, address)))
             }
 
-            /// A procedure of several transactions, [`Detection`](nikon_aformat::master::Detection) among them: does what its
-            /// steps ask for.
+            /// Runs a procedure of several transactions, for example [`Detection`](nikon_aformat::master::Detection).
             ///
             /// # Errors
-            /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] and
-            /// [`Error::Clock`] at once, and then whether the last request had its effect is not known.
+            /// [`Error`]: the error of the procedure, for which a fault of the port counts as a lost answer;
+            /// [`Error::NeverQuiet`] and [`Error::Clock`] at once, and it is then not known whether the last request took effect.
             pub $($asynch)? fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<F>>
             where
                 P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
@@ -150,7 +153,7 @@ macro_rules! driver {
                 ended.outcome.map_err(Error::Protocol)
             }
 
-            /// One request and its answer.
+            /// Sends one request and receives its answer.
             ///
             /// # Errors
             /// [`Error`].
@@ -161,7 +164,7 @@ macro_rules! driver {
                 Ok(exchange)
             }
 
-            /// One request and all that answers.
+            /// Sends one request and receives all answers.
             $($asynch)? fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
                 &mut self,
                 request: Request,
@@ -205,7 +208,7 @@ macro_rules! driver {
                 }
             }
 
-            /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
+            /// Waits until the line is free and discards what arrives meanwhile, errors of the port included.
             $($asynch)? fn settle(&mut self) -> Result<(), Failure<F>> {
                 let mut until_ns = self.state.first_ns(&mut self.clock)?;
                 let mut settling = self.state.settle(until_ns);

@@ -1,4 +1,4 @@
-//! The exchange as a future: the interrupt is waited for, with a look at the clock beside it.
+//! The exchange as a future, which waits for the interrupt while watching the clock.
 
 use embedded_hal_async::digital::Wait;
 
@@ -13,28 +13,29 @@ use crate::race::{race, sleep};
 pub enum Began {
     /// By the interrupt.
     Edge,
-    /// By the clock, for the edge did not come: it was lost, or the ASIC has stopped, which the echo watch notices.
+    /// By the clock, because the edge did not come: it was lost, or the ASIC has stopped, which the echo watch notices.
     Clock,
 }
 
-/// A period that was awaited.
+/// The period that was awaited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Period {
-    /// How it began.
+    /// How the period began.
     pub began: Began,
     /// How its exchange went.
     pub exchanged: Exchanged,
 }
 
 impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
-    /// Waits for the next falling edge of `sync` (XSYNC, or the pin of the external timer), an update period and a half at the
-    /// longest, then exchanges. It may be dropped while it waits; the exchange itself is one step. An edge that comes while nobody
-    /// waits is missed: the commands of that period go out once more.
+    /// Waits for the next falling edge of `sync` (XSYNC, or the pin of the external timer), for one and a half update periods at
+    /// most, then performs the exchange. The future may be dropped while it waits; the exchange itself is one step. An edge that
+    /// comes while nobody waits is missed, and the commands of that period are sent once more.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io) and [`Error::Clock`](crate::Error::Clock); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
+    /// [`Error::Io`](crate::Error::Io) and [`Error::Clock`](crate::Error::Clock); the next exchange continues. A fault reported
+    /// by the pin counts as a lost edge.
     pub async fn next(&mut self, sync: &mut impl Wait) -> Result<Period, Failure<P>> {
         let update_ns = u64::from(self.master().config().periods.update_ns);
         let until_ns = self.now_ns()?.saturating_add(update_ns.saturating_mul(3) >> 1);
@@ -53,9 +54,10 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
         self.exchange(began_ns).map(|exchanged| Period { began, exchanged })
     }
 
-    /// When the period began in which it is `now_ns`. An executor wakes late, and a lost edge is noticed half a period late; so the
-    /// grid of the periods before says it, for which both clocks may differ by 1/4096. Rather too early than too late: the end of
-    /// the period is when the bank is switched. An edge that is noticed by more than half a period late is taken for the next one.
+    /// Returns when the period began that contains `now_ns`. An executor wakes late, and a lost edge is noticed half a period
+    /// late. So the start is derived from the grid of the previous periods; the two clocks may differ by 1/4096. The result is
+    /// rather too early than too late, because the bank is switched at the end of the period. An edge that is noticed more than
+    /// half a period late is taken for the next one.
     fn began_ns(&self, now_ns: u64, began: Began) -> u64 {
         let update_ns = u64::from(self.master().config().periods.update_ns);
         let past_ns = now_ns.saturating_sub(self.began_ns.unwrap_or(now_ns));

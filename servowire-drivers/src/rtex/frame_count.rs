@@ -1,6 +1,6 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// What the receive interrupt (XINTRX) tells the exchange: that a frame has come. A `static` for both.
+/// Tells the exchange that a frame has arrived; set by the receive interrupt (XINTRX). Make it a `static` that both use.
 ///
 /// ```
 /// use servowire_drivers::rtex::FrameCount;
@@ -20,12 +20,12 @@ pub struct FrameCount {
 }
 
 impl FrameCount {
-    /// No frame yet.
+    /// Creates a count of no frames.
     pub const fn new() -> Self {
         Self { frames: AtomicU32::new(0) }
     }
 
-    /// A frame has come. Call it from the receive interrupt only, before that switches the bank.
+    /// Counts a frame. Call this only from the receive interrupt, before it switches the bank.
     pub fn add(&self) {
         // One writer, so no read-modify-write is needed, which small processors do not have.
         self.frames.store(self.get().wrapping_add(1), Ordering::Release);

@@ -1,4 +1,4 @@
-//! A port of A-format frames made of an SPI.
+//! A port for A-format frames over an SPI.
 
 use embedded_hal::spi::SpiBus;
 #[cfg(feature = "async")]
@@ -12,14 +12,14 @@ use crate::nikon::asynch;
 use crate::nikon::{Frame, blocking};
 use crate::{Clock, Direction};
 
-/// A port of A-format frames made of an SPI. It knows when each frame ended, by its place among the samples.
+/// A port for A-format frames over an SPI. It knows when each frame ended from its place among the samples.
 ///
-/// `send` sends the frames in one transfer and then samples the window, so it lasts as long as the whole exchange. A request has at
-/// most five frames: with 8 samples a bit and no gaps `tx` needs 93 bytes. The window is all of `rx`: the wait for the answer and
-/// 54 or 72 bits, for each encoder that answers.
+/// `send` sends the frames in one transfer and then samples the window, so it lasts as long as the whole exchange. A request has
+/// at most five frames; with 8 samples per bit and no gaps, `tx` needs 93 bytes. The window is all of `rx`: it has to hold the
+/// wait for the answer and 54 or 72 bits for each encoder that answers.
 ///
-/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is one: a request is sent by its
-/// [`SpiBus`], so that none is cut off.
+/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is an async transfer; a request
+/// is sent through the blocking [`SpiBus`], so that none is cut off.
 #[derive(Debug)]
 pub struct SpiFrames<'b, S, D, C> {
     sampler: Sampler<'b, S, D>,
@@ -29,12 +29,12 @@ pub struct SpiFrames<'b, S, D, C> {
 }
 
 impl<'b, S, D, C> SpiFrames<'b, S, D, C> {
-    /// A port at this SPI, which is set to the clock and the order that `sampling` says. `clock` is that of the driver.
+    /// Creates a port on this SPI, which has to be set to the clock and the order in `sampling`. `clock` is that of the driver.
     pub const fn new(bus: S, direction: D, clock: C, sampling: Sampling, tx: &'b mut [u8], rx: &'b mut [u8]) -> Self {
         Self { sampler: Sampler::new(bus, direction, sampling, tx, rx), clock, began_ns: 0 }
     }
 
-    /// Gives SPI, direction and clock back.
+    /// Returns SPI, direction and clock.
     pub fn release(self) -> ReleasedFrames<S, D, C> {
         let Released { bus, direction } = self.sampler.release();
         ReleasedFrames { bus, direction, clock: self.clock }
@@ -49,7 +49,7 @@ impl<'b, S, D, C> SpiFrames<'b, S, D, C> {
     }
 }
 
-/// Frames as units of sixteen bits.
+/// Returns frames as units of sixteen bits.
 fn units(frames: &[RequestFrame]) -> impl Iterator<Item = (u16, u32)> {
     frames.iter().map(|frame| (frame.content(), 16))
 }

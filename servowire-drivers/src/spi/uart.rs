@@ -1,4 +1,4 @@
-//! A UART made of an SPI: 8N1.
+//! An 8N1 UART over an SPI.
 
 use embedded_hal::spi::SpiBus;
 #[cfg(feature = "async")]
@@ -8,33 +8,34 @@ use embedded_io::{ErrorType, Read, ReadReady, Write};
 use super::{Fault, Heard, Released, Sampler, Sampling, SpiError, line_bits};
 use crate::Direction;
 
-/// A UART made of an SPI, for the T-Format drivers: give them [`Automatic`](crate::Automatic) as direction, because this one
+/// A UART over an SPI, for the T-Format drivers. Pass them [`Automatic`](crate::Automatic) as direction, because this UART
 /// switches the line driver itself.
 ///
-/// A write sends its bytes in one transfer and then samples the window, so it lasts as long as the whole exchange; what was heard is
-/// read afterwards. Requests have at most four bytes: with 8 samples a bit `tx` needs 42 bytes. The window is all of `rx`.
+/// A write sends its bytes in one transfer and then samples the window, so it lasts as long as the whole exchange; what was
+/// received is read afterwards. Requests have at most four bytes; with 8 samples per bit, `tx` needs 42 bytes. The window is all of
+/// `rx`.
 ///
-/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is one: a request is sent by its
-/// [`SpiBus`], so that none is cut off: ID 0 without its end is ID 8.
+/// The async futures of the SPI have to stop the transfer when they are dropped. Only the window is an async transfer; a request
+/// is sent through the blocking [`SpiBus`], so that none is cut off: ID 0 without its end is ID 8.
 #[derive(Debug)]
 pub struct SpiUart<'b, S, D> {
     sampler: Sampler<'b, S, D>,
-    /// What a look has found.
+    /// The result of a look at the line.
     next: Option<Heard>,
 }
 
 impl<'b, S, D> SpiUart<'b, S, D> {
-    /// A UART at this SPI, which is set to the clock and the order that `sampling` says.
+    /// Creates a UART on this SPI, which has to be set to the clock and the order in `sampling`.
     pub const fn new(bus: S, direction: D, sampling: Sampling, tx: &'b mut [u8], rx: &'b mut [u8]) -> Self {
         Self { sampler: Sampler::new(bus, direction, sampling, tx, rx), next: None }
     }
 
-    /// Gives SPI and direction back.
+    /// Returns SPI and direction.
     pub fn release(self) -> Released<S, D> {
         self.sampler.release()
     }
 
-    /// Fields as bytes, the first of them `heard`.
+    /// Writes fields to `bytes`, beginning with `heard`; returns how many.
     fn take<E, P>(&mut self, heard: Heard, bytes: &mut [u8]) -> Result<usize, SpiError<E, P>> {
         let mut heard = Some(heard);
         let mut count = 0_usize;
@@ -56,7 +57,7 @@ impl<'b, S, D> SpiUart<'b, S, D> {
     }
 }
 
-/// Bytes as units of eight bits.
+/// Returns bytes as units of eight bits.
 fn units(bytes: &[u8]) -> impl Iterator<Item = (u16, u32)> {
     bytes.iter().map(|byte| (u16::from(*byte), 8))
 }

@@ -1,9 +1,10 @@
-//! Waits by giving the time back. Every future may be dropped at any point: a request that has begun goes out whole, for which the
-//! destructor waits some microseconds if software switches the line driver, and the next call waits until the line is free.
-//! Whether a request that changes the encoder has had its effect is not known then.
+//! Waits by yielding to the executor. Every future may be dropped at any point. A request that has begun is sent completely, for
+//! which the destructor waits some microseconds if software switches the line driver, and the next call waits until the line is
+//! free.
+//! It is then not known whether a request that changes the encoder took effect.
 //!
-//! The UART's `read` should be free of side effects when it is dropped, as that of buffered UARTs is; otherwise bytes are lost,
-//! which costs the exchange in which it happens. Its `write` should take all bytes or none when it is dropped.
+//! The UART's `read` should have no side effects when it is dropped, as with buffered UARTs; otherwise bytes are lost, which
+//! costs the exchange in which it happens. Its `write` should take all bytes or none when it is dropped.
 
 use embedded_io_async::{ErrorType, Read, Write};
 use servowire_core::run_async as run;
@@ -13,7 +14,7 @@ use crate::race::{self, race};
 
 driver!(awaited, [Read, Write], Timer, async);
 
-/// What comes until a time, or an error of the UART.
+/// Waits for data until a given time; returns the data or an error of the UART.
 async fn read<U: Read>(
     uart: &mut U,
     bytes: &mut [u8],

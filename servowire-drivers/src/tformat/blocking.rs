@@ -8,7 +8,7 @@ use crate::quiet::spin;
 
 driver!(spun, [Read, ReadReady, Write], Clock);
 
-/// What comes until a time, or an error of the UART.
+/// Waits for data until a given time; returns the data or an error of the UART.
 #[inline(always)]
 fn read<U: Read + ReadReady>(
     uart: &mut U,

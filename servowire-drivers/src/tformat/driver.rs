@@ -1,4 +1,5 @@
-//! The text of both drivers. What they wait with is in [`blocking`](super::blocking) and `asynch` (feature `async`).
+//! The common source text of both drivers. How they wait is defined in [`blocking`](super::blocking) and `asynch` (feature
+//! `async`).
 
 macro_rules! driver {
     ($wait:ident, [$($uart:path),+], $clock:path $(, $asynch:tt)?) => {
@@ -15,10 +16,10 @@ macro_rules! driver {
         use crate::sending::Sending;
         use crate::{Direction, Error, PinTooSlow, exchange};
 
-        /// Why a call of a [`Driver`] failed.
+        /// Why a call to a [`Driver`] failed.
         pub type Failure<U, D> = Error<<U as ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
-        /// An encoder, alone at its UART.
+        /// The driver of an encoder that is alone on its UART.
         #[derive(Debug)]
         pub struct Driver<U, D, C> {
             uart: U,
@@ -30,12 +31,13 @@ macro_rules! driver {
         }
 
         impl<U: $($uart +)+, D: Direction, C: $clock> Driver<U, D, C> {
-            /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
+            /// Creates a driver for an encoder on this UART, which has to be set to the rate of `line`, 8 data bits, no parity,
+            /// one stop bit.
             ///
-            /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
+            /// It makes no difference whether the receiver is enabled while the request is sent: an echo is recognised by its time.
             ///
             /// # Errors
-            /// [`PinTooSlow`] if `direction` is a pin that software cannot switch off for certain between a request and its answer.
+            /// [`PinTooSlow`] if `direction` is a pin that software cannot reliably switch off between a request and its answer.
             pub fn new(uart: U, direction: D, clock: C, line: Line) -> Result<Self, PinTooSlow> {
                 let direction = Switch::new(direction);
                 direction.check(line.turn_around_ns)?;
@@ -43,19 +45,20 @@ macro_rules! driver {
                 Ok(Self { uart, direction, clock, line, state, late_ns: 0 })
             }
 
-            /// Gives UART, direction and clock back.
+            /// Returns UART, direction and clock.
             pub fn release(self) -> Released<U, D, C> {
                 Released { uart: self.uart, direction: self.direction.release(), clock: self.clock }
             }
 
-            /// By how much the direction pin may have gone off too late after the last request, ns; 0 if it was certainly in
-            /// time. If not, [`Worst`](crate::Worst) was too optimistic, or the processor was busy elsewhere.
+            /// By how much the direction pin may have been switched off too late after the last request, in ns; 0 if it was
+            /// certainly in time. If it is not 0, [`Worst`](crate::Worst) was too optimistic, or the processor was busy elsewhere.
             pub const fn late_ns(&self) -> u64 {
                 self.late_ns
             }
 
-            /// The position, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence), judged at
-            /// once by the rules of [`Evidence::at`]. The answer alone lasts 44 us at 2.5 Mbit/s and 22 us at 5, so it is never younger.
+            /// Reads the position, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
+            /// judged at once by the rules of [`Evidence::at`]. The answer alone lasts 44 us at 2.5 Mbit/s and 22 us at 5, so it
+            /// is never younger.
             ///
             /// # Errors
             /// [`Error`], [`Error::Doubt`] among them.
@@ -68,8 +71,8 @@ macro_rules! driver {
                 evidence.at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
             }
 
-            /// What the encoder says of its position, from ID 3, to be judged where it is used. If the request was held up on its
-            /// way out, the position is younger by that.
+            /// Reads with ID 3 what the encoder reports about its position, to be judged where it is used. If the request was
+            /// held up on its way out, the position is younger by that time.
             ///
             /// # Errors
             /// [`Error`].
@@ -77,8 +80,8 @@ macro_rules! driver {
                 Ok($wait!(self.transact(Request::ReadAll))?.evidence(resolution))
             }
 
-            /// ID 3: the fields for position, turns, encoder ID and alarms as they came. For a position that may be used take
-            /// [`read_position`](Self::read_position).
+            /// Sends ID 3 and returns the fields for position, turns, encoder ID and alarms as received. For a position that may
+            /// be used, call [`read_position`](Self::read_position).
             ///
             /// # Errors
             /// [`Error`].
@@ -86,7 +89,7 @@ macro_rules! driver {
                 all_data($wait!(self.transact(Request::ReadAll))?.response).map_err(Error::Protocol)
             }
 
-            /// ID 7, ten times: clears the latched alarms. Position and turns stay.
+            /// Clears the latched alarms: ID 7, ten times. Position and turns are unchanged.
             ///
             /// # Errors
             /// [`Error`]; read the alarms to see whether they were cleared.
@@ -94,7 +97,7 @@ macro_rules! driver {
                 $wait!(self.run(&mut Reset::clear_errors()))
             }
 
-            /// ID D: the byte at `address` of `page`, which is checked before and after.
+            /// Reads the byte at `address` of `page` (ID D); the page is checked before and after.
             ///
             /// # Errors
             /// [`Error`].
@@ -106,10 +109,10 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
             }
 
-            /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what you overwrite.
+            /// Writes a byte and reads it back (ID 6). Motor makers keep commutation data in this memory: know what you overwrite.
             ///
             /// # Errors
-            /// [`Error`]: whether the byte was written is not known then. Read it.
+            /// [`Error`]; it is then not known whether the byte was written. Read it.
             pub $($asynch)? fn write_eeprom(
                 &mut self,
                 page: Page,
@@ -119,12 +122,14 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING)))
             }
 
-            /// Finds the encoder after its supply was switched on, now or before: at either rate, of which the driver keeps the one at
-            /// which it was found. `set_rate` sets the UART, and is called before the first request too. Take
-            /// `Detection::on([line, line])` if one rate is enough, or if the lines need other times than the defaults.
+            /// Finds the encoder after power-on, whether that was just now or earlier, at either rate; the driver keeps the rate
+            /// at which the encoder was found. `set_rate` sets the rate of the UART, and is also called before the first
+            /// request. Use `Detection::on([line, line])` if one rate is enough, or if the lines need other times than the
+            /// defaults.
             ///
             /// # Errors
-            /// [`Error`], that of `set_rate` as [`Error::Io`]; [`Error::PinTooSlow`] if the pin is too slow for one of the rates.
+            /// [`Error`], with the error of `set_rate` as [`Error::Io`]; [`Error::PinTooSlow`] if the pin is too slow for one of
+            /// the rates.
             pub $($asynch)? fn detect(
                 &mut self,
                 mut detection: Detection,
@@ -140,12 +145,12 @@ macro_rules! driver {
                 $wait!(self.drive(&mut Tuning(&mut detection), tune))
             }
 
-            /// A procedure of several transactions at the driver's rate: does what its steps ask for. [`Detection`] has its [own
+            /// Runs a procedure of several transactions at the driver's rate. [`Detection`] has its [own
             /// call](Self::detect).
             ///
             /// # Errors
-            /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
-            /// that cannot be used, and then whether the last request had its effect is not known.
+            /// [`Error`]: the error of the procedure, for which a fault of the UART counts as a lost answer; or at once an error
+            /// of the pin or of a line that cannot be used, and it is then not known whether the last request took effect.
             pub $($asynch)? fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<U, D>>
             where
                 P: Procedure<Request = Request, Response = Response, Error = tformat::Error>,
@@ -176,7 +181,7 @@ macro_rules! driver {
                 if self.line.leaves_time() { Ok(()) } else { Err(Error::Protocol(tformat::Error::Line)) }
             }
 
-            /// One request and its answer.
+            /// Sends one request and receives its answer.
             ///
             /// # Errors
             /// [`Error`].
@@ -214,7 +219,7 @@ macro_rules! driver {
                 }
             }
 
-            /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
+            /// Waits until the line is free and discards what arrives meanwhile, errors of the UART included.
             $($asynch)? fn settle(&mut self) -> Result<(), Failure<U, D>> {
                 let mut until_ns = self.state.first_ns(&mut self.clock)?;
                 let mut settling = self.state.settle(until_ns);
@@ -233,7 +238,7 @@ macro_rules! driver {
                 }
             }
 
-            /// Sends a request, until its last bit has left: when it began.
+            /// Sends a request until its last bit has left; returns when it began.
             $($asynch)? fn send(&mut self, request: Request) -> Result<u64, Failure<U, D>> {
                 let (line, frame) = (self.line, request.emit());
                 self.late_ns = 0;

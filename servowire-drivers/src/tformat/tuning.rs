@@ -1,10 +1,10 @@
-//! The search for an encoder as a procedure whose requests say at which rate they leave.
+//! The search for an encoder as a procedure whose requests say at which rate they are sent.
 
 use servowire_core::{Procedure, Step};
 use tformat::master::{Detection, Line};
 use tformat::{AllData, Error, Request, Response};
 
-/// A request, and the line on which it leaves.
+/// A request, and the line on which it is sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tuned {
     pub(super) request: Request,
