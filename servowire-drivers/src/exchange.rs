@@ -32,7 +32,11 @@ mod tests {
 
     #[test]
     fn only_faults_of_the_answer_are_for_the_procedure() {
-        let heard = |exchanged| ended(exchanged, 9, &mut Line::new(8_000), &mut || 5_000);
+        let heard = |exchanged| {
+            let mut line = Line::new(8_000, 0);
+            line.clean(0);
+            ended(exchanged, 9, &mut line, &mut || 5_000)
+        };
         assert_eq!(heard(Ok(1)), Ok(Ended { outcome: Ok(1), ready_ns: 5_000 }));
         assert_eq!(heard(Err(Fault::Protocol(4))), Ok(Ended { outcome: Err(4), ready_ns: 5_000 }));
         for fault in [Fault::Io(4), Fault::DriverLate { by_ns: 4 }] {
@@ -48,7 +52,7 @@ mod tests {
     /// What was lost may still be answered.
     #[test]
     fn a_procedure_hears_when_the_line_is_free() {
-        let mut line = Line::new(8_000);
+        let mut line = Line::new(8_000, 0);
         line.begin(90_000);
         let ended = ended::<u8, _, _, _, _>(Err(Fault::Io(4)), 9, &mut line, &mut || 5_000);
         assert_eq!(ended, Ok(Ended { outcome: Err(9), ready_ns: 95_000 }));

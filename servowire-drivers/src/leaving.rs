@@ -52,9 +52,9 @@ impl Leaving {
         Some(latest_ns.saturating_add(last_ns.saturating_sub(latest_ns) >> 1))
     }
 
-    /// A time longer than a whole request needs to leave, plus the longest time for which the driver may stay on after it.
+    /// See [`longest_ns`].
     pub(crate) const fn longest_ns(&self) -> u64 {
-        self.field_ns.saturating_mul(4).saturating_add(self.window_ns.saturating_mul(2))
+        longest_ns(self.field_ns, self.window_ns)
     }
 
     /// Returns whether enough time has passed for an answer to have begun.
@@ -67,6 +67,11 @@ impl Leaving {
         let latest_ns = self.ends.map_or(u64::MAX, |ends| ends.earliest_ns.saturating_add(self.window_ns));
         now_ns.saturating_add(self.worst.clock_ns.into()).saturating_sub(latest_ns)
     }
+}
+
+/// A time longer than a whole request needs to leave, plus the longest time for which the driver may stay on after it.
+pub(crate) const fn longest_ns(field_ns: u64, window_ns: u64) -> u64 {
+    field_ns.saturating_mul(4).saturating_add(window_ns.saturating_mul(2))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ pub mod asynch;
 pub mod blocking;
 
 use nikon_aformat::master::Line;
-use nikon_aformat::{Error, FRAME_BITS, Request, Resolution};
+use nikon_aformat::{EncoderAddress, Error, FRAME_BITS, Operation, Request, Resolution};
 use servowire_core::{Machine, Progress};
 
 /// A frame as received from the line.
@@ -49,6 +49,13 @@ fn hear<M: Machine<Unit = [Option<u16>]>>(machine: &mut M, frame: Frame, now_ns:
 /// Returns how long this request and the longest answer to it take.
 fn longest_ns(line: Line, request: Request, resolution: Resolution) -> u64 {
     line.longest_ns(request, &request.expected(resolution)).into()
+}
+
+/// The same of a request that nobody knows of: the longest one, and the longest answers of all encoders.
+const fn unknown_ns(line: Line, resolution: Resolution) -> u64 {
+    let write = Request::new(EncoderAddress::ZERO, Operation::EepromWriteBank { bank: 0, address: 0, data: 0 });
+    let all = Request::new(EncoderAddress::MAX, Operation::Abs24VelAccMt);
+    line.request_ns(write).saturating_add(line.answered_ns(&all.expected(resolution))) as u64
 }
 
 /// How long the line has to be silent after unexpected data: two frames.

@@ -53,9 +53,10 @@ pub(crate) struct Settling {
 }
 
 impl Line {
-    pub(crate) const fn new(silence_ns: u32) -> Self {
+    /// A line of which nothing is known yet: somebody may just have sent a request, and somebody may be talking for so long after it.
+    pub(crate) const fn new(silence_ns: u32, unknown_ns: u64) -> Self {
         let check = ClockCheck::new(MAX_LOOKS);
-        Self { check, ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64, shifted: false }
+        Self { check, ready_ns: 0, leaving_ns: Some(unknown_ns), silence_ns: silence_ns as u64, shifted: false }
     }
 
     /// Sets the silence for a new bit length.
@@ -131,16 +132,26 @@ impl Line {
 
     /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock was set back or has jumped
     /// since the request began, none of that time has passed for certain; a clock that has stopped has been looked at for longer.
+    ///
+    /// # Errors
+    /// The first fault of the clock; the time has passed all the same.
     #[cfg(feature = "tformat")]
-    pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) {
+    pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) -> Result<(), ClockError> {
+        let mut told = Ok(());
         for _ in 0..CLOCK_FAULTS {
-            let latest_ns = self.now_ns(clock).unwrap_or(self.last_ns()).saturating_add(longest_ns);
+            let latest_ns = self.now_ns(clock).unwrap_or_else(|error| {
+                told = told.and(Err(error));
+                self.last_ns()
+            });
+            let latest_ns = latest_ns.saturating_add(longest_ns);
             let until_ns = if self.shifted { latest_ns } else { ns.min(latest_ns) };
-            match self.wait_until(clock, until_ns) {
-                Err(ClockError::Backwards { .. } | ClockError::Ahead { .. }) => {}
-                _ => return,
+            let waited = self.wait_until(clock, until_ns);
+            told = told.and(waited);
+            if !matches!(waited, Err(ClockError::Backwards { .. } | ClockError::Ahead { .. })) {
+                break;
             }
         }
+        told
     }
 
     /// Call before the first byte of a request; it may keep the line busy for `longest_ns` after it leaves. After a fault or a
@@ -148,6 +159,12 @@ impl Line {
     pub(crate) const fn begin(&mut self, longest_ns: u64) {
         self.leaving_ns = Some(longest_ns);
         self.shifted = false;
+    }
+
+    /// Whether a request may be on its way out of which nobody has seen the end.
+    #[cfg(feature = "tformat")]
+    pub(crate) const fn is_leaving(&self) -> bool {
+        self.leaving_ns.is_some()
     }
 
     /// Notes that the request was handed over by `now_ns`. However long that took, the worst case is assumed until the end is
@@ -237,15 +254,27 @@ pub(crate) fn spin<T>(
 mod tests {
     use super::*;
 
+    /// A line on which everything is known to be over.
+    fn clean() -> Line {
+        Line { leaving_ns: None, ..Line::new(8_000, 0) }
+    }
+
+    #[test]
+    fn of_a_line_nothing_is_known_at_first() {
+        let mut line = Line::new(8_000, 90_000);
+        assert_eq!(line.settle(700_000).next(false, 789_999), Settle::Until(790_000));
+        assert_eq!(line.settle(790_000).next(false, 790_000), Settle::Quiet);
+    }
+
     #[test]
     fn a_clean_line_is_used_at_once() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         assert_eq!(line.settle(5).next(false, 5), Settle::Quiet);
     }
 
     #[test]
     fn a_line_in_use_is_waited_for_and_babble_is_waited_out() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         line.begin(90_000);
         line.sent(10_000);
         let mut settling = line.settle(10_000);
@@ -263,7 +292,7 @@ mod tests {
     #[test]
     fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
         let sent = || {
-            let mut line = Line::new(8_000);
+            let mut line = clean();
             line.begin(90_000);
             line.sent(10_000);
             line
@@ -283,7 +312,7 @@ mod tests {
     /// It may have left at any time up to the next call.
     #[test]
     fn a_request_that_was_not_seen_to_leave_may_just_have_left() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         line.begin(90_000);
         assert_eq!(line.settle(700_000).next(false, 789_999), Settle::Until(790_000));
         assert_eq!(line.settle(790_000).next(false, 790_000), Settle::Quiet);
@@ -294,7 +323,7 @@ mod tests {
     /// 60 us of 90 were left when the clock was set back, and none of them has passed for certain.
     #[test]
     fn a_line_in_use_stays_so_when_the_clock_is_set_back() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         line.begin(90_000);
         assert_eq!(line.now_ns(&mut || 10_000), Ok(10_000));
         line.sent(10_000);
@@ -311,7 +340,7 @@ mod tests {
     /// Five seconds of a clock that jumps are no time that has passed; between two calls, or after a wait until then, they may have.
     #[test]
     fn a_clock_that_jumps_is_named_and_frees_no_line() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         line.begin(90_000);
         assert_eq!(line.first_ns(&mut || 7_000_000_000), Ok(7_000_000_000));
         line.sent(7_000_000_000);
@@ -327,13 +356,14 @@ mod tests {
     #[test]
     fn sitting_out_takes_as_long_as_it_has_to() {
         let sat_out_ns = |set_back_at| {
-            let (mut line, mut looks) = (Line::new(8_000), 0);
+            let (mut line, mut looks) = (clean(), 0);
             let mut clock = || {
                 looks += 1;
                 10 * looks + if looks < set_back_at { 1_000 } else { 0 }
             };
             line.begin(90_000);
-            line.sit_out(&mut clock, 1_500, 10_000);
+            let told = line.sit_out(&mut clock, 1_500, 10_000);
+            assert_eq!(told.is_err(), set_back_at < u64::MAX);
             10 * looks
         };
         assert!((500..600).contains(&sat_out_ns(u64::MAX)), "{}", sat_out_ns(u64::MAX));
@@ -343,7 +373,7 @@ mod tests {
     #[cfg(feature = "async")]
     #[test]
     fn a_wait_is_no_jump() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         assert_eq!(line.after_ns(&mut || 17_000_030_000, 16_000_030_000), Ok(17_000_030_000));
         let jumped = Err(ClockError::Ahead { by_ns: 5_000_000_001 });
         assert_eq!(line.after_ns(&mut || 22_000_030_001, 21_000_030_000), jumped);
@@ -353,7 +383,7 @@ mod tests {
     /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.
     #[test]
     fn the_end_of_a_procedure_frees_no_line_that_somebody_else_may_be_using() {
-        let mut line = Line::new(8_000);
+        let mut line = clean();
         line.keep(90);
         assert_eq!(
             (line.settle(89).next(false, 89), line.settle(90).next(false, 90)),
@@ -370,14 +400,14 @@ mod tests {
     /// One byte was there when the processor came back.
     #[test]
     fn nobody_is_given_up_for_the_processors_absence() {
-        let mut settling = Line::new(8_000).settle(0);
+        let mut settling = clean().settle(0);
         assert_eq!(settling.next(true, 10_000_000), Settle::Until(10_008_000));
         assert_eq!(settling.next(false, 10_008_000), Settle::Quiet);
     }
 
     #[test]
     fn an_endless_talker_is_given_up() {
-        let mut settling = Line::new(8_000).settle(0);
+        let mut settling = clean().settle(0);
         let mut now_ns = 0;
         while settling.next(true, now_ns) != Settle::Never {
             now_ns += 4_000;

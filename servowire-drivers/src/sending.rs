@@ -4,7 +4,7 @@ use servowire_core::ClockError;
 use tformat::master::Line;
 
 use crate::direction::Switch;
-use crate::leaving::Leaving;
+use crate::leaving::{self, Leaving};
 use crate::quiet;
 use crate::{Clock, Direction, Worst};
 
@@ -27,6 +27,30 @@ pub(crate) struct Sending<'a, D: Direction, C: Clock> {
 pub(crate) struct Sent {
     pub(crate) start_ns: u64,
     pub(crate) late_ns: u64,
+}
+
+/// Sees to it that the line driver is off, before anybody listens. A future that was forgotten while its request was going out has left it
+/// on: then not before that request has left, however long nobody has looked.
+#[inline]
+pub(crate) fn off<D: Direction>(
+    switch: &mut Switch<D>,
+    clock: &mut impl Clock,
+    state: &mut quiet::Line,
+    line: &Line,
+) -> Result<Result<(), ClockError>, D::Error> {
+    let cut = switch.is_on() && switch.worst().is_some() && state.is_leaving();
+    let waited = if cut { outlast(clock, state, line) } else { Ok(()) };
+    switch.off()?;
+    Ok(waited)
+}
+
+/// Waits until nothing of a request is on its way out, whenever it began.
+#[cold]
+#[inline(never)]
+fn outlast(clock: &mut impl Clock, state: &mut quiet::Line, line: &Line) -> Result<(), ClockError> {
+    let longest_ns = leaving::longest_ns(line.rate.fields_ns(1).into(), line.turn_around_ns.into());
+    let looked = state.first_ns(clock).map(|_| ());
+    looked.and(state.sit_out(clock, u64::MAX, longest_ns))
 }
 
 impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
@@ -122,7 +146,7 @@ impl<D: Direction, C: Clock> Drop for Sending<'_, D, C> {
                 leaving.taken(self.asked, now_ns, now_ns);
             }
             if let Some(off_ns) = leaving.off_ns() {
-                self.line.sit_out(self.clock, off_ns, leaving.longest_ns());
+                let _: Result<(), _> = self.line.sit_out(self.clock, off_ns, leaving.longest_ns());
             }
         }
         // Nobody is there to hear of it; the next call tries again before it listens.

@@ -34,7 +34,16 @@ const MAX_BYTES: usize = 16;
 
 /// Returns how long this request and the longest answer to it take, until the answer is handed over.
 fn longest_ns(line: &Line, request: &Frame) -> u64 {
-    let fields = request.fields().saturating_add(12);
+    answered_ns(line, request.fields())
+}
+
+/// The same of a request that nobody knows of: the longest one.
+fn unknown_ns(line: &Line) -> u64 {
+    answered_ns(line, 4)
+}
+
+fn answered_ns(line: &Line, fields: u8) -> u64 {
+    let fields = fields.saturating_add(12);
     let answered_ns = u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into());
     answered_ns.saturating_add(line.hand_over_ns.into())
 }

@@ -76,7 +76,7 @@ impl Line {
     }
 
     /// Line time of a request in ns, including its gaps.
-    pub fn request_ns(&self, request: Request) -> u32 {
+    pub const fn request_ns(&self, request: Request) -> u32 {
         self.rate.bits_ns(request.emit().line_bits(self.rate.bits(self.frame_gap_ns)))
     }
 
@@ -119,13 +119,13 @@ impl Line {
     }
 
     /// The time after which a transaction has ended in any case, in ns from its start.
-    pub fn longest_ns(&self, request: Request, expected: &Expected) -> u32 {
+    pub const fn longest_ns(&self, request: Request, expected: &Expected) -> u32 {
         self.request_ns(request).saturating_add(self.answered_ns(expected))
     }
 
     /// Shortest period in which a request can be repeated even if nobody answers, in ns: the longest transaction plus
     /// [`request_gap_ns`](Self::request_gap_ns).
-    pub fn min_cycle_ns(&self, request: Request, expected: &Expected) -> u32 {
+    pub const fn min_cycle_ns(&self, request: Request, expected: &Expected) -> u32 {
         self.longest_ns(request, expected).saturating_add(self.request_gap_ns)
     }
 

@@ -14,7 +14,7 @@ macro_rules! driver {
         };
         use servowire_core::{ClockError, Machine, Procedure};
 
-        use super::{LOST, Released, hear, longest_ns, silence_ns};
+        use super::{LOST, Released, hear, longest_ns, silence_ns, unknown_ns};
         use crate::quiet::{self, Heard, Settle};
         use crate::{Error, exchange};
 
@@ -36,7 +36,8 @@ macro_rules! driver {
             /// `line.latency_budget_ns()` of their end, unless it reports their times. So either nothing but the driver may run
             /// meanwhile, or the line needs a larger budget.
             pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
-                Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
+                let state = quiet::Line::new(silence_ns(line), unknown_ns(line, resolution));
+                Self { port, clock, resolution, line, state }
             }
 
             /// Returns port and clock.

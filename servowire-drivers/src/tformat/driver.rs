@@ -10,10 +10,10 @@ macro_rules! driver {
         };
 
         use super::tuning::{Tuned, Tuning};
-        use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns};
+        use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns, unknown_ns};
         use crate::direction::Switch;
         use crate::quiet::{self, Heard, Settle};
-        use crate::sending::Sending;
+        use crate::sending::{self, Sending};
         use crate::{Direction, Error, PinTooSlow, exchange};
 
         /// Why a call to a [`Driver`] failed.
@@ -41,7 +41,7 @@ macro_rules! driver {
             pub fn new(uart: U, direction: D, clock: C, line: Line) -> Result<Self, PinTooSlow> {
                 let direction = Switch::new(direction);
                 direction.check(line.turn_around_ns)?;
-                let state = quiet::Line::new(silence_ns(&line));
+                let state = quiet::Line::new(silence_ns(&line), unknown_ns(&line));
                 Ok(Self { uart, direction, clock, line, state, late_ns: 0 })
             }
 
@@ -187,7 +187,7 @@ macro_rules! driver {
             /// [`Error`].
             pub $($asynch)? fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
                 self.check()?;
-                self.direction.off().map_err(Error::Pin)?;
+                sending::off(&mut self.direction, &mut self.clock, &mut self.state, &self.line).map_err(Error::Pin)??;
                 $wait!(self.settle())?;
                 let start_ns = $wait!(self.send(request))?;
                 let mut transaction = Transaction::start(request, self.line, start_ns);

@@ -234,7 +234,8 @@ mod asynch {
     #[test]
     fn a_future_that_was_forgotten_leaves_nobody_deaf() {
         let mut on = 0;
-        for polls in 0..120 {
+        // Before its first request a driver waits for what nobody knows of.
+        for polls in (0..2_000).step_by(3) {
             let bench = Bench::new();
             let mut encoder = encoder(&bench);
             forget(encoder.transact(Request::ReadAll), polls);
@@ -248,7 +249,7 @@ mod asynch {
     /// An SPI sends without giving the time back, so nobody can forget it with the driver on.
     #[test]
     fn nor_at_an_spi() {
-        for polls in 0..60 {
+        for polls in 0..400 {
             let bench = Bench::new();
             let (mut tx, mut rx) = ([0; 48], [0; 160]);
             let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();

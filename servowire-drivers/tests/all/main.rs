@@ -30,6 +30,8 @@ mod refusals;
 mod sampler;
 mod second;
 
+#[cfg(all(feature = "tformat", feature = "nikon"))]
+mod anew;
 #[cfg(all(feature = "tformat", feature = "nikon", feature = "rtex"))]
 mod clock;
 mod contract;

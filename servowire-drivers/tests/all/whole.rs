@@ -402,10 +402,10 @@ fn an_understated_worst_case_breaks_it() {
 
 #[cfg(feature = "async")]
 mod asynch {
-    use servowire_drivers::tformat::asynch;
+    use servowire_drivers::tformat::{Released, asynch};
 
     use super::*;
-    use crate::polls::{FOR_EVER, Looks, pause, run};
+    use crate::polls::{FOR_EVER, Looks, forget, pause, run};
 
     impl embedded_io_async::Write for Bench {
         async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
@@ -426,6 +426,40 @@ mod asynch {
         }
     }
 
+    /// A future that was forgotten at any of its polls has left the line driver on. The next call does not cut its request off, not
+    /// even one of a driver that was made anew.
+    #[test]
+    fn nor_one_of_which_the_future_was_forgotten() {
+        let (mut draw, mut on, mut going) = (Draw::default(), 0, 0);
+        for case in 0..12_000 {
+            let board = Board { tick_ns: 6, soft_ns: 0, jitter_ns: 60, ..board(&mut draw) };
+            let (request, bytes) = pick(&mut draw, &requests());
+            let polls = draw.below(3_500) as usize;
+            let bench = Bench::new(board, draw);
+            let pin = DirectionPin::new(bench.clone(), board.worst(bytes.len() as u64));
+            let driver = asynch::Driver::new(bench.clone(), pin, Looks(bench.clone()), Line::new(board.rate));
+            if let Ok(mut encoder) = driver {
+                forget(encoder.transact(request), polls);
+                let (forgotten, now_ns) = (bench.0.borrow().sent.len(), bench.0.borrow().now_ns);
+                on += u32::from(bench.0.borrow().driver_is_on(u64::MAX));
+                going += u32::from(bench.0.borrow().end_ns() > now_ns);
+                if draw.below(2) == 0 {
+                    let Released { uart, direction, clock } = encoder.release();
+                    encoder = asynch::Driver::new(uart, direction, clock, Line::new(board.rate)).unwrap();
+                }
+                let _ = run(encoder.transact(Request::ReadEncoderId), FOR_EVER);
+                let world = bench.0.borrow();
+                let sent: Vec<_> = world.sent.iter().map(|(_, byte)| (*byte, true)).collect();
+                let what = format!("case {case}, {polls} polls, {forgotten} bytes of {bytes:02x?}, {board:?}");
+                assert_eq!(world.heard(), sent, "{what}");
+                assert!(!world.driver_is_on(u64::MAX), "{what}");
+            }
+            draw = bench.0.borrow().draw;
+        }
+        println!("forgotten with the driver on: {on}, while the request was going out: {going}");
+        assert!(on > 200 && going > 200, "{on} {going}");
+    }
+
     /// Futures, half of them dropped at any of their polls.
     #[test]
     fn no_request_is_ever_heard_as_another() {
@@ -433,7 +467,7 @@ mod asynch {
         for case in 0..20_000 {
             let board = board(&mut draw);
             let (request, bytes) = pick(&mut draw, &requests());
-            let polls = if draw.below(2) == 0 { draw.below(900) as usize } else { FOR_EVER };
+            let polls = if draw.below(2) == 0 { draw.below(4_000) as usize } else { FOR_EVER };
             let bench = Bench::new(board, draw);
             let pin = DirectionPin::new(bench.clone(), board.worst(bytes.len() as u64));
             let driver = asynch::Driver::new(bench.clone(), pin, Looks(bench.clone()), Line::new(board.rate));

@@ -34,7 +34,7 @@ pub(crate) fn tenths<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I]) ->
 }
 
 /// The same of a kernel that works on a state.
-#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+#[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
 pub(crate) fn tenths_on<S, I, O>(state: &mut S, kernel: fn(&mut S, &'static I) -> O, inputs: &'static [I]) -> u32 {
     let rounds = CALLS.div_ceil(inputs.len());
     let (kernel, empty) = black_box((kernel, nothing_on::<S, I, O> as fn(&mut S, &'static I) -> _));
@@ -84,7 +84,7 @@ fn nothing<I, O>(_: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()
 }
 
-#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+#[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
 #[inline(never)]
 fn nothing_on<S, I, O>(_: &mut S, _: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()

@@ -114,7 +114,7 @@ macro_rules! kernels {
 use kernels;
 
 /// As [`kernels`], for kernels that work on a state, each with how it is measured.
-#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+#[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
 macro_rules! kernels_on_states {
     ($($(#[$doc:meta])* fn $name:ident($state:tt: &mut $of:ty, $input:tt: &$from:ty) -> $to:ty $body:block as $tenths:block)*) => {
         $(
@@ -128,5 +128,5 @@ macro_rules! kernels_on_states {
         pub(crate) const KERNELS: &[$crate::kernels::Kernel] = &[$($crate::kernels::Kernel { name: stringify!($name), tenths: || $tenths },)*];
     };
 }
-#[cfg(any(feature = "servowire-core", feature = "step-motion"))]
+#[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
 use kernels_on_states;

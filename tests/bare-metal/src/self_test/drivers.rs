@@ -7,7 +7,7 @@ use tformat::master::Line;
 use tformat::{BitRate, Resolution};
 
 use super::{Tally, Topic, each};
-use crate::transport::{Port, Uart, steps};
+use crate::transport::{Port, Steps, Uart};
 
 /// All data (ID 3): ABS 0x3bc029, turns 3, no alarms.
 pub(crate) const ALL_DATA: &[u8] = &[0x1a, 0x00, 0x29, 0xc0, 0x3b, 0x17, 0x03, 0x00, 0x00, 0x00, 0xdc];
@@ -49,7 +49,9 @@ fn tformat() -> Tally {
         &TFORMAT,
         |row| row.0,
         |(_, answer, want)| {
-            let Ok(mut encoder) = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE) else { return false };
+            let Ok(mut encoder) = Driver::new(Uart::new(answer), Automatic, Steps::new(4_000), LINE) else {
+                return false;
+            };
             match encoder.read_position(RESOLUTION, tformat::Policy::new(1_000_000)) {
                 Ok(sample) => Some(sample.single_turn()) == *want && sample.turns() == Some(3),
                 Err(Error::Protocol(_)) => want.is_none(),
@@ -64,7 +66,7 @@ fn nikon() -> Tally {
         &NIKON,
         |row| row.0,
         |(_, answer, want)| {
-            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(7_200), WIDTHS, SLOW);
+            let mut master = nikon::blocking::Driver::new(Port::new(answer), Steps::new(7_200), WIDTHS, SLOW);
             match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
                 Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),

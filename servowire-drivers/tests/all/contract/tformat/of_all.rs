@@ -58,8 +58,9 @@ pub(super) fn every_error_of_the_port_is_told<D: Calls>() {
         for (op, calls) in [(Op::Write, 3), (Op::Flush, 1), (Op::Ready, 60), (Op::Read, 4)] {
             let mut told = 0;
             for call in 0..calls {
-                let faults = Faults::one(op, call, kind);
-                let (bench, mut driver) = driver::<D>(Port { write_most: 1, read_most: 1, faults, ..Port::good() });
+                let (bench, mut driver) = driver::<D>(Port { write_most: 1, read_most: 1, ..Port::good() });
+                driver.read_data().unwrap();
+                bench.0.borrow_mut().port.faults = Faults::one(op, call, kind);
                 let outcome = driver.transact(Request::read_eeprom(at(9)));
                 let what = format!("{op:?} {call} {kind:?}: {outcome:?}");
                 match outcome {
