@@ -1,5 +1,9 @@
 //! G-code: a part program as straight lines, and the steps that they are made of.
 
+mod arcs;
+mod item;
+mod modes;
+mod numbers;
 mod program;
 #[cfg(test)]
 mod programs;
@@ -15,7 +19,8 @@ use clap::Args;
 use servowire_decode::fault::{At, Fault};
 use step_motion::{AxisSetup, Limits};
 
-use program::{Item, Program};
+use item::Item;
+use program::Program;
 pub(crate) use steps::Steps;
 
 /// Axes of a part program: X, Y and Z.

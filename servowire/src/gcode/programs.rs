@@ -1,7 +1,8 @@
 //! What part programs say, in the words of five posts, and what is refused.
 
 use super::AXES;
-use super::program::{Item, Line, Program};
+use super::item::{Item, Line};
+use super::program::Program;
 
 fn items(text: &str) -> Vec<Item> {
     Program::new("part.nc", text.as_bytes(), false).collect::<Result<_, _>>().unwrap()

@@ -7,7 +7,8 @@ use servowire_decode::fault::Fault;
 use step_motion::{AxisPulse, AxisSetup, Clock, LinePulses, Path};
 
 use super::AXES;
-use super::program::{Item, Line, Program};
+use super::item::{Item, Line};
+use super::program::Program;
 
 /// Lines that are looked ahead.
 const AHEAD: usize = 64;

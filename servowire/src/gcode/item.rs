@@ -1,0 +1,22 @@
+//! What a part program is made of.
+
+use super::AXES;
+
+/// A straight line of a part program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Line {
+    /// Where it ends, in mm.
+    pub(super) to: [f64; AXES],
+    /// In um/s; `None` for as fast as the machine can.
+    pub(super) feed: Option<u32>,
+}
+
+/// What a machine is to do next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Item {
+    Line(Line),
+    /// Come to rest, for this many ns.
+    Rest(u64),
+    /// From here on corners may be rounded by this many um; `None`: by the machine's setting.
+    Deviation(Option<u32>),
+}

@@ -1,0 +1,309 @@
+//! What a line of a part program does, by what the lines before it have set.
+
+use std::collections::VecDeque;
+
+use step_motion::Turning;
+
+use super::AXES;
+use super::item::{Item, Line};
+use super::numbers::Numbers;
+use super::words::Word;
+
+/// Farther than this from 0 no axis goes, in mm.
+const FAR: f64 = 50_000.0;
+
+const NAMES: [char; AXES] = ['X', 'Y', 'Z'];
+
+/// What a line with X, Y or Z means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Motion {
+    /// Nothing has been said yet.
+    None,
+    Straight {
+        rapid: bool,
+    },
+    Arc(Turning),
+    /// After G80.
+    Cancelled,
+}
+
+/// What a word without mode does, in its line alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Once {
+    Dwell,
+    /// To a reference, or keep it: which.
+    Reference(usize),
+    Keep(usize),
+    Machine,
+    Shift,
+    Unshift,
+}
+
+/// What stays as it is until a line says something else.
+pub(super) struct State {
+    /// In mm, of the machine.
+    pub(super) at: [f64; AXES],
+    /// What G92 has added to what the program says.
+    shift: [f64; AXES],
+    /// Of G28 and G30.
+    references: [[f64; AXES]; 2],
+    motion: Motion,
+    /// The axes of the plane of arcs, and the one along which they are seen.
+    pub(super) plane: [usize; AXES],
+    /// In mm/min.
+    feed: Option<f64>,
+    /// Millimetres in a unit.
+    pub(super) unit: f64,
+    relative: bool,
+    /// G61.1: rest behind each line.
+    stops: bool,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            at: [0.0; AXES],
+            shift: [0.0; AXES],
+            references: [[0.0; AXES]; 2],
+            motion: Motion::None,
+            plane: [0, 1, 2],
+            feed: None,
+            unit: 1.0,
+            relative: false,
+            stops: false,
+        }
+    }
+}
+
+/// The group of G80, which posts write beside G0.
+const CYCLES: usize = 9;
+
+const SUBSET: &str = "G0 to G4, G17 to G21, G28, G30, G40, G43, G49, G53 to G59, G61, G64, G80, G90 to G92, G94";
+
+impl State {
+    /// Does what a line says; `true` at the end of the program.
+    pub(super) fn block(&mut self, words: &[Word], items: &mut VecDeque<Item>) -> Result<bool, String> {
+        let mut numbers = Numbers::default();
+        let (mut once, mut over, mut pause, mut smooth) = (None, false, false, false);
+        let mut groups: [Option<f64>; 14] = [None; 14];
+        for word in words {
+            match word.letter {
+                'G' => {
+                    let (group, what) = self.general(word.value, items)?;
+                    let place = groups.get_mut(group).ok_or("no such group")?;
+                    if let Some(other) = place.replace(word.value) {
+                        return Err(format!("G{other} and G{} in one line: only one of them can apply", word.value));
+                    }
+                    smooth |= tenths(word.value) == 640;
+                    once = what.or(once);
+                }
+                'M' => match tenths(word.value) {
+                    20 | 300 => over = true,
+                    0 | 10 | 60 | 600 => pause = true,
+                    // Spindle, coolant and overrides move no axis.
+                    30 | 40 | 50 | 70 | 80 | 90 | 480 | 490 => {}
+                    _ => {
+                        let number = word.value;
+                        return Err(format!("M{number} is not in the subset: M0 to M9, M30, M48, M49, M60"));
+                    }
+                },
+                _ => numbers.add(*word)?,
+            }
+        }
+        if groups[1].is_none() && groups[CYCLES].is_some() {
+            self.motion = Motion::Cancelled;
+        }
+        if let Some(feed) = numbers.feed {
+            let feed = feed * self.unit;
+            if !(0.06..=60_000_000.0).contains(&feed) {
+                return Err(format!("F: a feed of {feed} mm/min: from 0.06 to 60000000"));
+            }
+            self.feed = Some(feed);
+        }
+        if smooth {
+            let most = numbers.p.map(|p| (p * self.unit * 1000.0).round() as u32);
+            items.push_back(Item::Deviation(most));
+        } else if numbers.p.is_some() && once != Some(Once::Dwell) {
+            return Err("P belongs to G4 and G64".to_owned());
+        }
+        self.act(once, &numbers, items)?;
+        if pause {
+            items.push_back(Item::Rest(0));
+        }
+        Ok(over)
+    }
+
+    /// A G word: its group, no two of which go together, and what it does in its line alone.
+    fn general(&mut self, number: f64, items: &mut VecDeque<Item>) -> Result<(usize, Option<Once>), String> {
+        let arc = |turning| (1, Motion::Arc(turning));
+        let tenths = tenths(number);
+        let (group, motion) = match tenths {
+            0 => (1, Motion::Straight { rapid: true }),
+            10 => (1, Motion::Straight { rapid: false }),
+            20 => arc(Turning::Clockwise),
+            30 => arc(Turning::Counterclockwise),
+            _ => (0, self.motion),
+        };
+        self.motion = motion;
+        let once = match tenths {
+            40 => Once::Dwell,
+            280 => Once::Reference(0),
+            300 => Once::Reference(1),
+            281 => Once::Keep(0),
+            301 => Once::Keep(1),
+            530 => Once::Machine,
+            920 => Once::Shift,
+            921 | 922 => Once::Unshift,
+            _ if group == 1 => return Ok((1, None)),
+            _ => return self.mode(number, tenths, items).map(|group| (group, None)),
+        };
+        Ok((0, Some(once)))
+    }
+
+    /// A mode other than that of motion: its group.
+    fn mode(&mut self, number: f64, tenths: i64, items: &mut VecDeque<Item>) -> Result<usize, String> {
+        Ok(match tenths {
+            170 | 180 | 190 => {
+                self.plane = if tenths == 170 {
+                    [0, 1, 2]
+                } else if tenths == 180 {
+                    [2, 0, 1]
+                } else {
+                    [1, 2, 0]
+                };
+                2
+            }
+            200 | 210 => {
+                self.unit = if tenths == 200 { 25.4 } else { 1.0 };
+                6
+            }
+            900 | 910 => {
+                self.relative = tenths == 910;
+                3
+            }
+            610 | 611 | 640 => {
+                self.stops = tenths == 611;
+                if tenths != 640 {
+                    items.push_back(Item::Deviation(Some(0)));
+                }
+                13
+            }
+            // Centers of arcs from where they begin; feeds by the minute; no radius of a tool; a tool of length 0; offsets of 0.
+            911 => 4,
+            940 => 5,
+            800 => CYCLES,
+            400 => 7,
+            430 | 490 => 8,
+            540 | 550 | 560 | 570 | 580 | 590 | 591 | 592 | 593 => 12,
+            _ => return Err(format!("G{number} is not in the subset: {SUBSET}")),
+        })
+    }
+
+    /// Motion and what stands in its place.
+    fn act(&mut self, once: Option<Once>, numbers: &Numbers, items: &mut VecDeque<Item>) -> Result<(), String> {
+        let moves = numbers.axes.iter().any(Option::is_some);
+        match once {
+            Some(Once::Dwell) => {
+                let seconds = numbers.p.ok_or("G4 needs P, in seconds")?;
+                if moves || !(0.0..=86_400.0).contains(&seconds) {
+                    return Err(format!("G4 P{seconds}: a rest of 0 to 86400 s, without X, Y and Z"));
+                }
+                items.push_back(Item::Rest((seconds * 1e9) as u64));
+            }
+            Some(Once::Reference(which)) => {
+                let home = self.references.get(which).copied().unwrap_or_default();
+                let chosen = |axis: Option<f64>| !moves || axis.is_some();
+                if moves {
+                    let by = self.target(numbers, false)?;
+                    self.go(by, None, items);
+                }
+                let mut to = self.at;
+                for ((to, home), axis) in to.iter_mut().zip(home).zip(numbers.axes) {
+                    if chosen(axis) {
+                        *to = home;
+                    }
+                }
+                self.go(to, None, items);
+            }
+            Some(Once::Keep(which)) => {
+                if let Some(place) = self.references.get_mut(which) {
+                    *place = self.at;
+                }
+            }
+            Some(Once::Shift) => {
+                if !moves {
+                    return Err("G92 needs X, Y or Z: the coordinates that this place has from here on".to_owned());
+                }
+                for ((shift, at), axis) in self.shift.iter_mut().zip(self.at).zip(numbers.axes) {
+                    if let Some(word) = axis {
+                        *shift = at - word * self.unit;
+                    }
+                }
+            }
+            Some(Once::Unshift) => self.shift = [0.0; AXES],
+            None | Some(Once::Machine) => {
+                if moves || numbers.center.iter().any(Option::is_some) || numbers.radius.is_some() {
+                    return self.run(numbers, once.is_some(), items);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where X, Y and Z lead, in mm of the machine.
+    fn target(&self, numbers: &Numbers, machine: bool) -> Result<[f64; AXES], String> {
+        let mut to = self.at;
+        for (((to, word), shift), name) in to.iter_mut().zip(numbers.axes).zip(self.shift).zip(NAMES) {
+            if let Some(word) = word {
+                let from = match (machine, self.relative) {
+                    (true, _) => 0.0,
+                    (_, true) => *to,
+                    _ => shift,
+                };
+                *to = word * self.unit + from;
+            }
+            if to.abs() > FAR {
+                return Err(format!("{name}: {to} mm is farther than {FAR} mm from 0"));
+            }
+        }
+        Ok(to)
+    }
+
+    fn run(&mut self, numbers: &Numbers, machine: bool, items: &mut VecDeque<Item>) -> Result<(), String> {
+        let to = self.target(numbers, machine)?;
+        let feed = match (self.motion, self.feed) {
+            (Motion::None, _) => return Err("no G0 to G3 before it".to_owned()),
+            (Motion::Cancelled, _) => {
+                return Err("G80 has cancelled the motion mode: G0 to G3 sets it again".to_owned());
+            }
+            (Motion::Straight { rapid: true }, _) => None,
+            (_, Some(feed)) => Some((feed * 1000.0 / 60.0).round() as u32),
+            _ => return Err("no feed yet: add F, in mm/min".to_owned()),
+        };
+        let Motion::Arc(turning) = self.motion else {
+            if numbers.center.iter().any(Option::is_some) || numbers.radius.is_some() {
+                return Err("I, J, K and R belong to G2 and G3".to_owned());
+            }
+            self.go(to, feed, items);
+            return Ok(());
+        };
+        if machine {
+            return Err("G53 goes with G0 and G1".to_owned());
+        }
+        let center = self.center(to, numbers, turning)?;
+        self.arc(to, center, turning, feed, items)
+    }
+
+    pub(super) fn go(&mut self, to: [f64; AXES], feed: Option<u32>, items: &mut VecDeque<Item>) {
+        items.push_back(Item::Line(Line { to, feed }));
+        if self.stops {
+            items.push_back(Item::Rest(0));
+        }
+        self.at = to;
+    }
+}
+
+/// Codes have one digit behind the point at most: G28.1 is 281.
+fn tenths(number: f64) -> i64 {
+    (number * 10.0).round() as i64
+}

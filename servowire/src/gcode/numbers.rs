@@ -1,0 +1,37 @@
+//! The numbers of a line that are no codes.
+
+use super::AXES;
+use super::words::Word;
+
+/// The numbers of a line.
+#[derive(Default)]
+pub(super) struct Numbers {
+    pub(super) axes: [Option<f64>; AXES],
+    pub(super) center: [Option<f64>; AXES],
+    pub(super) radius: Option<f64>,
+    pub(super) feed: Option<f64>,
+    pub(super) p: Option<f64>,
+}
+
+impl Numbers {
+    pub(super) fn add(&mut self, word: Word) -> Result<(), String> {
+        let place = match word.letter {
+            'X' => &mut self.axes[0],
+            'Y' => &mut self.axes[1],
+            'Z' => &mut self.axes[2],
+            'I' => &mut self.center[0],
+            'J' => &mut self.center[1],
+            'K' => &mut self.center[2],
+            'R' => &mut self.radius,
+            'F' => &mut self.feed,
+            'P' => &mut self.p,
+            // Spindle and tool move no axis.
+            'S' | 'T' | 'H' | 'D' => return Ok(()),
+            other => return Err(format!("{other} is not in the subset: X, Y, Z, I, J, K, R, F and P")),
+        };
+        match place.replace(word.value) {
+            Some(_) => Err(format!("{} is there twice", word.letter)),
+            None => Ok(()),
+        }
+    }
+}
