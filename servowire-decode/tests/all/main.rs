@@ -24,6 +24,7 @@ use servowire_decode::codec::Codec;
 use servowire_decode::event::Event;
 use servowire_decode::output::Output;
 use servowire_decode::output::printer::{Origin, Printer};
+use servowire_decode::protocols::CODECS;
 use servowire_decode::settings::Settings;
 
 /// Keeps all events.
@@ -35,6 +36,11 @@ impl Printer for Keep {
         self.0.push(event.clone());
         Ok(())
     }
+}
+
+/// A protocol by its name.
+fn protocol(name: &str) -> &'static dyn Codec {
+    CODECS.iter().copied().find(|codec| codec.name == name).unwrap()
 }
 
 /// Opens a recording of lines.

@@ -7,9 +7,16 @@ mod buses;
 mod dsl;
 mod line;
 mod links;
+mod logs;
+mod network;
+mod packets;
+mod ring;
 mod rng;
 
+use std::borrow::Cow;
+
 use servowire_decode::capture::{Capture, Change, Memory};
+use servowire_decode::codec::Codec;
 use servowire_decode::event::{Event, Place, Value};
 use servowire_decode::output::Output;
 use servowire_decode::recognition::Note;
@@ -27,6 +34,8 @@ enum Shown {
     /// Picoseconds, and by how many more or fewer.
     Within(f64, f64),
     Text(String),
+    /// All bits, and the names of those that are set.
+    Flags(u64, Vec<&'static str>),
     /// Whatever it is.
     Any,
 }
@@ -42,6 +51,7 @@ impl Shown {
             Self::Number(due) => number == Some(*due),
             Self::Near(due) => number.is_some_and(|number| (number as f64 - due).abs() <= 1.0),
             Self::Within(due, near) => number.is_some_and(|number| (number as f64 - due).abs() <= *near),
+            Self::Flags(due, names) => matches!(value, Value::Flags { raw, set, .. } if raw == due && set == names),
             Self::Text(due) => matches!(value, Value::Text(text) if text == due),
             Self::Any => true,
         }
@@ -51,8 +61,8 @@ impl Shown {
 /// What was said on the line, and every value that may be shown of it.
 #[derive(Debug, Clone)]
 struct Said {
-    kind: &'static str,
-    /// Its first bit, in picoseconds.
+    kind: Cow<'static, str>,
+    /// Its first bit in picoseconds, or its line where there are no times.
     start: f64,
     fields: Vec<(&'static str, Shown)>,
     position: Option<(&'static str, i64)>,
@@ -90,15 +100,27 @@ fn decode(edges: &[(i64, bool)], end: f64) -> (Vec<Event>, String) {
         |(time, level): &(i64, bool)| Change { time: Time::from_ps((*time).into()), channel: 0, level: *level };
     let changes = edges.iter().map(change).collect();
     let memory = Memory::new(vec!["LINE".to_owned()], changes, Time::from_ps(end as i128));
+    read(Capture::Edges(Box::new(memory)), None, &Settings::default())
+}
+
+/// All events of a capture, and what was said beside them.
+fn read(capture: Capture, protocol: Option<&'static dyn Codec>, settings: &Settings) -> (Vec<Event>, String) {
     let mut keep = Keep::default();
     let said = std::cell::RefCell::new(String::new());
     let notes = |note: &Note| said.borrow_mut().push_str(&note.to_string());
     let mut out = Output::new("x", &mut keep).with_notes(&notes);
-    let capture = Capture::Edges(Box::new(memory));
-    if let Err(stop) = servowire_decode::decode("x", capture, None, &Settings::default(), &mut out) {
+    if let Err(stop) = servowire_decode::decode("x", capture, protocol, settings, &mut out) {
         said.borrow_mut().push_str(&stop.to_string());
     }
     (keep.0, said.into_inner())
+}
+
+/// When it begins, or in which line it is.
+fn start(event: &Event) -> f64 {
+    match event.place {
+        Place::Time { start, .. } => start.ps() as f64,
+        Place::Line(line) => line as f64,
+    }
 }
 
 /// Holds what is shown against what was said; `near`: picoseconds by which a frame may be shown early or late.
@@ -106,8 +128,7 @@ fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) 
     let mut outcome = Outcome::default();
     let mut met = vec![false; said.len()];
     for event in events.iter().filter(|event| event.verdict.is_ok() && !event.remark && event.kind != "cut") {
-        let Place::Time { start, .. } = event.place else { continue };
-        let start = start.ps() as f64;
+        let start = start(event);
         let same = |it: &Said| it.kind == event.kind && (it.start - start).abs() <= near;
         let Some(at) = (0..said.len()).find(|at| same(&said[*at]) && !met[*at]) else {
             outcome.wrong.push(format!("nothing like it was said: {event:?}"));
@@ -142,10 +163,7 @@ fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) 
     }
     for (at, it) in said.iter().enumerate() {
         if !met[at] && !it.damaged && due(it, at) {
-            let instead = events.iter().find(|event| {
-                matches!(event.place, Place::Time { start, .. } if (start.ps() as f64 - it.start).abs() <= near)
-                    && !event.verdict.is_ok()
-            });
+            let instead = events.iter().find(|event| (start(event) - it.start).abs() <= near && !event.verdict.is_ok());
             outcome.lost.push(format!("{} at {:.2} us: {:?}", it.kind, it.start / 1e6, instead.map(|it| &it.verdict)));
         }
     }
@@ -168,7 +186,7 @@ fn hold<C: Copy>(conditions: &[(&str, C)], run: impl Fn(&str, C, u64) -> Outcome
             let outcome = run(name, *condition, seed);
             right += u64::from(outcome.is_right());
             (shown, wrong, lost) = (shown + outcome.shown, wrong + outcome.wrong.len(), lost + outcome.lost.len());
-            if !outcome.is_right() && faults.len() < 6000 {
+            if !outcome.is_right() && faults.len() < 9000 {
                 faults.push_str(&outcome.told(name, seed));
             }
         }

@@ -196,7 +196,7 @@ pub(crate) fn build(bus: &Bus, seed: u64) -> (Wire, Vec<Said>, f64) {
             fields.extend(matches!(bus.bias, Bias::Weak(..)).then_some(("note", Shown::Any)));
             fields
         };
-        said.push(Said { kind: it.kind, start, fields: heard(it.asked), position: None, damaged: false });
+        said.push(Said { kind: it.kind.into(), start, fields: heard(it.asked), position: None, damaged: false });
         let pause = match bus.kind {
             Kind::Tformat => rng.between(2.7e6, 4.0e6),
             Kind::Aformat => rng.between(8.0, 20.0) * nominal,
@@ -214,7 +214,7 @@ pub(crate) fn build(bus: &Bus, seed: u64) -> (Wire, Vec<Said>, f64) {
             now = speak(&mut wire, start, answers, &bits, bus.bias, &mut rng);
             let mut fields = heard(it.said);
             fields.push(("delay", Shown::Within(pause, 0.7 * nominal)));
-            said.push(Said { kind: it.kind, start, fields, position: it.position, damaged });
+            said.push(Said { kind: it.kind.into(), start, fields, position: it.position, damaged });
         }
         now += rng.between(20.0e6, 80.0e6);
     }

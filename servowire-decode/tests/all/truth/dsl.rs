@@ -89,7 +89,7 @@ impl Builder<'_> {
         if extra > 0 {
             fields.push(("EXTRA", Shown::Number(extra)));
         }
-        self.said.push(Said { kind: "H-frame", start, fields, position: None, damaged });
+        self.said.push(Said { kind: "H-frame".into(), start, fields, position: None, damaged });
         self.damaged = damaged;
         end
     }
@@ -137,7 +137,7 @@ impl Builder<'_> {
     /// Says an answer. Without its head nobody can tell what it is.
     fn say(&mut self, kind: &'static str, answer: (f64, Option<u64>), fields: Vec<(&'static str, Shown)>) {
         let damaged = answer.1.is_some() || self.damaged;
-        self.said.push(Said { kind, start: answer.0, fields, position: None, damaged });
+        self.said.push(Said { kind: kind.into(), start: answer.0, fields, position: None, damaged });
     }
 
     /// A message that ends with the frame said last.
@@ -145,7 +145,7 @@ impl Builder<'_> {
         let (Some(text), Some(last)) = (text, self.said.last()) else { return };
         let (start, damaged) = (last.start, last.damaged);
         let fields = vec![("message", Shown::Text(text))];
-        self.said.push(Said { kind: "message", start, fields, position: None, damaged });
+        self.said.push(Said { kind: "message".into(), start, fields, position: None, damaged });
     }
 
     fn delay(&self) -> (&'static str, Shown) {

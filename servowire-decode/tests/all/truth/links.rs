@@ -65,7 +65,7 @@ fn due(link: &Link, recording: Recording) -> impl Fn(&Said, usize) -> bool {
     let from = recording.from + 2.0 * 273.0 * BIT;
     let clean = link.damaged == 0.0 && link.heads_damaged == 0.0;
     move |said, _| {
-        let frame = matches!(said.kind, "H-frame" | "answer" | "test pattern" | "identifier");
+        let frame = matches!(&*said.kind, "H-frame" | "answer" | "test pattern" | "identifier");
         said.start > from && (frame || clean && said.kind == "message" && said.start > from + 1.2e7)
     }
 }

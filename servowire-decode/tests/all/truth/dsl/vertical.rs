@@ -34,6 +34,6 @@ impl Vertical {
 
     pub(super) fn said(&self, start: f64, quality: Shown) -> Said {
         let fields = [self.fields.clone(), vec![("QM", quality)]].concat();
-        Said { kind: "V-frame", start, fields, position: Some(("VPOS", self.position)), damaged: self.damaged }
+        Said { kind: "V-frame".into(), start, fields, position: Some(("VPOS", self.position)), damaged: self.damaged }
     }
 }

@@ -1,0 +1,183 @@
+//! RTEX logs under many conditions: how they are written, and what goes wrong in them.
+
+use std::fmt::Write as _;
+use std::io::Cursor;
+
+use servowire_decode::capture::{self, Hints, Input};
+use servowire_decode::event::{Event, Value};
+use servowire_decode::settings::{Rtex, Settings};
+
+use super::ring::{Block, Ring, build};
+use super::rng::Rng;
+use super::{Outcome, Said, Shown, hold, judge, read, start};
+use crate::protocol;
+
+/// How a log is written down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Form {
+    /// A line a block, nothing else.
+    Lines,
+    /// With time and direction.
+    Monitor,
+    /// A table with times, directions and drives.
+    Table,
+    /// Binary records of a block each.
+    Records,
+}
+
+/// What happens to a log, and how it is read.
+#[derive(Debug, Clone, Copy)]
+struct Log {
+    form: Form,
+    /// Bytes of each word exchanged; 1: as they are.
+    word: usize,
+    /// Update periods of which blocks are missing, and blocks that are cut short, as shares.
+    missing: f64,
+    cut: f64,
+    /// Every block shown whole.
+    whole: bool,
+    /// Times by the update counter.
+    counted: bool,
+}
+
+const PLAIN: Log = Log { form: Form::Monitor, word: 1, missing: 0.0, cut: 0.0, whole: true, counted: false };
+
+type Condition = fn(&mut Rng) -> (Ring, Log);
+
+fn ring(rng: &mut Rng) -> Ring {
+    Ring { drives: 1 + rng.below(4) as usize, ..Ring::PLAIN }
+}
+
+const CONDITIONS: &[(&str, Condition)] = &[
+    ("lines", |rng| (ring(rng), Log { form: Form::Lines, ..PLAIN })),
+    ("lines of a monitor", |rng| (ring(rng), PLAIN)),
+    ("a table", |rng| (ring(rng), Log { form: Form::Table, ..PLAIN })),
+    ("binary records", |rng| (ring(rng), Log { form: Form::Records, ..PLAIN })),
+    ("only what changes", |rng| (ring(rng), Log { whole: false, ..PLAIN })),
+    ("32 bytes", |rng| {
+        (Ring { wide: true, ..ring(rng) }, Log { form: rng.pick(&[Form::Lines, Form::Records]), ..PLAIN })
+    }),
+    ("32 bytes, only what changes", |rng| (Ring { wide: true, ..ring(rng) }, Log { whole: false, ..PLAIN })),
+    ("times by the counter", |rng| (ring(rng), Log { form: Form::Lines, counted: true, ..PLAIN })),
+    ("NOPs before the start", |rng| (Ring { nops: 5 + rng.below(90) as usize, ..ring(rng) }, PLAIN)),
+    ("words of 16 bits exchanged", |rng| (ring(rng), Log { word: 2, form: Form::Lines, ..PLAIN })),
+    ("words of 32 bits exchanged", |rng| (ring(rng), Log { word: 4, form: Form::Lines, ..PLAIN })),
+    ("much is asked", |rng| (Ring { asked: 0.8, ..ring(rng) }, PLAIN)),
+    ("much is refused", |rng| (Ring { asked: 0.8, refused: 0.5, ..ring(rng) }, PLAIN)),
+    ("a drive alarms", |rng| (Ring { alarm: true, ..ring(rng) }, PLAIN)),
+    ("update periods are missing", |rng| (ring(rng), Log { missing: 0.1, whole: rng.chance(0.5), ..PLAIN })),
+    ("blocks are cut short", |rng| (ring(rng), Log { cut: 0.1, form: Form::Lines, ..PLAIN })),
+];
+
+/// The log as a file, and what was said of each block in it.
+fn written(log: &Log, blocks: Vec<Block>, rng: &mut Rng) -> (Vec<u8>, Vec<Said>) {
+    let (mut text, mut said) = (Vec::new(), Vec::new());
+    let mut lines = 0;
+    if log.form == Form::Table {
+        text.extend(b"time_us,direction,axis,data\n");
+        lines += 1;
+    }
+    let mut gone = None;
+    let mut first = None;
+    let mut updates = std::collections::BTreeMap::new();
+    for block in blocks {
+        if block.drive == 1 && block.from_master {
+            gone = rng.chance(log.missing).then_some(block.update);
+        }
+        if gone == Some(block.update) {
+            continue;
+        }
+        let mut bytes: Vec<u8> = block.bytes.chunks(log.word).flat_map(|word| word.iter().rev()).copied().collect();
+        let cut = rng.chance(log.cut);
+        if cut {
+            bytes.truncate(1 + rng.below(15) as usize);
+        }
+        let mut line = String::new();
+        let us = block.ns as f64 / 1e3;
+        let side = |master: &'static str, drive: &'static str| if block.from_master { master } else { drive };
+        // A String takes everything.
+        let _ = match log.form {
+            Form::Lines | Form::Records => Ok(()),
+            Form::Monitor => write!(line, "14:02:07.{:06} {} ", us, side("TX", "RX")),
+            Form::Table => write!(line, "{us},{},{},", side("command", "response"), block.drive),
+        };
+        for byte in &bytes {
+            let _ = write!(line, "{byte:02x}");
+        }
+        lines += 1;
+        if log.form == Form::Records {
+            text.extend(&bytes);
+        } else {
+            text.extend(line.as_bytes());
+            text.push(b'\n');
+        }
+        let begin: &mut usize = updates.entry((block.drive, block.from_master)).or_insert(block.update);
+        let start = match log.form {
+            // From the first block of the drive and the direction on.
+            _ if log.counted => (block.update - *begin) as f64 * 500e6,
+            Form::Lines | Form::Records => f64::from(lines),
+            Form::Monitor => (block.ns - *first.get_or_insert(block.ns)) as f64 * 1e3,
+            Form::Table => block.ns as f64 * 1e3,
+        };
+        let mut fields = block.said.fields;
+        fields.push(("note", Shown::Any));
+        // Where blocks are missing, the counter goes on by more than one.
+        fields.extend(
+            ["Update_Counter", "Update_Counter_Echo"].iter().filter(|_| log.missing > 0.0).map(|it| (*it, Shown::Any)),
+        );
+        said.push(Said { start, damaged: cut, fields, ..block.said });
+    }
+    (text, said)
+}
+
+/// What is said beside the values of a block and is not so.
+fn remarks(event: &Event, said: &[Said]) -> Vec<String> {
+    let Some(said) = said.iter().find(|it| it.kind == event.kind && (it.start - start(event)).abs() < 0.5) else {
+        return Vec::new();
+    };
+    let is = |name: &str| said.fields.iter().any(|(field, due)| *field == name && *due == Shown::Number(1));
+    let holds = |remark: &&str| match *remark {
+        "command failed while executing" => is("ERR"),
+        "command executed with a restriction" => is("WNG"),
+        "command not accepted" => is("CMD_Error"),
+        "alarm" => is("ALARM"),
+        "a NOP does not switch the servo off" => {
+            let nop = Shown::Text("NOP normal (00h)".to_owned());
+            said.fields.iter().any(|(name, due)| *name == "Command_Code" && *due == nop)
+        }
+        // How long the drive took, or was given, is counted from its answers.
+        remark => remark.starts_with("answered after ") || remark.contains(" is given up after "),
+    };
+    let note = event.fields.iter().find_map(|field| match &field.value {
+        Value::Text(text) if field.name == "note" => Some(text.as_str()),
+        _ => None,
+    });
+    let wrong = note.into_iter().flat_map(|note| note.split("; ")).filter(|remark| !holds(remark));
+    wrong.map(|remark| format!("{}: {remark}", event.kind)).collect()
+}
+
+fn run(name: &str, condition: Condition, seed: u64) -> Outcome {
+    let mut rng = Rng::new(seed ^ 0x0052_7465 ^ (name.len() as u64) << 32);
+    let (ring, log) = condition(&mut rng);
+    let (text, said) = written(&log, build(&ring, seed), &mut rng);
+    let record_size = (log.form == Form::Records).then_some(if ring.wide { 32 } else { 16 });
+    let hints = Hints { record_size, ..Hints::default() };
+    let capture = capture::open(Input::over("log.txt", Cursor::new(text)), hints).unwrap();
+    let period_ns = log.counted.then_some(500_000);
+    let settings = Settings { rtex: Rtex { whole: log.whole, period_ns, ..Rtex::default() }, ..Settings::default() };
+    let (events, notes) = read(capture, Some(protocol("rtex")), &settings);
+    let mut outcome = judge(&events, &said, 0.5, |_, _| true);
+    if log.missing + log.cut == 0.0 {
+        outcome.wrong.extend(events.iter().filter(|event| !event.remark).flat_map(|event| remarks(event, &said)));
+    }
+    if notes.contains("exchanged") != (log.word == 2) || notes.contains("in the other order") != (log.word == 4) {
+        outcome.wrong.push(notes.clone());
+    }
+    outcome.notes = notes;
+    outcome
+}
+
+#[test]
+fn every_value_of_a_log_of_blocks_is_true() {
+    hold(CONDITIONS, run);
+}
