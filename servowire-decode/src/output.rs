@@ -30,8 +30,10 @@ pub struct Output<'a> {
     notes: Option<&'a dyn Fn(&Note)>,
     /// Says whether the user has enough.
     enough: Option<&'a dyn Fn() -> bool>,
-    /// The first refused frame is the last one.
-    until_error: bool,
+    /// Reading ends so many picoseconds after the first refused frame.
+    until_error: Option<i64>,
+    /// That is then.
+    last: Option<Time>,
     done: bool,
     /// Frames so far.
     pub tally: Tally,
@@ -51,7 +53,8 @@ impl<'a> Output<'a> {
             progress: None,
             notes: None,
             enough: None,
-            until_error: false,
+            until_error: None,
+            last: None,
             done: false,
             tally: Tally::default(),
             chosen: Tally::default(),
@@ -73,10 +76,10 @@ impl<'a> Output<'a> {
         Self { enough: Some(enough), ..self }
     }
 
-    /// Stops after the first refused frame that is shown.
+    /// Stops so many picoseconds after the first refused frame that is shown; 0: with it.
     #[must_use]
-    pub fn until_error(self) -> Self {
-        Self { until_error: true, ..self }
+    pub fn until_error(self, after: i64) -> Self {
+        Self { until_error: Some(after.max(0)), ..self }
     }
 
     /// Called after every block that was read.
@@ -159,7 +162,9 @@ impl<'a> Output<'a> {
 
     /// Returns whether nothing that was requested can follow once a recording was read up to `time`.
     pub fn is_over(&self, time: Time) -> bool {
-        self.is_done() || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
+        self.is_done()
+            || self.last.is_some_and(|last| time >= last)
+            || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
     }
 
     /// Returns whether the user has enough: whatever follows is dropped.
@@ -182,6 +187,8 @@ impl<'a> Output<'a> {
 
 impl Sink for Output<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
+        // What begins before the end and is not over by then is cut off by nobody but the user.
+        self.done |= self.last.is_some_and(|last| event.place.end().is_none_or(|end| end >= last));
         if self.is_done() {
             return Ok(());
         }
@@ -204,7 +211,10 @@ impl Sink for Output<'_> {
                 cause.clone_from(&refusal.cause);
             }
         }
-        self.done = self.until_error && !event.verdict.is_ok();
+        if let Some(after) = self.until_error.filter(|_| !event.verdict.is_ok() && self.last.is_none()) {
+            self.last = event.place.end().filter(|_| after > 0).map(|end| end + after);
+            self.done = self.last.is_none();
+        }
         let Self { printers, origin, .. } = self;
         printers.iter_mut().try_for_each(|printer| printer.event(origin, event))
     }

@@ -6,6 +6,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anstream::{AutoStream, ColorChoice};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -27,11 +28,15 @@ pub(crate) use arguments::Decode;
 
 use crate::files::{self, Piped};
 use crate::interrupt;
+use crate::live::{Live, Shown};
 use crate::picture::Picture;
 use crate::terminal;
 
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
+
+/// How often figures are shown on a terminal.
+const A_SECOND: Duration = Duration::from_secs(1);
 
 /// What was found, as the exit code says it; of several files or findings the sum.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -91,7 +96,14 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     interrupt::note();
     let stdout = io::stdout();
     let out = BufWriter::with_capacity(1 << 16, stdout.lock());
-    let mut printer: Box<dyn Printer> = if arguments.stats {
+    let mut printer: Box<dyn Printer> = if let Some(every) = every(arguments, piped.is_some(), stdout.is_terminal()) {
+        let shown = match (arguments.json, stdout.is_terminal()) {
+            (true, _) => Shown::Json,
+            (false, true) => Shown::InPlace,
+            (false, false) => Shown::Lines,
+        };
+        Box::new(Live::new(out, shown, every, arguments.jump))
+    } else if arguments.stats {
         let stats = Stats::new(out, arguments.jump);
         Box::new(if arguments.json { stats.in_json() } else { stats })
     } else if arguments.json {
@@ -120,6 +132,12 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// How often figures are shown while a capture comes in; `None`: only at its end.
+fn every(arguments: &Decode, piped: bool, terminal: bool) -> Option<Duration> {
+    let live = piped || arguments.reading.file.follow || arguments.files.iter().any(|file| file.as_os_str() == "-");
+    arguments.every.or((arguments.stats && live && terminal && !arguments.json).then_some(A_SECOND))
 }
 
 /// What was found in all files.
@@ -170,9 +188,10 @@ fn one(
     let mut vcd = match &arguments.vcd {
         None => None,
         Some(path) => match File::create(path) {
-            Ok(file) => Some(match (VcdOut::new(BufWriter::new(file)), arguments.cut) {
-                (vcd, Some((from, to))) => vcd.within(from, to),
-                (vcd, None) => vcd,
+            Ok(file) => Some(match (VcdOut::new(BufWriter::new(file)), arguments.cut, arguments.around) {
+                (vcd, Some((from, to)), _) => vcd.within(from, to),
+                (vcd, None, Some(around)) => vcd.around(around),
+                (vcd, None, None) => vcd,
             }),
             Err(e) => {
                 let file = path.display().to_string();
@@ -187,7 +206,7 @@ fn one(
     out = out.with_beside(picture.as_mut().map(|picture| picture as &mut dyn Printer));
     out = out.with_enough(&interrupt::asked);
     if arguments.until.is_some() {
-        out = out.until_error();
+        out = out.until_error(arguments.around.unwrap_or(0));
     }
     out.begin()?;
     let mut settings = arguments.reading.settings();

@@ -17,6 +17,7 @@ mod explain;
 mod files;
 mod gcode;
 mod interrupt;
+mod live;
 mod picture;
 mod pipe;
 pub mod profile;

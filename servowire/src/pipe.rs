@@ -1,6 +1,8 @@
 //! A source that may be silent for a while: a pipe, or a file that still grows.
 
+use std::cell::RefCell;
 use std::io::{self, Read};
+use std::rc::Rc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -19,6 +21,16 @@ const PAUSE: Duration = Duration::from_millis(60);
 const SHOWN: Duration = Duration::from_millis(250);
 /// How often it is looked whether a file has grown.
 const LOOK: Duration = Duration::from_millis(50);
+
+thread_local! {
+    /// What is done again and again while nothing comes.
+    static WAITING: RefCell<Option<Rc<dyn Fn()>>> = const { RefCell::new(None) };
+}
+
+/// From now on `call` is made again and again while this thread waits for a source that gives nothing.
+pub(crate) fn while_waiting(call: impl Fn() + 'static) {
+    WAITING.set(Some(Rc::new(call)));
+}
 
 /// Reads in a thread of its own, so that one can ask whether something is there.
 pub(crate) struct Pipe {
@@ -107,8 +119,13 @@ impl Live for Pipe {
 impl Read for Pipe {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.is_empty() {
+            let waiting = WAITING.with_borrow(Option::clone);
             // Somebody who wants it to end is heard also while nothing comes.
-            while !interrupt::asked() && !self.gives_within(LOOK) {}
+            while !interrupt::asked() && !self.gives_within(LOOK) {
+                if let Some(call) = &waiting {
+                    call();
+                }
+            }
             self.ended |= interrupt::asked();
         }
         if let Some(fault) = self.fault.take() {

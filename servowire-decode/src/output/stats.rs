@@ -31,14 +31,14 @@ pub struct Table {
 }
 
 /// Figures of each encoder, drive or device.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Gathered {
     /// Counts that a position may move from one frame to the next.
     limit: Option<u64>,
     by: BTreeMap<Speaker, Figures>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Figures {
     requests: u64,
     answers: u64,
@@ -64,7 +64,7 @@ struct Figures {
 }
 
 /// A position, and how far it moved at most.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 struct Followed {
     last: Position,
     largest: u64,
@@ -248,6 +248,33 @@ impl Figures {
         rows
     }
 
+    /// In a line.
+    fn brief(&self) -> String {
+        let us = |ps: f64| ps / 1e6;
+        let missing = self.refused.get(NO_RESPONSE).copied().unwrap_or(0);
+        let bad = self.refused.values().sum::<u64>();
+        let all = self.ok + bad;
+        let mut said = vec![format!("{all} frames")];
+        // Where nothing is wrong, nothing is to be read about it.
+        let refused =
+            self.refused.iter().map(|(class, count)| format!("{class} {count}")).collect::<Vec<_>>().join(", ");
+        let share = bad as f64 * 100.0 / (all as f64).max(1.0);
+        said.push(if bad == 0 { "no errors".to_owned() } else { format!("{share:.2} % errors ({refused})") });
+        for (what, spread) in [("cycle", self.cycle), ("delay", self.delay)] {
+            if spread.count > 0 && !(self.counted && what == "cycle") {
+                said.push(format!("{what} {:.3} us +- {:.3}", us(spread.mean), us(spread.deviation())));
+            }
+        }
+        said.extend(self.positions.iter().map(|(name, Followed { last, .. })| match last.turns() {
+            Some(turns) => format!("{name} {} ({turns:.6} turns)", last.counts),
+            None => format!("{name} {}", last.counts),
+        }));
+        if missing == all {
+            return format!("{missing} requests without an answer");
+        }
+        said.join("  ")
+    }
+
     fn cycle_text(&self) -> String {
         match self.cycle {
             Spread { count: 1.., mean, .. } if self.counted => {
@@ -288,6 +315,55 @@ impl Gathered {
         self.by.iter().map(one).collect()
     }
 
+    /// Writes a table for each speaker, or an object a line; one without figures where nobody spoke.
+    pub fn write(mut self, origin: &Origin, in_json: bool, out: &mut impl Write) -> io::Result<()> {
+        if self.by.is_empty() {
+            self.by.insert(Speaker { lane: 0, address: None }, Figures::default());
+        }
+        if in_json {
+            for object in self.json(origin) {
+                serde_json::to_writer(&mut *out, &object)?;
+                out.write_all(b"\n")?;
+            }
+            return out.flush();
+        }
+        writeln!(out, "{}", origin.file)?;
+        for Table { speaker, rows } in self.tables(origin) {
+            if !speaker.is_empty() {
+                writeln!(out, "  {speaker}")?;
+            }
+            for (what, text) in rows {
+                match what {
+                    "" => writeln!(out, "    {text}")?,
+                    _ => writeln!(out, "  {what:<12}  {text}")?,
+                }
+            }
+        }
+        out.flush()
+    }
+
+    /// A line for each speaker of `all` with what it did in these figures: frames, errors, cycle, delay and position.
+    pub fn brief(&self, all: &Self, origin: &Origin) -> Vec<String> {
+        let one = |speaker: &Speaker| {
+            let name = match origin.name(*speaker) {
+                name if name.is_empty() => name,
+                name => format!("{name}: "),
+            };
+            let said = self.by.get(speaker).map_or_else(|| "nothing".to_owned(), Figures::brief);
+            format!("{name}{said}")
+        };
+        all.by.keys().map(one).collect()
+    }
+
+    /// The figures of each speaker as an object; those that spoke in `all` and not in these have zeros.
+    pub fn objects(&self, all: &Self, origin: &Origin) -> Vec<Json> {
+        let mut whole = self.clone();
+        for speaker in all.by.keys() {
+            whole.by.entry(*speaker).or_default();
+        }
+        whole.json(origin)
+    }
+
     fn json(&self, origin: &Origin) -> Vec<Json> {
         let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
         let one = |(speaker, f): (&Speaker, &Figures)| {
@@ -296,6 +372,7 @@ impl Gathered {
                 "address": speaker.address, "requests": f.requests, "answers": f.answers, "others": f.others,
                 "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
                 "cycle": if f.counted { Json::Null } else { f.cycle.json() }, "answer_delay": f.delay.json(),
+                "last_positions": f.positions.iter().map(|(name, followed)| (*name, followed.last.counts)).collect::<BTreeMap<_, _>>(),
                 "largest_move": f.positions.values().map(|followed| followed.largest).max(),
                 "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
                 "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
@@ -329,30 +406,7 @@ impl<W: Write> Printer for Stats<W> {
     }
 
     fn end(&mut self, origin: &Origin) -> io::Result<()> {
-        let mut gathered = std::mem::take(&mut self.gathered);
-        self.gathered.limit = gathered.limit;
-        if gathered.by.is_empty() {
-            gathered.by.insert(Speaker { lane: 0, address: None }, Figures::default());
-        }
-        if self.json {
-            for object in gathered.json(origin) {
-                serde_json::to_writer(&mut self.out, &object)?;
-                self.out.write_all(b"\n")?;
-            }
-            return self.out.flush();
-        }
-        writeln!(self.out, "{}", origin.file)?;
-        for Table { speaker, rows } in gathered.tables(origin) {
-            if !speaker.is_empty() {
-                writeln!(self.out, "  {speaker}")?;
-            }
-            for (what, text) in rows {
-                match what {
-                    "" => writeln!(self.out, "    {text}")?,
-                    _ => writeln!(self.out, "  {what:<12}  {text}")?,
-                }
-            }
-        }
-        self.out.flush()
+        let empty = Gathered::new(self.gathered.limit);
+        std::mem::replace(&mut self.gathered, empty).write(origin, self.json, &mut self.out)
     }
 }

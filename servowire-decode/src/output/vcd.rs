@@ -1,5 +1,7 @@
 //! The capture again, with the decoded frames beside it as string variables (GTKWave, Surfer).
 
+mod ring;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, Write};
 
@@ -9,6 +11,7 @@ use super::printer::{Origin, Printer};
 use crate::capture::Change;
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 use crate::time::Time;
+use ring::{Ring, Turn};
 
 /// An event comes after the edges it was made of; edges wait so long for it, in picoseconds.
 const WINDOW: i64 = 2_000_000_000;
@@ -32,7 +35,9 @@ pub struct VcdOut {
     origin: Option<Time>,
     written: Option<u64>,
     window: Option<(Time, Time)>,
-    /// The levels of the channels before the window.
+    /// Only what is near refused frames.
+    ring: Option<Ring>,
+    /// The levels of the channels before the window, or before what is written next.
     before: BTreeMap<u16, bool>,
 }
 
@@ -57,6 +62,7 @@ impl VcdOut {
             origin: None,
             written: None,
             window: None,
+            ring: None,
             before: BTreeMap::new(),
         }
     }
@@ -65,6 +71,13 @@ impl VcdOut {
     #[must_use]
     pub fn within(self, from: Time, to: Time) -> Self {
         Self { window: Some((from, to)), ..self }
+    }
+
+    /// Writes only the line around refused frames and missing answers, so many picoseconds before and after each. Between such
+    /// pieces the channels are unknown. No more than this time is held in memory, however long the capture goes on.
+    #[must_use]
+    pub fn around(self, picoseconds: i64) -> Self {
+        Self { ring: Some(Ring::new(picoseconds.max(0))), ..self }
     }
 
     fn wait(&mut self, time: Time, code: IdCode, text: String) {
@@ -78,12 +91,45 @@ impl VcdOut {
             return;
         }
         self.origin = Some(time.min(Time::ZERO));
-        let strings = self.strings.clone();
-        for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
+        if self.ring.is_some() {
+            return;
+        }
+        for code in self.codes() {
             self.wait(time, code, NOTHING.to_owned());
         }
         let levels = std::mem::take(&mut self.before);
         self.levels.extend(levels.into_iter().map(|(channel, level)| Change { time, channel, level }));
+    }
+
+    /// All string variables.
+    fn codes(&self) -> Vec<IdCode> {
+        let of = |s: &Strings| [s.frame, s.verdict].into_iter().chain(s.fields.clone()).collect::<Vec<_>>();
+        self.strings.iter().flat_map(of).collect()
+    }
+
+    /// Begins and ends the pieces around faults up to a time; whether what is then is written.
+    fn turn(&mut self, time: Time) -> io::Result<bool> {
+        while let Some(turn) = self.ring.as_mut().and_then(|ring| ring.turn(time)) {
+            let (at, begins) = match turn {
+                Turn::Begins(at) => (at, true),
+                Turn::Ends(at) => (at, false),
+            };
+            self.stamp(at)?;
+            for (channel, [low, high]) in (0_u16..).zip(&self.channels) {
+                let level = self.before.get(&channel).filter(|_| begins);
+                // The line that says that it is unknown differs in its first letter only.
+                let line = match level {
+                    Some(true) => high.clone(),
+                    Some(false) => low.clone(),
+                    None => low.replacen('0', "x", 1),
+                };
+                self.writer.writer().write_all(line.as_bytes())?;
+            }
+            for code in self.codes() {
+                self.writer.change_string(code, NOTHING)?;
+            }
+        }
+        Ok(self.ring.as_ref().is_none_or(Ring::is_inside))
     }
 
     fn flush_before(&mut self, time: Time) -> io::Result<()> {
@@ -93,8 +139,15 @@ impl VcdOut {
             match (level, text) {
                 (None, None) => return Ok(()),
                 (Some(at), text) if text.is_none_or(|text| at <= text) => {
-                    self.stamp(at)?;
+                    let is_written = self.turn(at)?;
                     let change = self.levels.pop_front();
+                    if self.ring.is_some() {
+                        self.before.extend(change.map(|change| (change.channel, change.level)));
+                    }
+                    if !is_written {
+                        continue;
+                    }
+                    self.stamp(at)?;
                     let lines =
                         change.and_then(|change| Some((change, self.channels.get(usize::from(change.channel))?)));
                     if let Some((change, [low, high])) = lines {
@@ -103,8 +156,10 @@ impl VcdOut {
                 }
                 _ => {
                     if let Some(((at, _), (code, text))) = self.texts.pop_first() {
-                        self.stamp(at)?;
-                        self.writer.change_string(code, &text)?;
+                        if self.turn(at)? {
+                            self.stamp(at)?;
+                            self.writer.change_string(code, &text)?;
+                        }
                     }
                 }
             }
@@ -165,13 +220,17 @@ impl Printer for VcdOut {
             None => self.open(change.time),
         }
         self.levels.push_back(*change);
-        self.flush_before(change.time - WINDOW)
+        let around = self.ring.as_ref().map_or(0, Ring::around);
+        self.flush_before(change.time - WINDOW - around)
     }
 
     fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
         let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(origin.speaks)) else {
             return Ok(());
         };
+        if let Some(ring) = self.ring.as_mut().filter(|_| !event.verdict.is_ok()) {
+            ring.fault(start, end);
+        }
         let (from, to) = self.window.unwrap_or((start, end));
         let side = match event.direction {
             Some(Direction::Request) => "request ",

@@ -1,6 +1,7 @@
 //! What `servowire decode` is told.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use servowire_decode::output::filter::{Choice, Filter};
@@ -21,6 +22,8 @@ use crate::units::moment;
   servowire decode --stats --jump 4000 session.sr
   servowire decode --errors --from 1ms --to 20ms digital.csv
   servowire decode --cut 1ms..2ms -o piece.vcd line.vcd
+  sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary |
+    servowire decode --rate 24M --stats --until error --around 5ms -o fault.vcd -
   sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary | servowire decode --rate 24M -")]
 pub(crate) struct Decode {
     /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
@@ -39,12 +42,20 @@ pub(crate) struct Decode {
     /// With --stats, list moves of the position by more than this from one frame to the next.
     #[arg(long, value_name = "COUNTS", requires = "stats")]
     pub(super) jump: Option<u64>,
+    /// With --stats, of what comes in live (a pipe, --follow): also the figures of what came since the last ones, so often, such
+    /// as 1s or 200ms, a line an encoder. On a terminal every second without being asked.
+    #[arg(long, value_name = "TIME", value_parser = interval, requires = "stats")]
+    pub(super) every: Option<Duration>,
     /// Write the capture as VCD, with the decoded fields beside it as strings.
     #[arg(short = 'o', long, value_name = "OUT")]
     pub(super) vcd: Option<PathBuf>,
     /// Write only this piece of it, such as 1ms..2ms, and show only its frames.
     #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, requires = "vcd", conflicts_with_all = ["from", "to"])]
     pub(super) cut: Option<(Time, Time)>,
+    /// With -o, write only the line so long before and after each refused frame or missing answer; no more of it is held in
+    /// memory. With --until error, go on for so long.
+    #[arg(long, value_name = "TIME", value_parser = around, requires = "vcd", conflicts_with = "cut")]
+    pub(super) around: Option<i64>,
     /// Stop at the first refused frame or missing answer.
     #[arg(long, value_name = "EVENT", value_enum)]
     pub(super) until: Option<Until>,
@@ -88,6 +99,22 @@ pub(crate) struct FilterArgs {
 pub(crate) enum Until {
     /// A frame is refused, or an answer is missing.
     Error,
+}
+
+/// How often something is shown.
+fn interval(text: &str) -> Result<Duration, String> {
+    match moment(text)?.ps() / 1_000_000 {
+        us @ 1_000..=3_600_000_000 => Ok(Duration::from_micros(us as u64)),
+        _ => Err(format!("\"{text}\" is not a time from 1ms to 3600s")),
+    }
+}
+
+/// A time before and after something, in picoseconds.
+fn around(text: &str) -> Result<i64, String> {
+    match moment(text)?.ps() {
+        ps @ 1..=10_000_000_000_000 => Ok(ps as i64),
+        _ => Err(format!("\"{text}\" is not a time above 0, up to 10s")),
+    }
 }
 
 /// Two times with two dots between them.

@@ -226,3 +226,102 @@ fn until_the_first_error() {
     let run = bench.decode("log.txt", log, &["--json", "--until", "error"]);
     assert_eq!((run.code, run.out.lines().count()), (1, 2), "{}", run.out);
 }
+
+/// Figures while a capture comes in, of each encoder; also that nothing comes any more. The whole at the end.
+#[test]
+fn figures_while_it_comes() {
+    let packed = exchanges(100, 40).packed(20e6);
+    let options = ["decode", "--rate", "20M", "--format", "packed", "--stats", "--every", "200ms"];
+    let mut live = Live::start(&[&options[..], &["-"]].concat());
+    live.write(&packed);
+    let line = live.lines.recv_timeout(LONG).expect("no figures");
+    assert!(line.contains(" frames  no errors  cycle ") && !line.contains('\x1b'), "{line}");
+    assert!(line.contains("  delay 3.000 us +- 0.000  ABM, ABS "), "{line}");
+    let silent = live.lines.iter().find(|line| line.ends_with(" s  nothing"));
+    assert!(silent.is_some(), "nobody says that nothing comes");
+    live.write(&packed);
+    let again = live.lines.iter().find(|line| line.contains("ABM, ABS 139 "));
+    assert!(again.is_some(), "what comes after a pause is not shown");
+    let lines = live.end();
+    assert!(lines.iter().any(|line| line == "  frames        80 requests, 80 answers, 0 others"), "{lines:?}");
+
+    let mut live = Live::start(&[&options[..], &["--json", "-"]].concat());
+    live.write(&packed);
+    let line: serde_json::Value = serde_json::from_str(&live.lines.recv_timeout(LONG).expect("no figures")).unwrap();
+    assert!(line["at_s"].as_f64().unwrap() > 0.19 && line["over_s"].as_f64().unwrap() > 0.19, "{line}");
+    assert!(line["last_positions"]["ABM, ABS"].is_u64() && line["refused"].as_object().unwrap().is_empty(), "{line}");
+    let lines = live.end();
+    let whole: serde_json::Value = serde_json::from_str(lines.last().unwrap()).unwrap();
+    assert_eq!((whole["answers"].as_u64(), whole.get("at_s")), (Some(40), None));
+}
+
+/// Ctrl-C while nothing comes ends figures too, and prints those of the whole.
+#[cfg(unix)]
+#[test]
+fn the_end_of_figures_while_nothing_comes() {
+    let mut live = Live::start(&["decode", "--rate", "20M", "--format", "packed", "--stats", "--every", "100ms", "-"]);
+    live.write(&exchanges(100, 40).packed(20e6));
+    assert!(live.lines.iter().any(|line| line.ends_with(" s  nothing")));
+    assert!(Command::new("kill").args(["-INT", &live.child.id().to_string()]).status().unwrap().success());
+    assert_eq!(live.child.wait().unwrap().code(), Some(0));
+    assert!(live.end().iter().any(|line| line == "  frames        40 requests, 40 answers, 0 others"));
+}
+
+/// Positions of the answers in what a VCD shows, and its first and last time in us.
+fn shown(path: &std::path::Path) -> (Vec<u64>, f64, f64) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let stamps: Vec<f64> =
+        text.lines().filter_map(|line| line.strip_prefix('#')?.parse::<f64>().ok()).map(|ns| ns / 1e3).collect();
+    let run = common::decode(path, &["--json"]);
+    let events = run.json();
+    let abs = |event: &serde_json::Value| event["fields"]["ABS"].as_u64();
+    (events.iter().filter_map(abs).collect(), stamps[0], *stamps.last().unwrap())
+}
+
+/// Only the line around the errors is kept: of one, of two beside each other, and of one far away.
+#[test]
+fn a_ring_around_each_fault() {
+    let damaged = |k: u32| {
+        let mut bad = id3(k, 0, 0);
+        bad[5] ^= 1;
+        bad
+    };
+    let mut wave = exchanges(0, 100);
+    for k in 100..400 {
+        let answer = if [200, 202, 330].contains(&k) { damaged(k) } else { id3(k, 0, 0) };
+        wave.exchange(&[0x1a], &answer);
+    }
+    let bench = Bench::new();
+    let (path, out) = (bench.file("long.vcd", wave.vcd()), bench.path("faults.vcd"));
+    let around = ["--around", "500us", "-o", out.to_str().unwrap(), "--json"];
+    let run = common::decode(&path, &around);
+    assert_eq!((run.code, run.json().len()), (1, 800), "everything is still shown");
+    let (positions, from, _) = shown(&out);
+    // An exchange takes 91 us: five before and after each.
+    let want: Vec<u64> = (195..200).chain([201]).chain(203..208).chain(325..330).chain(331..336).collect();
+    let near = |(got, want): (&u64, &u64)| got == want;
+    assert!(positions.len() == want.len() && positions.iter().zip(&want).all(near), "{positions:?}");
+    let first = run.json().iter().find(|event| event["verdict"] == "crc").unwrap()["start_ps"].as_f64().unwrap() / 1e6;
+    assert!((first - 500.0 - from).abs() < 0.01, "{first} {from}");
+    // Between the pieces the line is unknown, for those who look at it.
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.lines().any(|line| line == "x!"), "{}", &text[..text.len().min(2000)]);
+
+    // Live, until the first error and so long after it.
+    let live = Live::start(
+        &[
+            &["decode", "--follow", path.to_str().unwrap(), "--until", "error"][..],
+            &["--around", "500us", "-o", out.to_str().unwrap(), "--json"],
+        ]
+        .concat(),
+    );
+    assert!(live.end().last().unwrap().contains("\"ok\""), "what comes after the fault is shown");
+    let (positions, again, to) = shown(&out);
+    assert!((again - from).abs() < 0.01 && positions.iter().all(|at| (195..208).contains(at)), "{positions:?}");
+    // The second fault is in the piece of the first, and has its own time after it.
+    assert!(to > first + 400.0 && to < first + 800.0, "{first} {to}");
+    // Without an error there is nothing to keep.
+    let quiet = bench.file("quiet.vcd", exchanges(0, 50).vcd());
+    common::decode(&quiet, &around).is_good();
+    assert!(!std::fs::read_to_string(&out).unwrap().contains("\n#"));
+}
