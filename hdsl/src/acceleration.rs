@@ -10,8 +10,8 @@ use crate::error::Error;
 ///                        ΔΔ, 11 bits         CRC-5
 /// ```
 ///
-/// The line carries the two bytes as 8b/10b words, high byte first. It is a difference of positions between
-/// H-frames; in sync mode these have different lengths, so that it is proportional to no physical acceleration.
+/// The line carries the two bytes as 8b/10b words, high byte first. It is a difference of positions between H-frames. In sync
+/// mode these have different lengths, so the value is not proportional to any physical acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "i16", into = "i16"))]
 pub struct DeltaDelta(i16);
@@ -29,7 +29,7 @@ impl DeltaDelta {
         if value < Self::MIN.0 || value > Self::MAX.0 { None } else { Some(Self(value)) }
     }
 
-    /// The nearest value in range.
+    /// Returns the nearest value in range.
     #[expect(clippy::cast_possible_truncation, reason = "within 11 bits after the comparison")]
     pub const fn clamp(value: i64) -> Self {
         if value < Self::MIN.0 as i64 {
@@ -57,7 +57,7 @@ impl DeltaDelta {
         value << 5 | crc5(value) as u16
     }
 
-    /// Takes the value out of a word.
+    /// Extracts the value from a word.
     ///
     /// # Errors
     /// [`Error::AccelerationCrc`].
@@ -66,7 +66,7 @@ impl DeltaDelta {
         Self::from_bytes(word.to_be_bytes())
     }
 
-    /// The same of the two bytes, the high one first.
+    /// Extracts the value from the two bytes, the high one first.
     #[inline]
     pub(crate) const fn from_bytes(bytes: [u8; 2]) -> Result<Self, Error> {
         if is_crc5_right(bytes) {

@@ -8,7 +8,7 @@ use crate::frame::ANSWER_BITS;
 use crate::parameter::EncoderByte;
 use crate::symbol::{Character, Control, Entry, Reading, Rule, RunningDisparity, Word};
 
-/// An answer as received: each channel is judged alone, a bad word in one does not touch the others.
+/// An answer as received. Each channel is judged separately; a bad word in one does not affect the others.
 ///
 /// ```text
 ///  bit   0         10          20      30              50  51        61
@@ -27,7 +27,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Reads the 61 low bits of `line`, the first line bit in bit 0.
+    /// Reads the 61 low bits of `line`, with the first line bit in bit 0.
     #[inline]
     pub const fn from_bits(rule: Rule, line: u64) -> Self {
         let line = line & (u64::MAX >> 3);
@@ -43,7 +43,7 @@ impl Answer {
         }
     }
 
-    /// Reads an answer from the beginning of `line`; the bits after it are left alone.
+    /// Reads an answer from the start of `line`; bits after it are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`].
@@ -60,7 +60,7 @@ impl Answer {
         self.line
     }
 
-    /// Whether it was read by the tables, [`Rule::Strict`].
+    /// Returns whether it was read by the tables ([`Rule::Strict`]).
     pub(crate) const fn is_strict(self) -> bool {
         matches!(self.rule, Rule::Strict)
     }
@@ -80,7 +80,7 @@ impl Answer {
     /// The parameter byte.
     ///
     /// # Errors
-    /// [`Error::InvalidWord`]. A special character is taken by its value, as the vendor's receiver does.
+    /// [`Error::InvalidWord`]. A special character is taken by its value, as by the vendor's receiver.
     #[inline]
     pub const fn parameter(self) -> Result<EncoderByte, Error> {
         match self.parameter_word().byte() {
@@ -108,7 +108,7 @@ impl Answer {
         Reading::new(self.secondary, word(self.line >> 51))
     }
 
-    /// Returns whether the switch bit is the inverse of the bit before it. A wrong one is only noted.
+    /// Returns whether the switch bit is the inverse of the bit before it. A wrong switch bit is only noted.
     #[inline]
     pub const fn switch_ok(self) -> bool {
         (self.line >> 49 ^ self.line >> 50) & 1 == 1
@@ -120,7 +120,7 @@ impl Answer {
         [self.vertical(), self.parameter_word(), self.pipe(), high, low, self.secondary()]
     }
 
-    /// Whether all words are good, and none but those of the pipe and the secondary channel is a special character.
+    /// Returns whether all words are good, and only those of the pipe and the secondary channel are special characters, if any.
     #[inline]
     pub(crate) const fn is_plain(&self) -> bool {
         let [high, low] = self.acceleration;
@@ -128,7 +128,7 @@ impl Answer {
         plain.is_data() && !self.pipe.or(self.secondary).is_byte_error()
     }
 
-    /// Returns whether no other word can be read either: an encoder that did not hear the head is silent.
+    /// Returns whether no other word can be read either, as with an encoder that did not hear the head and is silent.
     pub(crate) const fn is_silence(&self) -> bool {
         self.parameter.is_byte_error()
             && self.secondary.is_byte_error()
@@ -136,7 +136,7 @@ impl Answer {
             && self.pipe.is_byte_error()
     }
 
-    /// What is wrong with the words of an answer that is not [plain](Self::is_plain).
+    /// Returns what is wrong with the words of an answer that is not [plain](Self::is_plain).
     #[inline]
     pub(crate) const fn bad_words(&self) -> BadWords {
         let [high, low] = self.acceleration;
@@ -154,10 +154,10 @@ impl Answer {
     ///
     /// # Errors
     /// In this order: [`Error::InvalidWord`] for either word, [`Error::EncoderError`] for K29.7 K29.7,
-    /// [`Error::WrongKind`] for any other special character, by [`Rule::Strict`] only, [`Error::AccelerationCrc`].
+    /// [`Error::WrongKind`] for any other special character (by [`Rule::Strict`] only), [`Error::AccelerationCrc`].
     ///
-    /// D28.y and K28.y differ in one line bit and have the same value: taking data characters only lets no single wrong
-    /// line bit through.
+    /// D28.y and K28.y differ in one line bit and have the same value. Accepting only data characters lets no single wrong line
+    /// bit through.
     #[inline]
     pub const fn delta_delta(self) -> Result<DeltaDelta, Error> {
         let [high, low] = self.acceleration;
@@ -167,7 +167,7 @@ impl Answer {
         self.special_delta_delta()
     }
 
-    /// The same for words that are not both data characters.
+    /// Does the same for words that are not both data characters.
     #[cold]
     const fn special_delta_delta(self) -> Result<DeltaDelta, Error> {
         let [high, low] = self.acceleration_words();
@@ -185,7 +185,7 @@ impl Answer {
     }
 }
 
-/// As its words in line order.
+/// Returns the answer as its words in line order.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
 impl serde::Serialize for Answer {
@@ -201,15 +201,15 @@ servowire_core::one_line!(Answer {
         answer.acceleration_words()[0], answer.acceleration_words()[1], answer.secondary();
 });
 
-/// The words of an answer as bits, in line order.
+/// Returns the words of an answer as bits, in line order.
 pub(crate) const VERTICAL: u8 = 1;
 pub(crate) const PARAMETER: u8 = 1 << 1;
 pub(crate) const PIPE: u8 = 1 << 2;
 pub(crate) const ACCELERATION: u8 = 1 << 3 | 1 << 4;
 pub(crate) const SECONDARY: u8 = 1 << 5;
 
-/// Which words are no good, and which of the others are special characters that have no meaning in their channel. (Those of
-/// pipe and secondary channel all have one.)
+/// The words that are bad, and those of the others that are special characters without a meaning in their channel. (In the pipe
+/// and secondary channels all of them have one.)
 pub(crate) struct BadWords {
     pub(crate) bad: u8,
     pub(crate) special: u8,
@@ -234,7 +234,7 @@ impl BadWords {
     }
 }
 
-/// What an encoder puts into an answer.
+/// The contents that an encoder puts into an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -244,7 +244,7 @@ pub struct Content {
     pub vertical: Character,
     /// Parameter byte.
     pub parameter: EncoderByte,
-    /// SensorHub data; K30.7 for none.
+    /// SensorHub data; K30.7 stands for none.
     pub pipe: Character,
     /// The acceleration word, high byte first; `None` is sent as K29.7 K29.7.
     pub acceleration: Option<DeltaDelta>,
@@ -252,7 +252,7 @@ pub struct Content {
     pub secondary: Character,
 }
 
-/// An answer as it goes out.
+/// An answer as it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -264,7 +264,7 @@ pub struct EncodedAnswer {
 }
 
 impl Content {
-    /// As it goes out. The switch bit does not count in the running disparity.
+    /// Encodes the answer as it is sent. The switch bit is not counted in the running disparity.
     ///
     /// ```
     /// use hdsl::symbol::{Character, Control, Rule, RunningDisparity};
@@ -292,14 +292,14 @@ impl Content {
     }
 }
 
-/// Ten bits of the line from the lowest up.
+/// Returns ten bits of the line from the lowest up.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "ten bits are taken")]
 const fn word(line: u64) -> Word {
     Word::truncate(line as u16 & 0x3ff)
 }
 
-/// Six characters as an answer.
+/// Encodes six characters as an answer.
 pub(crate) fn emit(characters: [Character; 6], rd: RunningDisparity) -> EncodedAnswer {
     let (mut bits, mut rd) = (0_u64, rd);
     for (k, character) in (0_u32..).zip(characters) {

@@ -1,10 +1,10 @@
-//! What can be said about safe channel 2 without knowing the encoder's scaling.
+//! What can be checked in safe channel 2 without knowing the encoder's scaling.
 
 use crate::error::Error;
 use crate::registers::Status2;
 use crate::vframe::VFrame;
 
-/// What is wrong with safe channel 2, by the SICK manual (p. 55-58) and the HDSL register list.
+/// The faults of safe channel 2, according to the SICK manual (p. 55-58) and the HDSL register list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -20,7 +20,7 @@ bitflags::bitflags! {
         const TOG2 = 1 << 2;
         /// ERR2: the encoder reports an error of channel 2.
         const ERR2 = 1 << 3;
-        /// TEST2: a test runs.
+        /// TEST2: a test is running.
         const TEST2 = 1 << 4;
         /// The encoder says that it has no second position (K27.7).
         const VPOS2 = 1 << 5;
@@ -32,8 +32,8 @@ servowire_core::show_flags!(Channel2Findings);
 
 /// Watches safe channel 2, V-frame by V-frame.
 ///
-/// It reports what the documents say about the channel and nothing else. The comparison of both safe positions is the
-/// application's: scaling and complement of the second one depend on the encoder.
+/// It checks only what the documents say about the channel. The application has to compare the two safe positions, because
+/// scaling and complement of the second one depend on the encoder.
 ///
 /// ```
 /// use hdsl::{Channel2Findings, Channel2Monitor, VFrame};
@@ -51,7 +51,7 @@ pub struct Channel2Monitor {
 }
 
 impl Channel2Monitor {
-    /// At the beginning of a link; start again from it after a restart.
+    /// Creates the state at the beginning of a link; use it again after a restart.
     pub const fn new() -> Self {
         Self { toggle: None, age: 0 }
     }
@@ -77,7 +77,7 @@ impl Channel2Monitor {
         findings
     }
 
-    /// V-frames since the last sound block.
+    /// Number of V-frames since the last sound block.
     pub const fn age(&self) -> u32 {
         self.age
     }

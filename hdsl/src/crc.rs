@@ -17,9 +17,9 @@ pub const CRC_16: Algorithm<u16> = Algorithm {
 
 static TABLE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16);
 
-/// CRC-16 of `bytes`; it is sent high byte first.
+/// Computes the CRC-16 of `bytes`, which is sent high byte first.
 ///
-/// No error of up to five bits in a block of 4, 8 or 14 bytes with its CRC goes unseen.
+/// Every error of up to five bits in a block of 4, 8 or 14 bytes including its CRC is detected.
 ///
 /// ```
 /// assert_eq!(hdsl::crc16(b"123456789"), 0x91c5);
@@ -30,13 +30,13 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     TABLE.checksum(bytes)
 }
 
-/// The CRC-16 as it grows byte by byte, for data that arrive at one byte per H-frame.
+/// The CRC-16 computed byte by byte, for data that arrive at one byte per H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RunningCrc16(u16);
 
 impl RunningCrc16 {
-    /// Before the first byte.
+    /// Creates the register before the first byte.
     pub const fn new() -> Self {
         Self(0)
     }
@@ -49,12 +49,12 @@ impl RunningCrc16 {
         self.0 = digest.finalize() ^ CRC_16.xorout;
     }
 
-    /// The CRC to be sent after the bytes so far.
+    /// Returns the CRC to send after the bytes so far.
     pub const fn finish(self) -> u16 {
         self.0 ^ CRC_16.xorout
     }
 
-    /// Returns whether the bytes so far end in their right CRC.
+    /// Returns whether the bytes so far end with their correct CRC.
     pub const fn is_residue(self) -> bool {
         self.0 == CRC_16.residue
     }
@@ -78,9 +78,9 @@ static FIVE: [u8; 32] = {
     table
 };
 
-/// CRC-5 of the 11 low bits of `value`, most significant bit first: x^5 + x^2 + 1, initial value 0, final XOR 1Fh.
+/// Computes the CRC-5 of the 11 low bits of `value`, most significant bit first: x^5 + x^2 + 1, initial value 0, final XOR 1Fh.
 ///
-/// Every error of one or two bits in the 16-bit word is seen; 19 of the 560 triples pass.
+/// Every error of one or two bits in the 16-bit word is detected; 19 of the 560 errors of three bits pass.
 #[expect(clippy::indexing_slicing, reason = "five bits are below 32")]
 pub(crate) const fn crc5(value: u16) -> u8 {
     let top = FIVE[(value >> 10 & 1) as usize];
@@ -88,7 +88,8 @@ pub(crate) const fn crc5(value: u16) -> u8 {
     FIVE[((middle as u16 ^ value) & 31) as usize] ^ 0x1f
 }
 
-/// What the bytes of an acceleration word add to its syndrome: those of the high byte, those of the low one.
+/// What the bytes of an acceleration word contribute to its syndrome: first the values of the high byte, then those of the low
+/// byte.
 #[expect(clippy::indexing_slicing, reason = "runs at compile time")]
 static SYNDROME: [[u8; 256]; 2] = {
     let mut tables = [[0; 256]; 2];
@@ -105,7 +106,7 @@ static SYNDROME: [[u8; 256]; 2] = {
     tables
 };
 
-/// Whether the five low bits of a 16-bit word are the [`crc5`] of the eleven above them.
+/// Returns whether the five low bits of a 16-bit word are the [`crc5`] of the eleven bits above them.
 #[inline]
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
 pub(crate) const fn is_crc5_right([high, low]: [u8; 2]) -> bool {

@@ -1,15 +1,15 @@
-//! The encoder as a machine without I/O: what a simulator or a test bench runs.
+//! The encoder as a state machine without I/O, for simulators and test benches.
 //!
-//! In every H-frame it is given the line bits from SYNC to PARA and the position at the sampling edge, and gives the
-//! answer, which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, whatever
-//! the acceleration channel could say about it.
+//! In every H-frame it receives the line bits from SYNC to PARA and the position at the sampling edge, and returns the answer,
+//! which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, no matter what the
+//! acceleration channel was able to carry.
 //!
 //! On a sampled line [`Heard::on_line`] finds the bits and, to an eighth of a bit, the edge;
-//! [`Device::sampling_instant`] is when the position is to be taken.
+//! [`Device::sampling_instant`] is when to take the position.
 //!
-//! It shares no rule of the line with the receiver: code, test pattern, symbols, messages, checks and limits are written down
-//! here once more. What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong a
-//! [`Fault`].
+//! It shares no protocol rule with the receiver: code, test pattern, symbols, messages, checks and limits are implemented
+//! separately here. Each point that the documents leave to the encoder is a switch in [`Behaviour`]; each thing that it can do
+//! wrong is a [`Fault`].
 //!
 //! ```
 //! use hdsl::EncoderId;
@@ -55,7 +55,7 @@ use code::Symbol;
 /// The test pattern, first line bit in bit 0: 0100110011001000000100010101110111111011001100110100010011001.
 const PATTERN: u64 = 0x1322_ccdf_ba88_1332;
 
-/// What an encoder sends in an H-frame: its answer begins one bit after PARA.
+/// What an encoder sends in an H-frame. The answer begins one bit after PARA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -76,15 +76,15 @@ pub struct Device {
     resources: Resources,
     pipe: Option<u8>,
     channel: Channel,
-    /// Requests so far, for what it forgets.
+    /// Number of requests so far, to decide which to forget.
     requests: u16,
     disparity: RunningDisparity,
-    /// SYNC frames since the last RESET.
+    /// Number of SYNC frames since the last RESET.
     synchronised: u8,
     /// Place in the V-frame; `None` before the first normal answer.
     at: Option<u8>,
     toggle: bool,
-    /// Position at the next sampling edge.
+    /// True position at the next sampling edge.
     shaft: u64,
     /// True position at the last sampling edge.
     position: u64,
@@ -95,7 +95,8 @@ pub struct Device {
 }
 
 impl Device {
-    /// An encoder with this identifier, at position 0. If the identifier asks for a position of more than 40 bits, it has 40.
+    /// Creates an encoder with this identifier, at position 0. If the identifier asks for a position of more than 40 bits, it
+    /// has 40.
     pub const fn new(id: EncoderId) -> Self {
         Self {
             id: id.get(),
@@ -122,12 +123,12 @@ impl Device {
         self.behaviour = behaviour;
     }
 
-    /// Sets its fault from now on.
+    /// Sets its fault; takes effect at once.
     pub const fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
     }
 
-    /// The byte for the pipe channel in the next answers; `None` sends K30.7, no data.
+    /// Sets the byte for the pipe channel in the next answers; `None` sends K30.7 (no data).
     pub const fn set_pipe(&mut self, byte: Option<u8>) {
         self.pipe = byte;
     }
@@ -137,12 +138,12 @@ impl Device {
         &self.resources
     }
 
-    /// The same, to be changed from inside the encoder.
+    /// The same registers and resources, for changing them from inside the encoder.
     pub const fn resources_mut(&mut self) -> &mut Resources {
         &mut self.resources
     }
 
-    /// Turns the shaft: the position in steps at the sampling edge of the next head. What is beyond the width of the encoder is
+    /// Turns the shaft: the position in steps at the sampling edge of the next head. Bits beyond the width of the encoder are
     /// dropped.
     pub const fn set_position(&mut self, position: u64) -> &mut Self {
         self.shaft = position;
@@ -151,8 +152,8 @@ impl Device {
 
     /// Takes the head of an H-frame and returns the answer; `None` if the encoder sends none.
     ///
-    /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
-    /// symbol of the master that has no meaning is passed over.
+    /// Before it has seen RESET and enough SYNC frames, it does not answer. A head that cannot be read is not answered; a symbol
+    /// of the master that has no meaning is ignored.
     pub fn hear(&mut self, head: Window) -> Option<Transmission> {
         let before = self.position;
         self.position = self.shaft & self.mask();
@@ -196,13 +197,13 @@ impl Device {
         (self.fault != Fault::Silent).then_some(Transmission { bits: answer })
     }
 
-    /// When the position for [`hear`](Self::hear) is to be taken, in eighths of a bit (13.333 ns) on the time base of the samples
+    /// Returns when to take the position for [`hear`](Self::hear), in eighths of a bit (13.333 ns) on the time base of the samples
     /// in which the head was heard: at the sampling edge, and later by [`Behaviour::sampling_lag`].
     pub const fn sampling_instant(&self, heard: &Heard) -> u32 {
         (heard.edge as u32).saturating_add(self.behaviour.sampling_lag as u32)
     }
 
-    /// Messages, V-frame, clock and running disparity as after power-up. The motion goes on.
+    /// Resets messages, V-frame, clock and running disparity as after power-up. The motion continues.
     const fn reset(&mut self) {
         self.channel = Channel::new();
         self.disparity = RunningDisparity::Minus;
@@ -225,7 +226,8 @@ impl Device {
         bits
     }
 
-    /// The second difference that takes the receiver to the present position; `None` if the encoder says that it has none.
+    /// Returns the second difference that takes the receiver to the present position; `None` if the encoder reports that it has
+    /// none.
     fn measure(&mut self) -> Option<i16> {
         let step = self.signed(self.position.wrapping_sub(self.told));
         if self.at.is_none() {
@@ -246,8 +248,8 @@ impl Device {
         i16::try_from(value).ok()
     }
 
-    /// Bits of the position: those of the acceleration, 8 more than bits 3:0 of the identifier say, and as many more as bits 9:4
-    /// say; 40 at most.
+    /// Returns the number of bits of the position: the bits of the acceleration, which are 8 plus bits 3:0 of the identifier,
+    /// plus bits 9:4; 40 at most.
     fn bits(&self) -> u32 {
         (self.id & 15).wrapping_add(8).wrapping_add(self.id >> 4 & 0x3f).min(40)
     }
@@ -256,13 +258,13 @@ impl Device {
         !(u64::MAX << self.bits())
     }
 
-    /// A difference of positions, with its sign.
+    /// Returns a difference of positions, with its sign.
     fn signed(&self, difference: u64) -> i64 {
         let unused = 64_u32.saturating_sub(self.bits());
         i64::from_le_bytes((difference << unused).to_le_bytes()) >> unused
     }
 
-    /// The frame counts, though its head could not be read.
+    /// Counts the frame although its head could not be read.
     fn go_on(&mut self, before: u64) {
         if let Some(at) = self.at {
             if at == 0 {
@@ -294,7 +296,7 @@ impl Device {
         self.emit([vertical, Symbol::data(parameter), pipe, high, low, secondary])
     }
 
-    /// The master's symbol; a request that is complete waits for its answer, unless it is forgotten.
+    /// Takes the master's symbol; a complete request waits for its answer, unless it is forgotten.
     fn take(&mut self, symbol: u8) {
         let Some(request) = self.channel.hear(symbol) else { return };
         self.requests = self.requests.wrapping_add(1);
@@ -312,7 +314,7 @@ impl Device {
         }
     }
 
-    /// The two safe blocks of a V-frame; `position` is that of the sampling edge before it.
+    /// Creates the two safe blocks of a V-frame; `position` is that of the sampling edge before it.
     fn latch(&mut self, position: u64) {
         let test = if self.fault == Fault::Test2 { 0x40 } else { 0 };
         let error = if self.fault == Fault::Error2 { 0x20 } else { 0 };
@@ -347,7 +349,7 @@ fn block(status: Symbol, position: i64, bad_crc: bool) -> [Symbol; 8] {
     marked([status; 8], [p4, p3, p2, p1, p0], bad_crc)
 }
 
-/// The block with another position and the CRC that belongs to it.
+/// Returns the block with another position and the matching CRC.
 fn marked(block: [Symbol; 8], position: [Symbol; 5], bad_crc: bool) -> [Symbol; 8] {
     let [status, ..] = block;
     let [p4, p3, p2, p1, p0] = position;
@@ -356,7 +358,7 @@ fn marked(block: [Symbol; 8], position: [Symbol; 5], bad_crc: bool) -> [Symbol; 
     [status, p4, p3, p2, p1, p0, high, low]
 }
 
-/// Eleven bits, and the remainder of x^5 + x^2 + 1 with its five bits inverted, by long division.
+/// Appends to eleven bits the remainder of x^5 + x^2 + 1 with its five bits inverted, by long division.
 fn acceleration_word(value: i16) -> u16 {
     let [high, low] = value.to_be_bytes();
     let word = u16::from_be_bytes([high, low]) << 5;
@@ -369,7 +371,7 @@ fn acceleration_word(value: i16) -> u16 {
     word | (rest ^ 0x1f) & 0x1f
 }
 
-/// CRC-16 by long division: x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, then the low byte inverted.
+/// Computes the CRC-16 by long division: x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, then the low byte inverted.
 fn check(bytes: &[u8]) -> u16 {
     let mut rest = 0_u16;
     for byte in bytes {

@@ -12,24 +12,24 @@ use crate::symbol::Rule;
 pub enum RegisterRule {
     /// The SICK manual, p. 31-55.
     ///
-    /// * Each safe channel shows its last valid block, whatever the other does; a bad word or a wrong CRC sets SCE. If the
-    ///   encoder has no position VPOS shows FDh five times.
-    /// * An event is raised when its status arises, and again only after that has gone. MIN alone is raised in every
+    /// * Each safe channel shows its last valid block, regardless of the other; a bad word or a wrong CRC sets SCE. If the
+    /// encoder has no position, VPOS shows FDh five times.
+    /// * An event is raised when its status arises, and again only after that status has gone. MIN alone is raised in every
     ///   frame.
-    /// * What the receiver writes cannot be written; ACC_ERR_CNT stops at 31; an error code of a long message stands in
-    ///   PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
+    /// * The application cannot write registers that the receiver writes; ACC_ERR_CNT stops at 31; the error code of a long
+    /// message is in PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
     #[default]
     Sick,
     /// The firmware of the Motor Control SDK.
     ///
     /// * SUMMARY and VPOSCRC are shown as received; channel 2 is shown only with a good channel 1, and a bad word in it
     ///   leaves SCE2 as it was.
-    /// * POS and QMLW are raised in every frame while they last.
-    /// * The map is memory: everything can be written. An error code stands in PC_BUFFER with its class first.
+    /// * POS and QMLW are raised in every frame for as long as they last.
+    /// * The map is memory: everything can be written. An error code is in PC_BUFFER with its class first.
     Ti,
 }
 
-/// Where receivers differ, and what to follow.
+/// The points in which receivers differ, and the rule to follow in each.
 ///
 /// [`SICK`](Self::SICK) follows the manual and the code tables; [`TI`](Self::TI) does what the receiver firmware of
 /// the Motor Control SDK (release 09.02) does, so that both can be compared frame by frame.
@@ -62,17 +62,17 @@ pub struct Dialect {
     /// A V-frame without a good safe position is aligned with the last good one. Otherwise it makes the position
     /// unreliable and restarts the alignment.
     pub stale_position: bool,
-    /// The flag POS is set from the lock until the first alignment succeeds. The register list asks for it, the
-    /// vendor's receiver does not do it.
+    /// The flag POS is set from the lock until the first alignment succeeds. The register list requires this; the vendor's
+    /// receiver does not do it.
     pub doubt_at_lock: bool,
     /// The link is restarted when an acceleration word cannot be used and ACC_ERR_CNT has reached its threshold.
     pub restart_on_acceleration_errors: bool,
-    /// An acceleration word with a bad 8b/10b word and a right CRC-5 is used. The vendor's firmware does so: it clears its
+    /// An acceleration word with a bad 8b/10b word and a correct CRC-5 is used. The vendor's firmware does so: it clears its
     /// error flag before it tests it (`datalink.asm`). Off in both dialects.
     pub damaged_acceleration: bool,
-    /// An encoder without VSYNC is given up after this many frames with INIT; 0 waits for ever.
+    /// The link restarts if there is no VSYNC after this many frames with INIT; 0 waits for ever.
     pub vsync_frames: u8,
-    /// How often and how long messages are tried.
+    /// How many times and for how long messages are tried.
     pub messages: Limits,
 }
 

@@ -4,25 +4,25 @@
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Doubt {
-    /// There was no H-frame yet.
+    /// There has been no H-frame yet.
     Never,
     /// The link is not up, or was lost.
     NoLink,
     /// The last acceleration word could not be used: the fast position is estimated.
     Estimated,
-    /// The fast position does not agree with the safe one yet, or no longer.
+    /// The fast position does not yet agree with the safe one, or no longer does.
     Alignment,
-    /// The velocity is beyond a sixteenth of the range a frame, where it is known modulo an eighth of the range only.
+    /// The velocity exceeds a sixteenth of the range per frame, but it is known only modulo an eighth of the range.
     Speed,
     /// No V-frame is complete yet.
     NoVFrame,
-    /// The last V-frame brought no sound safe block: what is in the registers is older.
+    /// The last V-frame brought no sound safe block, so the registers hold older data.
     Stale,
-    /// The encoder says that it has no position.
+    /// The encoder reports that it has no position.
     Withheld,
     /// The position was sampled too long ago, or by a clock that was set back in the meantime.
     Old {
-        /// How far the instant of sampling is away, in ns.
+        /// Distance to the instant of sampling, in ns.
         age_ns: u64,
     },
 }

@@ -21,14 +21,14 @@ impl EncoderId {
         (self.byte(0) & 15).wrapping_add(8)
     }
 
-    /// Width of the position, 8..=86 bits as coded; see [`PositionBits`] for what is possible.
+    /// Width of the position, 8..=86 bits as coded; see [`PositionBits`] for what is supported.
     pub const fn position_bits(self) -> u8 {
         let [low, high, ..] = self.get().to_le_bytes();
         let more = low >> 4 | (high & 3) << 4;
         self.acceleration_bits().wrapping_add(more)
     }
 
-    /// A position of this encoder as a number: without the unused high bits of `raw`, and with its sign if the positions
+    /// Returns a position of this encoder as a number, without the unused high bits of `raw`, and with its sign if the positions
     /// are signed.
     pub const fn position(self, raw: u64) -> i64 {
         let unused = 64_u8.saturating_sub(self.position_bits()) as u32;
@@ -61,8 +61,8 @@ impl EncoderId {
         }
     }
 
-    /// The width of the position, if this receiver can work with the encoder: acceleration of 11 bits, position of
-    /// 8..=40 bits, no continuation.
+    /// Returns the width of the position, if this receiver supports the encoder: acceleration of 11 bits, position of 8..=40
+    /// bits, no continuation.
     ///
     /// # Errors
     /// [`Error::UnsupportedEncoder`].
@@ -77,18 +77,18 @@ impl EncoderId {
         }
     }
 
-    /// Takes the identifier out of the answer to IDREQ, which carries it twice.
+    /// Extracts the identifier from the answer to IDREQ, which carries it twice.
     ///
     /// ```text
     ///  vertical   parameter   pipe                  acc high   acc low
     ///  ID 7:0     ID 15:8     ID 19:16, ID 19:16    ID 15:8    ID 7:0
     /// ```
     ///
-    /// There are no check bits. A line that is inverted for this one frame gives another identifier with both copies equal:
-    /// an application that knows its encoder compares.
+    /// There are no check bits. A line that is inverted for this one frame yields a different identifier with both copies equal,
+    /// so an application that knows its encoder should compare it.
     ///
     /// # Errors
-    /// [`Error::InvalidWord`] for a word of these five that is in no table, by [`Rule::Strict`](crate::Rule::Strict) only;
+    /// [`Error::InvalidWord`] if one of these five words is in no table, by [`Rule::Strict`](crate::Rule::Strict) only;
     /// [`Error::EncoderIdMismatch`] if the two copies differ.
     pub fn from_answer(answer: Answer) -> Result<Self, Error> {
         if answer.is_strict() {
@@ -105,7 +105,7 @@ impl EncoderId {
         Ok(Self::truncate(second))
     }
 
-    /// The answer to IDREQ. The secondary word is not used; the caller may fill it.
+    /// Creates the answer to IDREQ. The secondary word is not used; the caller may fill it.
     ///
     /// ```
     /// use hdsl::symbol::{Character, RunningDisparity};

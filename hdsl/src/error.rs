@@ -1,7 +1,7 @@
 use crate::resource::ResourceError;
 
 servowire_core::errors! {
-    /// Why something received was refused, or something asked for cannot be done.
+    /// Why received data were refused, or why a requested operation cannot be done.
     ///
     /// An answer is judged channel by channel, each in this order, and the first check that fails is the one reported:
     ///
@@ -16,18 +16,18 @@ servowire_core::errors! {
         /// Fewer bits, samples or bytes than the unit has.
         #[error("{got} of {want} are there")]
         Truncated = 1 {
-            /// How many there are.
+            /// How many there were.
             got: u16,
             /// How many the unit has.
             want: u16,
         },
-        /// A 10-bit word stands in neither column of the 8b/10b tables.
+        /// A 10-bit word is in neither column of the 8b/10b tables.
         #[error("{word:#05x} (a in bit 0) is no 8b/10b word")]
         InvalidWord = 2 {
             /// The word, first line bit in bit 0.
             word: u16,
         },
-        /// A special character came where only data may be, or data where a special character must be.
+        /// A special character came where only data are allowed, or data where a special character is required.
         #[error("character {byte:#04x} is of the wrong kind here")]
         WrongKind = 3 {
             /// Value of the character.
@@ -49,7 +49,7 @@ servowire_core::errors! {
         Crc = 6 {
             /// Received.
             got: u16,
-            /// Computed over the received bytes.
+            /// The CRC computed over the received bytes.
             want: u16,
         },
         /// The block is sound, but the encoder cannot deliver a position.
@@ -67,10 +67,10 @@ servowire_core::errors! {
         /// The line stayed high: no encoder answered.
         #[error("no falling edge: nobody answered")]
         NoEdge = 9,
-        /// The test pattern of the start-up is at none of the delays.
+        /// The test pattern of the start-up was found at none of the delays.
         #[error("the test pattern is at none of the delays, sampled at index {index}")]
         PatternNotFound = 10 {
-            /// Sampling index that the first edge gave, 0..=7.
+            /// Sampling index derived from the first edge, 0..=7.
             index: u8,
         },
         /// The answer is not the test pattern of the start-up.
@@ -82,12 +82,12 @@ servowire_core::errors! {
         /// The two copies of the encoder identifier differ.
         #[error("the identifier came as {first:#07x} and as {second:#07x}")]
         EncoderIdMismatch = 13 {
-            /// From the vertical, parameter and pipe words.
+            /// The copy from the vertical, parameter and pipe words.
             first: u32,
-            /// From the acceleration words and the other nibble of the pipe word.
+            /// The copy from the acceleration words and the other nibble of the pipe word.
             second: u32,
         },
-        /// The identifier asks for something this receiver does not do.
+        /// The identifier requires something that this receiver does not support.
         #[error("encoder identifier {id:#07x} is not supported")]
         UnsupportedEncoder = 14 {
             /// The 20 bits.
@@ -105,7 +105,7 @@ servowire_core::errors! {
             /// The byte.
             first: u8,
         },
-        /// A sound message speaks of another register or address, or of the other direction.
+        /// A sound message is for another register or address, or for the other direction.
         #[error("the answer begins with {got:#06x}, expected {want:#06x}")]
         Header = 17 {
             /// Received header.
@@ -122,13 +122,13 @@ servowire_core::errors! {
         /// The encoder did not accept the message (SNAK or LNAK) in any of the tries.
         #[error("the encoder did not accept the message, {tries} tries")]
         NotAccepted = 19 {
-            /// Times the message was sent.
+            /// How many times the message was sent.
             tries: u8,
         },
         /// No sound answer within the time-out in any of the tries.
         #[error("no answer to the message, {tries} tries")]
         NoAnswer = 20 {
-            /// Times the message was sent.
+            /// How many times the message was sent.
             tries: u8,
         },
         /// The message was dropped by a message reset or a restart of the link.
@@ -146,16 +146,16 @@ servowire_core::errors! {
             /// Bytes given.
             len: u8,
         },
-        /// The period is shorter than the frames that shall fit into it.
+        /// The period is shorter than the frames that have to fit into it.
         #[error("the period lacks {missing} line bits for the shortest frames")]
         PeriodTooShort = 25 {
-            /// Bits that are missing, rounded up.
+            /// Number of missing bits, rounded up.
             missing: u32,
         },
         /// The name of a user file is invalid: it has 1 to 8 characters 20h..=7Eh, then 00h.
         #[error("this is no name of a user file")]
         FileName = 26,
-        /// No pulse period is known that the frames could be synchronised with.
+        /// No pulse period is known with which the frames could be synchronised.
         #[error("no pulse period was given")]
         NoPulse = 27,
         /// The register map has no register at this address.
@@ -167,7 +167,7 @@ servowire_core::errors! {
         /// The EXTRA window of the start-up arithmetic is outside 4..=9 bits.
         #[error("the EXTRA window would be {extra} bits, 4 to 9 are allowed")]
         ExtraOutOfRange = 29 {
-            /// Whole bits a frame.
+            /// Whole bits per frame.
             extra: u32,
         },
     }

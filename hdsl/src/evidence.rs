@@ -1,13 +1,14 @@
-//! What a control loop may use of the positions, judged at the moment of use.
+//! The positions that a control loop may use, judged at the moment of use.
 
 use servowire_core::{Angle, Feedback, Shaft, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
-/// Despite what a position may be used: up to this many missing acceleration words.
+/// How many missing acceleration words a position may have and still be used.
 ///
-/// One wrong bit takes an acceleration word away, and with it the exact position for 17 to 24 frames, until a safe position has shown
-/// what was in the word and another one has agreed. In the meantime the position is estimated, with a bound that grows.
+/// One wrong bit makes an acceleration word unusable, and with it the exact position is lost for 17 to 24 frames, until a safe
+/// position has shown what was in the word and another one has agreed. In the meantime the position is estimated, with a bound
+/// that grows.
 ///
 /// ```
 /// use hdsl::{Policy, Tolerated};
@@ -25,12 +26,14 @@ pub struct Tolerated {
 }
 
 impl Tolerated {
-    /// Nothing: every doubt counts.
+    /// Tolerates nothing: every doubt counts.
     pub const NOTHING: Self = Self { words: 0, acceleration: 0 };
 
-    /// Missing acceleration words, this many at most since the position was exact, in answers of which something could be read (an
-    /// encoder that is silent may not have heard the head, and then it has not sampled). `acceleration` is the largest of the shaft, in
-    /// either direction, in steps a frame²; 1024 is all that the link can carry. [`Sample::bound`] holds for that.
+    /// Tolerates at most this many missing acceleration words since the position was exact, in answers of which something could
+    /// be read (a silent encoder may not have heard the head, and then it has not sampled). `acceleration` is the largest of the
+    /// shaft, in
+    /// either direction, in steps per frame²; 1024 is the most that the link can carry. [`Sample::bound`] holds for this
+    /// acceleration.
     pub const fn missing_words(words: u8, acceleration: u16) -> Self {
         Self { words, acceleration }
     }
@@ -40,7 +43,7 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// Up to which age, and over how many missing words, a position may be used.
+/// The age up to which, and the number of missing words over which, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// A fast position that may be used.
@@ -68,19 +71,21 @@ impl Sample {
     }
 
     /// How far the position may be off in either direction, in steps: 0 unless acceleration words are missing and the policy
-    /// tolerates that. It does not know of a word that was wrong and passed its checks; where others are missing at the same time that
-    /// is found out after 24 frames or more, not after 16.
+    /// tolerates that. It does not cover a wrong word that passed its checks; if others are missing at the same time, this is
+    /// discovered after 24 frames or more, not after 16.
     pub const fn bound(&self) -> u32 {
         self.bound
     }
 
-    /// Number of the H-frame, modulo 2^32. Frames that [`Master::skip`](crate::master::Master::skip) told of have numbers too; after some
-    /// of which nobody told, known by the time alone, there are doubts first and numbers that leave them out.
+    /// Number of the H-frame, modulo 2^32. Frames reported with [`Master::skip`](crate::master::Master::skip) have numbers too.
+    /// Frames that were lost without a report are recognised only by their time; they lead to doubts first and are left out of
+    /// the numbers.
     pub const fn frame(&self) -> u32 {
         self.frame
     }
 
-    /// The angle within the turn, for [`Master::set_steps_per_turn`](crate::master::Master::set_steps_per_turn); 0 without.
+    /// The angle within the turn, if [`Master::set_steps_per_turn`](crate::master::Master::set_steps_per_turn) was called;
+    /// otherwise 0.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "less than the steps of a turn")]
     pub const fn angle(&self) -> Angle {
         match self.position.checked_rem_euclid(self.steps_per_turn as i64) {
@@ -97,8 +102,8 @@ impl Sample {
         Angle::from_counts(self.bound, self.steps_per_turn)
     }
 
-    /// When the shaft was there, on the clock that the ends of the frames were told by: when the sampling edge of its H-frame left the
-    /// master, and [`Master::set_latency_ns`](crate::master::Master::set_latency_ns) later.
+    /// When the shaft was there, on the clock used for the ends of the frames: the time at which the sampling edge of its
+    /// H-frame left the master, plus the latency set with [`Master::set_latency_ns`](crate::master::Master::set_latency_ns).
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns
     }
@@ -111,7 +116,7 @@ servowire_core::one_line!(Sample {
         "{} within {} at {} a frame, sampled at {} ns", position, bound, velocity, sampled_ns;
 });
 
-/// What is known about the fast position after an H-frame: from [`Master::fast`](crate::master::Master::fast).
+/// What is known about the fast position after an H-frame; returned by [`Master::fast`](crate::master::Master::fast).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -119,15 +124,15 @@ servowire_core::one_line!(Sample {
 pub struct Evidence {
     pub(crate) doubt: Option<Doubt>,
     pub(crate) sample: Sample,
-    /// Missing words, if but for them the position would be known.
+    /// Number of missing words, if the position would be known but for them.
     pub(crate) missing: Option<u8>,
-    /// How many frames they have counted, all together, and the way that was estimated in these.
+    /// The sum of the frames for which they have counted, and the distance estimated in these.
     pub(crate) frames: u32,
     pub(crate) way: u32,
 }
 
 impl Evidence {
-    /// Before the first H-frame.
+    /// The evidence before the first H-frame.
     pub const NEVER: Self = Self::doubtful(Doubt::Never);
 
     pub(crate) const fn doubtful(doubt: Doubt) -> Self {
@@ -135,8 +140,8 @@ impl Evidence {
         Self { doubt: Some(doubt), sample, missing: None, frames: 0, way: 0 }
     }
 
-    /// The fast position, if it may be used at this time: the truth as long as the real speed stays below a sixteenth of the
-    /// range a frame, or within [`Sample::bound`] of it over missing words that the policy tolerates.
+    /// Returns the fast position, if it may be used at this time. It is the true position as long as the real speed stays below
+    /// a sixteenth of the range per frame, or within [`Sample::bound`] of it over missing words that the policy tolerates.
     ///
     /// # Errors
     /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::Speed`], [`Doubt::Estimated`], [`Doubt::Alignment`], then
@@ -155,7 +160,7 @@ impl Evidence {
         }
     }
 
-    /// How far the position may be off, if no more words are missing than is tolerated.
+    /// Returns how far the position may be off, if no more words are missing than are tolerated.
     #[cold]
     const fn over_missing_words(&self, tolerated: Tolerated) -> Option<u32> {
         match self.missing {
@@ -191,13 +196,13 @@ impl SafeSample {
         self.position
     }
 
-    /// SUMMARY: bit n sums up the encoder status register ENC_STn.
+    /// SUMMARY: bit n summarises the encoder status register ENC_STn.
     pub const fn summary(&self) -> u8 {
         self.summary
     }
 
-    /// When the sampling edge of the H-frame before its V-frame left the master, on the clock that the ends of the frames were
-    /// told by: 8 to 15 H-frames before that of the last H-frame.
+    /// When the sampling edge of the H-frame before its V-frame left the master, on the clock used for the ends of the frames: 8
+    /// to 15 H-frames before the edge of the last H-frame.
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns
     }
@@ -207,7 +212,7 @@ servowire_core::one_line!(SafeSample {
     Self { position, summary, sampled_ns } => "{}, SUMMARY {:02X}h, sampled at {} ns", position, summary, sampled_ns;
 });
 
-/// What is known about the safe position after an H-frame: from [`Master::safe`](crate::master::Master::safe).
+/// What is known about the safe position after an H-frame; returned by [`Master::safe`](crate::master::Master::safe).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -215,10 +220,11 @@ servowire_core::one_line!(SafeSample {
 pub struct SafeEvidence(pub(crate) Result<SafeSample, Doubt>);
 
 impl SafeEvidence {
-    /// Before the first H-frame.
+    /// The evidence before the first H-frame.
     pub const NEVER: Self = Self(Err(Doubt::Never));
 
-    /// The safe position, if it may be used at this time: words and CRC are good, and the encoder does not mark it as missing.
+    /// Returns the safe position, if it may be used at this time: words and CRC are good, and the encoder does not mark it as
+    /// missing.
     ///
     /// # Errors
     /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::NoVFrame`], [`Doubt::Stale`], [`Doubt::Withheld`], then [`Doubt::Old`].
@@ -262,7 +268,7 @@ feedback! {
     SafeEvidence => SafeSample;
 }
 
-/// The numbers that stand for doubts in a cell; 0 is a value.
+/// The numbers that stand for doubts in a cell; 0 stands for a value.
 const fn number(doubt: Doubt) -> u32 {
     match doubt {
         Doubt::Never => 1,
@@ -277,7 +283,7 @@ const fn number(doubt: Doubt) -> u32 {
     }
 }
 
-/// The doubt with this number; `wide` is what came in the place of the position.
+/// Returns the doubt with this number; `wide` is what came in place of the position.
 const fn doubt(number: u32, wide: u64) -> Doubt {
     match number {
         2 => Doubt::NoLink,
@@ -292,7 +298,7 @@ const fn doubt(number: u32, wide: u64) -> Doubt {
     }
 }
 
-/// Low and high word.
+/// Splits into low and high word.
 const fn halves(value: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = value.to_le_bytes();
     [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
@@ -302,10 +308,10 @@ const fn whole(low: u32, high: u32) -> u64 {
     (high as u64) << 32 | low as u64
 }
 
-/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+/// Passes evidence from where it is received to where it is used, between two priorities or cores.
 pub type EvidenceCell = servowire_core::Cell<Evidence, 10>;
 
-/// Like [`EvidenceCell`], and also gives the angle at an instant between two samples.
+/// Like [`EvidenceCell`], and also returns the angle at an instant between two samples.
 pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 10>;
 
 /// For an [`EvidenceCell`]; the lower half of a number of 64 bits is first.

@@ -1,7 +1,7 @@
-//! The fast position for control: the second differences of the acceleration channel integrated twice from the safe positions
-//! on, and compared with each of them.
+//! The fast position for control: the second differences of the acceleration channel, integrated twice starting from the safe
+//! positions and compared with each of them.
 //!
-//! A receiver's registers POS and VEL follow the vendors' rules, with their faults; see
+//! A receiver's registers POS and VEL follow the vendors' rules, including their faults; see
 //! [`PositionTracker`](crate::PositionTracker).
 
 use crate::acceleration::DeltaDelta;
@@ -9,35 +9,35 @@ use crate::doubt::Doubt;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::evidence::{Evidence, Sample};
 
-/// Speeds are below this, in steps a frame: two of them can be added.
+/// Speeds are below this, in steps per frame, so that two of them can be added.
 const FASTEST: i64 = 1 << 30;
 /// H-frames of a V-frame.
 const V_FRAME: u32 = 8;
 
-/// What the safe positions have shown.
+/// What the safe positions have shown so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Known {
     Nothing,
     /// The position at the sampling edge before this V-frame.
     Position,
-    /// Position and speed.
+    /// Position and speed are known.
     Speed,
     /// Another safe position has agreed.
     Confirmed,
 }
 
-/// Acceleration words that are missing.
+/// The missing acceleration words.
 ///
-/// If word k is estimated, wrong by d, then n frames later the position is wrong by n d. The caller knows how large d can be:
+/// If the estimate of word k is wrong by d, then n frames later the position is wrong by n d. The caller knows how large d can be:
 /// the largest acceleration and what was estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Missing {
     words: u16,
-    /// Sum of n over these words: frames from each of them to now, its own included.
+    /// Sum of n over these words, where n is the number of frames from each of them to now, including its own.
     frames: u32,
-    /// Sum of the sizes of the estimates, in steps a frame².
+    /// Sum of the sizes of the estimates, in steps per frame².
     estimated: u32,
     /// Sum of n times the size.
     way: u32,
@@ -51,13 +51,14 @@ impl Missing {
         self.estimated = self.estimated.saturating_add(estimate.unsigned_abs().into());
     }
 
-    /// Another frame is integrated.
+    /// Notes that another frame has been integrated.
     fn drift(&mut self) {
         self.frames = self.frames.saturating_add(self.words.into());
         self.way = self.way.saturating_add(self.estimated);
     }
 
-    /// The position at the sampling edge before this V-frame, eight frames ago, turned out; `since` are the words missing since then.
+    /// Notes that the position at the sampling edge before this V-frame, eight frames ago, is now known; `since` holds the words
+    /// missing since then.
     fn position_known(&mut self, since: &Self) {
         let before = u32::from(self.words.saturating_sub(since.words));
         self.frames = before.saturating_mul(V_FRAME).saturating_add(since.frames);
@@ -68,9 +69,9 @@ impl Missing {
 
 /// The fast position of a link, and whether it may be used.
 ///
-/// In each H-frame it takes the acceleration word, after the last H-frame of a V-frame the safe position. The first safe position
-/// gives the position, the second one the speed, and the third one has to agree. A missing word is estimated; one alone is made
-/// good by the next safe position but one at the latest, several by the one after that.
+/// In each H-frame it takes the acceleration word, and after the last H-frame of a V-frame the safe position. The first safe
+/// position provides the position, the second one the speed, and the third one has to agree. A missing word is estimated. A
+/// single one is corrected by the second safe position after it at the latest, several by the third.
 ///
 /// ```
 /// use hdsl::{DeltaDelta, Doubt, EncoderId, FastPosition, Policy};
@@ -95,16 +96,16 @@ pub struct FastPosition {
     bits: PositionBits,
     /// Modulo 2^64; the low bits count.
     position: u64,
-    /// Steps a frame.
+    /// Steps per frame.
     velocity: i32,
     /// The last accelerations, the newest at `at`.
     recent: [i16; 8],
     at: u8,
     known: Known,
-    /// It was confirmed, and nothing but missing words has happened since.
+    /// It was confirmed, and only missing words have occurred since.
     followed: bool,
     missing: Missing,
-    /// Those in this V-frame.
+    /// The missing words of this V-frame.
     missing_here: Missing,
     /// Whether words of the V-frame before are missing.
     missing_before: bool,
@@ -115,7 +116,7 @@ pub struct FastPosition {
 }
 
 impl FastPosition {
-    /// Before the first word of a link.
+    /// Creates the state before the first word of a link.
     ///
     /// # Errors
     /// [`Error::UnsupportedEncoder`](crate::Error::UnsupportedEncoder).
@@ -166,7 +167,7 @@ impl FastPosition {
         }
     }
 
-    /// The estimate in the place of a value: last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol Design), with `last`
+    /// Returns the estimate in place of a value: last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol Design), with `last`
     /// the value before and d0..d4 its five newest differences.
     #[cold]
     fn without_value(&mut self) -> i16 {
@@ -187,7 +188,7 @@ impl FastPosition {
         estimate
     }
 
-    /// After the last H-frame of a V-frame: its safe position, `None` if it brought none. That is the position at the sampling
+    /// Takes the safe position of a V-frame after its last H-frame; `None` if it brought none. That is the position at the sampling
     /// edge before the V-frame, 40 bits.
     pub fn align(&mut self, safe: Option<u64>) {
         if let Some(safe) = safe {
@@ -243,7 +244,7 @@ impl FastPosition {
         self.known = Known::Speed;
     }
 
-    /// Whether the speed is beyond what a V-frame can tell.
+    /// Returns whether the speed exceeds what a V-frame can determine.
     const fn is_too_fast(&self) -> bool {
         let sixteenth = 1_i64.wrapping_shl(self.bits.get().saturating_sub(4) as u32);
         let limit = if sixteenth < FASTEST { sixteenth } else { FASTEST };
@@ -251,7 +252,7 @@ impl FastPosition {
         velocity < limit.wrapping_neg() || velocity >= limit
     }
 
-    /// A wrong word can leave a speed that is off by an eighth of the range, on which all safe positions agree.
+    /// A wrong word can leave a speed that is off by an eighth of the range, with which all safe positions agree.
     #[cold]
     fn reduce(&mut self) {
         if let Some(velocity) = self.speed(0, V_FRAME) {
@@ -260,29 +261,29 @@ impl FastPosition {
         }
     }
 
-    /// The real speed if it was off for `frames` frames and the position has got `error` from that. A speed of up to a sixteenth
-    /// of the range a frame is told exactly, for eight frames of it are half a range.
+    /// Returns the real speed if it was off for `frames` frames and this caused an `error` of the position. A speed of up to a
+    /// sixteenth of the range per frame is determined exactly, because eight frames of it are half a range.
     fn speed(&self, error: i64, frames: u32) -> Option<i32> {
         let way = self.signed_of(i64::from(self.velocity).wrapping_mul(frames.into()).wrapping_add(error));
         let speed = divide(way, frames)?;
         if speed.unsigned_abs() > FASTEST.unsigned_abs() { None } else { i32::try_from(speed).ok() }
     }
 
-    /// A word that was wrong has passed its checks, or a frame is lost: only the position is known now.
+    /// Handles a wrong word that has passed its checks, or a lost frame: only the position is known now.
     fn lose(&mut self, error: i64) {
         self.position = self.position.wrapping_add_signed(error);
         self.missing.position_known(&self.missing_here);
         (self.known, self.followed) = (Known::Position, false);
     }
 
-    /// Tells that frames passed of which nothing is known.
+    /// Notes that frames have passed of which nothing is known.
     pub const fn interrupt(&mut self) {
         self.known = Known::Nothing;
         self.followed = false;
     }
 
-    /// There was no answer at all: if the encoder has not heard the head it has not sampled, and its next word is no second difference
-    /// from frame to frame. How far the estimate is off is not known.
+    /// Notes that there was no answer at all. If the encoder has not heard the head, it has not sampled, and its next word is
+    /// not a second difference from frame to frame. It is not known how far the estimate is off.
     pub(crate) const fn unanswered(&mut self) {
         self.followed = false;
     }
@@ -292,10 +293,10 @@ impl FastPosition {
         self.in_a_row
     }
 
-    /// What there is to say after the last H-frame, the number of which is `frame` and whose sampling edge was at `sampled_ns`.
+    /// Returns the evidence after the last H-frame, whose number is `frame` and whose sampling edge was at `sampled_ns`.
     ///
-    /// What is given without a doubt is the truth as long as the real speed stays below a sixteenth of the range a frame (that
-    /// is above 300 000 revolutions a minute for an encoder that counts one turn), and below 2^30 steps a frame.
+    /// A position returned without a doubt is the true one as long as the real speed stays below a sixteenth of the range per
+    /// frame (more than 300 000 revolutions per minute for an encoder that counts one turn), and below 2^30 steps per frame.
     pub const fn evidence(&self, frame: u32, sampled_ns: u64) -> Evidence {
         let doubt = if self.is_too_fast() {
             Some(Doubt::Speed)
@@ -324,13 +325,13 @@ impl FastPosition {
         Evidence { doubt, sample, missing, frames, way }
     }
 
-    /// Whether a register map shows what may be used.
+    /// Returns whether a register map shows what may be used.
     pub(crate) fn is_at(&self, position: u64, velocity: i32) -> bool {
         let agrees = self.signed(position.wrapping_sub(self.position)) == 0 && velocity == self.velocity;
         agrees && self.evidence(0, 0).doubt.is_none()
     }
 
-    /// A difference of positions as a number with a sign.
+    /// Returns a difference of positions as a signed number.
     const fn signed(&self, difference: u64) -> i64 {
         let unused = 64_u32.saturating_sub(self.bits.get() as u32);
         i64::from_le_bytes(difference.wrapping_shl(unused).to_le_bytes()).wrapping_shr(unused)
@@ -341,10 +342,10 @@ impl FastPosition {
     }
 }
 
-/// A way of less than 2^40 divided by 1 to 8 frames; `None` if something remains.
+/// Divides a distance of less than 2^40 by 1 to 8 frames; `None` if there is a remainder.
 ///
-/// The inverse of an odd divisor modulo 2^64 makes the quotient directly; `None` where it is too large. (A division of 64 bits
-/// takes hundreds of instructions.)
+/// The inverse of an odd divisor modulo 2^64 yields the quotient directly; `None` if it is too large. (A 64-bit division takes
+/// hundreds of instructions.)
 const fn divide(way: i64, frames: u32) -> Option<i64> {
     let (halvings, inverse) = match frames {
         1 => (0, 1),

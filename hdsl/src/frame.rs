@@ -7,8 +7,8 @@
 //!                          ^ the encoder samples          1 bit      cable
 //! ```
 //!
-//! The falling edge inside SAMPLE is the instant for which the encoder gives its position. Free running there is no
-//! EXTRA window and no stuffing, and a frame has 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and
+//! The falling edge inside SAMPLE is the instant for which the encoder reports its position. A free-running frame has no EXTRA
+//! window and no stuffing, and takes 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and
 //! 0..=26 stuffing blocks stretch it (HDSL Protocol Design; SICK manual, p. 31).
 
 use nrz_line::Window;
@@ -44,23 +44,23 @@ const FIXED: u32 = 0b1111_0100;
 const TRAILER: u8 = 0b1100_0000;
 
 ranged! {
-    /// The EXTRA window of sync mode: the level is high for 24..=72 eighths of a bit, then low to the end of the bit. The
-    /// number is the place of the falling edge, in eighths after the start of the window.
+    /// The EXTRA window of sync mode: the level is high for 24..=72 eighths of a bit, then low to the end of the bit. The number
+    /// is the place of the falling edge, in eighths from the start of the window.
     pub struct Extra(24..=72);
 }
 
 ranged! {
-    /// Blocks of stuffing after a frame, 0..=26.
+    /// Number of stuffing blocks after a frame, 0..=26.
     pub struct Stuffing(0..=26);
 }
 
 impl Extra {
-    /// Bits that the window occupies, 3..=9.
+    /// Number of bits that the window occupies, 3..=9.
     pub const fn bits(self) -> u8 {
         self.0.div_ceil(8)
     }
 
-    /// EXTRA_EDGE: the samples of the last bit, the first of them in bit 7. 00h means a whole bit of ones.
+    /// EXTRA_EDGE: the samples of the last bit, the first one in bit 7. 00h means a whole bit of ones.
     ///
     /// ```
     /// # use hdsl::frame::Extra;
@@ -71,7 +71,7 @@ impl Extra {
         edge_register(self.0 % 8)
     }
 
-    /// From the falling edge to the end of the window, in ns rounded up.
+    /// Time from the falling edge to the end of the window, in ns rounded up.
     pub(crate) const fn low_ns(self) -> u8 {
         let eighths = self.0.wrapping_neg() % 8;
         // 13 1/3 ns each.
@@ -107,14 +107,14 @@ impl Head {
     /// Bits without an EXTRA window.
     pub const BITS: u32 = 26;
 
-    /// The head for a parameter byte. `before` is the disparity before
-    /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
+    /// Creates the head for a parameter byte. `before` is the disparity before EQUALISATION, including the ones of the EXTRA
+    /// window if there is one (the partly high last bit counts as a one).
     #[inline]
     pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> Self {
         Self::coded(byte, extra, before).0
     }
 
-    /// The same with the line disparity after it.
+    /// Creates the head, and returns it with the line disparity after it.
     #[inline]
     pub(crate) const fn coded(
         byte: ParameterByte,
@@ -153,7 +153,7 @@ impl Head {
         }
     }
 
-    /// The line bits; the last bit of an EXTRA window is a one also when its edge lies inside.
+    /// The line bits; the last bit of an EXTRA window is a one even if its edge lies inside.
     #[inline]
     pub fn bits(self) -> Window {
         // SYNC, the two ones of SAMPLE and those of the window: at most 17 bits, then 18 more.
@@ -181,7 +181,7 @@ impl Head {
         })
     }
 
-    /// What an encoder reads from the line bits of a head. The EQUALISATION bits are not looked at.
+    /// Reads the line bits of a head as an encoder does. The EQUALISATION bits are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::Framing`], and [`Error::InvalidWord`] for a parameter word that is in no table.
@@ -213,9 +213,9 @@ impl Head {
 pub struct ParsedHead {
     /// The parameter byte.
     pub byte: ParameterByte,
-    /// Bits of the EXTRA window; 0 free running.
+    /// Number of bits of the EXTRA window; 0 if free running.
     pub extra_bits: u32,
-    /// Bits of the whole head.
+    /// Number of bits of the whole head.
     pub len: u32,
 }
 
@@ -247,7 +247,7 @@ pub const FILLER: Window = {
 pub enum Trailer {
     /// All eight bits, in frames without an answer.
     Whole,
-    /// The last six after an answer. The line idles during the first two (the specification speaks of five driven
+    /// The last six bits, after an answer. The line idles during the first two (the specification speaks of five driven
     /// zeros, the vendor's receiver drives four).
     AfterAnswer,
     /// The four zeros only: the vendor's receiver breaks off there when a LEARN frame has failed.
@@ -267,7 +267,7 @@ pub struct Tail {
 }
 
 impl Tail {
-    /// Bits of the line time that the tail takes.
+    /// Number of bit times that the tail takes.
     pub const fn time(self) -> u32 {
         let trailer = match self.trailer {
             Trailer::Whole | Trailer::AfterAnswer => TRAILER_BITS,

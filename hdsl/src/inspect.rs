@@ -1,8 +1,8 @@
-//! For tools: looks at an answer or a head that was refused, lists all that is wrong with it and guesses the cause.
+//! For tools: looks at an answer or a head that was refused, lists everything that is wrong with it and guesses the cause.
 //!
-//! A receiver judges channel by channel and goes on; a person at a bench wants to know what became of the whole answer. Here
-//! all words are looked at, the running disparity between them too, and the usual mistakes (wires exchanged, some bits early or
-//! late, half the rate) are undone one by one: the one without which the answer is sound is the cause.
+//! A receiver judges channel by channel and continues; a person at a bench wants to know what happened to the whole answer. Here
+//! all words are checked, as is the running disparity between them, and the usual mistakes (swapped wires, some bits early or
+//! late, half the rate) are undone one by one: the mistake without which the answer is sound is the cause.
 //!
 //! ```
 //! use hdsl::Window;
@@ -43,7 +43,7 @@ pub use head::{
 pub use nrz_line::Cause as LineCause;
 pub use rules::{Beginnings, BrokenRule, HeadRules};
 
-/// What a frame is answered with.
+/// The kind of answer to a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -52,7 +52,7 @@ pub enum Expected {
     TestPattern,
     /// The encoder identifier: IDREQ.
     Identifier,
-    /// An answer of a link that runs.
+    /// An answer of a running link.
     Normal {
         /// Its place in the V-frame, 0..=7, if that is known.
         at: Option<u8>,
@@ -64,9 +64,9 @@ pub enum Expected {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// The line itself was damaged, or is connected or read in a wrong way.
+    /// The line itself was damaged, or is connected or read in the wrong way.
     Line(LineCause),
-    /// The test pattern, where something else was asked for.
+    /// The test pattern, although something else was requested.
     TestPattern,
 }
 
@@ -75,7 +75,7 @@ servowire_core::one_line!(Cause {
     Self::TestPattern => "this is the test pattern: the encoder has not heard what it was asked for";
 });
 
-/// What an inspection found out about an answer.
+/// The result of an inspection of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
@@ -92,19 +92,19 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// What the words say of the running disparity. If there is no other fault and this does not hold, bits of at least one word
-    /// were flipped.
+    /// What the words tell about the running disparity. If there is no other fault and the disparity does not hold, bits of at
+    /// least one word were flipped.
     pub const fn disparity(&self) -> Chain {
         self.disparity
     }
 
-    /// The answer: as received if nothing is wrong, or as it would be without the cause. For display only.
+    /// The answer as received if nothing is wrong, otherwise as it would be without the cause. For display only.
     pub const fn answer(&self) -> Option<Answer> {
         self.answer
     }
 }
 
-/// Inspects line bits that should begin with such an answer; more of them than its 61 let a late one be found.
+/// Inspects line bits that should begin with such an answer; with more than its 61 bits, a late answer can be found.
 pub fn inspect(expected: Expected, line: Window) -> Report {
     let answer = Answer::parse(Rule::Strict, line);
     let error = answer.map_or_else(Some, |answer| wrong(expected, answer));
@@ -123,8 +123,8 @@ pub fn inspect(expected: Expected, line: Window) -> Report {
 /// test pattern.
 pub const PERFECT: usize = 12;
 
-/// How well an answer fits at the beginning of this line: a point for each good word, more for its checks; most for the test
-/// pattern. What is perfect is where it is; of a damaged answer some words may hold a bit beside it by chance.
+/// Returns how well an answer fits at the start of this line: a point for each good word, more for its checks, and most for the
+/// test pattern. A perfect answer is where it should be; with a damaged one, some words may happen to fit one bit away.
 pub fn score(line: Window) -> usize {
     let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
     if answer.bits() == TEST_PATTERN {
@@ -141,7 +141,7 @@ fn low(line: Window) -> u64 {
     u64::from_le_bytes([a, b, c, d, e, f, g, h])
 }
 
-/// Why an answer is refused.
+/// Returns why an answer is refused.
 fn wrong(expected: Expected, answer: Answer) -> Option<Error> {
     match expected {
         Expected::TestPattern => (answer.bits() != TEST_PATTERN).then_some(Error::Pattern),
@@ -167,9 +167,9 @@ fn of_one(error: Error) -> Findings {
     found
 }
 
-/// What is wrong with an answer of a link that runs, in the order in which it is reported.
+/// Returns what is wrong with an answer of a running link, in the order in which it is reported.
 ///
-/// D28.y and K28.y differ in one bit of the line, so a special character where none is due is a flipped bit.
+/// D28.y and K28.y differ in one bit of the line, so an unexpected special character is a flipped bit.
 fn faults(answer: Answer, at: Option<u8>) -> [Option<Error>; 4] {
     let bad_word = answer.words().into_iter().find_map(|word| word.byte().err());
     // The position has five bytes, and five times the same special character where there is none.
@@ -191,7 +191,7 @@ fn is_k28(word: Reading) -> bool {
     word.is_special() && word.byte().is_ok_and(|byte| byte & 31 == 28)
 }
 
-/// The answer, if nothing is wrong with it.
+/// Returns the answer, if nothing is wrong with it.
 fn sound(expected: Expected, line: Window) -> Option<Answer> {
     let answer = Answer::parse(Rule::Strict, line).ok()?;
     let whole = wrong(expected, answer).is_none();
@@ -199,7 +199,7 @@ fn sound(expected: Expected, line: Window) -> Option<Answer> {
     (whole && holds).then_some(answer)
 }
 
-/// The usual mistakes, and the answer without the one that was found.
+/// Looks for the usual mistakes; returns the one found, and the answer without it.
 fn diagnose(expected: Expected, line: Window) -> (Option<Cause>, Option<Answer>) {
     let begin = Window::from_bits(line.bits(), line.len().min(ANSWER_BITS)).unwrap_or(line);
     if let Some(stuck) = LineCause::stuck(begin) {

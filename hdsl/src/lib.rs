@@ -34,7 +34,7 @@ pub mod symbol;
 pub mod sync;
 mod vframe;
 
-/// The step of a sweep of a test: under Miri every `n`-th case, since a whole sweep takes minutes there.
+/// The step width of a test sweep: under Miri every `n`-th case, because a whole sweep takes minutes there.
 #[cfg(test)]
 pub(crate) const fn thin(n: usize) -> usize {
     if cfg!(miri) { n } else { 1 }

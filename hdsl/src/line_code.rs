@@ -1,5 +1,5 @@
-//! The master's part of the line balance: EQUALISATION, and the parameter byte with its polarity chosen by the
-//! line disparity instead of a running disparity.
+//! The master's part of balancing the line: EQUALISATION, and the parameter byte, whose polarity is chosen by the line disparity
+//! instead of a running disparity.
 
 use core::fmt;
 
@@ -8,7 +8,7 @@ use crate::symbol::{FOUR_MORE_ZEROS, NEUTRAL, Rule, SIX_MORE_ZEROS, Word};
 
 /// Ones minus zeros that the master has sent, as its receiver counts them.
 ///
-/// The count is the vendor's book-keeping and not exact: SYNC, SAMPLE and CYCLE RESET are taken as neutral, and so
+/// The count follows the vendor's rule and is not exact: SYNC, SAMPLE and CYCLE RESET are taken as neutral, and so
 /// is an EQUALISATION of 0000 for a disparity of -1..=1. It starts at 0 and returns to 0 with the TRAILER of every
 /// answered frame; in frames without an answer it is carried on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -43,7 +43,7 @@ impl LineDisparity {
     /// Balanced.
     pub const ZERO: Self = Self(0);
 
-    /// With this count.
+    /// Creates the disparity with this count.
     pub const fn new(ones_minus_zeros: i8) -> Self {
         Self(ones_minus_zeros)
     }
@@ -57,12 +57,12 @@ impl LineDisparity {
         Self(self.0.saturating_add(difference))
     }
 
-    /// The count after an EXTRA window with this many ones.
+    /// Returns the count after an EXTRA window with this many ones.
     pub const fn with_ones(self, ones: u8) -> Self {
         self.plus(if ones > 127 { 127 } else { i8::from_le_bytes([ones]) })
     }
 
-    /// The four EQUALISATION bits, and the disparity that counts afterwards.
+    /// Returns the four EQUALISATION bits, and the disparity that counts afterwards.
     ///
     /// ```text
     ///  disparity   bits sent   afterwards
@@ -86,16 +86,16 @@ impl LineDisparity {
         Equalisation { bits, disparity }
     }
 
-    /// The count after a head with this parameter byte; see [`Head::new`](crate::frame::Head::new).
+    /// Returns the count after a head with this parameter byte; see [`Head::new`](crate::frame::Head::new).
     pub const fn after_head(self, byte: ParameterByte) -> Self {
         self.equalisation().disparity.encode(byte).disparity
     }
 
-    /// The word for the parameter byte, and the disparity afterwards.
+    /// Returns the word for the parameter byte, and the disparity afterwards.
     ///
     /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),
-    ///    otherwise the version with more zeros while d >= 0, its inverse while d < 0; d takes up its balance;
-    /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), by the new d, which it does not change.
+    ///    otherwise the version with more zeros if d >= 0, its inverse if d < 0; its balance is added to d;
+    /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), using the new d, which it does not change.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
     pub const fn encode(self, byte: ParameterByte) -> EncodedParameter {
@@ -120,7 +120,7 @@ impl LineDisparity {
 /// The 6-bit block of the word has more zeros.
 const MORE_ZEROS: u16 = 0x8000;
 
-/// The words of all bytes for a balanced line, as it is before every answered frame of a free-running link.
+/// The words of all bytes for a balanced line, as before every answered frame of a free-running link.
 #[expect(clippy::indexing_slicing, reason = "runs at compile time")]
 static BALANCED: [u16; 256] = {
     let mut table = [0; 256];
@@ -136,7 +136,8 @@ static BALANCED: [u16; 256] = {
     table
 };
 
-/// The block itself if it is neutral or `d` wants zeros, else its inverse; and its balance. Neutral blocks are marked in the
+/// Returns the block itself if it is neutral or `d` requires zeros, otherwise its inverse; and its balance. Neutral blocks are
+/// marked in the
 /// tables.
 const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
     if block & NEUTRAL != 0 {
@@ -149,7 +150,7 @@ const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
 }
 
 impl ParameterByte {
-    /// The byte that a word from [`LineDisparity::encode`] stands for, regardless of the disparity; `None` if a
+    /// Returns the byte that a word from [`LineDisparity::encode`] stands for, regardless of the disparity; `None` if a
     /// sub-block is in no table.
     pub const fn decode(word: Word) -> Option<Self> {
         // The sub-block look-ups disregard polarity, as an encoder has to.
@@ -160,7 +161,7 @@ impl ParameterByte {
     }
 }
 
-/// Whether the word is one of those that stand for FFh: 101011 or its inverse, then y = 7.
+/// Returns whether the word is one of those that stand for FFh: 101011 or its inverse, then y = 7.
 const fn is_ff(bits: u16) -> bool {
     let six = matches!(bits & 0x3f, 0b11_0101 | 0b00_1010);
     six && matches!(bits >> 6, 0b0111 | 0b1000 | 0b1110 | 0b0001)

@@ -1,11 +1,11 @@
-//! The receiver as a machine without I/O.
+//! The receiver as a state machine without I/O.
 //!
-//! Every H-frame has two halves. [`Master::transmission`] says what to send from SYNC to PARA and whether an encoder
-//! answers; [`Master::hear`] takes the samples of the answer and says how the frame ends. What it brought is in the
-//! [`HFrame`], from which [`Registers::apply`](crate::registers::Registers::apply) makes the register map.
+//! Every H-frame has two halves. [`Master::transmission`] returns what to send from SYNC to PARA and whether an encoder answers;
+//! [`Master::hear`] takes the samples of the answer and returns how the frame ends. The data of the frame are in the [`HFrame`],
+//! from which [`Registers::apply`](crate::registers::Registers::apply) builds the register map.
 //!
-//! A position to control with comes from [`Master::fast`], the safe one from [`Master::safe`]; both are evidence, which gives a
-//! number only where it may be used.
+//! The position for control comes from [`Master::fast`], the safe one from [`Master::safe`]; both are evidence, which yields a
+//! number only if it may be used.
 //!
 //! ```text
 //!  RESET -> SYNC -> START -> LEARN -> CHECK -> IDREQ -> WAIT VSYNC -> RX0 ... RX7
@@ -14,7 +14,7 @@
 //!  +---- restart: pattern missing or wrong, identifier wrong, link lost, reset asked for
 //! ```
 //!
-//! The firmware loads of the vendor's state diagram have no place here: they are particular to its processor.
+//! The firmware loads of the vendor's state diagram are left out, because they are specific to its processor.
 //!
 //! ```
 //! use hdsl::device::Device;
@@ -62,10 +62,10 @@ use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
 
-/// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
-/// after it, the direction switch, the answer and its reserve.
+/// Number of bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: the rest of
+/// the head, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
-/// Half a free-running frame in ns, and one and a half.
+/// Half and one and a half free-running frames, in ns.
 const HALF_FRAME_NS: u32 = 5_760;
 const FREE_RUNNING_NS: u32 = 3 * HALF_FRAME_NS;
 /// The same time in ns, rounded up.
@@ -77,10 +77,10 @@ const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE a
 pub struct Master {
     dialect: Dialect,
     sync: Option<Synchroniser>,
-    /// Eighths from pulse to pulse, once known.
+    /// Eighths of a bit from pulse to pulse, once known.
     pulse: Option<u32>,
     state: State,
-    /// Frames of the state that are done.
+    /// Number of completed frames of the state.
     done: u8,
     disparity: LineDisparity,
     present: Transmission,
@@ -95,37 +95,38 @@ pub struct Master {
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
-    /// When the window of the last answer was over, and whether frames after it were lost.
+    /// When the window of the last answer ended, and whether frames after it were lost.
     end_ns: u64,
     gap: bool,
-    /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
+    /// Time from the end of a window to that of the next, plus half a frame: if it takes longer, a frame was lost.
     longest_ns: u32,
-    /// Blocks of stuffing after a frame of a running link that is free running, and `longest_ns` of it.
+    /// Number of stuffing blocks after a frame of a free-running link that is up, and the `longest_ns` that belongs to it.
     stuffing: Stuffing,
     usual_ns: u32,
-    /// Steps of a turn for the angle in a sample; 0 if they are not known.
+    /// Steps per turn for the angle in a sample; 0 if not known.
     steps_per_turn: u32,
-    /// From the sampling edge at the master to the sampling in the encoder.
+    /// Time from the sampling edge at the master to the sampling in the encoder.
     latency_ns: u16,
-    /// By how much its sampling edge was before the end of an EXTRA window, in ns.
+    /// How long before the end of an EXTRA window its sampling edge was, in ns.
     edge_ns: u8,
     /// How late the external pulse of the present frame was, in eighths of a bit.
     late: Option<i16>,
-    /// The next head, if it left before this frame's answer was taken in.
+    /// The next head, if it was sent before this frame's answer was processed.
     ahead: Option<Transmission>,
-    /// Why the link is lost, while the frame after the loss is on the line already.
+    /// Why the link was lost, while the frame after the loss is already on the line.
     lost: Option<RestartReason>,
-    /// The frame does not end in the usual way: sync mode, a restart that was asked for, frames lost before it, or one of the two above.
+    /// The frame does not end in the usual way: because of sync mode, a requested restart, frames lost before it, or one of the
+    /// two above.
     detour: bool,
 }
 
 impl Master {
-    /// A free-running receiver at the beginning of the start-up.
+    /// Creates a free-running receiver at the beginning of the start-up.
     pub fn new(dialect: Dialect) -> Self {
         Self::start(dialect, None)
     }
 
-    /// A receiver that keeps its frames on an external pulse.
+    /// Creates a receiver that keeps its frames on an external pulse.
     pub fn synchronised(dialect: Dialect, sync: Synchroniser) -> Self {
         Self::start(dialect, Some(sync))
     }
@@ -165,7 +166,7 @@ impl Master {
         }
     }
 
-    /// What to send at the beginning of the present H-frame.
+    /// Returns what to send at the beginning of the present H-frame.
     pub const fn transmission(&self) -> Transmission {
         self.present
     }
@@ -183,12 +184,12 @@ impl Master {
         }
     }
 
-    /// What the last H-frame brought.
+    /// The data of the last H-frame.
     pub const fn h_frame(&self) -> &HFrame {
         &self.h_frame
     }
 
-    /// What was counted.
+    /// The counts.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
@@ -208,18 +209,18 @@ impl Master {
         self.sync.is_some_and(|sync| sync.is_on_pulse())
     }
 
-    /// In step with the external pulse, see [`Synchroniser::is_in_step`]; `false` when free running.
+    /// Returns whether the frames are in step with the external pulse, see [`Synchroniser::is_in_step`]; `false` when free running.
     pub fn is_in_step(&self) -> bool {
         self.sync.is_some_and(|sync| sync.is_in_step())
     }
 
     /// Takes the samples of the answer, one byte per bit time with the first sample in bit 7, and ends the H-frame.
     ///
-    /// For a frame without an answer the samples are not looked at. `end_ns` is when the [`WINDOW`] bit times were over, on
-    /// the clock of the application: [`fast`](Self::fast) and [`safe`](Self::safe) count from it when a position was sampled.
+    /// For a frame without an answer the samples are ignored. `end_ns` is when the [`WINDOW`] bit times had ended, on the clock
+    /// of the application: [`fast`](Self::fast) and [`safe`](Self::safe) derive the instants of sampling from it.
     ///
     /// # Errors
-    /// [`Error::Truncated`] for fewer than [`WINDOW`] bytes of samples of an answer; nothing has changed then.
+    /// [`Error::Truncated`] for fewer than [`WINDOW`] bytes of samples of an answer; then nothing has changed.
     pub fn hear(&mut self, samples: &[u8], end_ns: u64) -> Result<&HFrame, Error> {
         if self.present.answered && samples.len() < WINDOW {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
@@ -236,8 +237,8 @@ impl Master {
         })
     }
 
-    /// The same with four bytes of samples per word, the first of them in the low bits: what a DMA leaves in the memory of a
-    /// little-endian processor, and fast on one that cannot load words from any address.
+    /// Does the same with four bytes of samples per word, the first one in the low bits, as DMA leaves them in the memory of a
+    /// little-endian processor. It is fast even on one that cannot load words from any address.
     ///
     /// ```
     /// use hdsl::Dialect;
@@ -270,7 +271,7 @@ impl Master {
         }
     }
 
-    /// A frame with the test pattern.
+    /// Handles a frame with the test pattern.
     fn hear_window(&mut self, samples: &[u8; WINDOW]) -> &HFrame {
         match self.alignment {
             Some(alignment) if self.state != State::Start => {
@@ -282,7 +283,7 @@ impl Master {
         }
     }
 
-    /// A START frame.
+    /// Handles a START frame.
     fn learn(&mut self, samples: &[u8]) -> &HFrame {
         self.edges = 0;
         match Alignment::learn(self.dialect.edge, samples) {
@@ -304,10 +305,10 @@ impl Master {
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
     /// ends the H-frame. `signal` is what that front end knows about the quality of the line; without it RSSI does not
-    /// count. In START frames too the bits have to be the test pattern.
+    /// count. In START frames, too, the bits have to be the test pattern.
     ///
-    /// For a frame without an answer the bits are not looked at. `end_ns` is when the [`WINDOW`] bit times were over in which an
-    /// answer can come, whatever the delay of the cable is.
+    /// For a frame without an answer the bits are ignored. `end_ns` is when the [`WINDOW`] bit times had ended in which an
+    /// answer can come, regardless of the delay of the cable.
     ///
     /// ```
     /// use hdsl::device::Device;
@@ -330,13 +331,14 @@ impl Master {
         self.end(bits, signal)
     }
 
-    /// The external pulse of the present frame came this many eighths of a bit after its sampling edge (negative: before it);
-    /// call it before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
+    /// Takes how many eighths of a bit after its sampling edge the external pulse of the present frame came (negative: before
+    /// it). Call this before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
     pub const fn hear_pulse(&mut self, late: i16) {
         self.late = Some(late);
     }
 
-    /// Another H-frame was heard. If it ended too late, a frame was lost that was not reported, and the position with it.
+    /// Notes that another H-frame was heard. If it ended too late, a frame was lost that was not reported, and the position with
+    /// it.
     #[inline]
     fn frame_ends(&mut self, end_ns: u64) {
         let is_late = end_ns.saturating_sub(self.end_ns) > self.longest_ns.into();
@@ -346,7 +348,7 @@ impl Master {
         }
     }
 
-    /// Frames went by of which nobody told.
+    /// Handles lost frames that were not reported.
     #[cold]
     fn interrupt(&mut self) {
         self.note_gap();
@@ -355,25 +357,25 @@ impl Master {
         self.link.interrupt(before_ns);
     }
 
-    /// Frames before the next one are not heard.
+    /// Notes that frames before the next one are not heard.
     const fn note_gap(&mut self) {
         if matches!(self.state, State::Running) {
             (self.gap, self.detour) = (true, true);
         }
     }
 
-    /// From the end of the last window to that of the next one.
+    /// Time from the end of the last window to that of the next one.
     const fn frame_ns(&self) -> u32 {
         self.longest_ns.saturating_sub(HALF_FRAME_NS)
     }
 
-    /// When the encoder sampled in the last H-frame.
+    /// Returns when the encoder sampled in the last H-frame.
     const fn sampled_ns(&self) -> u64 {
         let since_edge_ns = SINCE_EDGE_NS.wrapping_add(self.edge_ns as u64).saturating_sub(self.latency_ns as u64);
         self.end_ns.saturating_sub(since_edge_ns)
     }
 
-    /// A V-frame begins after the present H-frame.
+    /// Notes that a V-frame begins after the present H-frame.
     fn latch(&mut self) {
         self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
         self.link.latch(self.sampled_ns());
@@ -390,7 +392,7 @@ impl Master {
         self.go_on()
     }
 
-    /// What [`end_with`](Self::end_with) comes to on a running link that is free running: the usual end.
+    /// The usual end: what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
     fn go_on(&mut self) -> &HFrame {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
@@ -438,7 +440,7 @@ impl Master {
         &self.h_frame
     }
 
-    /// How the frames of a running link that is free running end, and how long they are.
+    /// Sets how the frames of a free-running link that is up end, and how long they are.
     const fn usual(&mut self) {
         self.longest_ns = self.usual_ns;
         self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };
@@ -490,7 +492,7 @@ impl Master {
         Ok(())
     }
 
-    /// Begins the start-up again. Messages under way end.
+    /// Restarts the start-up. Messages under way end.
     fn begin_again(&mut self) {
         self.counters.restarts = self.counters.restarts.wrapping_add(1);
         (self.state, self.done) = (State::Reset, 0);

@@ -1,4 +1,4 @@
-//! Messages over the parameters channel: one nibble an H-frame in each direction.
+//! Messages over the parameters channel: one nibble per H-frame in each direction.
 //!
 //! ```text
 //!  first byte   bit 7   0 short, 1 long       bit 6   1 read, 0 write
@@ -9,8 +9,8 @@
 //!                                               ->   ADD_H ADD_L [data] CRC CRC
 //! ```
 //!
-//! Each byte goes high nibble first, and at least one IDLE is between two messages. How long an encoder takes for an
-//! answer is not limited.
+//! Each byte is sent high nibble first, with at least one IDLE between two messages. There is no limit to the time that an
+//! encoder takes to answer.
 
 #[cfg(feature = "files")]
 mod access;

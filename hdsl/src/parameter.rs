@@ -1,4 +1,4 @@
-//! The parameters channel: one byte an H-frame in each direction.
+//! The parameters channel: one byte per H-frame in each direction.
 
 use crate::error::Error;
 
@@ -7,7 +7,7 @@ servowire_core::number! {
     pub struct Nibble(u8, 4);
 }
 
-/// Declares what an end can say in bits 4:0 of its parameter byte: four bits of a message, or a code with a name.
+/// Declares what one end can send in bits 4:0 of its parameter byte: four bits of a message, or a named code.
 macro_rules! symbols {
     ($(#[$meta:meta])* pub enum $name:ident { $($(#[$doc:meta])* $symbol:ident = $code:literal => $text:literal,)* }) => {
         $(#[$meta])*
@@ -29,7 +29,7 @@ macro_rules! symbols {
                 }
             }
 
-            /// From the five bits; `None` for a code without a meaning, and for more than five bits.
+            /// Decodes the five bits; `None` for a code without a meaning, and for more than five bits.
             pub const fn from_code(code: u8) -> Option<Self> {
                 Some(match code {
                     nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
@@ -47,21 +47,21 @@ macro_rules! symbols {
 }
 
 symbols! {
-    /// What the master says in bits 4:0 of its parameter byte.
+    /// What the master sends in bits 4:0 of its parameter byte.
     pub enum MasterSymbol {
-        /// 10h: nothing to say.
+        /// 10h: nothing to send.
         Idle = 0x10 => "IDLE",
         /// 19h: synchronise; no answer.
         Sync = 0x19 => "SYNC",
-        /// 1Ah: answer with the test pattern, the delay is being searched.
+        /// 1Ah: answer with the test pattern; the delay is being searched for.
         Start = 0x1a => "START",
         /// 1Bh: answer with the test pattern at the learned delay.
         Learn = 0x1b => "LEARN",
-        /// 1Ch: line check, answer with the test pattern.
+        /// 1Ch: line check; answer with the test pattern.
         Check = 0x1c => "CHECK",
         /// 1Dh: answer with the encoder identifier.
         IdReq = 0x1d => "IDREQ",
-        /// 1Eh: drop all messages; in the start-up also wait for VSYNC.
+        /// 1Eh: drop all messages; during start-up, also wait for VSYNC.
         Init = 0x1e => "INIT",
         /// 1Fh: reset the link; no answer.
         Reset = 0x1f => "RESET",
@@ -69,7 +69,7 @@ symbols! {
 }
 
 impl MasterSymbol {
-    /// Returns whether it belongs to the start-up: frames that are answered by the test pattern or the identifier.
+    /// Returns whether it belongs to the start-up frames that are answered by the test pattern or the identifier.
     pub const fn is_start_up(self) -> bool {
         matches!(self, Self::Start | Self::Learn | Self::Check | Self::IdReq)
     }
@@ -103,7 +103,7 @@ impl ParameterByte {
         Self(raw)
     }
 
-    /// The byte for a symbol, its other bits 0.
+    /// Creates the byte for a symbol, with its other bits 0.
     pub const fn of(symbol: MasterSymbol) -> Self {
         Self(symbol.code())
     }
@@ -148,9 +148,9 @@ impl ParameterByte {
 }
 
 symbols! {
-    /// What the encoder says in bits 4:0 of its parameter byte.
+    /// What the encoder sends in bits 4:0 of its parameter byte.
     pub enum EncoderSymbol {
-        /// 10h: nothing to say.
+        /// 10h: nothing to send.
         Idle = 0x10 => "IDLE",
         /// 15h: the short message was not understood.
         Snak = 0x15 => "SNAK",
@@ -183,7 +183,7 @@ impl EncoderByte {
         Self(raw)
     }
 
-    /// The byte for a symbol, its other bits 0.
+    /// Creates the byte for a symbol, with its other bits 0.
     pub const fn of(symbol: EncoderSymbol) -> Self {
         Self(symbol.code())
     }

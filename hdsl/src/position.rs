@@ -1,5 +1,5 @@
-//! The registers POS and VEL of a receiver: the second differences of the acceleration channel integrated twice, aligned with the
-//! safe position once a V-frame, as the vendors do it.
+//! The registers POS and VEL of a receiver: the second differences of the acceleration channel, integrated twice and aligned
+//! with the safe position once per V-frame, as by the vendors.
 
 use crate::acceleration::DeltaDelta;
 use crate::encoder_id::PositionBits;
@@ -8,25 +8,25 @@ const POSITION: u64 = 0xff_ffff_ffff;
 const VELOCITY: u32 = 0xff_ffff;
 /// How velocity and position are calculated.
 ///
-/// Either way last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 stands in for an acceleration word that cannot be used (HDSL
-/// Protocol Design), rounded towards minus infinity, with `last` the value before and d0..d4 its five newest differences.
+/// By either rule, an unusable acceleration word is replaced by last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol
+/// Design), rounded towards minus infinity, where `last` is the value before and d0..d4 are its five newest differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum PositionRule {
     /// The estimate is limited to the 11 bits of a real value. Positions and their differences are taken modulo the
-    /// width of the position (SICK manual, p. 44). A V-frame tells the velocity modulo an eighth of the range, so after stage 1 it
-    /// is within a sixteenth.
+    /// width of the position (SICK manual, p. 44). A V-frame determines the velocity modulo an eighth of the range, so after
+    /// stage 1 it is within a sixteenth.
     #[default]
     Sick,
-    /// As the firmware of the Motor Control SDK does it.
+    /// As in the firmware of the Motor Control SDK.
     ///
-    /// * The estimate wraps at 16 bits, and goes into the velocity with its sign only if bit 10 is set. While nothing
-    ///   wraps both rules estimate the same.
-    /// * The alignment subtracts positions as 40-bit numbers whatever the width. If the position passes the end of its
-    ///   range in the V-frame of stage 0, the velocity is then wrong by an eighth of the range, and so is the position
-    ///   of seven frames in eight, without any flag.
+    /// * The estimate wraps at 16 bits, and is added to the velocity with its sign only if bit 10 is set. While nothing wraps,
+    /// both rules produce the same estimate.
+    /// * The alignment subtracts positions as 40-bit numbers, whatever their width. If the position passes the end of its range
+    /// in the V-frame of stage 0, the velocity is afterwards wrong by an eighth of the range, and so is the position in seven
+    /// frames out of eight, without any flag.
     Ti,
 }
 
@@ -37,12 +37,12 @@ pub enum PositionRule {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[repr(u8)]
 pub enum AlignmentStage {
-    /// 0: the position is not known; the next safe position is taken over.
+    /// 0: the position is not known; the next safe position is adopted.
     #[default]
     Position = 0,
-    /// 1: the next safe position gives the error of the velocity.
+    /// 1: the next safe position reveals the error of the velocity.
     Velocity = 1,
-    /// 2: one V-frame with right values has to pass.
+    /// 2: one V-frame with correct values has to pass.
     Settle = 2,
     /// 3: aligned; every safe position is compared.
     Check = 3,
@@ -56,20 +56,20 @@ pub enum AlignmentStage {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct PositionRegisters {
-    /// POS4..POS0, 40 bits. By [`PositionRule::Ti`] it can have bits above the width of the encoder right after stages 0 and
+    /// POS4..POS0, 40 bits. With [`PositionRule::Ti`] it can have bits above the width of the encoder right after stages 0 and
     /// 1; the next step removes them.
     pub pos: u64,
     /// VEL2..VEL0 with their sign: the velocity in steps per H-frame, 24 bits.
     pub vel: i32,
-    /// ACC_ERR_CNT without its limit: unusable words since the last usable one.
+    /// ACC_ERR_CNT without its limit: the number of unusable words since the last usable one.
     pub acc_err_cnt: u32,
-    /// The flag POS: an estimated value is in the position, or the last check failed.
+    /// The flag POS: the position contains an estimated value, or the last check failed.
     pub pos_flag: bool,
 }
 
-/// Integrates the acceleration words to velocity and position.
+/// Integrates the acceleration words into velocity and position.
 ///
-/// All arithmetic is modulo the width: 24 bits of velocity in steps an H-frame, 40 bits of position.
+/// All arithmetic is modulo the width: 24 bits of velocity in steps per H-frame, 40 bits of position.
 ///
 /// ```
 /// use hdsl::{DeltaDelta, PositionBits, PositionTracker};
@@ -84,7 +84,7 @@ pub struct PositionRegisters {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionTracker {
     bits: PositionBits,
-    /// As many ones.
+    /// Returns a mask of this many ones.
     mask: u64,
     rule: PositionRule,
     position: u64,
@@ -94,7 +94,7 @@ pub struct PositionTracker {
     last: i16,
     /// Differences between successive values, the newest first.
     history: [i16; 5],
-    /// Position of stage 0, from which stage 1 learns the error of the velocity.
+    /// Position at stage 0, from which stage 1 derives the error of the velocity.
     reference: u64,
     stage: AlignmentStage,
     unreliable: bool,
@@ -102,12 +102,12 @@ pub struct PositionTracker {
 }
 
 impl PositionTracker {
-    /// At standstill at position 0, not aligned.
+    /// Creates a tracker at standstill at position 0, not aligned.
     pub const fn new(bits: PositionBits) -> Self {
         Self::with_rule(bits, PositionRule::Sick)
     }
 
-    /// The same by a rule.
+    /// Creates a tracker that follows a rule.
     pub const fn with_rule(bits: PositionBits, rule: PositionRule) -> Self {
         Self {
             bits,
@@ -125,7 +125,7 @@ impl PositionTracker {
         }
     }
 
-    /// Takes the acceleration of one H-frame; `None` if it cannot be used, so that it is estimated.
+    /// Takes the acceleration of one H-frame; `None` if it cannot be used, in which case it is estimated.
     #[inline]
     pub fn step(&mut self, value: Option<DeltaDelta>) {
         let (added, kept) = match value {
@@ -138,7 +138,7 @@ impl PositionTracker {
         self.integrate(added, kept);
     }
 
-    /// The estimate in the place of a value.
+    /// The estimate in place of a value.
     #[cold]
     fn without_value(&mut self) -> (i32, i16) {
         self.errors = self.errors.saturating_add(1);
@@ -183,7 +183,7 @@ impl PositionTracker {
         }
     }
 
-    /// Compares or aligns with the safe position, after the last H-frame of a V-frame.
+    /// Compares or aligns the position with the safe position, after the last H-frame of a V-frame.
     ///
     /// `safe` is the position at the sampling instant before the V-frame, 40 bits.
     ///
@@ -195,8 +195,8 @@ impl PositionTracker {
     ///  stage 3   safe + relative = pos: aligned; otherwise                  -> 0
     /// ```
     ///
-    /// One V-frame tells the speed modulo an eighth of the range only. The alignment is right for speeds of up to a
-    /// sixteenth of the range a frame; by [`PositionRule::Sick`] the speed is brought into that range.
+    /// One V-frame determines the speed only modulo an eighth of the range. The alignment is right for speeds of up to a
+    /// sixteenth of the range per frame; with [`PositionRule::Sick`] the speed is brought into that range.
     pub fn align(&mut self, safe: u64) {
         let relative = i64::from(self.relative);
         let mask = match self.rule {
@@ -231,7 +231,7 @@ impl PositionTracker {
         self.relative = 0;
     }
 
-    /// Instead of [`align`](Self::align), when the V-frame brought no safe position.
+    /// Call this instead of [`align`](Self::align) if the V-frame brought no safe position.
     pub const fn no_safe_position(&mut self) {
         self.stage = AlignmentStage::Position;
         self.unreliable = true;
@@ -243,7 +243,7 @@ impl PositionTracker {
         self.unreliable = true;
     }
 
-    /// What the registers of the receiver show, usable or not: for register maps, not for a control loop.
+    /// Returns what the registers of the receiver show, usable or not, for register maps and not for a control loop.
     #[inline]
     pub const fn registers(&self) -> PositionRegisters {
         PositionRegisters {
@@ -254,7 +254,7 @@ impl PositionTracker {
         }
     }
 
-    /// The velocity within a sixteenth of the range, where its 24 bits hold more than that.
+    /// Returns the velocity within a sixteenth of the range, if its 24 bits can hold more than that.
     fn reduced(&self) -> u32 {
         let [a, b, c, d, ..] = sign_extend(self.velocity.into(), self.mask >> 3).to_le_bytes();
         let eighth = u32::from(self.bits.get()).saturating_sub(3);
@@ -272,7 +272,7 @@ impl PositionTracker {
     }
 }
 
-/// The low bits that `mask` selects, with the sign of the highest of them.
+/// Returns the low bits that `mask` selects, sign-extended from the highest of them.
 const fn sign_extend(value: u64, mask: u64) -> i64 {
     let unused = mask.leading_zeros();
     i64::from_le_bytes((value << unused).to_le_bytes()) >> unused

@@ -1,9 +1,9 @@
-//! The quality monitor: counts what is right and wrong on the link, and decides when it is lost.
+//! The quality monitor: counts what is right and wrong on the link and decides when the link is lost.
 
 use crate::answer::{ACCELERATION, Answer, BadWords, PARAMETER, PIPE, SECONDARY, VERTICAL};
 use crate::vframe::VFrame;
 
-/// What the quality monitor counts.
+/// The events that the quality monitor counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -11,21 +11,21 @@ use crate::vframe::VFrame;
 pub enum QualityEvent {
     /// VSYNC came in the last H-frame of the V-frame.
     VsyncOk,
-    /// VSYNC did not come there.
+    /// VSYNC did not come in the last H-frame.
     VsyncMissing,
     /// VSYNC came in one of the first seven H-frames.
     VsyncEarly,
     /// Safe channel 1 is right.
     Safe1Ok,
-    /// Safe channel 1 has a bad word or a wrong CRC; once a V-frame.
+    /// Safe channel 1 has a bad word or a wrong CRC; once per V-frame.
     Safe1Error,
-    /// Safe channel 2 has a bad word, or by [`QualityRule::Sick`] a wrong CRC; once a V-frame.
+    /// Safe channel 2 has a bad word, or with [`QualityRule::Sick`] a wrong CRC; once per V-frame.
     Safe2Error,
     /// STATUS2 has TEST2 set; only [`QualityRule::Ti`] counts it.
     Test2,
-    /// A bad word in the parameters or the pipe channel, each.
+    /// A bad word in the parameters or the pipe channel, counted separately.
     ParameterOrPipeWord,
-    /// A bad word in the acceleration channel, once a frame.
+    /// A bad word in the acceleration channel; once per frame.
     AccelerationWord,
     /// A special character that has no meaning in its channel.
     UnknownSpecial,
@@ -33,7 +33,7 @@ pub enum QualityEvent {
     LowRssi,
 }
 
-/// Which table of penalties applies.
+/// The table of penalties that applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -47,7 +47,7 @@ pub enum QualityRule {
 }
 
 impl QualityRule {
-    /// What an event adds.
+    /// The amount that an event adds.
     pub const fn weight(self, event: QualityEvent) -> i8 {
         match (self, event) {
             (_, QualityEvent::VsyncOk | QualityEvent::Safe1Ok) => 1,
@@ -72,7 +72,7 @@ pub struct QualityMonitor {
     rule: QualityRule,
     value: u8,
     lost: bool,
-    /// The penalties for a bad word in the vertical and the secondary channel were given in this V-frame.
+    /// Whether the penalties for a bad word in the vertical and the secondary channel were already applied in this V-frame.
     counted: [bool; 2],
 }
 
@@ -81,15 +81,15 @@ impl QualityMonitor {
     pub const START: u8 = 8;
     /// Below this value the flag QMLW (quality monitor low) is set.
     pub const LOW: u8 = 14;
-    /// The best value.
+    /// The highest value.
     pub const MAX: u8 = 15;
 
-    /// At the start of a link.
+    /// Creates the monitor at the start of a link.
     pub const fn new(rule: QualityRule) -> Self {
         Self { rule, value: Self::START, lost: false, counted: [false; 2] }
     }
 
-    /// Counts an event. A lost link stays lost and its value 0.
+    /// Counts an event. A lost link stays lost, and its value stays 0.
     pub const fn count(&mut self, event: QualityEvent) {
         self.add(self.rule.weight(event));
     }
@@ -141,7 +141,7 @@ impl QualityMonitor {
         bad
     }
 
-    /// The part of [`count_answer`](Self::count_answer) about words.
+    /// The part of [`count_answer`](Self::count_answer) that deals with words.
     #[inline]
     pub(crate) fn count_words(&mut self, at: u8, answer: &Answer) -> u8 {
         if at == 0 {
@@ -150,7 +150,7 @@ impl QualityMonitor {
         if answer.is_plain() { 0 } else { self.count_bad_words(answer) }
     }
 
-    /// The part about VSYNC.
+    /// The part that deals with VSYNC.
     #[inline]
     pub(crate) const fn count_vsync(&mut self, at: u8, vsync: bool) {
         let event = match (at, vsync) {
@@ -162,7 +162,7 @@ impl QualityMonitor {
         self.count(event);
     }
 
-    /// Bad words and special characters without a meaning. All of it takes away, so that one sum is as good as one step each.
+    /// Counts bad words and special characters without a meaning. All of these subtract, so one sum is equivalent to single steps.
     #[cold]
     fn count_bad_words(&mut self, answer: &Answer) -> u8 {
         let ti = self.rule == QualityRule::Ti;
@@ -204,12 +204,12 @@ impl QualityMonitor {
         bad.count_ones().to_le_bytes()[0]
     }
 
-    /// Counts the safe blocks of a V-frame that is complete.
+    /// Counts the safe blocks of a complete V-frame.
     pub fn count_v_frame(&mut self, frame: &VFrame) {
         self.count_blocks(frame.safe1.is_sound(), frame.safe2.is_sound());
     }
 
-    /// The same if it is known whether they are sound.
+    /// Does the same if it is known whether they are sound.
     pub(crate) fn count_blocks(&mut self, sound1: bool, sound2: bool) {
         if sound1 {
             self.count(QualityEvent::Safe1Ok);

@@ -1,6 +1,6 @@
 //! Small numbers whose range is not a power of two.
 
-/// Declares a `u8` from `MIN` to `MAX`, with the same ways in and out as `servowire_core::number!`.
+/// Declares a `u8` from `MIN` to `MAX`, with the same constructors and conversions as `servowire_core::number!`.
 macro_rules! ranged {
     ($(#[$meta:meta])* pub struct $name:ident($min:literal..=$max:literal);) => {
         $(#[$meta])*

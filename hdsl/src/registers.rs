@@ -1,12 +1,12 @@
-//! The register map of the receiver: one byte an address, several bytes with the highest first.
+//! The register map of the receiver: one byte per address; values of several bytes have the highest byte first.
 //!
-//! A [`Registers`] has the addresses of the Motor Control SDK (HDSL register list) by either rule. The SICK IP core has its own: 40h
-//! registers, a bank with those of safe channel 2, POSTX and the flags of the online status beside them. An image of it becomes one
-//! of these with [`Registers::from_core`]; [`RemoteReceiver`] reaches either device by its own map.
+//! A [`Registers`] has the addresses of the Motor Control SDK (HDSL register list), whichever rule it follows. The SICK IP core
+//! has its own map: 40h registers, a bank with those of safe channel 2, and separately POSTX and the flags of the online status.
+//! [`Registers::from_core`] converts an image of it to this map; [`RemoteReceiver`] accesses either device by its own map.
 //!
-//! A [`Registers`] is an image of that map. Beside a [`Master`](crate::master::Master) it is kept up to date with
-//! [`Registers::apply`] and takes what an application writes with [`Registers::write`]. The image of a foreign receiver,
-//! for example the memory of the SDK's firmware, becomes one with [`Registers::from_bytes`].
+//! A [`Registers`] is an image of that map. Next to a [`Master`](crate::master::Master), [`Registers::apply`] keeps it up to
+//! date and [`Registers::write`] takes what an application writes. [`Registers::from_bytes`] creates it from the image of
+//! another receiver, for example the memory of the SDK's firmware.
 //!
 //! ```
 //! use hdsl::Dialect;
@@ -51,11 +51,11 @@ pub struct Registers {
     pipe: PipeFifo,
     /// POS and VEL by the rule of the dialect.
     tracker: PositionTracker,
-    /// What may be used of them; none of a foreign image.
+    /// What may be used of them; nothing from the image of another receiver.
     fast: Option<FastPosition>,
     /// The blocks of a V-frame, which are shown one H-frame after its end.
     v_frame: Option<VFrame>,
-    /// The last good safe position, or none because the encoder had none.
+    /// The last good safe position, or `None` because the encoder had none.
     last_safe: Option<u64>,
 }
 
@@ -63,7 +63,7 @@ impl Registers {
     /// Bytes of the map.
     pub const LEN: usize = 0x56;
 
-    /// As after power-up: the flags of a restart are set.
+    /// Creates the map as after power-up: the flags of a restart are set.
     pub fn new(dialect: &Dialect) -> Self {
         let mut all = Self::from_bytes(dialect, [0; Self::LEN]);
         all.put(Register::Version, [0x10]);
@@ -80,7 +80,7 @@ impl Registers {
         all
     }
 
-    /// An image that was read from somewhere else.
+    /// Creates the map from an image that was read elsewhere.
     pub const fn from_bytes(dialect: &Dialect, bytes: [u8; Self::LEN]) -> Self {
         Self {
             bytes,
@@ -93,12 +93,12 @@ impl Registers {
         }
     }
 
-    /// Registers of the SICK core, without those of the encoder.
+    /// Number of registers of the SICK core, without those of the encoder.
     pub const CORE_LEN: usize = 0x40;
 
-    /// An image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if that was read. The online
-    /// status is no register there. Of its flags POS is set here, since it is unknown whether the fast position is aligned, so
-    /// [`pos`](Self::pos) gives none; all others are clear.
+    /// Creates the map from an image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if
+    /// that was read. The online status is not a register there. Of its flags, POS is set here, because it is unknown whether
+    /// the fast position is aligned, so [`pos`](Self::pos) returns none; all others are clear.
     pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
         let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
         for (address, byte) in (0..).zip(drive) {
@@ -118,19 +118,19 @@ impl Registers {
         &self.bytes
     }
 
-    /// One byte; `None` after the end of the map.
+    /// Returns one byte; `None` after the end of the map.
     pub fn byte(&self, address: u8) -> Option<u8> {
         self.bytes.get(usize::from(address)).copied()
     }
 
-    /// Sets one byte. After the end of the map nothing happens.
+    /// Sets one byte; does nothing after the end of the map.
     fn set_byte(&mut self, address: u8, value: u8) {
         if let Some(byte) = self.bytes.get_mut(usize::from(address)) {
             *byte = value;
         }
     }
 
-    /// The bytes of a register that is `N` wide, the highest first.
+    /// Returns the bytes of a register that is `N` bytes wide, the highest first.
     #[inline]
     pub fn get<const N: usize>(&self, register: Register) -> [u8; N] {
         let bytes = self.bytes.get(register as usize..).and_then(<[u8]>::first_chunk);
@@ -166,9 +166,9 @@ impl Registers {
         qm & 15
     }
 
-    /// POS4..POS0: the fast position, 40 bits, if it may be used: the link is up and POS is clear, and in a map that is kept with
-    /// [`apply`](Self::apply) what [`Master::fast`](crate::master::Master::fast) gives is the same. A receiver that is
-    /// elsewhere can show a position that is not aligned without saying so.
+    /// POS4..POS0: the fast position, 40 bits, if it may be used: the link is up, POS is clear, and in a map that is kept up to
+    /// date with [`apply`](Self::apply), [`Master::fast`](crate::master::Master::fast) returns the same position. A remote
+    /// receiver can show an unaligned position without saying so.
     pub fn pos(&self) -> Option<u64> {
         self.shown().map(|(pos, _)| pos)
     }

@@ -25,9 +25,9 @@ macro_rules! addresses {
 addresses! {
     /// Node of all resources.
     ROOT = 0x000,
-    /// Node of what identifies the encoder.
+    /// Node of the identification of the encoder.
     IDENT = 0x001,
-    /// Node of what is monitored.
+    /// Node of monitoring.
     MONITOR = 0x002,
     /// Node of administration.
     ADMIN = 0x003,
@@ -35,9 +35,9 @@ addresses! {
     COUNTER = 0x004,
     /// Kind of encoder, 2 bytes: 0 rotary bipolar, 1 linear bipolar, 2 rotary unipolar, 3 linear unipolar.
     ENCTYPE = 0x080,
-    /// Steps a turn, 4 bytes; of a linear encoder the step in nm.
+    /// Steps per turn, 4 bytes; for a linear encoder, the step in nm.
     RESOLUTN = 0x081,
-    /// Turns that are coded, 4 bytes; of a linear encoder the steps.
+    /// Number of coded turns, 4 bytes; for a linear encoder, the number of steps.
     RANGE = 0x082,
     /// Type code, 18 characters.
     TYPECODE = 0x083,
@@ -47,23 +47,23 @@ addresses! {
     FWREVNO = 0x085,
     /// Date of the firmware, 8 characters.
     FWDATE = 0x086,
-    /// Bytes of the user memory, 2 bytes.
+    /// Size of the user memory in bytes, 2 bytes.
     EESIZE = 0x087,
-    /// Least and greatest temperature, 2 bytes each, in 0.1 °C.
+    /// Lowest and highest temperature, 2 bytes each, in 0.1 °C.
     TEMPRNG = 0x0c0,
-    /// Temperature, 2 bytes, in 0.1 °C, new every second.
+    /// Temperature, 2 bytes, in 0.1 °C, updated every second.
     TEMPRTUR = 0x0c1,
     /// Supply voltage, 2 bytes, in mV.
     SUPVOLT = 0x0c5,
-    /// Greatest speed, 2 bytes, in revolutions a minute.
+    /// Highest speed, 2 bytes, in revolutions per minute.
     SPEEDRNG = 0x0c6,
-    /// Speed, 2 bytes, in revolutions a minute, new every second.
+    /// Speed, 2 bytes, in revolutions per minute, updated every second.
     SPEED = 0x0c7,
-    /// Greatest acceleration, 2 bytes, in 1000 rad/s².
+    /// Highest acceleration, 2 bytes, in 1000 rad/s².
     ACCRANGE = 0x0c8,
-    /// Error log, 16 bytes an entry.
+    /// Error log, 16 bytes per entry.
     ERRORLOG = 0x0cc,
-    /// Usage histogram, 4 bytes a class.
+    /// Usage histogram, 4 bytes per class.
     USAGEHIS = 0x0cd,
     /// **Reset or shut-down of the encoder**, see `LongRequest::reset_encoder` (feature `files`).
     RESET = 0x100,
@@ -71,7 +71,7 @@ addresses! {
     COUNTDIR = 0x102,
     /// Access level and its key, 8 bytes.
     SETACCESS = 0x104,
-    /// **Change of an access key**; a key that is lost cannot be had back.
+    /// **Change of an access key**; a lost key cannot be recovered.
     CHANGEKEY = 0x105,
     /// User-defined warnings, 8 bytes each.
     UWARNING = 0x107,
@@ -85,7 +85,7 @@ addresses! {
     RESETCNT = 0x122,
     /// Name of the user file to work with, 8 characters.
     LOADFILE = 0x130,
-    /// Contents of the loaded file; the offset is the address in it.
+    /// Contents of the loaded file; the offset is the address within it.
     RWFILE = 0x131,
     /// Rights and size of the loaded file, 4 bytes.
     FILESTAT = 0x132,
@@ -97,7 +97,7 @@ addresses! {
     ACCESSIO = 0x200,
 }
 
-/// The address as the manual writes it, with its name: `081h RESOLUTN`.
+/// Displays the address as the manual writes it, with its name: `081h RESOLUTN`.
 #[derive(Clone, Copy)]
 pub(crate) struct Named(pub(crate) ResourceAddress);
 
@@ -123,7 +123,7 @@ pub struct ResourceError {
     detail: u8,
 }
 
-/// What kind of thing went wrong. The class also shows in ENC_ST4: bit 0 for 40h to bit 3 for 43h.
+/// The kind of fault. The class also appears in ENC_ST4: bit 0 for 40h to bit 3 for 43h.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

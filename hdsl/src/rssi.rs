@@ -1,17 +1,17 @@
-//! Signal quality from the places of the edges in the sample byte.
+//! Signal quality, derived from the positions of the edges in the sample byte.
 
 use crate::ranged::ranged;
 
 ranged! {
     /// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
     ///
-    /// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
-    /// sample periods; 0 for G <= 2.
+    /// It is 12 with no edge or one, otherwise 2 (G - 2) for the longest gap G between neighbouring edges, counted cyclically
+    /// over the eight sample periods; 0 for G <= 2.
     pub struct Rssi(0..=12);
 }
 
 impl Rssi {
-    /// Of an edge byte, see [`edges`].
+    /// Returns the RSSI of an edge byte, see [`edges`].
     ///
     /// ```
     /// use hdsl::rssi::{Rssi, edges};
@@ -24,19 +24,19 @@ impl Rssi {
         Self::of_ones(ONES[edges as usize])
     }
 
-    /// Half of it, as a row of that many ones: the smaller of two is their bitwise and.
+    /// Half of it, as a row of that many ones, so that the smaller of two is their bitwise AND.
     #[expect(clippy::cast_possible_truncation, reason = "at most six ones")]
     pub(crate) const fn of_ones(ones: u8) -> Self {
         Self(2_u8.wrapping_mul(ones.count_ones() as u8))
     }
 }
 
-/// Where the level changes in a byte of samples: bit 7 for a change before the first sample.
+/// Returns where the level changes in a byte of samples: bit 7 for a change before the first sample.
 pub const fn edges(previous: bool, samples: u8) -> u8 {
     samples ^ (samples >> 1 | (previous as u8) << 7)
 }
 
-/// The longest distance between neighbouring edges, counted round the byte: 8 with one edge, `None` without.
+/// Returns the longest distance between neighbouring edges, counted cyclically over the byte: 8 with one edge, `None` without any.
 pub const fn longest_gap(edges: u8) -> Option<u8> {
     if edges == 0 {
         return None;
@@ -57,7 +57,7 @@ pub const fn longest_gap(edges: u8) -> Option<u8> {
     Some(longest.to_le_bytes()[0])
 }
 
-/// Of a bit time with one edge or none.
+/// The value for a bit time with one edge or none.
 const PERFECT: u8 = 0x3f;
 
 /// Half the RSSI of an edge byte, as a row of that many ones.
@@ -76,7 +76,7 @@ static ONES: [u8; 256] = {
     table
 };
 
-/// Collects edges over bit times: for [`Rssi`] and the register EDGES (SICK manual, p. 41).
+/// Collects edges over bit times, for [`Rssi`] and the register EDGES (SICK manual, p. 41).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EdgeWatch {
@@ -87,7 +87,7 @@ pub struct EdgeWatch {
 }
 
 impl EdgeWatch {
-    /// `previous` is the level of the sample before the first byte.
+    /// Starts with `previous`, the level of the sample before the first byte.
     pub const fn new(previous: bool) -> Self {
         Self { previous, seen: 0, ones: PERFECT }
     }
@@ -106,13 +106,13 @@ impl EdgeWatch {
         Rssi::of_ones(self.ones)
     }
 
-    /// Sample periods in which an edge was seen, by the bits of the register EDGES: bit n stands for period n.
+    /// The sample periods in which an edge was seen, as bits of the register EDGES: bit n stands for period n.
     pub const fn edges(self) -> u8 {
         self.seen.reverse_bits()
     }
 }
 
-/// An [`EdgeWatch`] over four bit times at once, the first sample of them in bit 31.
+/// An [`EdgeWatch`] over four bit times at once, the first sample in bit 31.
 #[derive(Clone, Copy)]
 pub(crate) struct WordWatch {
     previous: u32,
@@ -121,7 +121,7 @@ pub(crate) struct WordWatch {
 }
 
 impl WordWatch {
-    /// `previous` are the samples before the first word.
+    /// Starts with `previous`, the samples before the first word.
     pub(crate) const fn after(previous: u32) -> Self {
         Self { previous, seen: 0, ones: PERFECT }
     }
@@ -140,7 +140,7 @@ impl WordWatch {
         }
     }
 
-    /// After the first `bytes` + 1 bytes of the last word.
+    /// Returns the result after the first `bytes` + 1 bytes of the last word.
     pub(crate) const fn finish(self, bytes: u8) -> EdgeWatch {
         let [a, b, c, d] = self.seen.to_le_bytes();
         let last = self.previous.wrapping_shr(24_u32.wrapping_sub((bytes as u32).wrapping_mul(8)));
@@ -148,7 +148,8 @@ impl WordWatch {
     }
 }
 
-/// The lowest RSSI, as a row of that many ones, of the bit times in four words after the one with the samples before them.
+/// Returns the lowest RSSI, as a row of that many ones, of the bit times in four words, which follow the word with the samples
+/// before them.
 #[inline(always)]
 pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -> u8 {
     let (mut previous, mut ones) = (before, PERFECT);
@@ -169,7 +170,7 @@ fn of_four(edges: u32) -> u8 {
     at(0) & at(8) & at(16) & at(24)
 }
 
-/// Four bit times one of which has several edges. What is as bad as it can be does not become worse.
+/// Handles four bit times, one of which has several edges. A value that is already the lowest cannot become lower.
 #[cold]
 #[inline(never)]
 fn several(seen: u32, ones: u8, edges: u32) -> (u32, u8) {

@@ -1,7 +1,7 @@
-//! From 75 MHz samples to bits: where to sample, how long the cable delays the answer, how good the edges are.
+//! Converts 75 MHz samples to bits: where to sample, how long the cable delays the answer, and how good the edges are.
 //!
-//! Reception begins one bit after the end of PARA. A byte holds the eight samples of one bit time of the master, the
-//! first of them in bit 7. The line is high until the encoder drives it.
+//! Reception begins one bit after the end of PARA. A byte holds the eight samples of one bit time of the master, the first one
+//! in bit 7. The line is high until the encoder drives it.
 
 mod gather;
 
@@ -11,7 +11,7 @@ use crate::ranged::ranged;
 use crate::rssi::{EdgeWatch, Rssi, edges, lowest};
 use gather::{Gather, Words};
 
-/// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
+/// Number of bytes of samples that a receiver takes for one answer: 61 bits and room for a delay of up to 11.
 pub const WINDOW: usize = 72;
 
 /// The test pattern that the encoder answers during START, LEARN and CHECK, first line bit in bit 0.
@@ -34,12 +34,12 @@ pub const TEST_PATTERN: u64 = {
 };
 
 servowire_core::number! {
-    /// The place in every byte of samples where the bit is taken, 0..=7; 0 is the first sample in time.
+    /// The index in every byte of samples at which the bit is taken, 0..=7; 0 is the first sample in time.
     pub struct SampleIndex(u8, 3);
 }
 
 ranged! {
-    /// Bits before an answer, 0..=11: the delay of the cable there and back, about 100 ns or 10 m each.
+    /// Number of bits before an answer, 0..=11: the round-trip delay of the cable, about 100 ns or 10 m per bit.
     pub struct Delay(0..=11);
 }
 
@@ -57,8 +57,8 @@ impl SampleIndex {
         Self::truncate((byte.count_ones() as u8).wrapping_add(4))
     }
 
-    /// The same for a byte that holds a rising edge, as the design document draws it: there the formula counts from
-    /// the last sample.
+    /// Does the same for a byte that holds a rising edge, as drawn in the design document, where the formula counts from the
+    /// last sample.
     ///
     /// ```
     /// use hdsl::sampling::SampleIndex;
@@ -69,13 +69,13 @@ impl SampleIndex {
         Self::truncate(7_u8.wrapping_sub(Self::after_falling_edge(byte).get()))
     }
 
-    /// The bit that a byte of samples stands for.
+    /// Returns the bit that a byte of samples stands for.
     #[inline]
     pub const fn bit(self, samples: u8) -> bool {
         samples >> (7 & !self.get()) & 1 == 1
     }
 
-    /// The first 128 bits of a line, the first of them in bit 0.
+    /// Returns the first 128 bits of a line, the first one in bit 0.
     pub fn bits(self, samples: &[u8]) -> u128 {
         let mut parts = [0; 4];
         for (part, bytes) in parts.iter_mut().zip(samples.chunks(32)) {
@@ -85,7 +85,7 @@ impl SampleIndex {
         a | b << 32 | c << 64 | d << 96
     }
 
-    /// The bits of up to 32 bytes, the first in bit 0.
+    /// Returns the bits of up to 32 bytes, the first in bit 0.
     #[inline]
     fn word(self, samples: &[u8]) -> u32 {
         let mut words = samples.chunks_exact(4);
@@ -104,7 +104,7 @@ impl SampleIndex {
     }
 }
 
-/// How the first falling edge is read from its byte.
+/// How the first falling edge is derived from its byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -113,8 +113,8 @@ pub enum EdgeRule {
     /// The ones before the edge count.
     #[default]
     Leading,
-    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the
-    /// next one comes a sample early, a one from after it is counted and the pattern is not found.
+    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the next edge
+    /// comes a sample early, a one after that edge is counted too, and the pattern is not found.
     All,
 }
 
@@ -129,7 +129,7 @@ pub struct Alignment {
     pub delay: Delay,
 }
 
-/// An answer taken out of its samples.
+/// An answer extracted from its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SampledAnswer {
@@ -140,11 +140,11 @@ pub struct SampledAnswer {
 }
 
 impl Alignment {
-    /// Finds the sampling index from the first falling edge, and the delay from the place of the test pattern.
+    /// Finds the sampling index from the first falling edge, and the delay from the position of the test pattern.
     ///
-    /// The vendor's receiver begins at a delay of 1; at 0 m encoder and transceivers need most of a bit anyway.
+    /// The vendor's receiver begins at a delay of 1; even at 0 m, encoder and transceivers need most of a bit.
     ///
-    /// `samples` holds a byte a bit time, the first sample in bit 7; [`WINDOW`] of them allow every delay.
+    /// `samples` holds one byte per bit time, the first sample in bit 7; [`WINDOW`] of them allow for every delay.
     ///
     /// # Errors
     /// [`Error::Truncated`] for fewer than 61 bytes, [`Error::NoEdge`] if the line stayed high,
@@ -191,12 +191,12 @@ impl Alignment {
         }
     }
 
-    /// The same of a whole window.
+    /// Does the same for a whole window.
     pub(crate) fn read_window(self, samples: &[u8; WINDOW]) -> SampledAnswer {
         Words::of_bytes(samples, self.delay).read(self)
     }
 
-    /// The same of words of four bytes each, the first byte in the low bits: for processors that load whole words only.
+    /// Does the same for words of four bytes each, the first byte in the low bits, for processors that load only whole words.
     pub fn read_words(self, samples: &[u32; WINDOW / 4]) -> SampledAnswer {
         Words::of_words(samples, self.delay).read(self)
     }
@@ -210,7 +210,7 @@ impl Alignment {
         answer.fold((0, before), fold).0.reverse_bits()
     }
 
-    /// The bits of an answer, and the RSSI of a quarter of them, 0..=3.
+    /// Returns the bits of an answer, and the RSSI of one `quarter` of them, 0..=3.
     #[inline]
     pub(crate) fn read_quarter(self, samples: &[u8; WINDOW], quarter: u8) -> (u64, Rssi) {
         let at = usize::from(self.delay.get() & !3).saturating_add(usize::from(quarter).wrapping_mul(16));
@@ -223,7 +223,7 @@ impl Alignment {
         (Words::of_bytes(samples, self.delay).bits(self), self.quarter(before, words, quarter))
     }
 
-    /// The same of words.
+    /// Does the same for words.
     #[inline]
     pub(crate) fn read_quarter_words(self, samples: &[u32; WINDOW / 4], quarter: u8) -> (u64, Rssi) {
         let at = usize::from(self.delay.get() / 4).saturating_add(usize::from(quarter).wrapping_mul(4));
@@ -242,7 +242,7 @@ impl Alignment {
         Rssi::of_ones(lowest(before, words.zip([begin, u32::MAX, u32::MAX, end])))
     }
 
-    /// The same of fewer bytes than a window has, which may be enough for a short delay.
+    /// Does the same for fewer bytes than a window has, which may be enough for a short delay.
     #[cold]
     fn read_short(self, samples: &[u8]) -> Result<SampledAnswer, Error> {
         room(samples, self.delay)?;
@@ -262,7 +262,7 @@ impl Alignment {
     }
 }
 
-/// How many bytes there are beyond those of an answer that begins after `delay`; 255 at most.
+/// Returns how many bytes there are beyond those of an answer that begins after `delay`; 255 at most.
 fn room(samples: &[u8], delay: Delay) -> Result<u8, Error> {
     let want = usize::from(delay.get()).saturating_add(ANSWER_BITS as usize);
     let rest = samples.len().checked_sub(want).ok_or_else(|| short(samples, delay))?;
@@ -288,8 +288,8 @@ const fn low61(line: u128) -> u64 {
     line as u64 & (u64::MAX >> 3)
 }
 
-/// The samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
-/// after it: what [`Alignment::bits`] takes apart.
+/// Creates the samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
+/// after it: the input of [`Alignment::bits`].
 ///
 /// ```
 /// use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};

@@ -1,6 +1,6 @@
-//! 8b/10b words: what every byte of the link is sent as.
+//! 8b/10b words, as which every byte of the link is sent.
 //!
-//! The word goes out in the order `a b c d e i f g h j`; `a` belongs to bit 0 of the byte (HDSL Protocol Design).
+//! The word is sent in the order `a b c d e i f g h j`; `a` belongs to bit 0 of the byte (HDSL Protocol Design).
 //! A [`Word`] holds it with `a` in bit 0, so that nothing is ever reversed.
 //!
 //! ```text
@@ -20,7 +20,7 @@ pub(crate) use table::{FOUR_MORE_ZEROS, NEUTRAL, SIX_MORE_ZEROS};
 use crate::error::Error;
 
 servowire_core::number! {
-    /// Ten bits of the line, the first of them (`a`) in bit 0.
+    /// Ten bits of the line, the first one (`a`) in bit 0.
     pub struct Word(u16, 10);
 }
 
@@ -31,7 +31,7 @@ impl Word {
         i8::from_le_bytes([ones]).wrapping_mul(2).wrapping_sub(10)
     }
 
-    /// What the word stands for by the tables of the code; `None` if it is in neither column.
+    /// Returns what the word stands for by the tables of the code; `None` if it is in neither column.
     ///
     /// ```
     /// use hdsl::symbol::{Character, Control, Word};
@@ -43,7 +43,7 @@ impl Word {
         if entry & INVALID != 0 { None } else { Some(Character(entry & 0x1ff)) }
     }
 
-    /// K28.1, 2, 5 and 6 of column RD+.
+    /// Returns whether the word is K28.1, 2, 5 or 6 of column RD+.
     const fn is_crossed_k28(self) -> bool {
         let k28_plus = self.get() & 63 == 0b00_0011;
         // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
@@ -55,7 +55,7 @@ impl Word {
         self.entry() & column.flag() != 0
     }
 
-    /// How a receiver reads the word by `rule`.
+    /// Returns how a receiver reads the word by `rule`.
     #[inline]
     pub const fn read(self, rule: Rule) -> Reading {
         Reading::new(rule.table().entry(self), self)
@@ -87,7 +87,7 @@ impl RunningDisparity {
         }
     }
 
-    /// The other one.
+    /// Returns the opposite sign.
     pub const fn other(self) -> Self {
         match self {
             Self::Minus => Self::Plus,
@@ -100,7 +100,7 @@ impl RunningDisparity {
     }
 }
 
-/// A character as it goes out.
+/// A character as it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -154,7 +154,7 @@ impl Character {
         Self(control as u16 | SPECIAL)
     }
 
-    /// Byte and kind; `None` if `k` is set and there is no such special character.
+    /// Creates a character from byte and kind; `None` if `k` is set and there is no such special character.
     pub(crate) fn new(byte: u8, k: bool) -> Option<Self> {
         match (k, CONTROLS.contains(&byte)) {
             (false, _) => Some(Self::data(byte)),
@@ -173,7 +173,7 @@ impl Character {
         self.0 & SPECIAL != 0
     }
 
-    /// The word in the column of `rd`.
+    /// Returns the word in the column of `rd`.
     ///
     /// ```
     /// use hdsl::symbol::{Character, RunningDisparity};
@@ -221,16 +221,16 @@ servowire_core::one_line!(Character {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Rule {
-    /// By the tables: 464 of the 1024 words are good, each stands for one character.
+    /// By the tables: 464 of the 1024 words are good, and each stands for one character.
     #[default]
     Strict,
-    /// As the receiver firmware of the AM243x Motor Control SDK does it, which looks at runs of equal bits only.
+    /// As in the receiver firmware of the AM243x Motor Control SDK, which checks only for runs of equal bits.
     ///
     /// * byte error: a = b = c = d, or e = i = f = g = h;
     /// * special: c = d = e = i, or e, i, g, h, j = 0, 1, 1, 1, 1 or 1, 0, 0, 0, 0;
     /// * value: both sub-blocks looked up without regard to disparity, FFh if either is in no table.
     ///
-    /// Words that are in no table can pass, and some good words read as special.
+    /// Words that are in no table can pass, and some good words are read as special.
     Reduced,
 }
 
@@ -245,13 +245,13 @@ impl Rule {
     }
 }
 
-/// What a receiver makes of a word: value in bits 7:0, flags above.
+/// How a receiver reads a word: value in bits 7:0, flags above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Entry(u16);
 
 impl Entry {
-    /// The value that the look-ups give.
+    /// The value from the look-ups.
     #[inline]
     pub(crate) const fn raw(self) -> u8 {
         self.0.to_le_bytes()[0]
@@ -274,8 +274,8 @@ impl Entry {
         self.0 & INVALID != 0
     }
 
-    /// The same word read in the secondary channel, where the reduced rule puts K28.1, 2, 5 and 6 of column RD+
-    /// right. By the strict rule nothing is to be put right.
+    /// Returns the same word as read in the secondary channel, where the reduced rule corrects K28.1, 2, 5 and 6 of column RD+.
+    /// With the strict rule nothing needs correcting.
     #[inline]
     pub(crate) const fn in_secondary(self, rule: Rule, word: Word) -> Self {
         if matches!(rule, Rule::Reduced) && word.is_crossed_k28() { Self(self.0 ^ 0b1110_0000) } else { self }
@@ -312,7 +312,7 @@ impl Reading {
         self.entry.0 & SPECIAL != 0
     }
 
-    /// The value that the look-ups give, also for a bad word: FFh if a sub-block is in no table.
+    /// The value from the look-ups, even for a bad word: FFh if a sub-block is in no table.
     ///
     /// Registers of the receiver take this value; for anything else see [`byte`](Self::byte).
     #[inline]
@@ -382,7 +382,7 @@ pub struct DisparityCheck {
 }
 
 impl DisparityCheck {
-    /// Begins with this running disparity.
+    /// Starts with this running disparity.
     pub const fn new(rd: RunningDisparity) -> Self {
         Self { rd }
     }
@@ -393,7 +393,7 @@ impl DisparityCheck {
     }
 
     /// Judges the next word. After a word of the other column it continues from that column's result; after a word of neither
-    /// the sign of the word's own disparity counts, if it has one.
+    /// column, the sign of the word's own disparity counts, if it has one.
     pub fn step(&mut self, word: Word) -> DisparityStatus {
         let other = self.rd.other();
         if word.is_in(self.rd) {

@@ -1,8 +1,7 @@
 //! Synchronising the H-frames with an external pulse.
 //!
-//! The rising edge of the pulse and the falling edge inside the EXTRA window shall coincide, in every ES-th frame. The
-//! master reaches that with eighths of a bit in the window and, where those do not suffice, with stuffing blocks of
-//! six bits.
+//! The rising edge of the pulse and the falling edge inside the EXTRA window should coincide in every ES-th frame. The master
+//! achieves this with eighths of a bit in the window and, if those do not suffice, with stuffing blocks of six bits.
 //!
 //! ```text
 //!                     b eighths
@@ -12,7 +11,7 @@
 //! ```
 //!
 //! * [`ExtraWindow`] is the step from one frame to the next (HDSL Protocol Design);
-//! * [`Synchroniser`] puts both together for any ES and corrects by the measured time between pulse and edge.
+//! * [`Synchroniser`] combines both for any ES and corrects by the measured time between pulse and edge.
 
 use crate::error::Error;
 use crate::frame::{Extra, H_FRAME_BITS, STUFFING_BITS, Stuffing};
@@ -26,11 +25,11 @@ const _: () = assert!(STUFFING_BITS == 6 && FRAME == 864);
 
 /// The EXTRA window and the stuffing of the next frame, and how they follow from the present ones.
 ///
-/// With b the place of the edge in eighths, t = b reduced to 1..=8 and W the constant TIME_EXTRA_WINDOW, the next edge
-/// is at W - (8 - t). If that is outside 24..=71 eighths, six bits move between the window and the stuffing.
+/// Let b be the position of the edge in eighths, t = b reduced to 1..=8, and W the constant TIME_EXTRA_WINDOW; the next edge is
+/// then at W - (8 - t). If that is outside 24..=71 eighths, six bits are moved between the window and the stuffing.
 ///
-/// 48 N + W never changes, and the time from edge to edge is 864 + 48 N + W eighths. For that the limiter has to act
-/// before the stuffing of the present frame is sent: see [`Synchroniser::next`].
+/// 48 N + W never changes, and the time from edge to edge is 864 + 48 N + W eighths. For this, the limiter has to act before the
+/// stuffing of the present frame is sent; see [`Synchroniser::next`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ExtraWindow {
@@ -40,7 +39,7 @@ pub struct ExtraWindow {
 }
 
 impl ExtraWindow {
-    /// `window` is TIME_EXTRA_WINDOW in eighths; the window of the first frame has its edge at `edge`.
+    /// Creates the state. `window` is TIME_EXTRA_WINDOW in eighths; the window of the first frame has its edge at `edge`.
     pub const fn new(edge: Extra, stuffing: Stuffing, window: i16) -> Self {
         Self { edge, stuffing, window }
     }
@@ -50,7 +49,7 @@ impl ExtraWindow {
         self.edge
     }
 
-    /// NUM_STUFFING: blocks after the frame before this window.
+    /// NUM_STUFFING: number of blocks after the frame before this window.
     pub const fn stuffing(self) -> Stuffing {
         self.stuffing
     }
@@ -60,7 +59,7 @@ impl ExtraWindow {
         self.window
     }
 
-    /// Edge and stuffing after a step of `adjust` eighths, before any check of the range.
+    /// Returns edge and stuffing after a step of `adjust` eighths, before any check of the range.
     const fn raw_step(self, adjust: i16) -> (i32, i32, i32) {
         let t = (self.edge.get().saturating_sub(1) % 8) as i32;
         let window = self.window as i32;
@@ -74,11 +73,11 @@ impl ExtraWindow {
         }
     }
 
-    /// Advances to the next frame; its edge comes `adjust` eighths later than without.
+    /// Advances to the next frame, whose edge comes `adjust` eighths later than it otherwise would.
     ///
     /// # Errors
-    /// [`Error::ExtraOutOfRange`] if one stuffing block does not bring the window into its range, or there is none to
-    /// take away or no room for one more. The state stays as it was.
+    /// [`Error::ExtraOutOfRange`] if one stuffing block does not bring the window into its range, or if there is none to remove
+    /// or no room for another. The state stays as it was.
     pub fn step(&mut self, adjust: i16) -> Result<(), Error> {
         let (edge, stuffing, window) = self.raw_step(adjust);
         let refuse = || Error::ExtraOutOfRange { extra: edge.unsigned_abs() / 8 };
@@ -91,7 +90,7 @@ impl ExtraWindow {
 }
 
 ranged! {
-    /// ES: how many H-frames there are for one pulse, 1..=10.
+    /// ES: number of H-frames per pulse, 1..=10.
     pub struct Es(1..=10);
 }
 
@@ -112,9 +111,9 @@ pub struct Next {
 
 /// Keeps the sampling edge of every ES-th frame on the pulse.
 ///
-/// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a
-/// pulse, and what is less than an eighth is taken care of by the correction. By how much the real period differs from the given
-/// one is learned, so that the edges stay where they belong while some pulses are not seen.
+/// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a pulse, and
+/// the correction takes care of fractions of an eighth. It learns by how much the real period differs from the given one, so the
+/// edges stay where they belong while some pulses are not seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Synchroniser {
@@ -122,36 +121,37 @@ pub struct Synchroniser {
     period: u32,
     state: ExtraWindow,
     es: Es,
-    /// Eighths to be spread over the frames of a pulse, less than ES.
+    /// Eighths to spread over the frames of a pulse; less than ES.
     remainder: u8,
     /// Number of the present frame in its pulse group, 0 for the one on the pulse.
     frame: u8,
-    /// Eighths times ES that are due; begins in the middle, so that the edges are at most half an eighth off.
+    /// The eighths times ES that are due; starts in the middle, so that the edges are at most half an eighth off.
     spread: u8,
-    /// How much later each pulse comes than the period says, in eighths / 256, and what of it is due when one is not seen.
+    /// How much later each pulse comes than the period says, in 1/256 of an eighth, and how much of this is due when a pulse is
+    /// not seen.
     learned: i16,
     due: i16,
-    /// Pulses in a row that were close to their edges, and those in a row that were not seen.
+    /// Number of pulses in a row that were close to their edges, and number in a row that were not seen.
     close: u8,
     unseen: u8,
 }
 
 impl Synchroniser {
-    /// Largest correction in one frame, in eighths: as in the vendor's receiver.
+    /// Largest correction in one frame, in eighths, as in the vendor's receiver.
     const MAX_CORRECTION: i16 = 6;
 
-    /// In step: a pulse comes this close to its edge, in eighths: 93 ns. The vendor's receiver keeps 100 ns.
+    /// How close to its edge a pulse has to come to be in step, in eighths: 93 ns. The vendor's receiver allows 100 ns.
     const CLOSE: i16 = 7;
-    /// Pulses in a row that have to.
+    /// Number of pulses in a row that have to be this close.
     const PULSES: u8 = 4;
-    /// Pulses that may be missing; then nobody knows where the edges are.
+    /// Number of pulses that may be missing; after that it is unknown where the edges are.
     const UNSEEN: u8 = 8;
-    /// From the beginning of a frame to the end of the shortest EXTRA window from which every edge of the next frame can be had, a
-    /// correction either way included, and the longest one.
+    /// Time from the beginning of a frame to the end of the shortest EXTRA window from which every edge of the next frame can be
+    /// reached, including a correction in either direction, and the same for the longest one.
     const FRAMES: [u32; 2] = [FRAME + 32, FRAME + 26 * 48 + 69];
 
-    /// For a pulse every `period` eighths of a bit (13.333 ns each) and `es` frames for each of them: frames of 896 to 2181
-    /// eighths.
+    /// Creates the synchroniser for a pulse every `period` eighths of a bit (13.333 ns each) with `es` frames per pulse: frames
+    /// of 896 to 2181 eighths.
     ///
     /// # Errors
     /// [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
@@ -179,7 +179,8 @@ impl Synchroniser {
         Ok(Self { period, state, es, remainder, frame: 0, spread, learned: 0, due: 128, close: 0, unseen: 0 })
     }
 
-    /// In step with the pulse: the last four pulses came within 93 ns of their edges, and since then eight at most were not seen.
+    /// Returns whether the frames are in step with the pulse: the last four pulses came within 93 ns of their edges, and since
+    /// then at most eight were not seen.
     pub const fn is_in_step(&self) -> bool {
         self.close >= Self::PULSES && self.unseen <= Self::UNSEEN
     }
@@ -189,7 +190,7 @@ impl Synchroniser {
         self.period
     }
 
-    /// Eighths from the start of the first frame to its sampling edge: start that long before a pulse.
+    /// Eighths from the start of the first frame to its sampling edge; start this long before a pulse.
     ///
     /// ```
     /// use hdsl::sync::{Es, Synchroniser};
@@ -213,12 +214,12 @@ impl Synchroniser {
         self.frame == 0
     }
 
-    /// Stuffing after the present frame and the window of the next one; to be asked before the stuffing is sent, so
-    /// that an exchange between both does not move the edge.
+    /// Returns the stuffing after the present frame and the window of the next one. Call this before the stuffing is sent, so
+    /// that moving bits between the two does not move the edge.
     ///
     /// `late` is time(pulse) - time(edge) in eighths, rounded, if the present frame is on a pulse and the pulse was
-    /// seen: a later pulse makes the next edge later, by six eighths at most. Without
-    /// a pulse the frames run on with the period as it was given and what was learned of it.
+    /// seen: a later pulse makes the next edge later, by six eighths at most. Without a pulse, the frames continue with the
+    /// given period and what was learned about it.
     pub fn next(&mut self, late: Option<i16>) -> Next {
         self.spread = self.spread.saturating_add(self.remainder);
         let mut adjust = 0;
@@ -237,7 +238,7 @@ impl Synchroniser {
         Next { stuffing: self.state.stuffing, extra: self.state.edge }
     }
 
-    /// Eighths by which the next edge on a pulse has to come later: by what is measured, or by what is as a rule where nothing is.
+    /// Returns how many eighths later the next edge on a pulse has to come: as measured, or as learned if nothing was measured.
     fn correction(&mut self, late: Option<i16>) -> i16 {
         let limit = Self::MAX_CORRECTION;
         if let Some(late) = late {

@@ -1,4 +1,4 @@
-//! The V-frame: eight H-frames carry the two safe channels, a byte each in every answer.
+//! The V-frame: eight H-frames carry the two safe channels, one byte of each in every answer.
 
 use crate::answer::Answer;
 use crate::crc::RunningCrc16;
@@ -19,17 +19,17 @@ use crate::symbol::{Control, Reading, Rule, Word};
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SafeBlock {
     bytes: [u8; 8],
-    /// Of the bytes before the CRC.
+    /// Creates a block from the bytes before the CRC.
     #[cfg_attr(feature = "serde", serde(skip))]
     crc: RunningCrc16,
-    /// Words taken in order.
+    /// Number of words taken in order.
     len: u8,
     bad: Option<Word>,
     top_is_mark: bool,
 }
 
 impl SafeBlock {
-    /// Takes the word of H-frame `at`, 0..=7; only in order.
+    /// Takes the word of H-frame `at`, 0..=7; they have to come in order.
     #[inline(always)]
     fn put(&mut self, rule: Rule, at: u8, reading: Reading, mark: Control) {
         if at == 0 {
@@ -83,17 +83,17 @@ impl SafeBlock {
         u16::from_be_bytes([high, low])
     }
 
-    /// Returns whether a word of the block was no good.
+    /// Returns whether a word of the block was bad.
     pub(crate) const fn has_byte_error(&self) -> bool {
         self.bad.is_some()
     }
 
-    /// Returns whether the CRC of the bytes as received is right.
+    /// Returns whether the CRC of the bytes as received is correct.
     pub(crate) const fn crc_ok(&self) -> bool {
         self.crc.finish() == self.raw_crc()
     }
 
-    /// Returns whether words and CRC are good; whether the encoder has a position is another matter.
+    /// Returns whether words and CRC are good; this does not say whether the encoder has a position.
     pub fn is_sound(&self) -> bool {
         matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
@@ -103,7 +103,7 @@ impl SafeBlock {
     /// # Errors
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
     /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
-    /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
+    /// K27.7 first in channel 2. With [`Rule::Reduced`] the value of the top byte alone decides this.
     pub const fn vpos(&self) -> Result<u64, Error> {
         if self.len != 8 {
             return Err(Error::Truncated { got: self.len as u16, want: 8 });
@@ -128,7 +128,7 @@ impl SafeBlock {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct VFrame {
-    /// Vertical channel. Its status byte is SUMMARY: bit n sums up the encoder status register ENC_STn.
+    /// Vertical channel. Its status byte is SUMMARY: bit n summarises the encoder status register ENC_STn.
     pub safe1: SafeBlock,
     /// Secondary channel. Its status byte is STATUS2: TOG2, TEST2, ERR2, FIX2 = 11100b.
     pub safe2: SafeBlock,
@@ -142,7 +142,7 @@ impl VFrame {
         self.safe2.put(rule, at, answer.secondary(), Control::K27_7);
     }
 
-    /// The V-frame of eight answers.
+    /// Creates the V-frame from eight answers.
     pub fn of(rule: Rule, answers: &[Answer; 8]) -> Self {
         let mut frame = Self::default();
         for (at, answer) in (0..).zip(answers) {

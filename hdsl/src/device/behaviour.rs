@@ -1,6 +1,6 @@
 use crate::symbol::RunningDisparity;
 
-/// What the documents leave to the encoder.
+/// The points that the documents leave to the encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -9,33 +9,34 @@ use crate::symbol::RunningDisparity;
 pub struct Behaviour {
     /// What is sent for an acceleration beyond 11 bits.
     pub overload: Overload,
-    /// Which complement the second safe position is.
+    /// Which complement the second safe position uses.
     pub complement: Complement,
-    /// Bits by which the second safe position is coarser, 0..=31.
+    /// Number of bits by which the second safe position is coarser, 0..=31.
     pub second_shift: u8,
     /// Whether the running disparity continues from answer to answer.
     pub disparity: Disparity,
     /// Bits 6:5 of the parameter byte, 0..=3.
     pub reserved_bits: u8,
-    /// SYNC frames that it needs after RESET before it answers; the receiver sends 16.
+    /// Number of SYNC frames that the encoder needs after RESET before it answers; the receiver sends 16.
     pub sync_frames: u8,
-    /// Place in the V-frame of the first normal answer, 0..=7: VSYNC comes 8 - n frames after the first INIT.
+    /// Place n of the first normal answer in the V-frame, 0..=7: VSYNC comes 8 - n frames after the first INIT.
     pub first_place: u8,
     /// How it treats a frame whose head it could not read.
     pub bad_head: BadHead,
     /// The acknowledgement of a long write.
     pub acknowledgement: Acknowledgement,
-    /// From the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The manual promises
+    /// Time from the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The manual
+    /// promises
     /// less than 100 ns, so up to 7 (SICK manual, p. 12).
     pub sampling_lag: u8,
-    /// H-frames between a request and the first symbol of its answer.
+    /// Number of H-frames between a request and the first symbol of its answer.
     pub latency_frames: u16,
-    /// Every n-th request is forgotten; 0 none.
+    /// Every n-th request is forgotten; 0 forgets none.
     pub forgets_every: u16,
 }
 
 impl Behaviour {
-    /// A polite encoder.
+    /// Creates the behaviour of a well-behaved encoder.
     pub const fn new() -> Self {
         Self {
             overload: Overload::Saturated,
@@ -81,14 +82,14 @@ impl Default for Behaviour {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Overload {
-    /// The largest value; the following frames catch up. The fast position lags meanwhile, the safe one does not.
+    /// The largest value; the following frames catch up. The fast position lags meanwhile; the safe one does not.
     #[default]
     Saturated,
     /// K29.7 K29.7: no value.
     NoValue,
 }
 
-/// Which complement the second safe position is.
+/// Which complement the second safe position uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -97,20 +98,20 @@ pub enum Complement {
     /// All bits inverted.
     #[default]
     Ones,
-    /// The negative.
+    /// The negative value (two's complement).
     Twos,
 }
 
-/// With which running disparity an answer begins.
+/// The running disparity with which an answer begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Disparity {
-    /// That with which the one before ended.
+    /// The one with which the previous answer ended.
     #[default]
     CarriedOn,
-    /// Always this one.
+    /// Always the same.
     EachAnswer(RunningDisparity),
 }
 
@@ -120,10 +121,10 @@ pub enum Disparity {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum BadHead {
-    /// It counts in its V-frame.
+    /// The frame counts in the V-frame.
     #[default]
     Counts,
-    /// It does not count: VSYNC comes a frame later.
+    /// The frame does not count: VSYNC comes a frame later.
     Stalls,
 }
 
@@ -136,27 +137,27 @@ pub enum Acknowledgement {
     /// LLEN is 0.
     #[default]
     Empty,
-    /// LLEN is that of the request, though no data follow.
+    /// LLEN is that of the request, although no data follow.
     RepeatsLength,
 }
 
-/// A fault that an encoder can be given.
+/// A fault that an encoder can be made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Fault {
-    /// It does everything right.
+    /// The encoder works correctly.
     #[default]
     None,
-    /// It does not answer.
+    /// The encoder does not answer.
     Silent,
     /// VSYNC is never set.
     NoVsync,
     /// The acceleration channel carries K29.7 K29.7.
     NoAcceleration,
-    /// Safe channel 1 carries K29.7 in the place of a position.
+    /// Safe channel 1 carries K29.7 in place of a position.
     NoPosition,
     /// Safe channel 2 begins with K27.7.
     NoPosition2,

@@ -1,6 +1,7 @@
-//! The encoder's end of the parameters channel, from the printed layout of the messages: nothing is shared with the receiver.
+//! The encoder's end of the parameters channel, written from the printed layout of the messages; nothing is shared with the
+//! receiver.
 //!
-//! What comes in are the five bits of the master's symbols, what goes out those of the encoder's.
+//! Its input is the five bits of the master's symbols, its output those of the encoder's.
 
 use super::check;
 
@@ -20,7 +21,7 @@ pub(super) struct Message {
 impl Message {
     const EMPTY: Self = Self { bytes: [0; 14], len: 0 };
 
-    /// Of at most twelve bytes.
+    /// Creates a message of at most twelve bytes.
     pub(super) fn new(parts: &[&[u8]]) -> Self {
         let mut message = Self::EMPTY;
         for byte in parts.iter().copied().flatten() {
@@ -44,7 +45,7 @@ impl Message {
         self.bytes().first().is_some_and(|first| first & 0x80 != 0)
     }
 
-    /// With its CRC, the high byte first.
+    /// Appends the CRC, high byte first.
     fn sealed(mut self) -> Self {
         for byte in check(self.bytes()).to_be_bytes() {
             self.push(byte);
@@ -52,14 +53,14 @@ impl Message {
         self
     }
 
-    /// A nibble in the order sent, the high one of a byte first.
+    /// Returns a nibble in the order sent, the high one of each byte first.
     fn nibble(&self, at: u8) -> Option<u8> {
         let byte = self.bytes().get(usize::from(at / 2))?;
         Some(if at % 2 == 0 { byte >> 4 } else { byte & 15 })
     }
 }
 
-/// Bytes of the request that begins with this one, its CRC included.
+/// Returns the length in bytes of the request that begins with this byte, including its CRC.
 const fn request_len(first: u8) -> u8 {
     let offset: u8 = if first & 0x20 == 0 { 0 } else { 2 };
     let data = match first >> 2 & 3 {
@@ -82,19 +83,19 @@ const fn request_len(first: u8) -> u8 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Channel {
-    /// The request that is coming in.
+    /// The request being received.
     heard: Message,
     /// The first nibble of its next byte.
     half: Option<u8>,
-    /// There was an IDLE since the last message, or since one that was lost.
+    /// There has been an IDLE since the last message, or since a lost one.
     listening: bool,
-    /// A short and a long request whose answers take their time, with the H-frames left.
+    /// A short and a long request whose answers are pending, with the H-frames left.
     waiting: [Option<(Message, u16)>; 2],
-    /// A short and a long answer that wait for the channel.
+    /// A short and a long answer waiting for the channel.
     answers: [Option<Message>; 2],
-    /// SNAK, LNAK or INIT, to be said between messages.
+    /// SNAK, LNAK or INIT, to be sent between messages.
     signal: Option<u8>,
-    /// The answer that is going out and the nibble that comes next.
+    /// The answer being sent, and its next nibble.
     sending: Option<(Message, u8)>,
 }
 
@@ -111,7 +112,7 @@ impl Channel {
         }
     }
 
-    /// Takes the master's symbol; a request that is complete and sound.
+    /// Takes the master's symbol; returns a request that is complete and sound.
     pub(super) fn hear(&mut self, symbol: u8) -> Option<Message> {
         match symbol {
             0x00..=0x0f => return self.nibble(symbol),
@@ -127,7 +128,7 @@ impl Channel {
         None
     }
 
-    /// A symbol that could not be read: what was coming in is lost, up to the next IDLE.
+    /// Takes a symbol that could not be read: what was being received is lost, up to the next IDLE.
     pub(super) const fn miss(&mut self) {
         self.heard = Message::EMPTY;
         self.half = None;
@@ -159,13 +160,13 @@ impl Channel {
         None
     }
 
-    /// The request is answered this many H-frames later.
+    /// Sets the request to be answered this many H-frames later.
     pub(super) fn wait(&mut self, request: Message, frames: u16) {
         let [short, long] = &mut self.waiting;
         *(if request.is_long() { long } else { short }) = Some((request, frames));
     }
 
-    /// The requests whose time has come.
+    /// Returns the requests whose time has come.
     pub(super) fn due(&mut self) -> [Option<Message>; 2] {
         let due = self.waiting.map(|waiting| waiting.filter(|(_, frames)| *frames == 0).map(|(request, _)| request));
         self.waiting = self.waiting.map(|waiting| {
@@ -181,7 +182,7 @@ impl Channel {
         *(if answer.is_long() { long } else { short }) = Some(answer.sealed());
     }
 
-    /// The symbol of the next answer.
+    /// Returns the symbol of the next answer.
     pub(super) fn speak(&mut self) -> u8 {
         if let Some((message, at)) = self.sending.take() {
             let Some(nibble) = message.nibble(at) else { return IDLE };

@@ -1,5 +1,5 @@
-//! The encoder's own 8b/10b code and its own reading of the master's head, from the printed tables: nothing is shared with the
-//! receiver.
+//! The encoder's own 8b/10b code and its own reading of the master's head, written from the printed tables; nothing is shared
+//! with the receiver.
 
 use nrz_line::Window;
 
@@ -15,7 +15,7 @@ const FOUR: [&[u8; 4]; 9] = [b"1011", b"1001", b"0101", b"1100", b"1101", b"1010
 /// `fghj` of K.28.0 to K.28.7, column RD-; column RD+ has their inverses.
 const FOUR_K28: [&[u8; 4]; 8] = [b"1011", b"0110", b"1010", b"1100", b"1101", b"0101", b"1001", b"0111"];
 
-/// A byte to send; `special` for a K character.
+/// A byte to send; `special` marks a K character.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Symbol {
@@ -33,7 +33,7 @@ impl Symbol {
     }
 }
 
-/// Line bits as they are put together, the first in bit 0, and the running disparity: true for RD+.
+/// Line bits as they are assembled, the first in bit 0, and the running disparity: true for RD+.
 #[derive(Clone, Copy)]
 struct Writer {
     bits: u64,
@@ -47,8 +47,8 @@ impl Writer {
         self.len = self.len.saturating_add(1);
     }
 
-    /// A block as printed for RD-; what is not balanced is inverted for RD+ and changes the running disparity, and some balanced
-    /// ones are inverted too.
+    /// Appends a block, given as printed for RD-. Unbalanced blocks are inverted for RD+ and change the running disparity; some
+    /// balanced ones are inverted too.
     fn block(&mut self, printed: &[u8], inverted_when_balanced: bool) {
         let balanced = is_balanced(printed);
         let invert = self.plus && (!balanced || inverted_when_balanced);
@@ -77,13 +77,13 @@ impl Writer {
     }
 }
 
-/// As many ones as zeros.
+/// Returns whether there are as many ones as zeros.
 fn is_balanced(printed: &[u8]) -> bool {
     printed.iter().map(|bit| if *bit == b'1' { 1 } else { -1_i32 }).sum::<i32>() == 0
 }
 
-/// The 61 bits of an answer and the running disparity after it. The switch bit after the fifth word is the inverse of the bit
-/// before it and does not count.
+/// Returns the 61 bits of an answer and the running disparity after it. The switch bit after the fifth word is the inverse of
+/// the bit before it and is not counted.
 pub(super) fn answer(symbols: [Symbol; 6], plus: bool) -> (u64, bool) {
     let mut writer = Writer { bits: 0, len: 0, plus };
     for (at, symbol) in (0_u8..).zip(symbols) {
@@ -96,8 +96,8 @@ pub(super) fn answer(symbols: [Symbol; 6], plus: bool) -> (u64, bool) {
     (writer.bits, writer.plus)
 }
 
-/// The parameter byte of a head: SYNC 001011, SAMPLE 11, up to nine ones more and a zero, CYCLE RESET 110, four bits that mean
-/// nothing, ten bits of PARA with either polarity of each block. `None` if it cannot be read.
+/// Decodes the parameter byte of a head: SYNC 001011, SAMPLE 11, up to nine further ones and a zero, CYCLE RESET 110, four
+/// meaningless bits, ten bits of PARA with either polarity of each block. `None` if it cannot be read.
 pub(super) fn parameter(head: Window) -> Option<u8> {
     let mut bits = (0..head.len()).map_while(|at| head.get(at));
     for printed in *b"00101111" {

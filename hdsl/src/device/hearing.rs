@@ -4,28 +4,29 @@ use nrz_line::Window;
 
 /// SYNC 001011 and the two ones after it, eight samples a bit, the first in bit 63.
 const LOCK: u64 = 0x0000_ff00_ffff_ffff;
-/// How many samples of [`LOCK`] may differ: two for each of its four edges would be eight, and a wrong bit is eight.
+/// How many samples of [`LOCK`] may differ: two for each of its four edges would be eight, and so would one wrong bit.
 const TOLERANCE: u32 = 7;
 
-/// What an encoder hears of the head of an H-frame on a line with eight samples a bit.
+/// What an encoder receives of the head of an H-frame on a line with eight samples per bit.
 ///
-/// It locks on the edges of SYNC, so that its clock stands where most of them say; jitter of a sample and glitches of one do not
-/// hurt. The sampling edge is taken where it is, jitter included: that is the instant of the position.
+/// It locks to the edges of SYNC, by majority; jitter of one sample and glitches of one sample do no harm. The sampling edge is
+/// taken where it actually is, including jitter, because that is the instant of the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Heard {
     /// The bits from SYNC to PARA, for [`Device::hear`](super::Device::hear).
     pub bits: Window,
-    /// The sample at which SYNC begins by the encoder's clock.
+    /// The sample at which SYNC begins according to the encoder's clock.
     pub start: u16,
     /// The first sample after the sampling edge.
     pub edge: u16,
 }
 
 impl Heard {
-    /// Looks for a head in samples, one byte per bit time of the master, the first of them in bit 7. The line is high before and
+    /// Looks for a head in samples, one byte per bit time of the master, with the first sample in bit 7. The line is high before
+    /// and
     /// after
-    /// them. `None` if there is no head that can be read.
+    /// them. `None` if there is no readable head.
     pub fn on_line(samples: &[u8]) -> Option<Self> {
         // The shortest head has 26 bits.
         let last = samples.len().checked_sub(26)?.saturating_mul(8);
@@ -58,14 +59,14 @@ impl Heard {
     }
 }
 
-/// Where SYNC begins: the best of the first places where it can be. (PARA may end like it.)
+/// Returns where SYNC begins: the best of the first possible places. (PARA may end in the same way.)
 fn lock(samples: &[u8], last: usize) -> Option<usize> {
     let wrong = |place: &usize| (window(samples, *place) ^ LOCK).count_ones();
     let first = (0..=last).find(|place| wrong(place) <= TOLERANCE)?;
     (first..first.saturating_add(8)).min_by_key(wrong)
 }
 
-/// 64 samples from `place` on, the first in bit 63.
+/// Returns 64 samples from `place`, the first in bit 63.
 fn window(samples: &[u8], place: usize) -> u64 {
     let byte = |at| samples.get(at).copied().unwrap_or(0xff);
     let first = place / 8;
@@ -76,17 +77,17 @@ fn window(samples: &[u8], place: usize) -> u64 {
     }
 }
 
-/// A sample; the line is high outside of them.
+/// Returns a sample; the line is high before and after them.
 fn sample(samples: &[u8], place: usize) -> bool {
     samples.get(place / 8).is_none_or(|byte| byte << (place % 8) & 0x80 != 0)
 }
 
-/// The level in the middle of the bit that begins at `place`.
+/// Returns the level in the middle of the bit that begins at `place`.
 fn majority(samples: &[u8], place: usize) -> bool {
     [3, 4, 5].into_iter().filter(|k| sample(samples, place.saturating_add(*k))).count() >= 2
 }
 
-/// Where a level begins that lasts: three samples in a row.
+/// Returns where a stable level begins: three equal samples in a row.
 fn run(samples: &[u8], from: usize, level: bool) -> Option<usize> {
     let lasts = |place: &usize| (0..3).all(|k| sample(samples, place.saturating_add(k)) == level);
     (from..samples.len().saturating_mul(8)).find(lasts)

@@ -1,4 +1,4 @@
-//! What the messages reach in the encoder, with numbers of its own.
+//! The registers and resources that messages reach in the encoder, with their own constants.
 
 use super::behaviour::Acknowledgement;
 use super::channel::Message;
@@ -12,24 +12,24 @@ pub struct Resource {
     pub address: u16,
     /// Its name, filled up with spaces.
     pub name: [u8; 8],
-    /// Bytes of data, 0..=8.
+    /// Number of data bytes, 0..=8.
     pub size: u8,
     /// Access level needed to read.
     pub read_level: u8,
-    /// Access level needed to write; 15 is nobody.
+    /// Access level needed to write; 15 stands for nobody.
     pub write_level: u8,
-    /// Time-out that the encoder states, in ms.
+    /// The time-out stated by the encoder, in ms.
     pub timeout_ms: u8,
     /// Data type.
     pub data_type: u8,
-    /// The data, as many bytes as `size` says.
+    /// The data; `size` says how many bytes.
     pub data: [u8; 8],
 }
 
 /// Registers and resources of a simulated encoder.
 ///
 /// * direct read: the name without an offset or with offset 0, attributes 1..=5 as two bytes;
-/// * indirect read and write: the data, from the offset on;
+/// * indirect read and write: the data, from the offset onwards;
 /// * writing a status register clears it, reading SRSSI sets it to 7.
 ///
 /// Refusals (class, detail): 40h, 10h unknown resource; 41h, 10h no right to write; 40h, 13h offset after the data.
@@ -47,9 +47,9 @@ impl Default for Resources {
     }
 }
 
-/// Nobody may write.
+/// The level at which nobody may write.
 const READ_ONLY: u8 = 15;
-/// SRSSI among the 64 registers, and the value that it goes back to.
+/// The index of SRSSI among the 64 registers, and the value to which it returns.
 const SRSSI: usize = 0x3c;
 const SRSSI_BEST: u8 = 7;
 
@@ -105,7 +105,7 @@ impl Resources {
         }
     }
 
-    /// What a sound request does, and the answer to it; writes are acknowledged like this.
+    /// Executes a sound request and returns its answer; writes are acknowledged as `acknowledgement` says.
     pub(super) fn answer(&mut self, request: &Message, acknowledgement: Acknowledgement) -> Message {
         match request.bytes() {
             [first @ 0x80..=0xff, low, rest @ ..] => self.long(*first, *low, rest, acknowledgement),
@@ -177,7 +177,7 @@ impl Resource {
         Ok([0, value, 0, 0, 0, 0, 0, 0])
     }
 
-    /// The bytes from `offset` on, zeros after them.
+    /// Returns the bytes from `offset`, followed by zeros.
     fn read(&self, offset: u16) -> Result<[u8; 8], [u8; 2]> {
         if offset > u16::from(self.size) {
             return Err(OFFSET_TOO_HIGH);

@@ -2,7 +2,7 @@
 
 use crate::symbol::{RunningDisparity, Word};
 
-/// What the words of an answer say of the running disparity.
+/// What the words of an answer tell about the running disparity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -13,7 +13,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Of the 61 bits of an answer, the first in bit 0.
+    /// Evaluates the 61 bits of an answer, the first in bit 0.
     pub fn of(line: u64) -> Self {
         let words = [0, 10, 20, 30, 40, 51].map(|at| {
             let [low, high, ..] = (line >> at).to_le_bytes();
@@ -47,22 +47,22 @@ impl Chain {
         chain
     }
 
-    /// Returns whether each word stands in the column that the words before it leave.
+    /// Returns whether each word is in the column required by the words before it.
     pub const fn holds(self) -> bool {
         self.holds
     }
 
-    /// Before the first word, where the words tell: also those in front of a damaged one.
+    /// The running disparity before the first word, if the words tell it, including those before a damaged one.
     pub const fn before(self) -> Option<RunningDisparity> {
         self.before
     }
 
-    /// After the last word, where the words tell: also those behind a damaged one.
+    /// The running disparity after the last word, if the words tell it, including those after a damaged one.
     pub const fn after(self) -> Option<RunningDisparity> {
         self.after
     }
 
-    /// Returns whether `next` begins where this ends; `None` where one of the two does not tell.
+    /// Returns whether `next` begins with the disparity with which this one ends; `None` if one of the two does not tell.
     pub fn goes_on_in(self, next: Self) -> Option<bool> {
         Some(self.after? == next.before?)
     }

@@ -1,4 +1,4 @@
-//! Heads of H-frames, on a line that was read bit by bit.
+//! Heads of H-frames on a line that was read bit by bit.
 
 use nrz_line::Window;
 
@@ -12,7 +12,7 @@ const PATTERN: u128 = 0b1111_0100;
 const STUFFING: u128 = 0b11_0100;
 /// SYNC, SAMPLE and CYCLE RESET: 0 0 1 0 1 1, 1 1 0, 1 1 0.
 const WHOLE: u128 = 0b0110_1111_0100;
-/// Bits of TRAILER and of the longest stuffing in front of a head that [`ends_with_trailer`] looks at.
+/// Number of bits of TRAILER and of the longest stuffing before a head that [`ends_with_trailer`] looks at.
 pub const FRONT_BITS: u32 = 120;
 
 /// A head on a line.
@@ -20,14 +20,14 @@ pub const FRONT_BITS: u32 = 120;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FoundHead {
-    /// What an encoder reads of it.
+    /// What an encoder reads from it.
     pub head: ParsedHead,
-    /// Bits that it takes on this line.
+    /// Number of bits that it takes on this line.
     pub len: u32,
 }
 
-/// The head at the beginning of the line, if there is one. The partly high last bit of an EXTRA window may have been rounded to
-/// one bit more in all.
+/// Returns the head at the start of the line, if there is one. The partly high last bit of an EXTRA window may have been rounded
+/// up, which makes the head one bit longer.
 pub fn find_head(line: Window) -> Option<FoundHead> {
     let raw = line.bits();
     if raw & 0xff != PATTERN {
@@ -47,7 +47,7 @@ pub fn find_head(line: Window) -> Option<FoundHead> {
     Some(FoundHead { head, len: head.len.wrapping_add(1) })
 }
 
-/// What was found where the head of a frame was expected.
+/// The fault found where the head of a frame was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum HeadDamage {
@@ -79,9 +79,8 @@ impl HeadDamage {
     }
 }
 
-/// Finds out what is where the head of a frame was expected: `line` begins three bits before that place, and it may be three
-/// bits off
-/// either way.
+/// Determines what is at the place where the head of a frame was expected: `line` begins three bits before that place, and the
+/// head may be three bits off in either direction.
 pub fn head_damage(line: Window) -> HeadDamage {
     let wrong = |at: u32| ((line.bits() >> at & 0xfff) ^ WHOLE).count_ones();
     match (0..=6).map(wrong).min() {
@@ -92,7 +91,7 @@ pub fn head_damage(line: Window) -> HeadDamage {
     }
 }
 
-/// What is wrong with a head on its own.
+/// The faults of a head on its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum HeadFault {
@@ -110,7 +109,7 @@ servowire_core::one_line!(HeadFault {
     Self::Reserved => "bit 5 of the parameter byte is 1, and it is reserved";
 });
 
-/// What is wrong with the parameter byte of a head, if anything is.
+/// Returns what is wrong with the parameter byte of a head, if anything.
 pub(crate) const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
     match head.byte.symbol() {
         Err(_) => Some(HeadFault::UndefinedSymbol { symbol: head.byte.raw() & 31 }),
@@ -119,16 +118,17 @@ pub(crate) const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
     }
 }
 
-/// Whether EQUALISATION and PARA, the last 14 bits of a head, are coded as for a balanced line: so is every head without an EXTRA
-/// window that follows an answered frame.
+/// Returns whether EQUALISATION and PARA, the last 14 bits of a head, are coded as for a balanced line, which is the case for
+/// every head without an EXTRA window that follows an answered frame.
 pub(crate) fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
     let due = Head::new(head.byte, None, LineDisparity::ZERO);
     let coded = line.bits() >> head.len.saturating_sub(14) & 0x3fff;
     coded == u128::from(due.equalisation()) | u128::from(due.para().get()) << 4
 }
 
-/// Returns whether the line in front of a head ends with TRAILER as a master drives it, 000011, and blocks of stuffing. `front`: at most
-/// [`FRONT_BITS`] bits, the last of them before the head; stuffing all over them is taken as good.
+/// Returns whether the line before a head ends with TRAILER as a master drives it, 000011, followed by stuffing blocks. `front`
+/// holds at most [`FRONT_BITS`] bits, the last of which is just before the head; if all of them are stuffing, that is taken as
+/// good.
 pub fn ends_with_trailer(front: Window) -> bool {
     // The first bit in bit 0.
     const TRAILER: u128 = 0b11_0000;

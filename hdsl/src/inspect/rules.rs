@@ -1,4 +1,5 @@
-//! Rules that hold from frame to frame of a link: what all heads so far did is a rule, and the head that breaks it was damaged.
+//! Rules that hold from frame to frame of a link. Whatever all heads so far have done is a rule, and a head that breaks it was
+//! damaged.
 
 use nrz_line::Window;
 
@@ -8,10 +9,10 @@ use crate::frame::ParsedHead;
 use crate::parameter::MasterSymbol;
 use crate::symbol::RunningDisparity;
 
-/// Heads after which what all of them did is a rule.
+/// The number of heads after which what all of them did becomes a rule.
 const RULE: u8 = 16;
 
-/// What is wrong with a head after those before it.
+/// The faults of a head in view of those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum BrokenRule {
@@ -45,12 +46,12 @@ impl BrokenRule {
     }
 }
 
-/// How often a rule was kept.
+/// How many times a rule was kept.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 struct Kept(u8);
 
 impl Kept {
-    /// Whether the rule holds: until it is one, everything does.
+    /// Returns whether the rule holds; until it has become a rule, everything is accepted.
     fn holds(&mut self, kept: bool) -> bool {
         if kept {
             self.0 = self.0.saturating_add(1).min(2 * RULE);
@@ -63,24 +64,24 @@ impl Kept {
     }
 }
 
-/// What the heads of a link did so far.
+/// What the heads of a link have done so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct HeadRules {
     /// Heads in a row that were coded for a balanced line.
     balanced: Kept,
-    /// Whether the frame before was answered: with its TRAILER the count of the line begins anew.
+    /// Whether the previous frame was answered: with its TRAILER the count of the line restarts.
     answered: bool,
-    /// Frames in a row with FIRST.
+    /// Number of frames in a row with FIRST.
     first: Kept,
-    /// Frames in a row that end with TRAILER and stuffing.
+    /// Number of frames in a row that end with TRAILER and stuffing.
     ended: Kept,
-    /// MSYNC of this V-frame, and for how many frames it went by the rule.
+    /// MSYNC of this V-frame, and for how many frames it followed the rule.
     msync: Option<bool>,
     steady: Kept,
 }
 
 impl HeadRules {
-    /// What is wrong with the head at the beginning of `line`; `at`: its place in the V-frame, 0..=7, if that is known.
+    /// Returns what is wrong with the head at the start of `line`; `at` is its place in the V-frame, 0..=7, if known.
     pub fn check(&mut self, head: ParsedHead, line: Window, at: Option<u8>) -> Option<BrokenRule> {
         let symbol = head.byte.symbol().ok();
         let (balanced, first, msync) =
@@ -91,7 +92,7 @@ impl HeadRules {
         head_fault(head).map(BrokenRule::Fault).or(broken)
     }
 
-    /// Returns whether what stands in front of a head, as [`ends_with_trailer`] takes it, is damaged.
+    /// Returns whether the bits before a head, as [`ends_with_trailer`] takes them, are damaged.
     pub fn is_end_damaged(&mut self, front: Window) -> bool {
         !self.ended.holds(ends_with_trailer(front))
     }
@@ -101,7 +102,7 @@ impl HeadRules {
         head.extra_bits > 0 || !self.answered || self.balanced.holds(is_coded_for_balance(head, line))
     }
 
-    /// FIRST is 0 during start-up, then 1, but for masters that send it in the frames after a pulse only.
+    /// FIRST is 0 during start-up, then 1, except with masters that send it only in the frames after a pulse.
     fn is_first(&mut self, head: ParsedHead, symbol: Option<MasterSymbol>) -> bool {
         match symbol {
             None => true,
@@ -127,10 +128,10 @@ impl HeadRules {
     }
 }
 
-/// With which running disparity the answers of an encoder begin, which no document says: the line tells.
+/// Learns from the line with which running disparity the answers of an encoder begin, because no document says so.
 ///
-/// An answer that begins with + after one that ended with + was carried on; one that begins with - there began anew. After
-/// one that ended with - both begin with -, so that tells nothing.
+/// An answer that begins with + after one that ended with + has carried the disparity on; one that begins with - in that place
+/// has restarted it. After an answer that ended with -, both kinds begin with -, which proves nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Beginnings {
     carried: u32,
@@ -138,12 +139,12 @@ pub struct Beginnings {
 }
 
 impl Beginnings {
-    /// Answers that have to tell one and the same before it is taken for a rule.
+    /// The number of answers that have to agree before this is taken as a rule.
     const LEAST: u32 = 4;
-    /// One of this many may tell the other.
+    /// One answer in this many may disagree.
     const OF: u32 = 8;
 
-    /// Two answers followed each other.
+    /// Takes two answers that followed each other.
     pub fn note(&mut self, before: Chain, next: Chain) {
         let count = match (before.after(), next.before()) {
             (Some(RunningDisparity::Plus), Some(RunningDisparity::Plus)) => &mut self.carried,
@@ -156,12 +157,12 @@ impl Beginnings {
         }
     }
 
-    /// Returns whether nearly all answers so far began where the one before ended.
+    /// Returns whether nearly all answers so far began with the disparity with which the previous one ended.
     pub const fn are_carried(self) -> bool {
         Self::is_rule(self.carried, self.anew)
     }
 
-    /// Returns whether nearly all answers so far began with -, wherever the one before ended.
+    /// Returns whether nearly all answers so far began with -, however the previous one ended.
     pub const fn are_anew(self) -> bool {
         Self::is_rule(self.anew, self.carried)
     }

@@ -1,4 +1,4 @@
-//! The application's side of the receiver: positions to use, messages, settings.
+//! The application's side of the receiver: usable positions, messages, settings.
 
 use super::{FREE_RUNNING_NS, Master, State};
 use crate::doubt::Doubt;
@@ -10,7 +10,7 @@ use crate::message::{Finished, LongRequest, ShortRequest};
 use crate::sync::{Es, Synchroniser};
 
 impl Master {
-    /// What is known about the fast position after the last H-frame, to be judged where it is used.
+    /// Returns what is known about the fast position after the last H-frame, to be judged where it is used.
     pub fn fast(&self) -> Evidence {
         if self.linked().is_none() {
             return Evidence::doubtful(Doubt::NoLink);
@@ -20,12 +20,12 @@ impl Master {
         evidence
     }
 
-    /// What is known about the safe position of the last V-frame, to be judged where it is used.
+    /// Returns what is known about the safe position of the last V-frame, to be judged where it is used.
     pub fn safe(&self) -> SafeEvidence {
         self.linked().map_or(SafeEvidence(Err(Doubt::NoLink)), |id| self.link.safe(id))
     }
 
-    /// The encoder of a link that runs.
+    /// Returns the encoder of a running link.
     const fn linked(&self) -> Option<EncoderId> {
         match (self.state, self.lost) {
             (State::Running, None) => self.encoder,
@@ -39,32 +39,34 @@ impl Master {
         self.counters.frames.wrapping_sub(1) as u32
     }
 
-    /// Steps per turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
+    /// Sets the steps per turn, RESOLUTN (resource 081h) of a rotary encoder, for [`Sample::angle`](crate::Sample::angle); 0 for
+    /// none.
     pub const fn set_steps_per_turn(&mut self, steps: u32) {
         self.steps_per_turn = steps;
     }
 
-    /// Blocks of stuffing after each H-frame of a running link that is free running, 0 at first. A frame lasts 11.52 µs and 0.64 µs a
-    /// block: for a processor that needs more time, or another rate of positions. [`ahead`](Self::ahead) goes with it. On a link that runs it counts from the
-    /// end of the next frame on.
+    /// Sets the number of stuffing blocks after each H-frame of a free-running link that is up; initially 0. A frame lasts 11.52
+    /// µs plus 0.64 µs per block, which helps a processor that needs more time, or sets another rate of positions.
+    /// [`ahead`](Self::ahead) can be used with it. On a running link it takes effect from the end of the next frame.
     pub const fn set_stuffing(&mut self, stuffing: Stuffing) {
         self.stuffing = stuffing;
         self.usual_ns = FREE_RUNNING_NS.wrapping_add((stuffing.get() as u32).wrapping_mul(640));
         self.detour = true;
     }
 
-    /// How long after its edge has left the master an encoder samples: 5 ns per metre of cable, and up to 100 ns of its own (SICK
-    /// manual, p. 12). It counts in the instants of positions; 0 at first.
+    /// Sets how long after the edge has left the master the encoder samples: 5 ns per metre of cable, plus up to 100 ns in the
+    /// encoder (SICK manual, p. 12). It is included in the instants of positions; initially 0.
     pub const fn set_latency_ns(&mut self, latency_ns: u16) {
         self.latency_ns = latency_ns;
     }
 
-    /// So many H-frames went over the line whose answers will not be heard, before the one that is heard next: a block of samples was
-    /// overwritten, a head was repeated. Their words are missing, their V-frames have no safe position, and the numbers of frames go
-    /// on. Some 60 instructions each.
+    /// Reports that this many H-frames went over the line whose answers will not be heard, before the next one that is heard,
+    /// for example because a block of samples was overwritten or a head was repeated. Their words are missing, their V-frames
+    /// have no safe position, and the frame numbers include them. This takes some 60 instructions per frame.
     ///
-    /// A frame of which nobody tells is known by its time, if its end is told half a frame too late; then no fast position is given until
-    /// three safe positions have come, no safe one of that V-frame, and the number of the frame is not known.
+    /// A lost frame that is not reported is recognised by its time, if the reported end is half a frame too late. Then no fast
+    /// position is returned until three safe positions have come, no safe position from that V-frame, and the number of the
+    /// frame is not known.
     pub fn skip(&mut self, frames: u8) {
         self.counters.frames = self.counters.frames.wrapping_add(frames.into());
         let frame_ns = self.frame_ns();
@@ -82,7 +84,7 @@ impl Master {
         (self.restart, self.detour) = (true, true);
     }
 
-    /// Drops all messages and tells the encoder so (MRST). What was under way ends with [`Error::Dropped`].
+    /// Drops all messages and tells the encoder to do the same (MRST). Messages under way end with [`Error::Dropped`].
     ///
     /// # Errors
     /// [`Error::NotLocked`] before the first V-frame is complete.
@@ -91,7 +93,7 @@ impl Master {
         Ok(self.requester.reset())
     }
 
-    /// Starts a short message; its end is in [`HFrame::finished`](super::HFrame::finished).
+    /// Starts a short message; its result appears in [`HFrame::finished`](super::HFrame::finished).
     ///
     /// # Errors
     /// [`Error::NotLocked`] before the first V-frame is complete, [`Error::Busy`].
@@ -100,7 +102,7 @@ impl Master {
         self.requester.start_short(request)
     }
 
-    /// Starts a long message; its end is in [`HFrame::finished`](super::HFrame::finished).
+    /// Starts a long message; its result appears in [`HFrame::finished`](super::HFrame::finished).
     ///
     /// # Errors
     /// [`Error::NotLocked`] before the first V-frame is complete, [`Error::Busy`].
@@ -117,12 +119,13 @@ impl Master {
         }
     }
 
-    /// ACC_ERR_CNT_THRESH: unusable acceleration words in a row after which a dialect that does so restarts the link.
+    /// Sets ACC_ERR_CNT_THRESH: the number of unusable acceleration words in a row after which the link restarts, in a dialect
+    /// that has this rule.
     pub const fn set_acceleration_threshold(&mut self, words: u8) {
         self.threshold = words;
     }
 
-    /// The period of the external pulse in eighths of a bit (13.333 ns each), for
+    /// Sets the period of the external pulse in eighths of a bit (13.333 ns each), for
     /// [`set_frames_per_pulse`](Self::set_frames_per_pulse).
     ///
     /// ```
@@ -140,10 +143,11 @@ impl Master {
         self.pulse = Some(period);
     }
 
-    /// SYNC_CTRL: how many H-frames there are for a pulse from the next frame on, `None` free running. The link goes on.
+    /// Sets SYNC_CTRL: how many H-frames there are per pulse, starting with the next frame; `None` for free running. The link
+    /// continues.
     ///
     /// # Errors
-    /// [`Error::NoPulse`] if no period is known, [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`]; the frames stay as
+    /// [`Error::NoPulse`] if no period is known, [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`]; the frames then stay as
     /// they were.
     pub fn set_frames_per_pulse(&mut self, frames: Option<Es>) -> Result<(), Error> {
         self.sync = match frames {

@@ -1,4 +1,4 @@
-//! What an H-frame brought.
+//! What was received in an H-frame.
 
 use super::{RestartReason, State};
 use crate::acceleration::DeltaDelta;
@@ -18,17 +18,18 @@ use crate::vframe::VFrame;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SignalQuality {
-    /// RSSI of this answer. On a running link a receiver of samples looks at a quarter of its bits, at another one in each frame.
+    /// RSSI of this answer. On a running link a receiver of samples examines a quarter of its bits, a different quarter in each
+    /// frame.
     pub rssi: Rssi,
-    /// The delay of the cable, as learned at the start.
+    /// The delay of the cable, as learned during start-up.
     pub delay: Delay,
     /// Bit n is set if an edge of the test pattern was seen in sample period n of the start-up.
     pub edges: u8,
 }
 
-/// What an H-frame brought, and how it ends on the line.
+/// What was received in an H-frame, and how the frame ends on the line.
 ///
-/// What comes once a V-frame or more rarely is there in the one frame that it belongs to.
+/// Values that come once per V-frame or less often are present only in the frame to which they belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -41,23 +42,24 @@ pub struct HFrame {
     pub state: State,
     /// Set if the next frame begins a new start-up.
     pub restarted: Option<RestartReason>,
-    /// Frames of the running link before this one were not heard: [`Master::skip`](super::Master::skip) told of them, or the time.
+    /// Frames of the running link before this one were not heard, as reported by [`Master::skip`](super::Master::skip) or
+    /// recognised by the time.
     pub gap: bool,
-    /// The encoder identifier, in the frame that brought it.
+    /// The encoder identifier, in the frame in which it arrived.
     pub encoder: Option<EncoderId>,
-    /// The line, where it was measured.
+    /// The quality of the line, if it was measured.
     pub signal: Option<SignalQuality>,
     /// The quality monitor, 0..=15.
     pub quality: u8,
-    /// The acceleration, of a running link and if its word can be used.
+    /// The acceleration, on a running link and if its word can be used.
     pub acceleration: Option<DeltaDelta>,
-    /// Acceleration words in a row that could not be used.
+    /// Number of acceleration words in a row that could not be used.
     pub acceleration_errors: u32,
     /// The safe blocks, in the last H-frame of a V-frame.
     pub v_frame: Option<VFrame>,
     /// The word of the pipe channel, K30.7 included.
     pub pipe: Option<Reading>,
-    /// The encoder says INIT: it has dropped its messages.
+    /// The encoder sends INIT: it has dropped its messages.
     pub init: bool,
     /// Messages that have ended.
     pub finished: Finished,
@@ -74,7 +76,7 @@ servowire_core::one_line!(HFrame {
 });
 
 impl HFrame {
-    /// Before the first frame.
+    /// Creates the value before the first frame.
     pub(super) const START: Self = Self {
         tail: Tail { trailer: Trailer::Whole, stuffing: Stuffing::MIN },
         was: State::Reset,
@@ -94,7 +96,7 @@ impl HFrame {
         short_free: false,
     };
 
-    /// What a link brings, at its end.
+    /// Clears what a link has brought, at its end.
     pub(super) const fn clear(&mut self) {
         self.quality = QualityMonitor::START;
         self.acceleration = None;
@@ -112,7 +114,7 @@ impl HFrame {
         self.finished = Finished { short: None, long: None };
     }
 
-    /// What the pipe channel brought; `None` if it had no data in this frame.
+    /// Returns the data of the pipe channel; `None` if it had none in this frame.
     ///
     /// ```
     /// use hdsl::device::Device;
@@ -143,13 +145,13 @@ impl HFrame {
     }
 }
 
-/// What was counted since the machine was created.
+/// The counts since the machine was created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
-    /// H-frames, heard or told of.
+    /// Number of H-frames, heard or reported.
     pub frames: u64,
     /// Restarts.
     pub restarts: u32,

@@ -1,4 +1,4 @@
-//! The running link: what is done with every answer and every V-frame.
+//! The running link: handling of every answer and every V-frame.
 
 use super::{Master, RestartReason};
 use crate::acceleration::DeltaDelta;
@@ -14,7 +14,7 @@ use crate::quality::{QualityEvent, QualityMonitor, QualityRule};
 use crate::symbol::Reading;
 use crate::vframe::VFrame;
 
-/// What belongs to one link between its lock and its loss.
+/// The state of one link between its lock and its loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Link {
@@ -26,9 +26,9 @@ pub(super) struct Link {
     msync: bool,
     /// At least one V-frame is complete: messages may be sent.
     settled: bool,
-    /// What the last V-frame brought as a safe position, with SUMMARY.
+    /// The safe position of the last V-frame, with SUMMARY.
     safe: Result<(u64, u8), Doubt>,
-    /// TEST2 of the last V-frame is to be counted.
+    /// TEST2 of the last V-frame has to be counted.
     test2: bool,
     /// When the safe position of the last V-frame was sampled, and that of the present one.
     last_sampled_ns: u64,
@@ -63,7 +63,7 @@ impl Link {
         self.settled
     }
 
-    /// A V-frame begins after the H-frame that was sampled then.
+    /// Notes that a V-frame begins after the H-frame that was sampled at this time.
     pub(super) const fn latch(&mut self, sampled_ns: u64) {
         (self.last_sampled_ns, self.sampled_ns) = (self.sampled_ns, sampled_ns);
     }
@@ -78,7 +78,8 @@ impl Link {
         SafeEvidence(self.safe.map(|(raw, summary)| SafeSample { position: id.position(raw), summary, sampled_ns }))
     }
 
-    /// A frame whose answer is not heard: its word is missing, and so is a byte of both safe blocks. Returns whether another V-frame
+    /// Handles a frame whose answer is not heard: its word is missing, and so is a byte of each safe block. Returns whether
+    /// another V-frame
     /// begins after it.
     pub(super) fn skip(&mut self) -> bool {
         self.fast.step(None);
@@ -94,8 +95,8 @@ impl Link {
         last
     }
 
-    /// Frames went by unheard, nobody knows how many: what follows need not belong to the V-frame that had begun. The last of them was
-    /// sampled `before_ns`.
+    /// Handles an unknown number of unheard frames: what follows need not belong to the V-frame that had begun. The last one was
+    /// sampled at `before_ns`.
     pub(super) fn interrupt(&mut self, before_ns: u64) {
         self.fast.interrupt();
         self.vframe = VFrame::default();
@@ -104,7 +105,7 @@ impl Link {
 }
 
 impl Master {
-    /// One H-frame of RX0..RX7.
+    /// Handles one H-frame of RX0..RX7.
     pub(super) fn run(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
         self.count_test();
@@ -141,7 +142,7 @@ impl Master {
         }
     }
 
-    /// What is wrong with the words; mostly nothing.
+    /// Counts the faults of the words; mostly there are none.
     #[inline]
     fn count_words(&mut self, answer: Answer) {
         let weak = self.h_frame.signal.is_some_and(|signal| signal.rssi.get() < 2);
@@ -174,7 +175,7 @@ impl Master {
         self.h_frame.acceleration_errors = self.link.fast.missing_in_a_row();
     }
 
-    /// An acceleration word with something wrong: counted, and used all the same if the dialect does so.
+    /// Handles a faulty acceleration word: counts it, and uses it all the same if the dialect does so.
     #[cold]
     fn unusable(&mut self, answer: &Answer, error: Error) -> Option<DeltaDelta> {
         if self.dialect.damaged_acceleration && matches!(error, Error::InvalidWord { .. }) {
@@ -190,7 +191,7 @@ impl Master {
         None
     }
 
-    /// After RX7: judges the safe channels and aligns the fast position.
+    /// After RX7, judges the safe channels and aligns the fast position.
     fn end_v_frame(&mut self) {
         let link = &mut self.link;
         let VFrame { safe1, safe2 } = &link.vframe;

@@ -1,4 +1,5 @@
-//! What the receiver sends: the head of the next H-frame, before or after the answer of the present one, and the end of a frame.
+//! What the receiver sends: the head of the next H-frame, before or after the answer of the present one is processed, and the
+//! end of a frame.
 
 use super::{Master, RestartReason, State};
 use crate::frame::{Extra, H_FRAME_BITS, Head, STUFFING_BITS, Stuffing, Trailer};
@@ -14,19 +15,19 @@ pub struct Transmission {
     pub lead_in: u8,
     /// SYNC to PARA.
     pub head: Head,
-    /// Whether an encoder answers: then the line is released after PARA, reception begins one bit later and takes
-    /// [`WINDOW`](crate::sampling::WINDOW) bits. Otherwise [`FILLER`](crate::frame::FILLER) is sent.
+    /// Whether an encoder answers. If so, the line is released after PARA, and reception begins one bit later and takes
+    /// [`WINDOW`](crate::sampling::WINDOW) bits; otherwise [`FILLER`](crate::frame::FILLER) is sent.
     pub answered: bool,
 }
 
 impl Master {
-    /// The next head before the answer of the present frame is taken in, for a processor that has not finished an answer when
-    /// the next head has to begin: call it while the answer is being received, send the head, and give the samples to
-    /// [`hear`](Self::hear) while it is on the line.
+    /// Returns the next head before the answer of the present frame has been processed, for a processor that has not finished an
+    /// answer when the next head has to begin. Call this while the answer is being received, send the head, and pass the samples
+    /// to [`hear`](Self::hear) while the head is on the line.
     ///
-    /// What an answer changes comes a frame later on the line. If it is the end of the link, the frame that is out already is
-    /// sent to its end; [`fast`](Self::fast) and [`safe`](Self::safe) give nothing from the loss on, and what [`hear`](Self::hear) gives for that
-    /// frame says why the link is started anew.
+    /// Whatever an answer changes appears on the line one frame later. If it ends the link, the frame already begun is sent to
+    /// its end; [`fast`](Self::fast) and [`safe`](Self::safe) return nothing after the loss, and what [`hear`](Self::hear)
+    /// returns for that frame says why the link restarts.
     ///
     /// `None` while the next head depends on the answer: before the link runs, in sync mode, before a restart.
     ///
@@ -64,19 +65,20 @@ impl Master {
         self.ahead
     }
 
-    /// Whether the next head depends on the answer of a running link.
+    /// Returns whether the next head depends on the answer of a running link.
     #[cold]
     const fn waits_for_answer(&self) -> bool {
         self.sync.is_some() || self.restart || self.lost.is_some()
     }
 
-    /// The head after a frame of a running link that is free running.
+    /// Returns the head after a frame of a free-running link that is up.
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
         transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
     }
 
-    /// From the end of one window to that of the next one, which is that of `present`, and half a free-running frame, in ns.
+    /// Returns the time from the end of one window to that of the next, which is that of `present`, plus half a free-running
+    /// frame, in ns.
     pub(super) fn present_ns(&self) -> u32 {
         let extra = self.present.head.extra().map_or(0, |extra| extra.bits().into());
         let bits = H_FRAME_BITS
@@ -96,7 +98,7 @@ impl Master {
         Stuffing::new(blocks).unwrap_or(Stuffing::MAX)
     }
 
-    /// The head of the next frame.
+    /// Returns the head of the next frame.
     pub(super) fn prepare(&mut self, was: State, extra: Option<Extra>, restarted: bool) {
         let symbol = match self.state {
             State::Reset => MasterSymbol::Reset,
@@ -120,7 +122,7 @@ impl Master {
     }
 }
 
-/// What to send in a frame, and the line disparity after it.
+/// Returns what to send in a frame, and the line disparity after it.
 #[inline]
 pub(super) fn transmission(
     state: State,
@@ -141,7 +143,7 @@ pub(super) fn transmission(
     (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
 }
 
-/// How a frame ends that was sent in this state.
+/// Returns how a frame ends that was sent in this state.
 pub(super) const fn trailer(before: State, restarted: Option<RestartReason>) -> Trailer {
     match (before, restarted) {
         (State::Reset | State::Sync, _) => Trailer::Whole,

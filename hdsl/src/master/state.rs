@@ -1,4 +1,4 @@
-//! Where the receiver is in its start-up, and why it began anew.
+//! The state of the receiver in its start-up, and why it restarted.
 
 use crate::error::Error;
 
@@ -12,9 +12,9 @@ pub enum State {
     Sync,
     /// Nine frames: sampling index and delay are searched in the test pattern.
     Start,
-    /// Nine frames: the test pattern has to come at the learned place.
+    /// Nine frames: the test pattern has to appear at the learned place.
     Learn,
-    /// Sixteen frames more of the same: line check.
+    /// Sixteen more such frames: line check.
     Check,
     /// One frame: the encoder identifier.
     IdReq,
@@ -25,7 +25,7 @@ pub enum State {
 }
 
 impl State {
-    /// How many frames the state lasts; `None` if that depends on the encoder.
+    /// Number of frames that the state lasts; `None` if that depends on the encoder.
     pub const fn frames(self) -> Option<u8> {
         match self {
             Self::Reset => Some(2),
@@ -54,17 +54,17 @@ impl State {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum RestartReason {
-    /// The application asked for it (PRST).
+    /// The application requested it (PRST).
     Requested,
-    /// A START frame: no encoder, or the test pattern is not there.
+    /// In a START frame, there was no encoder or no test pattern.
     Learn(Error),
-    /// A LEARN or CHECK frame: the test pattern came with a wrong bit.
+    /// In a LEARN or CHECK frame, the test pattern had a wrong bit.
     Pattern,
-    /// The identifier was damaged or is of an encoder that this receiver does not support.
+    /// The identifier was damaged, or belongs to an encoder that this receiver does not support.
     Identifier(Error),
     /// No VSYNC within the frames that [`Dialect::vsync_frames`](crate::Dialect::vsync_frames) allows.
     NoVsync,
-    /// The quality monitor has run out.
+    /// The quality monitor has reached its lower limit.
     Quality,
     /// Too many acceleration words in a row could not be used.
     AccelerationErrors,

@@ -1,4 +1,4 @@
-//! Requests by what they are for. Those that cannot be undone say so in their name.
+//! Requests by purpose. Requests that cannot be undone say so in their names.
 
 use super::long::{Access, Data, LongRequest};
 use crate::resource::{Offset, ResourceAddress};
@@ -22,13 +22,13 @@ servowire_core::codes! {
 }
 
 impl LongRequest {
-    /// Resets the encoder (RID 100h, SICK manual, p. 114). It saves its lifetime data and does not answer; the link restarts,
-    /// and a position that is not saved by the encoder is lost.
+    /// Resets the encoder (RID 100h, SICK manual, p. 114). The encoder saves its lifetime data and does not answer; the link
+    /// restarts, and a position that the encoder does not save is lost.
     pub const fn reset_encoder() -> Self {
         Self { address: ResourceAddress::RESET, indirect: true, offset: None, access: Access::Write(Data::NONE) }
     }
 
-    /// Shuts the encoder down (RID 100h, offset 1): it is silent **until its power is switched off and on**.
+    /// Shuts the encoder down (RID 100h, offset 1): it stays silent **until its power is cycled**.
     pub const fn shut_encoder_down_until_power_cycle() -> Self {
         let access = Access::Write(Data::NONE);
         Self { address: ResourceAddress::RESET, indirect: true, offset: Offset::new(1), access }
@@ -39,12 +39,12 @@ impl LongRequest {
         Self { address: ResourceAddress::INCCOUNT, indirect: true, offset: None, access: Access::Write(Data::NONE) }
     }
 
-    /// Sets the user counter to 0 (RID 122h); what it had counted is lost.
+    /// Sets the user counter to 0 (RID 122h); its count is lost.
     pub const fn clear_user_counter_for_good() -> Self {
         Self { address: ResourceAddress::RESETCNT, indirect: true, offset: None, access: Access::Write(Data::NONE) }
     }
 
-    /// Asks for an access level with its key (RID 104h). After a reset the level is public again.
+    /// Requests an access level with its key (RID 104h). After a reset the level is public again.
     pub fn set_access(level: AccessLevel, key: [u8; 4]) -> Self {
         let [k0, k1, k2, k3] = key;
         let access = Access::Write(Data::eight([level.code(), 0, 0, 0, k0, k1, k2, k3]));
@@ -62,7 +62,7 @@ impl LongRequest {
         }
     }
 
-    /// Returns whether the encoder loses something through this request, or leaves the link: reset, shut-down, counting
+    /// Returns whether this request makes the encoder lose something or leave the link: reset, shut-down, counting
     /// direction, access
     /// keys, user counter, deletion of files.
     pub fn is_dangerous(&self) -> bool {

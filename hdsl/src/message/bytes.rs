@@ -27,7 +27,7 @@ impl MessageBytes {
         }
     }
 
-    /// The message with its CRC.
+    /// Appends the CRC to the message.
     pub(super) fn sealed(mut self) -> Self {
         let crc = crc16(self.as_bytes());
         self.push(&crc.to_be_bytes());
@@ -43,14 +43,14 @@ impl MessageBytes {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
     }
 
-    /// Nibble `at` in the order sent; `None` after the end.
+    /// Returns nibble `at` in the order sent; `None` after the end.
     pub fn nibble(&self, at: u8) -> Option<Nibble> {
         let byte = self.as_bytes().get(usize::from(at / 2))?;
         Some(Nibble::truncate(if at % 2 == 0 { byte >> 4 } else { *byte }))
     }
 }
 
-/// The bytes before the CRC of a message of `len` bytes at the beginning of `bytes`.
+/// Returns the bytes before the CRC of a message of `len` bytes at the start of `bytes`.
 pub(super) fn checked(bytes: &[u8], len: usize) -> Result<&[u8], Error> {
     let short = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
     let Some((covered, [high, low])) = bytes.get(..len).and_then(<[u8]>::split_last_chunk) else {

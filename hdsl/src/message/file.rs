@@ -5,7 +5,7 @@ use super::long::{Access, Data, Length, LongRequest};
 use crate::error::Error;
 use crate::resource::{Offset, ResourceAddress};
 
-/// Name of a user file: 1 to 8 characters 20h..=7Eh, filled up with 00h. Case counts.
+/// Name of a user file: 1 to 8 characters 20h..=7Eh, padded with 00h. Case counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(
     feature = "serde",
@@ -38,7 +38,7 @@ impl FileName {
 impl TryFrom<[u8; 8]> for FileName {
     type Error = Error;
 
-    /// As the encoder sends it: characters, then 00h.
+    /// The name as the encoder sends it: characters, then 00h.
     fn try_from(bytes: [u8; 8]) -> Result<Self, Error> {
         let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
         let (name, rest) = bytes.split_at_checked(len).unwrap_or((&bytes, &[]));
@@ -57,7 +57,7 @@ servowire_core::one_line!(FileName {
     name => "{}", name.as_str();
 });
 
-/// Rights and size of the loaded file, as FILESTAT (132h) gives them.
+/// Rights and size of the loaded file, as returned by FILESTAT (132h).
 ///
 /// ```
 /// use hdsl::message::{AccessLevel, Data, FileStatus};
@@ -70,16 +70,16 @@ servowire_core::one_line!(FileName {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FileStatus {
-    /// Level that may write; `None` if the number is not defined.
+    /// The level that may write; `None` if the number is not defined.
     pub write: Option<AccessLevel>,
-    /// Level that may read.
+    /// The level that may read.
     pub read: Option<AccessLevel>,
-    /// Bytes in the file.
+    /// Number of bytes in the file.
     pub size: u16,
 }
 
 impl FileStatus {
-    /// From the answer to [`LongRequest::file_status`].
+    /// Decodes the answer to [`LongRequest::file_status`].
     ///
     /// # Errors
     /// [`Error::DataLength`] unless there are four bytes.
@@ -100,12 +100,12 @@ impl LongRequest {
         Self { address, indirect: true, offset: Some(Offset::truncate(offset)), access: Access::Write(data) }
     }
 
-    /// Loads a file: the other file requests then refer to it. Its checksum is verified; one file at a time.
+    /// Loads a file, to which the other file requests then refer. Its checksum is verified; only one file is loaded at a time.
     pub fn load_file(name: FileName) -> Self {
         Self::write_file_resource(ResourceAddress::LOADFILE, 0x00, Data::eight(name.0))
     }
 
-    /// Loads a file whose checksum may be wrong.
+    /// Loads a file even if its checksum is wrong.
     pub fn load_file_unverified(name: FileName) -> Self {
         Self::write_file_resource(ResourceAddress::LOADFILE, 0x10, Data::eight(name.0))
     }
@@ -120,7 +120,7 @@ impl LongRequest {
         Self { address: ResourceAddress::RWFILE, indirect: true, offset: Some(address), access: Access::Write(data) }
     }
 
-    /// Rights and size of the loaded file, see [`FileStatus`].
+    /// Reads rights and size of the loaded file, see [`FileStatus`].
     pub const fn file_status() -> Self {
         Self::read(ResourceAddress::FILESTAT, Length::Four)
     }
@@ -140,18 +140,18 @@ impl LongRequest {
         Self::write_file_resource(ResourceAddress::MAKEFILE, 0x000, Data::eight(name.0))
     }
 
-    /// Directory: byte 0 the number of files, bytes 2 and 3 free, bytes 4 and 5 used bytes.
+    /// Reads the directory: byte 0 is the number of files, bytes 2 and 3 the free bytes, bytes 4 and 5 the used bytes.
     pub const fn directory() -> Self {
         Self::read_at(ResourceAddress::DIR, Offset::truncate(0), Length::Eight)
     }
 
-    /// Name of file `number`, from 1.
+    /// Reads the name of file `number`, from 1.
     pub const fn file_name(number: Offset) -> Self {
         Self::read_at(ResourceAddress::DIR, number, Length::Eight)
     }
 }
 
-/// Offset bits 7:4 write, 3:0 read level.
+/// Offset: write level in bits 7:4, read level in bits 3:0.
 fn rights(write: AccessLevel, read: AccessLevel) -> u16 {
     u16::from(write.code() << 4 | read.code())
 }

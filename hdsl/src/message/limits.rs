@@ -1,15 +1,15 @@
-/// How often and for how long the requester tries.
+/// How many times and for how long the requester tries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Limits {
-    /// Times a short message is sent; 0 counts as 1.
+    /// How many times a short message is sent; 0 counts as 1.
     pub short_tries: u8,
-    /// H-frames without an answer after which a short message is sent again.
+    /// Number of H-frames without an answer after which a short message is sent again.
     pub short_frames: u32,
-    /// H-frames without an answer after which a long message fails.
+    /// Number of H-frames without an answer after which a long message fails.
     pub long_frames: u32,
 }
 

@@ -3,7 +3,7 @@ use crate::error::Error;
 use crate::resource::{Named, Offset, ResourceAddress, ResourceError};
 
 servowire_core::codes! {
-    /// LLEN: how many data bytes a long message carries or asks for.
+    /// LLEN: how many data bytes a long message carries or requests.
     #[derive(Default)]
     #[allow(missing_docs, reason = "the name says how many")]
     pub enum Length: u8 {
@@ -53,7 +53,7 @@ impl Data {
     /// No data.
     pub const NONE: Self = Self { bytes: [0; 8], length: Length::None };
 
-    /// A copy of `bytes`.
+    /// Copies `bytes`.
     ///
     /// # Errors
     /// [`Error::DataLength`] unless there are 0, 2, 4 or 8.
@@ -96,7 +96,7 @@ impl Data {
 impl TryFrom<(Length, [u8; 8])> for Data {
     type Error = Error;
 
-    /// Bytes after the data have to be 0.
+    /// The bytes after the data have to be 0.
     fn try_from((length, bytes): (Length, [u8; 8])) -> Result<Self, Error> {
         let data = Self::new(bytes.get(..length.bytes()).unwrap_or(&bytes))?;
         if data.bytes == bytes { Ok(data) } else { Err(Error::DataLength { len: 8 }) }
@@ -117,7 +117,7 @@ servowire_core::one_line!(Data {
         "{:02X} {:02X} {:02X} {:02X} {:02X} {:02X} {:02X} {:02X}", b0, b1, b2, b3, b4, b5, b6, b7;
 });
 
-/// What a long message wants.
+/// What a long message asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -180,14 +180,14 @@ const fn address(first: u8, second: u8) -> ResourceAddress {
     ResourceAddress::truncate(u16::from_be_bytes([first & 3, second]))
 }
 
-/// Bytes of a long request that begins with this byte.
+/// Length in bytes of a long request that begins with this byte.
 pub(super) const fn request_len(first: u8) -> usize {
     let offset = if first & LOFF != 0 { 2 } else { 0 };
     let data = if first & LRW == 0 { Length::in_header(first).bytes() } else { 0 };
     4_usize.saturating_add(offset).saturating_add(data)
 }
 
-/// Bytes of a long answer that begins with this byte: the acknowledgement of a write has no data whatever its LLEN.
+/// Length in bytes of a long answer that begins with this byte. The acknowledgement of a write has no data, whatever its LLEN.
 pub(super) const fn answer_len(first: u8) -> usize {
     let has_data = first & (LRW | LOFF) != 0;
     4_usize.saturating_add(if has_data { Length::in_header(first).bytes() } else { 0 })
@@ -207,7 +207,7 @@ impl LongRequest {
         Self { address, indirect: true, offset: None, access: Access::Read(length) }
     }
 
-    /// Reads the value of a resource from `offset` on.
+    /// Reads the value of a resource, starting at `offset`.
     pub const fn read_at(address: ResourceAddress, offset: Offset, length: Length) -> Self {
         Self { address, indirect: true, offset: Some(offset), access: Access::Read(length) }
     }
@@ -253,7 +253,7 @@ impl LongRequest {
         bytes
     }
 
-    /// What an encoder makes of received bytes. Bytes after the message are left alone.
+    /// Decodes received bytes as an encoder does. Bytes after the message are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], and [`Error::ShortMessageStart`] for an
@@ -263,7 +263,7 @@ impl LongRequest {
         Self::of_covered(checked(bytes, request_len(first))?)
     }
 
-    /// From the bytes before a right CRC.
+    /// Decodes the bytes before a correct CRC.
     pub(super) fn of_covered(covered: &[u8]) -> Result<Self, Error> {
         let (Some([first, low]), Some(mut rest)) = (covered.first_chunk(), covered.get(2..)) else {
             return Err(Error::Truncated { got: 0, want: 2 });
@@ -281,18 +281,18 @@ impl LongRequest {
         Ok(Self { address: address(*first, *low), indirect: first & LIND != 0, offset, access })
     }
 
-    /// The data in the answer to this request; none after a write.
+    /// Returns the data in the answer to this request; none after a write.
     ///
     /// # Errors
-    /// In this order: [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], [`Error::Header`] if a
-    /// sound answer is for another request or brings less or more than was asked for, [`Error::Resource`] if the encoder refused.
+    /// In this order: [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], [`Error::Header`] if a sound answer is
+    /// for another request or carries less or more data than requested, [`Error::Resource`] if the encoder refused.
     pub fn parse_answer(&self, bytes: &[u8]) -> Result<Data, Error> {
         let answer = LongAnswer::parse(bytes)?;
         self.check_answer(answer)?;
         answer.result.map_err(|error| Error::Resource { error })
     }
 
-    /// Whether a sound answer belongs to this request.
+    /// Returns whether a sound answer belongs to this request.
     pub(super) fn check_answer(&self, answer: LongAnswer) -> Result<(), Error> {
         let (wanted, length) = match (&self.access, &answer.result) {
             (Access::Read(length), Ok(data)) => (*length, data.length),
@@ -314,16 +314,16 @@ impl LongRequest {
 pub struct LongAnswer {
     /// Which resource.
     pub address: ResourceAddress,
-    /// Whether it answers a read.
+    /// Whether this is the answer to a read.
     pub read: bool,
     /// LIND.
     pub indirect: bool,
-    /// The data read, nothing after a write, or why not.
+    /// The data read, nothing after a write, or the error.
     pub result: Result<Data, ResourceError>,
 }
 
 impl LongAnswer {
-    /// The answer to a request.
+    /// Creates the answer to a request.
     pub const fn to(request: &LongRequest, result: Result<Data, ResourceError>) -> Self {
         Self { address: request.address, read: request.is_read(), indirect: request.indirect, result }
     }
@@ -359,17 +359,17 @@ impl LongAnswer {
         bytes
     }
 
-    /// Reads an answer. Bytes after it are left alone.
+    /// Decodes an answer. Bytes after it are ignored.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer
-    /// of another length than two bytes.
+    /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer that is not
+    /// two bytes long.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = long_start(bytes)?;
         Self::of_covered(checked(bytes, answer_len(first))?)
     }
 
-    /// From the bytes before a right CRC.
+    /// Decodes the bytes before a correct CRC.
     pub(super) fn of_covered(covered: &[u8]) -> Result<Self, Error> {
         let (Some([first, low]), Some(rest)) = (covered.first_chunk(), covered.get(2..)) else {
             return Err(Error::Truncated { got: 0, want: 2 });
@@ -393,7 +393,7 @@ impl LongRequest {
         }
     }
 
-    /// The offset, for a text in which it stands.
+    /// The offset, as used in a text.
     const fn shown_offset(&self) -> u16 {
         match self.offset {
             Some(offset) => offset.get(),

@@ -1,11 +1,11 @@
-//! A message nibble by nibble, one an H-frame.
+//! Messages nibble by nibble, one per H-frame.
 
 use super::bytes::MessageBytes;
 use super::long;
 use crate::crc::RunningCrc16;
 use crate::parameter::Nibble;
 
-/// A message on its way out: one nibble an H-frame, its CRC grows along.
+/// A message being sent, one nibble per H-frame; its CRC is computed along the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Sender {
@@ -19,7 +19,7 @@ impl Sender {
         Self { body, crc: RunningCrc16::new(), at: 0 }
     }
 
-    /// The next nibble; `None` after the last one of the CRC.
+    /// Returns the next nibble; `None` after the last one of the CRC.
     pub(super) fn next(&mut self) -> Option<Nibble> {
         let at = self.at / 2;
         let [high, low] = self.crc.finish().to_be_bytes();
@@ -38,14 +38,14 @@ impl Sender {
     }
 }
 
-/// A message that is complete.
+/// A complete message.
 pub(super) struct Gathered {
     pub(super) bytes: MessageBytes,
     sound: bool,
 }
 
 impl Gathered {
-    /// The bytes before the CRC if it is right.
+    /// The bytes before the CRC, if it is correct.
     pub(super) fn covered(&self) -> Option<&[u8]> {
         let (covered, _) = self.bytes.as_bytes().split_last_chunk::<2>()?;
         self.sound.then_some(covered)
@@ -56,14 +56,14 @@ impl Gathered {
     }
 }
 
-/// Gathers the nibbles of one message; the length follows from the first byte.
+/// Collects the nibbles of one message; the length follows from the first byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Collector {
     bytes: MessageBytes,
     crc: RunningCrc16,
     high: Option<Nibble>,
-    /// An IDLE was seen since the last message.
+    /// An IDLE has been seen since the last message.
     ready: bool,
 }
 
@@ -72,7 +72,7 @@ impl Collector {
         Self { bytes: MessageBytes::EMPTY, crc: RunningCrc16::new(), high: None, ready: true }
     }
 
-    /// Something that is no nibble ends what was being gathered.
+    /// Takes a symbol that is not a nibble, which ends what was being collected.
     #[inline]
     pub(super) const fn idle(&mut self) {
         if !self.ready || self.high.is_some() || self.bytes.len() != 0 {
@@ -80,14 +80,14 @@ impl Collector {
         }
     }
 
-    /// The message is complete; the next one begins after an IDLE.
+    /// Ends a complete message; the next one begins after an IDLE.
     pub(super) const fn finish(&mut self) -> Gathered {
         let gathered = Gathered { bytes: self.bytes, sound: self.crc.is_residue() };
         *self = Self { ready: false, ..Self::new() };
         gathered
     }
 
-    /// Takes a nibble. Gives the message when `length`, told the first byte, says that it is complete.
+    /// Takes a nibble. Returns the message when it is complete according to `length`, which is given the first byte.
     pub(super) fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> Option<Gathered> {
         if !self.ready {
             return None;
@@ -106,7 +106,7 @@ impl Collector {
     }
 }
 
-/// Bytes of an answer that begins with this byte, CRC included.
+/// Length in bytes of an answer that begins with this byte, CRC included.
 pub(super) const fn answer_len(first: u8) -> usize {
     match (first & 0x80 != 0, first & 0x40 != 0) {
         (false, true) => 4,
@@ -115,7 +115,7 @@ pub(super) const fn answer_len(first: u8) -> usize {
     }
 }
 
-/// Bytes of a request that begins with this byte, CRC included.
+/// Length in bytes of a request that begins with this byte, CRC included.
 pub(super) const fn request_len(first: u8) -> usize {
     match (first & 0x80 != 0, first & 0x40 != 0) {
         (false, true) => 3,

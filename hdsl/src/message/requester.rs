@@ -8,16 +8,16 @@ use crate::parameter::{EncoderSymbol, MasterSymbol};
 
 /// The master's side of the parameters channel: one short and one long message can be under way.
 ///
-/// A short message goes before a long one, and may be sent while the long one waits for its answer; requests are
-/// never mixed nibble by nibble. A short message that is answered with SNAK or not at all is sent again, up to the
-/// limit of tries, a write too. A long one is not repeated: LNAK or a wrong CRC end it, and the application decides.
+/// A short message has priority over a long one, and may be sent while the long one waits for its answer; the nibbles of two
+/// requests are never interleaved. A short message that is answered with SNAK or not at all is sent again, up to the limit of
+/// tries, even if it is a write. A long one is not repeated: LNAK or a wrong CRC ends it, and the application decides.
 ///
-/// What began before the request was out is never its answer. An answer that comes after its request was given up
-/// ([`Error::NoAnswer`]) cannot be told from that of the next request of the same kind: [`reset`](Self::reset) makes the
-/// encoder forget it.
+/// A message that began before the request had been sent is never its answer. An answer that comes after its request was
+/// abandoned ([`Error::NoAnswer`]) cannot be told from the answer to the next request of the same kind; [`reset`](Self::reset)
+/// makes the encoder forget it.
 ///
-/// In every H-frame [`transmit`](Self::transmit) gives the symbol to send and [`receive`](Self::receive) takes the
-/// symbol that came back.
+/// In every H-frame [`transmit`](Self::transmit) returns the symbol to send and [`receive`](Self::receive) takes the symbol that
+/// came back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requester {
@@ -25,7 +25,7 @@ pub struct Requester {
     collector: Collector,
     short: Slot<ShortRequest>,
     long: Slot<LongRequest>,
-    /// What the two messages look like on the line, made when they are started.
+    /// The two messages as sent on the line, created when they are started.
     bodies: [MessageBytes; 2],
     sending: Option<Sender>,
     reset: bool,
@@ -35,7 +35,7 @@ pub struct Requester {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Slot<T> {
     Free,
-    /// Not sent yet; `tries` times before.
+    /// Not yet sent this time; sent `tries` times before.
     Queued {
         request: T,
         tries: u8,
@@ -51,19 +51,19 @@ enum Slot<T> {
     },
 }
 
-/// What ended in an H-frame.
+/// The messages that ended in an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Finished {
     /// The short message.
     pub short: Option<Result<ShortAnswer, Error>>,
-    /// The long message. A refusal by the encoder is an answer, too.
+    /// The long message. A refusal by the encoder is an answer too.
     pub long: Option<Result<LongAnswer, Error>>,
 }
 
-/// Whether a message began after the request was out, in the H-frame of its last nibble at the earliest. `frames`: since the
-/// IDLE after it. What began before answers an earlier request.
+/// Returns whether a message began after the request had been sent, in the H-frame of its last nibble at the earliest. `frames`
+/// counts from the IDLE after it. A message that began earlier answers an earlier request.
 fn is_answer(message: &Gathered, frames: u32) -> bool {
     let nibbles = message.bytes.as_bytes().len().saturating_mul(2);
     usize::try_from(frames).is_ok_and(|frames| frames.saturating_add(2) >= nibbles)
@@ -76,7 +76,7 @@ impl<T: Copy> Slot<T> {
 }
 
 impl Requester {
-    /// With nothing under way.
+    /// Creates the requester with nothing under way.
     pub const fn new(limits: Limits) -> Self {
         Self {
             limits,
@@ -125,22 +125,22 @@ impl Requester {
         Ok(())
     }
 
-    /// MRST: drops all messages and sends INIT once, upon which the encoder drops its own and answers INIT.
-    /// What was under way ends with [`Error::Dropped`].
+    /// Drops all messages and sends INIT once (MRST), upon which the encoder drops its own and answers INIT.
+    /// Messages under way end with [`Error::Dropped`].
     pub fn reset(&mut self) -> Finished {
         let dropped = self.drop_all();
         self.reset = true;
         dropped
     }
 
-    /// Drops all messages without telling the encoder: the link is being started anew.
+    /// Drops all messages without telling the encoder, because the link is restarting.
     pub(crate) fn drop_all(&mut self) -> Finished {
         let mut finished = Finished::default();
         self.drop_into(&mut finished);
         finished
     }
 
-    /// The same beside messages that have ended in this frame.
+    /// Does the same, and keeps messages that have ended in this frame.
     pub(crate) fn drop_into(&mut self, finished: &mut Finished) {
         if !self.short.is_free() {
             (self.short, finished.short) = (Slot::Free, Some(Err(Error::Dropped)));
@@ -153,7 +153,7 @@ impl Requester {
         self.reset = false;
     }
 
-    /// The symbol for the next H-frame.
+    /// Returns the symbol for the next H-frame.
     pub fn transmit(&mut self) -> MasterSymbol {
         if core::mem::take(&mut self.reset) {
             return MasterSymbol::Init;
@@ -178,7 +178,7 @@ impl Requester {
         }
     }
 
-    /// The message whose turn it is.
+    /// Returns the message whose turn it is.
     fn next(&mut self) -> Option<MessageBytes> {
         if let Slot::Queued { request, tries } = self.short {
             self.short = Slot::Sending { request, tries: tries.saturating_add(1) };
@@ -208,7 +208,7 @@ impl Requester {
         finished
     }
 
-    /// The symbol of an answer; what came to its end goes into `finished`.
+    /// Takes the symbol of an answer; messages that end go into `finished`.
     pub(crate) fn take(&mut self, symbol: Option<EncoderSymbol>, finished: &mut Finished) {
         match symbol {
             Some(EncoderSymbol::Data(nibble)) => {
@@ -238,7 +238,7 @@ impl Requester {
         self.count(finished);
     }
 
-    /// A message is complete, which is rare: the frames without one stay small.
+    /// Handles a complete message, which is rare; kept separate so that the frames without one take little code.
     #[cold]
     #[inline(never)]
     fn complete(&mut self, message: &Gathered, finished: &mut Finished) {
@@ -266,7 +266,7 @@ impl Requester {
         }
     }
 
-    /// Counts the frames of waiting.
+    /// Counts the frames spent waiting.
     #[inline]
     fn count(&mut self, finished: &mut Finished) {
         if let Slot::Waiting { request, tries, frames } = &mut self.short {

@@ -21,9 +21,9 @@ servowire_core::one_line!(Request {
 
 /// The encoder's side of the parameters channel.
 ///
-/// In every H-frame [`receive`](Self::receive) takes the master's symbol and [`transmit`](Self::transmit) gives the
-/// symbol of the answer. A request that is not understood is answered with SNAK or LNAK here; all others are given
-/// to the caller, who answers whenever it can.
+/// In every H-frame [`receive`](Self::receive) takes the master's symbol and [`transmit`](Self::transmit) returns the symbol of
+/// the answer. The responder itself answers a request that it does not understand with SNAK or LNAK; all others go to the
+/// caller, which answers when it can.
 ///
 /// ```
 /// use hdsl::MasterSymbol;
@@ -73,7 +73,7 @@ impl Default for Responder {
 }
 
 impl Responder {
-    /// With nothing under way.
+    /// Creates the responder with nothing under way.
     pub const fn new() -> Self {
         Self { collector: Collector::new(), short: None, long: None, signal: None, sending: None }
     }
@@ -106,7 +106,7 @@ impl Responder {
         None
     }
 
-    /// A symbol of the master was not readable: a message that was being received is lost.
+    /// Takes an unreadable symbol of the master: a message being received is lost.
     pub const fn receive_nothing(&mut self) {
         self.collector.finish();
     }
@@ -121,7 +121,7 @@ impl Responder {
         self.long = Some(answer.body());
     }
 
-    /// The symbol for the answer.
+    /// Returns the symbol for the answer.
     pub fn transmit(&mut self) -> EncoderSymbol {
         if let Some(sending) = &mut self.sending {
             if let Some(nibble) = sending.next() {

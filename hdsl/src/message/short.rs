@@ -9,13 +9,13 @@ use crate::error::Error;
 pub struct RemoteRegister(u8);
 
 impl RemoteRegister {
-    /// ENC_ST0, the first of eight status registers; writing clears.
+    /// ENC_ST0, the first of eight status registers; writing clears it.
     pub const ENC_ST0: Self = Self(0x40);
-    /// SRSSI, signal strength at the encoder, 0..=7; goes back to 7 when read.
+    /// SRSSI, signal strength at the encoder, 0..=7; returns to 7 when read.
     pub const SRSSI: Self = Self(0x7c);
-    /// MAIL, written only.
+    /// MAIL, write only.
     pub const MAIL: Self = Self(0x7e);
-    /// PING, keeps what is written; the hardware version after a start.
+    /// PING, keeps what is written; holds the hardware version after a start.
     pub const PING: Self = Self(0x7f);
 
     /// `None` outside 40h..=7Fh.
@@ -23,7 +23,7 @@ impl RemoteRegister {
         if address >> 6 == 1 { Some(Self(address)) } else { None }
     }
 
-    /// The register with this 6-bit index.
+    /// Returns the register with this 6-bit index.
     pub const fn of_index(index: u8) -> Self {
         Self(index & 0x3f | 0x40)
     }
@@ -33,7 +33,7 @@ impl RemoteRegister {
         self.0
     }
 
-    /// The six bits that travel, 0..=63.
+    /// The six bits that are transmitted, 0..=63.
     pub const fn index(self) -> u8 {
         self.0 & 0x3f
     }
@@ -102,7 +102,7 @@ impl ShortRequest {
         bytes
     }
 
-    /// What an encoder makes of received bytes. Bytes after the message are left alone.
+    /// Decodes received bytes as an encoder does. Bytes after the message are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::LongMessageStart`], [`Error::Crc`].
@@ -111,7 +111,7 @@ impl ShortRequest {
         Self::of_covered(checked(bytes, super::nibbles::request_len(first))?)
     }
 
-    /// From the bytes before a right CRC.
+    /// Decodes the bytes before a correct CRC.
     pub(super) const fn of_covered(covered: &[u8]) -> Result<Self, Error> {
         match covered {
             [first] => Ok(Self::Read(RemoteRegister::of_index(*first))),
@@ -121,18 +121,18 @@ impl ShortRequest {
         }
     }
 
-    /// The answer to this request.
+    /// Decodes the answer to this request.
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`], [`Error::LongMessageStart`], [`Error::Crc`], and [`Error::Header`] if a
-    /// sound answer is for another register or the other direction. The length is the one that belongs to the
-    /// request, so a changed direction shows as a wrong CRC.
+    /// sound answer is for another register or the other direction. The length follows from the request, so a changed direction
+    /// shows up as a wrong CRC.
     pub fn parse_answer(self, bytes: &[u8]) -> Result<ShortAnswer, Error> {
         short_start(bytes)?;
         self.answer_of_covered(checked(bytes, super::nibbles::answer_len(self.first()))?)
     }
 
-    /// From the bytes before a right CRC.
+    /// Decodes the bytes before a correct CRC.
     pub(super) fn answer_of_covered(self, covered: &[u8]) -> Result<ShortAnswer, Error> {
         let got = covered.first().copied().unwrap_or(0);
         if got != self.first() {

@@ -1,4 +1,4 @@
-//! From what an H-frame brought to the registers.
+//! Updates the registers from the data of an H-frame.
 
 use super::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Register, RegisterRule, Registers};
 use crate::encoder_id::PositionBits;
@@ -9,11 +9,11 @@ use crate::message::LongAnswer;
 use crate::position::PositionTracker;
 use crate::vframe::{SafeBlock, VFrame};
 
-/// The events of the drive that stand at the places of their status.
+/// The events of the drive whose bits are in the same places as their status.
 const STATUS_EVENTS: u16 = OnlineD::POS.bits() | OnlineD::QMLW.bits();
 
 impl Registers {
-    /// Takes over what an H-frame brought; the interrupt lines that are active then.
+    /// Takes the data of an H-frame; returns the interrupt lines that are then active.
     pub fn apply(&mut self, h_frame: &HFrame) -> Interrupts {
         if h_frame.restarted.is_some() {
             self.messages(h_frame);
@@ -40,7 +40,7 @@ impl Registers {
         news | self.masked_events()
     }
 
-    /// The head of the next H-frame is on the line: POSTX 0.
+    /// Sets POSTX to 0, because the head of the next H-frame is on the line.
     ///
     /// ```
     /// use hdsl::Dialect;
@@ -56,7 +56,7 @@ impl Registers {
         self.put(Register::PosTx, [0]);
     }
 
-    /// As the map is when the link is started anew.
+    /// Sets the map as it is when the link restarts.
     pub(super) fn restart(&mut self) {
         for status in [Register::OnlineStatusD, Register::OnlineStatus1, Register::OnlineStatus2] {
             self.put(status, [0x11, 0x04]);
@@ -85,7 +85,7 @@ impl Registers {
         self.put(Register::EventS, [(self.event_s() | events).bits()]);
     }
 
-    /// POS and VEL by the rule of the dialect, and whether they may be used.
+    /// Updates POS and VEL by the rule of the dialect, and whether they may be used.
     fn positions(&mut self, h_frame: &HFrame) {
         if let Some((id, bits)) = h_frame.encoder.and_then(|id| Some((id, id.check().ok()?))) {
             self.tracker = PositionTracker::with_rule(bits, self.dialect.position);
@@ -132,7 +132,7 @@ impl Registers {
         }
     }
 
-    /// Frames went by unheard: what is shown is not known to be right until it is aligned again.
+    /// Handles unheard frames: what is shown is not known to be right until it is aligned again.
     #[cold]
     fn interrupt(&mut self) {
         self.tracker.no_safe_position();
@@ -141,7 +141,7 @@ impl Registers {
         }
     }
 
-    /// What is shown as it is.
+    /// Updates the registers that show values unchanged.
     fn numbers(&mut self, h_frame: &HFrame) {
         if let Some(id) = h_frame.encoder {
             let [_, high, middle, low] = id.get().to_be_bytes();
@@ -166,7 +166,7 @@ impl Registers {
         }
     }
 
-    /// Online status, and the events that go with it.
+    /// Updates the online status and the events that belong to it.
     fn status(&mut self, h_frame: &HFrame) {
         let (before, mut d) = (self.online_d(), self.online_d());
         let [mut one, mut two] = [self.online_1().bits(), self.online_2().bits()];
@@ -218,7 +218,7 @@ impl Registers {
         }
     }
 
-    /// The ends of messages.
+    /// Handles the ends of messages.
     fn messages(&mut self, h_frame: &HFrame) {
         if let Some(result) = &h_frame.finished.short {
             if let Ok(answer) = result {
@@ -255,7 +255,7 @@ impl Registers {
         }
     }
 
-    /// Both channels by the manual: each keeps its last valid block.
+    /// Updates both channels by the manual: each keeps its last valid block.
     fn v_frame(&mut self, frame: &VFrame) -> Interrupts {
         let VFrame { safe1, safe2 } = *frame;
         let mut one = self.online_1();
@@ -288,7 +288,7 @@ impl Registers {
         news
     }
 
-    /// Both channels as the firmware of the SDK shows them.
+    /// Updates both channels as the firmware of the SDK shows them.
     fn v_frame_ti(&mut self, frame: &VFrame) -> Interrupts {
         let VFrame { safe1, safe2 } = *frame;
         let mut one = self.online_1();
@@ -329,7 +329,7 @@ impl Registers {
         news
     }
 
-    /// SUMMARY, with its flags and the event SUM.
+    /// Updates SUMMARY, with its flags and the event SUM.
     fn summary(&mut self, summary: u8, one: &mut Online1) {
         let ([mask], [before]) = (self.get(Register::MaskSum), self.get(Register::SafeSum));
         let mut d = self.online_d();

@@ -1,4 +1,4 @@
-//! A receiver that is elsewhere: typed access to its registers over a bus.
+//! A remote receiver: typed access to its registers over a bus.
 
 use core::fmt;
 
@@ -7,21 +7,21 @@ use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::message::{Access, Data, Length, LongRequest, ResourceError, ShortRequest};
 
-/// How the registers of a receiver are reached: the memory that a PRU shares, SPI or a parallel bus to an FPGA.
+/// How the registers of a receiver are accessed: memory shared with a PRU, or SPI or a parallel bus to an FPGA.
 pub trait RegisterBus {
-    /// What can go wrong on the way.
+    /// The error of the bus.
     type Error;
 
-    /// Reads registers from `address` on.
+    /// Reads registers, starting at `address`.
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Self::Error>;
 
-    /// Writes registers from `address` on, in the order of their addresses.
+    /// Writes registers, starting at `address`, in the order of their addresses.
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Self::Error>;
 }
 
@@ -31,7 +31,7 @@ pub trait RegisterBus {
 pub enum BusError<E> {
     /// The bus failed.
     Bus(E),
-    /// The receiver did not take the request, or the encoder refused it.
+    /// The receiver did not accept the request, or the encoder refused it.
     Link(Error),
 }
 
@@ -46,7 +46,7 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
 
 impl<E: core::error::Error> core::error::Error for BusError<E> {}
 
-/// A receiver that is reached over a [`RegisterBus`]: the firmware of the Motor Control SDK, or the SICK IP core.
+/// A receiver that is accessed over a [`RegisterBus`]: the firmware of the Motor Control SDK, or the SICK IP core.
 ///
 /// The two are different devices:
 ///
@@ -57,11 +57,11 @@ impl<E: core::error::Error> core::error::Error for BusError<E> {}
 /// | short message | SLAVE_REG_CTRL, S_PC_DATA | an access to the encoder's register; PC_DATA |
 /// | under way | FRES, FREL in the online status | what was started here |
 ///
-/// The firmware of the SDK sets its events by reading and writing too. Where both meet an event can be lost or come twice: the
-/// online status is the truth.
+/// The firmware of the SDK also sets its events by reading and writing. If both coincide, an event can be lost or come twice;
+/// rely on the online status.
 ///
-/// Messages are started with `start_...` and asked for with `poll_...` until they give something; their ends are known by
-/// the events FRES and FREL, which are taken then.
+/// Messages are started with `start_...` and polled with `poll_...` until there is a result; their ends are recognised by the
+/// events FRES and FREL, which are then cleared.
 ///
 /// ```
 /// use hdsl::Dialect;
@@ -116,12 +116,12 @@ impl<E: core::error::Error> core::error::Error for BusError<E> {}
 pub struct RemoteReceiver<B> {
     bus: B,
     dialect: Dialect,
-    /// A short and a long message that were started here.
+    /// The short and the long message that were started here.
     under_way: [bool; 2],
 }
 
 impl<B: RegisterBus> RemoteReceiver<B> {
-    /// Over a bus; the dialect determines the order of error codes.
+    /// Creates the access over a bus; the dialect determines the order of error codes.
     pub const fn new(dialect: Dialect, bus: B) -> Self {
         Self { bus, dialect, under_way: [false; 2] }
     }
@@ -145,11 +145,11 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         matches!(self.dialect.registers, RegisterRule::Sick)
     }
 
-    /// All registers; of the IP core those that are not in a bank of safe channel 2. The bytes are not of one instant: for a
-    /// position read only POS or VPOS.
+    /// Reads all registers; for the IP core, those that are not in a bank of safe channel 2. The bytes are not from the same
+    /// instant; to get a position, read only POS or VPOS.
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     pub fn registers(&mut self) -> Result<Registers, BusError<B::Error>> {
         if self.is_core() {
             let mut bytes = [0; Registers::CORE_LEN];
@@ -161,7 +161,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(Registers::from_bytes(&self.dialect, bytes))
     }
 
-    /// Clears events of which `present` was read.
+    /// Clears events, of which `present` were read.
     fn clear<const N: usize>(
         &mut self,
         register: Register,
@@ -177,10 +177,10 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         self.put(register, &written)
     }
 
-    /// Takes the events that happened: reads them, and clears those that were read.
+    /// Takes the events that happened: reads them and clears those that were read.
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
@@ -193,7 +193,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// Starts a short message.
     ///
     /// # Errors
-    /// [`Error::Busy`] while one is under way; those of the bus.
+    /// [`Error::Busy`] while one is under way; the errors of the bus.
     pub fn start_short(&mut self, request: ShortRequest) -> Result<(), BusError<B::Error>> {
         let [short, _] = self.under_way;
         if if self.is_core() { short } else { self.get::<2>(Register::OnlineStatus1)?[1] & 1 == 0 } {
@@ -220,10 +220,10 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(())
     }
 
-    /// Returns whether the short message has ended, and the data that it brought if it was a reading.
+    /// Returns whether the short message has ended, and its data if it was a read.
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     pub fn poll_short(&mut self) -> Result<Option<u8>, BusError<B::Error>> {
         let [events] = self.get(Register::EventS)?;
         if events & EventS::FRES.bits() == 0 {
@@ -238,7 +238,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// Starts a long message.
     ///
     /// # Errors
-    /// [`Error::Busy`] while one is under way; those of the bus.
+    /// [`Error::Busy`] while one is under way; the errors of the bus.
     pub fn start_long(&mut self, request: &LongRequest) -> Result<(), BusError<B::Error>> {
         let [_, long] = self.under_way;
         if if self.is_core() { long } else { self.get::<2>(Register::OnlineStatusD)?[1] & 2 == 0 } {
@@ -258,10 +258,10 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(())
     }
 
-    /// Whether the long message has ended, and what it brought: nothing after a write.
+    /// Returns whether the long message has ended, and its data: none after a write.
     ///
     /// # Errors
-    /// [`Error::NotAccepted`] if the answer failed (ANS), [`Error::Resource`] if the encoder refused; those of the bus.
+    /// [`Error::NotAccepted`] if the answer failed (ANS), [`Error::Resource`] if the encoder refused; the errors of the bus.
     pub fn poll_long(&mut self) -> Result<Option<Data>, BusError<B::Error>> {
         let [events] = self.get(Register::EventL)?;
         let [frel, ans] = [Event::FREL, Event::ANS].map(|event| event.bits().to_le_bytes()[0]);

@@ -1,6 +1,6 @@
 //! The flags in the registers.
 
-/// Makes a set of flags in a register.
+/// Declares a set of flags in a register.
 macro_rules! flags {
     ($(#[$doc:meta])* $name:ident($raw:ty) { $($(#[$($bit_doc:tt)*])* $bit:ident = $at:expr,)* }) => {
         $(#[$doc])*
@@ -25,7 +25,7 @@ flags! {
     /// EVENT_H and EVENT_L: what happened since the application wrote 0 to the flag. MASK_H and MASK_L have the same
     /// places.
     Event(u16) {
-        /// A bit of SUMMARY that MASK_SUM lets through.
+        /// A bit of SUMMARY that MASK_SUM lets through is set.
         SUM = 14,
         /// The fast position is not reliable.
         POS = 11,
@@ -33,7 +33,7 @@ flags! {
         PRST = 8,
         /// The encoder answered INIT.
         MIN = 5,
-        /// A long message was not answered well: LNAK, a wrong CRC, or no answer.
+        /// A long message was not answered properly: LNAK, a wrong CRC, or no answer.
         ANS = 4,
         /// The quality monitor is below 14.
         QMLW = 2,
@@ -63,7 +63,7 @@ flags! {
 }
 
 flags! {
-    /// ONLINE_STATUS_D: how things are now, for the drive.
+    /// ONLINE_STATUS_D: the present status, for the drive.
     OnlineD(u16) {
         /// SUMMARY is not 0.
         SUM = 14,
@@ -75,7 +75,7 @@ flags! {
         PRST = 8,
         /// The encoder answers INIT.
         MIN = 5,
-        /// The last long message was not answered well.
+        /// The last long message was not answered properly.
         ANS = 4,
         /// The quality monitor is below 14.
         QMLW = 2,
@@ -85,15 +85,15 @@ flags! {
 }
 
 flags! {
-    /// ONLINE_STATUS_1: how things are now, for safe channel 1.
+    /// ONLINE_STATUS_1: the present status, for safe channel 1.
     Online1(u16) {
         /// SUMMARY is not 0.
         SSUM = 14,
-        /// Wrong CRC; goes with the next right one.
+        /// Wrong CRC; cleared by the next correct one.
         SCE = 13,
         /// Always 1.
         FIX1 = 12,
-        /// No safe position; goes with the next good one.
+        /// No safe position; cleared by the next good one.
         VPOS = 10,
         /// From a restart until the line check has passed.
         PRST = 8,
@@ -107,9 +107,9 @@ flags! {
 }
 
 flags! {
-    /// ONLINE_STATUS_2: how things are now, for safe channel 2.
+    /// ONLINE_STATUS_2: the present status, for safe channel 2.
     Online2(u16) {
-        /// TEST2 or ERR2 of STATUS2.
+        /// TEST2 or ERR2 of STATUS2 is set.
         SUM2 = 14,
         /// Wrong CRC.
         SCE2 = 13,
@@ -152,7 +152,7 @@ flags! {
     }
 }
 
-/// What happened since it was last asked for.
+/// What has happened since the last query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

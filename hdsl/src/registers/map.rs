@@ -5,7 +5,7 @@ servowire_core::codes! {
     pub enum Register: u8 {
         /// SYS_CTRL: bit 7 PRST (protocol reset), bit 6 MRST (message reset); both are cleared when done.
         SysCtrl = 0x00 => "SYS_CTRL",
-        /// SYNC_CTRL: ES, 0 free running.
+        /// SYNC_CTRL: ES; 0 for free running.
         SyncCtrl = 0x01 => "SYNC_CTRL",
         /// MASTER_QM: bit 7 LINK, bits 3:0 quality monitor.
         MasterQm = 0x03 => "MASTER_QM",
@@ -13,7 +13,7 @@ servowire_core::codes! {
         EventH = 0x04 => "EVENT_H",
         /// EVENT_L, see [`Event`](super::Event).
         EventL = 0x05 => "EVENT_L",
-        /// MASK_H: which events interrupt. By the manual bit 6 MSUM is that some bit of MASK_SUM is set.
+        /// MASK_H: which events interrupt. According to the manual, bit 6 MSUM is set if any bit of MASK_SUM is set.
         MaskH = 0x06 => "MASK_H",
         /// MASK_L.
         MaskL = 0x07 => "MASK_L",
@@ -32,7 +32,7 @@ servowire_core::codes! {
         EncId = 0x0d => "ENC_ID",
         /// POS4..POS0: fast position.
         Pos = 0x10 => "POS",
-        /// VEL2..VEL0: speed in steps an H-frame.
+        /// VEL2..VEL0: speed in steps per H-frame.
         Vel = 0x15 => "VEL",
         /// VPOS4..VPOS0: safe position 1.
         VPos = 0x19 => "VPOS",
@@ -46,11 +46,12 @@ servowire_core::codes! {
         PcOff = 0x2a => "PC_OFF",
         /// PC_CTRL: bit 0 LSTA starts a long message.
         PcCtrl = 0x2c => "PC_CTRL",
-        /// PIPE_S: status of the pipe FIFO; reading takes its oldest entry out. Not in the SDK.
+        /// PIPE_S: status of the pipe FIFO; reading it takes out the oldest entry. Not in the SDK.
         PipeS = 0x2d => "PIPE_S",
         /// PIPE_D: the entry that was taken out; in the SDK the last byte of the pipe channel.
         PipeD = 0x2e => "PIPE_D",
-        /// PC_DATA: data of short messages at the drive's interface of the SICK core; S_PC_DATA is that of its safe one. Not in the
+        /// PC_DATA: data of short messages at the drive interface of the SICK core; S_PC_DATA is the one at its safe interface.
+        /// Not in the
         /// SDK.
         PcData = 0x2f => "PC_DATA",
         /// SAFE_CTRL: like SYS_CTRL.
@@ -59,20 +60,20 @@ servowire_core::codes! {
         SafeSum = 0x36 => "SAFE_SUM",
         /// S_PC_DATA: data of short messages.
         SPcData = 0x37 => "S_PC_DATA",
-        /// ACC_ERR_CNT: acceleration words in a row that could not be used; stops at 31 in the SICK core.
+        /// ACC_ERR_CNT: number of acceleration words in a row that could not be used; stops at 31 in the SICK core.
         AccErrCnt = 0x38 => "ACC_ERR_CNT",
-        /// MAXACC: limit of the estimator's acceleration, FFh at first. Kept here, and not in the SDK.
+        /// MAXACC: limit of the estimator's acceleration, initially FFh. Stored here; not in the SDK.
         MaxAcc = 0x39 => "MAXACC",
-        /// MAXDEV_H, MAXDEV_L: greatest deviation while estimating, FFFFh at first. Kept here, and not in the SDK.
+        /// MAXDEV_H, MAXDEV_L: largest deviation while estimating, initially FFFFh. Stored here; not in the SDK.
         MaxDev = 0x3a => "MAXDEV",
         /// EVENT_S, see [`EventS`](super::EventS).
         EventS = 0x3d => "EVENT_S",
         /// MASK_S: which safe events interrupt.
         MaskS = 0x3e => "MASK_S",
-        /// SLAVE_REG_CTRL: bit 7 read, bits 5:0 register of the encoder less 40h; writing starts a short message. 3Fh when
+        /// SLAVE_REG_CTRL: bit 7 read, bits 5:0 register of the encoder minus 40h; writing starts a short message. 3Fh when
         /// idle. In the SICK core the registers of the encoder are at 40h..7Fh of this map.
         SlaveRegCtrl = 0x40 => "SLAVE_REG_CTRL",
-        /// ACC_ERR_CNT_THRESH: restart threshold, 1Fh at first.
+        /// ACC_ERR_CNT_THRESH: restart threshold, initially 1Fh.
         AccErrCntThresh = 0x41 => "ACC_ERR_CNT_THRESH",
         /// VERSION2.
         Version2 = 0x44 => "VERSION2",

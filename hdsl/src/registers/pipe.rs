@@ -13,7 +13,7 @@ struct Entry {
 
 /// The FIFO of eight bytes that PIPE_S and PIPE_D read (SICK manual, p. 52-53).
 ///
-/// K30.7 means "no data" and is not stored. If the FIFO is full the oldest entry goes and POVR is set.
+/// K30.7 means "no data" and is not stored. If the FIFO is full, the oldest entry is dropped and POVR is set.
 ///
 /// ```text
 ///  PIPE_S   bit 3 POVR   entries were dropped since the last reading
@@ -38,13 +38,13 @@ struct Entry {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PipeFifo {
     entries: [Entry; 8],
-    /// Place of the oldest entry.
+    /// Index of the oldest entry.
     first: u8,
     len: u8,
     dropped: bool,
 }
 
-/// What is read of the FIFO.
+/// The result of reading the FIFO.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -56,7 +56,7 @@ pub struct PipeReading {
 }
 
 impl PipeFifo {
-    /// Entries were dropped since the last reading.
+    /// Entries have been dropped since the last reading.
     pub const POVR: u8 = 8;
     /// The FIFO was empty.
     pub const PEMP: u8 = 4;
@@ -105,7 +105,7 @@ impl PipeFifo {
         PipeReading { status: overflow | entry.flags, data: entry.byte }
     }
 
-    /// Entries waiting.
+    /// Number of entries waiting.
     pub const fn len(&self) -> u8 {
         self.len
     }

@@ -1,4 +1,4 @@
-//! The application's side of the map: what writing and reading a register does.
+//! The application's side of the map: the effect of writing and reading a register.
 
 use super::{Register, RegisterRule, Registers};
 use crate::error::Error;
@@ -23,14 +23,15 @@ const SLAVE_REG_CTRL: u8 = Register::SlaveRegCtrl as u8;
 const ACC_ERR_CNT: u8 = Register::AccErrCnt as u8;
 const ACC_ERR_CNT_THRESH: u8 = Register::AccErrCntThresh as u8;
 
-/// What only the receiver writes (SICK manual, p. 41-54); S_PC_DATA is written by the application before a short write.
+/// The registers that only the receiver writes (SICK manual, p. 41-54); S_PC_DATA is written by the application before a short
+/// write.
 const fn is_read_only(address: u8) -> bool {
     matches!(address, 0x03 | 0x09..=0x1f | 0x2d..=0x2f | 0x36 | 0x44..=0x55)
 }
 
 impl Registers {
-    /// Reads a register as an application does over the bus: reading PIPE_S takes the oldest entry out of the FIFO and
-    /// freezes it for PIPE_D. `None` after the end of the map.
+    /// Reads a register as an application does over the bus: reading PIPE_S takes the oldest entry from the FIFO and holds it
+    /// for PIPE_D. `None` after the end of the map.
     pub fn read(&mut self, address: u8) -> Option<u8> {
         if address == PIPE_S && self.dialect.registers == RegisterRule::Sick {
             let entry = self.pipe.take();
@@ -42,13 +43,13 @@ impl Registers {
     /// Writes a register as an application does over the bus.
     ///
     /// Writing 0 to a bit of an event register clears it. PRST and MRST in SYS_CTRL or SAFE_CTRL, SYNC_CTRL, SLAVE_REG_CTRL
-    /// and LSTA in PC_CTRL start what they stand for. By [`RegisterRule::Sick`] what the receiver shows cannot be written;
-    /// all other registers take the value.
+    /// and LSTA in PC_CTRL start what they stand for. With [`RegisterRule::Sick`], registers that the receiver writes cannot be
+    /// written; all other registers take the value.
     ///
     /// # Errors
     /// [`Error::NotLocked`] and [`Error::Busy`] for messages that cannot be started; [`Error::NoPulse`],
     /// [`Error::PeriodTooShort`] and [`Error::ExtraOutOfRange`] for an ES that does not fit the pulse;
-    /// [`Error::NoRegister`] after the end of the map. The register keeps its value then.
+    /// [`Error::NoRegister`] after the end of the map. The register then keeps its value.
     pub fn write(&mut self, master: &mut Master, address: u8, value: u8) -> Result<(), Error> {
         let Some(present) = self.byte(address) else { return Err(Error::NoRegister { address }) };
         if self.dialect.registers == RegisterRule::Sick && is_read_only(address) {
@@ -102,7 +103,7 @@ impl Registers {
         Ok(())
     }
 
-    /// PRST and MRST. Before the link is up there is no message to drop.
+    /// PRST and MRST. Before the link is up, there is no message to drop.
     fn control(&mut self, master: &mut Master, address: u8, value: u8) {
         if value & 0x40 != 0 && master.reset_messages().is_ok() {
             self.put(Register::SlaveRegCtrl, [0x3f]);
@@ -125,7 +126,7 @@ impl Registers {
         self.put(status, [high, low & !flag]);
     }
 
-    /// The long message that PC_ADD, PC_OFF and PC_BUFFER describe.
+    /// Returns the long message that PC_ADD, PC_OFF and PC_BUFFER describe.
     fn request_in_registers(&self) -> Result<LongRequest, Error> {
         let [high, low] = self.get(Register::PcAdd);
         let length = Length::in_header(high);

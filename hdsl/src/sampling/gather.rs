@@ -6,7 +6,7 @@ use core::slice::Iter;
 use super::{Alignment, Delay, SampleIndex, SampledAnswer, WINDOW};
 use crate::rssi::WordWatch;
 
-/// Takes one bit of each of four bytes.
+/// Takes one bit from each of four bytes.
 ///
 /// The mask leaves bits s, s + 8, s + 16 and s + 24; the product moves them next to each other, and no two of its other
 /// terms meet.
@@ -22,13 +22,13 @@ impl Gather {
         Self { mask: 0x0101_0101 << shift, factor: (1 << 28 | 1 << 21 | 1 << 14 | 1 << 7) >> shift }
     }
 
-    /// The bits of four bytes, the first of them in the low byte, in bits 31:28.
+    /// Returns the bits of four bytes, the first one in the low byte, in bits 31:28.
     #[inline]
     pub(super) const fn four(self, samples: u32) -> u32 {
         (samples & self.mask).wrapping_mul(self.factor) & 0xf000_0000
     }
 
-    /// The same at the top of `bits`, after those that are there.
+    /// Adds the bits of four bytes at the top of `bits`, after those already there.
     #[inline]
     const fn after(self, bits: u32, samples: u32) -> u32 {
         bits >> 4 | self.four(samples)
@@ -36,13 +36,13 @@ impl Gather {
 }
 
 /// The sixteen words that hold an answer, whatever its delay: 61 bytes and up to three before it. A word is four bytes, the
-/// first of them in its low bits.
+/// first one in its low bits.
 pub(super) struct Words<I> {
     before: u32,
     first: u32,
     /// Seven words.
     low: I,
-    /// Seven words more.
+    /// Takes seven more words.
     high: I,
     last: u32,
 }
@@ -112,12 +112,12 @@ impl<I: Iterator<Item = u32>> Words<I> {
     }
 }
 
-/// The 61 bits after the first `lead`.
+/// Returns the 61 bits after the first `lead`.
 const fn whole(low: u32, high: u32, lead: u8) -> u64 {
     ((high as u64) << 32 | low as u64) >> lead & (u64::MAX >> 3)
 }
 
-/// Bytes four at a time.
+/// Reads bytes four at a time.
 pub(super) struct Bytes<'a>(&'a [u8]);
 
 impl Iterator for Bytes<'_> {

@@ -1,6 +1,6 @@
-//! The tables of the 8b/10b code and the look-up tables generated from them.
+//! The tables of the 8b/10b code, and the look-up tables generated from them.
 //!
-//! The literals are written as the tables are printed, `a` (or `f`) on the left; [`line`] turns them into line
+//! The literals are written as the tables are printed, with `a` (or `f`) on the left; [`line`] turns them into line
 //! order with the first bit in bit 0. Encoding and decoding are then plain look-ups without any bit reversal.
 #![expect(
     clippy::arithmetic_side_effects,
@@ -30,17 +30,17 @@ const FOUR_K28: [u16; 8] = [0b1011, 0b0110, 0b1010, 0b1100, 0b1101, 0b0101, 0b10
 /// The twelve special characters.
 pub(super) const CONTROLS: [u8; 12] = [0x1c, 0x3c, 0x5c, 0x7c, 0x9c, 0xbc, 0xdc, 0xfc, 0xf7, 0xfb, 0xfd, 0xfe];
 
-/// `len` printed bits in line order: the leftmost becomes bit 0.
+/// Converts `len` printed bits to line order: the leftmost becomes bit 0.
 const fn line(printed: u16, len: u32) -> u16 {
     printed.reverse_bits() >> (16 - len)
 }
 
-/// Printed 6-bit and 4-bit block in line order.
+/// Converts a printed 6-bit and 4-bit block to line order.
 const fn word(six: u16, four: u16) -> u16 {
     line(six, 6) | line(four, 4) << 6
 }
 
-/// The word for a character in a column; `plus` is the column RD+.
+/// Returns the word for a character in a column; `plus` selects the column RD+.
 const fn encode(byte: u8, k: bool, plus: bool) -> u16 {
     let x = (byte & 31) as usize;
     let y = (byte >> 5) as usize;
@@ -97,7 +97,7 @@ pub(super) const MINUS: u16 = 1 << 10;
 /// The word is in column RD+.
 pub(super) const PLUS: u16 = 1 << 11;
 
-/// What each of the 1024 words stands for by a rule.
+/// What each of the 1024 words stands for under a rule.
 pub(crate) struct Table([u16; 1024]);
 
 impl Table {
@@ -107,7 +107,7 @@ impl Table {
     }
 }
 
-/// By the tables of the code: value in bits 7:0 and the flags above. Words in neither column
+/// The meaning of each word by the tables of the code: value in bits 7:0, flags above. Words in neither column
 /// carry the value of the two sub-block look-ups.
 pub(super) static DECODE: Table = {
     let mut table = [0; 1024];
@@ -136,7 +136,7 @@ pub(super) static DECODE: Table = {
     Table(table)
 };
 
-/// The 6-bit block in line order to x; FFh where no column has it.
+/// Maps the 6-bit block in line order to x; FFh if no column has it.
 pub(super) static SIX_TO_X: [u8; 64] = {
     let mut table = [0xff; 64];
     let mut x = 0;
@@ -153,7 +153,7 @@ pub(super) static SIX_TO_X: [u8; 64] = {
     table
 };
 
-/// The 4-bit block of a data character in line order to y; FFh where no column has it.
+/// Maps the 4-bit block of a data character in line order to y; FFh if no column has it.
 pub(super) static FOUR_TO_Y: [u8; 16] = {
     let mut table = [0xff; 16];
     let mut y = 0;
@@ -170,7 +170,7 @@ pub(super) static FOUR_TO_Y: [u8; 16] = {
     table
 };
 
-/// The value that the two sub-block look-ups give without regard to disparity; FFh if either fails.
+/// Returns the value of the two sub-block look-ups without regard to disparity; FFh if either fails.
 pub(super) const fn sub_blocks(word: u16) -> u8 {
     let (x, y) = (SIX_TO_X[(word & 63) as usize], FOUR_TO_Y[(word >> 6 & 15) as usize]);
     if x == 0xff || y == 0xff { 0xff } else { y << 5 | x }
