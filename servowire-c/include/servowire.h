@@ -2925,7 +2925,7 @@ typedef struct {
  * The end of the background. It belongs to its queue: it is not copied.
  */
 typedef struct {
-    uint64_t _private[460];
+    uint64_t _private[1040];
 } sw_motion_axis_t;
 
 /**

@@ -1,17 +1,21 @@
 //! The background's half of a motion: it plans, and hands segments to the interrupt.
 
+mod drafting;
+
 use core::sync::atomic::Ordering;
 
 use servowire_core::Direction;
 
+use self::drafting::UNSEEN;
 use crate::cutter::Demand;
 use crate::error::Error;
 use crate::limits::{Clock, Limits};
-use crate::mover::{Cut, Mover};
+use crate::mover::Mover;
+use crate::mover::cutting::News;
 use crate::queue::{IDLE, NONE, Queue, TICKET};
 use crate::real::Real;
 use crate::step_timer::StepTimer;
-use crate::writer::{LONGEST, TICK, Writer, tick};
+use crate::writer::{LONGEST, Writer, tick};
 
 /// What [`Axis::poll`] has left to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,12 +35,12 @@ pub enum Work {
 
 /// An axis whose steps are made in an interrupt.
 ///
-/// It takes the requests of a [`Mover`] and cuts what is planned into segments, a little ahead of the [`StepTimer`] that runs them. A
-/// request acts where the segments that are out end: after twice the [reach](Self::with_reach) at the latest, but for
+/// It takes the requests of a [`Mover`] and cuts what is planned into segments, ahead of the [`StepTimer`] that runs them. A
+/// request acts between two segments that are out: after twice the [reach](Self::with_reach) at the latest, but for
 /// [`halt`](Self::halt), after which there is no step. Each step is made within 3/4 of a tick, or 25 ns where that is more, of its exact
-/// time. Behind all that is out lies a stop: if [`poll`](Self::poll) is not called
-/// in time the axis comes to rest, and goes on from there when it is. Each of its steps is
-/// exact to a sixteenth of an interval.
+/// time. Behind all that is out lies a stop, unless it ends at rest: if [`poll`](Self::poll) is not called in time the axis
+/// stops after eight times the reach at most, or comes to rest by itself within four more, and goes on from there when it is. Each step of the stop is exact to a
+/// sixteenth of an interval.
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -61,40 +65,84 @@ pub enum Work {
 #[derive(Debug)]
 pub struct Axis<'q, const N: usize> {
     queue: &'q Queue<N>,
-    mover: Mover,
     /// How far off a step may be, in moments.
     off: Real,
-    /// Ticks of motion in a block.
+    /// Ticks within which half of a reaction is.
     reach: u32,
-    writer: Writer,
-    /// Steps cut so far, as the interrupt counts them.
+    /// What the interrupt told when there was nothing to do for a slice, and what that said.
+    seen: u32,
+    waits: Work,
+    /// The position when the interrupt had counted so many steps.
+    position: i64,
     made: u32,
-    /// The block that is filled, and where its time ends.
-    block: usize,
-    until: i128,
-    /// The stop from the end of the block, while it is cut.
-    stop: Option<Tail>,
-    /// Where the next block is linked to.
+    /// What has been asked for, on the plan of the block in which the interrupt is; the end of its steps, and the slot there. A block
+    /// has one plan.
+    mover: Mover,
+    end: Writer,
     last: usize,
-    /// Of both blocks, and which of them the interrupt may still come to.
+    news: News,
+    /// The block that is made, or linked, to follow: behind which slot, by which plan, with what that was told.
+    stage: Stage,
+    block: usize,
+    joint: usize,
+    work: Mover,
+    writer: Writer,
+    until: u64,
+    told: News,
+    /// The stop behind it, while that is cut.
+    stop: Option<Tail>,
+    /// Slots for the steps of a block, and how exact its stop is, as the one before had room for.
+    room: usize,
+    coarse: u32,
+    /// How often in turn the interrupt was beyond the joint before the block was there.
+    missed: u32,
+    /// Of both blocks, and of their slots.
     out: [Out; 2],
-    busy: [bool; 2],
-    /// What has been planned cannot be run; nothing is cut before the interrupt stands.
+    marks: [Mark; N],
+    /// What has been planned cannot be run; nothing is made before the interrupt stands.
     lost: bool,
     /// The halt that the interrupt has not confirmed.
     halt: Option<u32>,
     ticket: u32,
 }
 
+/// What the background is at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Idle,
+    Block,
+    Stop,
+    /// It waits for the interrupt to come near.
+    Ready,
+    /// The interrupt will come to it, if it is not beyond the joint.
+    Linked,
+}
+
 /// What has been made of a block.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Out {
-    /// Slots before those of the stop.
+    /// Where its time begins, and the tick after the last step before that.
+    begin: i128,
+    free: u64,
+    /// Slots before those of the stop, and their steps.
     len: usize,
-    /// Where the stop ends.
+    steps: u32,
+    /// Where the stop ends, and whether there is one.
     position: i64,
-    end: i128,
-    dir: Option<Direction>,
+    rest: Writer,
+    brakes: bool,
+}
+
+impl Out {
+    const NONE: Self =
+        Self { begin: 0, free: 0, len: 0, steps: 0, position: 0, rest: Writer::new(0, None), brakes: false };
+}
+
+/// Where the events of a slot end: 2^-32 ticks and steps from where its block begins. No time: nothing is to be joined there.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mark {
+    end: u64,
+    steps: u32,
 }
 
 /// A stop while it is cut.
@@ -105,11 +153,15 @@ struct Tail {
     moves: bool,
     demand: Demand,
     writer: Writer,
+    /// Steps of the block before it.
+    steps: u32,
 }
 
 /// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few.
 pub(crate) const COARSE: u32 = 4;
 pub(crate) const COARSEST: u32 = 2;
+/// The least reach, in ticks.
+const LEAST: u32 = 16;
 
 impl<'q, const N: usize> Axis<'q, N> {
     /// At rest at position 0, with the other end of the queue for the interrupt. A queue has one axis.
@@ -118,32 +170,42 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// [`Error::SpeedAboveClock`] above half the clock.
     pub fn new(queue: &'q Queue<N>, clock: Clock, limits: Limits) -> Result<(Self, StepTimer<'q, N>), Error> {
         let mover = Mover::new(clock, limits)?.cutting();
-        let timer = StepTimer::new(queue);
-        let off = clock.blur();
-        let reach = (clock.hz() / 100).max(4);
+        let (work, timer) = (mover.clone(), StepTimer::new(queue));
         let axis = Self {
             queue,
-            mover,
-            off,
-            reach,
-            writer: Writer::new(0, None),
+            off: clock.blur(),
+            reach: 0,
+            seen: UNSEEN,
+            waits: Work::More,
+            position: 0,
             made: 0,
-            block: 0,
-            until: 0,
-            stop: None,
+            mover,
+            end: Writer::new(0, None),
             last: 0,
-            out: [Out::default(); 2],
-            busy: [false; 2],
+            news: News::None,
+            stage: Stage::Idle,
+            block: 0,
+            joint: 0,
+            work,
+            writer: Writer::new(0, None),
+            until: 0,
+            told: News::None,
+            stop: None,
+            room: Self::ROOM,
+            coarse: COARSE,
+            missed: 0,
+            out: [Out::NONE; 2],
+            marks: [Mark::default(); N],
             lost: false,
             halt: None,
             ticket: 0,
         };
-        Ok((axis, timer))
+        Ok((axis.with_reach(clock.hz() / 100), timer))
     }
 
-    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms by default.
+    /// With another reach in ticks, at least 16: a request acts after twice as long at the latest. 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
-        Self { reach: ticks.clamp(4, LONGEST), ..self }
+        Self { reach: ticks.clamp(LEAST, LONGEST >> 3), ..self }
     }
 
     /// As [`Mover::with_reversal_pause`].
@@ -161,14 +223,20 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Steps made so far, forward less reverse ones.
     pub fn commanded(&self) -> i64 {
         #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
-        let ahead = self.made.wrapping_sub(self.queue.made.load(Ordering::Acquire)) as i32;
-        self.mover.commanded().wrapping_sub(ahead.into())
+        let since = self.queue.made.load(Ordering::Acquire).wrapping_sub(self.made) as i32;
+        self.position.wrapping_add(since.into())
     }
 
     /// Returns whether the timer is stopped and no step is to come (or is held back).
     pub fn is_at_rest(&self) -> bool {
-        let (current, _) = self.current();
-        self.halt.is_none() && self.writer.len == 0 && current.is_none() && self.mover.is_at_rest(self.now())
+        let (running, slot) = self.current();
+        let (mover, end) = match self.stage {
+            Stage::Idle => (&self.mover, &self.end),
+            Stage::Linked if self.is_in(slot) => (&self.work, &self.writer),
+            _ => return false,
+        };
+        let new = self.halt.is_some() || self.news != News::None;
+        !new && running.is_none() && mover.is_at_rest(tick(end.end))
     }
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
@@ -182,7 +250,9 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: i64) -> Result<(), Error> {
         self.ready()?;
-        self.mover.move_to(target, self.now())
+        self.mover.ask_move(target, self.commanded())?;
+        self.asked(News::Aim);
+        Ok(())
     }
 
     /// As [`Mover::run`].
@@ -191,37 +261,45 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
         self.ready()?;
-        self.mover.run(direction, speed, self.now())
+        self.mover.ask_run(direction, speed);
+        self.asked(News::Aim);
+        Ok(())
     }
 
     /// As [`Mover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
-        self.mover.set_override(percent, self.now());
+        self.mover.ask_override(percent);
+        self.asked(News::Change);
     }
 
     /// As [`Mover::hold`].
     pub fn hold(&mut self) {
-        self.mover.hold(self.now());
+        self.mover.ask_hold(true);
+        self.asked(News::Change);
     }
 
     /// As [`Mover::resume`].
     pub fn resume(&mut self) {
-        self.mover.resume(self.now());
+        self.mover.ask_hold(false);
+        self.asked(News::Change);
     }
 
     /// As [`Mover::stop`].
     pub fn stop(&mut self) {
-        self.mover.stop(self.now());
+        self.mover.ask_stop();
+        self.asked(News::Change);
     }
 
     /// As [`Mover::quick_stop`].
     pub fn quick_stop(&mut self, limits: Limits) {
-        self.mover.quick_stop(limits, self.now());
+        self.mover.ask_quick_stop(limits);
+        self.asked(News::Quick);
     }
 
     /// No further step, from now on: the interrupt sees it without the queue. Until it has been called once more, which
     /// [`poll`](Self::poll) asks for, moves are refused.
     pub fn halt(&mut self) {
+        self.look();
         self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
         self.ticket = self.ticket.max(1);
         if let Some(slot) = self.queue.slots.first() {
@@ -229,7 +307,8 @@ impl<'q, const N: usize> Axis<'q, N> {
         }
         self.queue.halt.store(self.ticket, Ordering::Release);
         self.halt = Some(self.ticket);
-        (self.stop, self.writer.len) = (None, 0);
+        self.seen = UNSEEN;
+        (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
 
     /// As [`Mover::set_commanded`].
@@ -237,10 +316,12 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
     pub fn set_commanded(&mut self, steps: i64) -> Result<(), Error> {
+        self.look();
         if !self.is_at_rest() {
             return Err(Error::Moving);
         }
-        self.mover.set_commanded(steps, self.now())
+        self.position = steps;
+        self.mover.set_commanded(steps, tick(self.end.end))
     }
 
     /// As [`Mover::set_limits`].
@@ -248,200 +329,19 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// [`Error::Moving`] before it is at rest, [`Error::SpeedAboveClock`] above half the clock.
     pub fn set_limits(&mut self, limits: Limits) -> Result<(), Error> {
+        self.look();
         if !self.is_at_rest() {
             return Err(Error::Moving);
         }
-        self.mover.set_limits(limits, self.now())
+        self.mover.set_limits(limits, tick(self.end.end))
     }
 
-    /// A slice of the background's work: a segment, a stop that is planned, or a look at the interrupt. Call it until it says
-    /// other than [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often where the slots of
-    /// a block hold less than that.
-    pub fn poll(&mut self) -> Work {
-        if let Some(ticket) = self.halt {
-            return self.confirm(ticket);
+    /// Moves are refused before a halt has been seen, and in a quick stop.
+    fn ready(&mut self) -> Result<(), Error> {
+        if self.halt.is_some() {
+            return Err(Error::Moving);
         }
-        let (running, slot) = self.current();
-        if let Some((block, place)) = Queue::<N>::place(slot) {
-            if self.out.get(block).is_some_and(|out| place >= out.len) {
-                // The interrupt has found nothing but the stop.
-                if running.is_some() {
-                    return Work::Later;
-                }
-                self.recover(block, slot);
-            } else if block != self.block {
-                self.set_busy(self.block, false);
-            }
-        }
-        if self.lost {
-            if running.is_some() {
-                return Work::Later;
-            }
-            let position = self.commanded();
-            self.made = self.queue.made.load(Ordering::Acquire);
-            self.mover.rest_at(position, self.now());
-            self.lost = false;
-        }
-        if self.busy.get(self.block) == Some(&true) {
-            return self.waiting(slot);
-        }
-        if self.stop.is_some() { self.cut_stop() } else { self.cut(slot) }
-    }
-
-    /// Where the interrupt is: in which place of which block, or `None` if it stands; and at which slot.
-    fn current(&self) -> (Option<(usize, usize)>, usize) {
-        let current = self.queue.current.load(Ordering::Acquire);
-        let slot = (current & 0xffff) as usize;
-        (Queue::<N>::place(slot).filter(|_| current & IDLE == 0), slot)
-    }
-
-    fn set_busy(&mut self, block: usize, to: bool) {
-        if let Some(busy) = self.busy.get_mut(block) {
-            *busy = to;
-        }
-    }
-
-    /// Nothing to cut, or no room for it.
-    fn waiting(&self, slot: usize) -> Work {
-        let stands = self.queue.current.load(Ordering::Acquire) & IDLE != 0;
-        let more = self.queue.slots.get(slot).is_some_and(|slot| slot.next.load(Ordering::Relaxed) != NONE);
-        match (stands, more) {
-            (true, true) => Work::Start,
-            (true, false) if self.mover.is_at_rest(self.now()) => Work::Rest,
-            _ => Work::Later,
-        }
-    }
-
-    /// The tick at which a request acts.
-    fn now(&self) -> u64 {
-        tick(self.writer.end)
-    }
-
-    fn ready(&self) -> Result<(), Error> {
-        if self.halt.is_some() { Err(Error::Moving) } else { Ok(()) }
-    }
-
-    /// The interrupt stands for a halt.
-    fn confirm(&mut self, ticket: u32) -> Work {
-        if self.queue.current.load(Ordering::Acquire) != IDLE | ticket << TICKET {
-            return Work::Start;
-        }
-        let position = self.commanded();
-        let was_moving = position != self.mover.commanded() || !self.mover.is_at_rest(self.now());
-        self.mover.halt_at(position, self.now(), was_moving);
-        self.made = self.queue.made.load(Ordering::Acquire);
-        (self.last, self.busy) = (0, [false; 2]);
-        self.writer = Writer::new(i128::from(self.now()) << 32, None);
-        self.queue.halt.store(0, Ordering::Release);
-        (self.halt, self.lost) = (None, false);
-        Work::More
-    }
-
-    /// From the end of the stop of a block.
-    fn recover(&mut self, block: usize, slot: usize) {
-        let Some(Out { position, end, dir, .. }) = self.out.get(block).copied() else { return };
-        (self.writer, self.last) = (Writer::new(end, dir), slot);
-        self.made = self.queue.made.load(Ordering::Acquire);
-        self.mover.rest_at(position, tick(end));
-        (self.block, self.stop, self.lost) = (1_usize.wrapping_sub(block), None, false);
-        self.set_busy(self.block, false);
-        // It stands at a slot that counts as one before the stop from now on.
-        if let Some(out) = self.out.get_mut(block) {
-            out.len = usize::MAX;
-        }
-    }
-
-    /// A segment of the block.
-    fn cut(&mut self, slot: usize) -> Work {
-        let over = self.mover.over();
-        if self.writer.len == 0 {
-            self.until = self.writer.end.saturating_add(i128::from(self.reach) << 32);
-        }
-        let (until, now) = (tick(self.until), self.now());
-        let full = self.writer.len.saturating_add(4) > Queue::<N>::BLOCK / 3;
-        if full || self.writer.len > 0 && now >= until {
-            return self.close(COARSE);
-        }
-        let time = until.saturating_sub(now).saturating_mul(1 << 32);
-        match self.mover.cut(&Demand { off: self.off, coarse: None, time }, until) {
-            Cut::Steps(stretch, direction) => {
-                let steps = u32::from(stretch.count);
-                self.made = self.made.wrapping_add(if direction.dir() { steps.wrapping_neg() } else { steps });
-                self.writer.put_steps((self.queue, self.block), &stretch, direction);
-                Work::More
-            }
-            Cut::Later => {
-                // A step that comes right after the wait has its tick, too.
-                self.writer.put_wait((self.queue, self.block), self.until.saturating_sub(2 * TICK));
-                self.until = self.writer.end;
-                Work::More
-            }
-            Cut::Rest if over > now => {
-                self.writer.put_wait((self.queue, self.block), i128::from(over.saturating_add(1)) << 32);
-                Work::More
-            }
-            Cut::Rest if self.writer.len > 0 => self.close(COARSE),
-            Cut::Rest => self.waiting(slot),
-        }
-    }
-
-    /// The block is as long as it is to be: what comes behind it.
-    fn close(&mut self, coarse: u32) -> Work {
-        if let Some(out) = self.out.get_mut(self.block) {
-            out.len = self.writer.len;
-        }
-        let demand = Demand { off: self.off, coarse: Some(coarse), time: u64::MAX };
-        self.stop = Some(Tail { mover: self.mover.clone(), moves: true, demand, writer: self.writer });
-        Work::More
-    }
-
-    /// A segment of the stop behind the block.
-    fn cut_stop(&mut self) -> Work {
-        let Some(tail) = &mut self.stop else { return Work::More };
-        if core::mem::take(&mut tail.moves) {
-            tail.mover.stop(tick(tail.writer.end));
-            return Work::More;
-        }
-        let to = (self.queue, self.block);
-        let more = match tail.mover.cut(&tail.demand, u64::MAX) {
-            Cut::Steps(stretch, direction) => {
-                tail.writer.put_steps(to, &stretch, direction);
-                true
-            }
-            Cut::Later | Cut::Rest => {
-                tail.writer.put_wait(to, i128::from(tail.mover.over()) << 32);
-                false
-            }
-        };
-        if tail.writer.len > Queue::<N>::BLOCK {
-            // Once more with fewer segments.
-            match tail.demand.coarse {
-                Some(coarse) if coarse > COARSEST => return self.close(coarse.saturating_sub(1)),
-                _ => return self.give_up(),
-            }
-        }
-        if !more {
-            self.publish();
-        }
-        Work::More
-    }
-
-    /// The block cannot be run: what was cut of it is forgotten, and the axis comes to rest where the interrupt does.
-    fn give_up(&mut self) -> Work {
-        (self.writer.len, self.lost, self.stop) = (0, true, None);
-        self.mover.stop(self.now());
-        Work::TooFewSlots
-    }
-
-    fn publish(&mut self) {
-        let Some(Tail { mover, writer, .. }) = &self.stop else { return };
-        let len = self.writer.len;
-        if let Some(out) = self.out.get_mut(self.block) {
-            *out = Out { len, position: mover.commanded(), end: writer.end, dir: writer.dir };
-        }
-        self.queue.link(self.last, Queue::<N>::slot(self.block, 0));
-        self.last = Queue::<N>::slot(self.block, len.saturating_sub(1));
-        self.set_busy(self.block, true);
-        (self.block, self.writer.len, self.stop) = (1_usize.wrapping_sub(self.block), 0, None);
+        self.look();
+        self.mover.ready(self.is_at_rest())
     }
 }

@@ -34,6 +34,27 @@ pub(crate) struct Cutter {
     piece: Part,
     /// Time from the slower end of the piece to the last step, and the speed then; none before the first one of the piece.
     last: Option<(u64, Inverse)>,
+    /// Steps that have been counted, and are not a stretch yet.
+    few: Option<Few>,
+}
+
+/// What a part of the work gives.
+pub(crate) enum Slice {
+    More,
+    Steps(Stretch),
+    /// There was the last step.
+    End,
+}
+
+/// Up to four steps, which are a segment whatever the curve is.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Few {
+    stretch: Stretch,
+    /// The last time, and the differences there.
+    time: i128,
+    interval: i64,
+    add: i64,
 }
 
 /// A piece from its slower end. Times are in 2^-64 of its time, ways and speeds in 2^-62 of its way and of that in its time.
@@ -84,6 +105,8 @@ pub(crate) struct Stretch {
     pub(crate) differences: [i64; 3],
 }
 
+/// As many steps are a segment whatever the curve is: each is searched.
+const FEW: u16 = 4;
 /// Fraction bits of a position here.
 const P2: i32 = 2 * P;
 /// Intervals within a segment are below 2^28 ticks, so that three of them are no overflow.
@@ -130,7 +153,7 @@ impl Stretch {
 
 impl Cutter {
     pub(crate) const fn new() -> Self {
-        Self { count: 0, next: 0, until: 0, piece: Part::NONE, last: None }
+        Self { count: 0, next: 0, until: 0, piece: Part::NONE, last: None, few: None }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -140,31 +163,75 @@ impl Cutter {
 
     /// The next steps; `None` after the last one.
     pub(crate) fn next(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Option<Stretch> {
+        loop {
+            match self.slice(curve, frame, demand) {
+                Slice::More => {}
+                Slice::Steps(stretch) => return Some(stretch),
+                Slice::End => return None,
+            }
+        }
+    }
+
+    /// A part of the work for the next steps.
+    pub(crate) fn slice(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Slice {
+        if let Some(few) = self.few.take() {
+            return self.search(few, demand);
+        }
+        if self.count >= self.until {
+            return if self.take_piece(curve, frame, demand) { Slice::More } else { Slice::End };
+        }
+        let left = self.left();
+        if self.piece.even {
+            let stretch = self.piece.cruise(self.count, left, demand.time);
+            self.count = self.count.saturating_add(stretch.count.into());
+            return Slice::Steps(stretch);
+        }
+        if let Some((stretch, last)) = self.last.and_then(|last| self.piece.many(self.count, left, last, demand)) {
+            (self.last, self.count) = (Some(last), self.count.saturating_add(stretch.count.into()));
+            return Slice::Steps(stretch);
+        }
+        self.search(Few::NONE, demand)
+    }
+
+    /// Steps left of the piece.
+    const fn left(&self) -> u32 {
+        self.until.saturating_sub(self.count)
+    }
+
+    /// The next piece with steps; false after the last one.
+    fn take_piece(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> bool {
         while self.count >= self.until {
-            let (piece, end, until) = frame.piece(curve, self.next)?;
+            let Some((piece, end, until)) = frame.piece(curve, self.next) else { return false };
             self.next = self.next.saturating_add(1);
             if until > self.count {
                 self.piece = Part::new(curve, frame, (piece, end), demand.off);
                 (self.until, self.last) = (until, None);
             }
         }
-        let left = self.until.saturating_sub(self.count);
-        if self.piece.even {
-            let stretch = self.piece.cruise(self.count, left, demand.time);
-            self.count = self.count.saturating_add(stretch.count.into());
-            return Some(stretch);
+        true
+    }
+
+    /// The next two steps of some that are searched one by one.
+    fn search(&mut self, mut few: Few, demand: &Demand) -> Slice {
+        for _ in 0..self.left().min(2) {
+            let coarse = demand.coarse.zip(self.last).map_or(0, |(by, (_, v))| v.of(self.piece.step) >> by);
+            let near = self.piece.off.max(coarse) >> 4;
+            let (time, speed) = self.piece.search(self.count, self.last, near);
+            if !few.add(self.piece.tick(time), demand.time.min(LONGEST)) {
+                return Slice::Steps(few.stretch);
+            }
+            // A step that was due before the piece began is made there, and has not its place: no segment begins at it.
+            let since = if self.piece.back { !time } else { time };
+            (self.last, self.count) = ((since > near).then_some((time, speed)), self.count.saturating_add(1));
+            if self.last.is_none() {
+                return Slice::Steps(few.stretch);
+            }
         }
-        if let Some((stretch, last)) = self.last.and_then(|last| self.piece.many(self.count, left, last, demand)) {
-            (self.last, self.count) = (Some(last), self.count.saturating_add(stretch.count.into()));
-            return Some(stretch);
+        if self.left() > 0 && few.stretch.count < FEW {
+            self.few = Some(few);
+            return Slice::More;
         }
-        let coarse = demand.coarse.zip(self.last).map_or(0, |(by, (_, v))| v.of(self.piece.step) >> by);
-        let near = self.piece.off.max(coarse) >> 4;
-        let (time, speed) = self.piece.search(self.count, self.last, near);
-        // A step that was due before the piece began is made there, and has not its place: no segment begins at it.
-        let since = if self.piece.back { !time } else { time };
-        (self.last, self.count) = ((since > near).then_some((time, speed)), self.count.saturating_add(1));
-        Some(Stretch { count: 1, first: self.piece.tick(time), differences: [0; 3] })
+        Slice::Steps(few.stretch)
     }
 
     /// When a step of the piece under way is made, as exactly as there are digits.
@@ -174,6 +241,33 @@ impl Cutter {
         }
         let (time, _) = self.piece.search(count, None, 0);
         self.piece.tick(time)
+    }
+}
+
+impl Few {
+    const NONE: Self =
+        Self { stretch: Stretch { count: 0, first: 0, differences: [0; 3] }, time: 0, interval: 0, add: 0 };
+
+    /// Adds a step at a time, if that is within `longest` of the first one.
+    fn add(&mut self, time: i128, longest: u64) -> bool {
+        let Stretch { count, first, differences } = &mut self.stretch;
+        if *count == 0 {
+            *first = time;
+        } else {
+            if time.saturating_sub(*first) > i128::from(longest) {
+                return false;
+            }
+            let interval = i64::try_from(time.saturating_sub(self.time)).unwrap_or(0);
+            let add = interval.wrapping_sub(self.interval);
+            match *count {
+                1 => differences[0] = interval,
+                2 => differences[1] = add,
+                _ => differences[2] = add.wrapping_sub(self.add),
+            }
+            (self.interval, self.add) = (interval, add);
+        }
+        (*count, self.time) = (count.saturating_add(1), time);
+        true
     }
 }
 
@@ -303,16 +397,23 @@ impl Part {
         if pace >= LONGEST {
             return None;
         }
-        let room = if demand.time == u64::MAX { demand.time } else { demand.time.checked_div(pace).unwrap_or(0) };
         let step = v.of(self.step);
+        // Of one step: w / 2. Five steps are not to be more than half of the way to rest.
+        let half = self.at(time).half;
+        let w = v.of(high(half, step));
+        if left >= FEW.into() && w > u64::MAX / 20 {
+            return None;
+        }
+        let y = v.of(high(high(self.sixth, step), step));
         // How far the first three terms may miss.
         let most = demand.coarse.map_or(self.off, |by| self.off.max(step >> by)).saturating_mul(6);
-        // Of one step: w / 2 and y / 6.
-        let half = self.at(time).half;
-        let (w, y) = (v.of(high(half, step)), v.of(high(high(self.sixth, step), step)));
         let long = if demand.coarse.is_some() { 2048 } else { 512 };
-        let mut n = few(step, w, y, most).min(left).min(long).min(u32::try_from(room).unwrap_or(u32::MAX));
-        while n >= 2 {
+        let mut n = about(step, w, y, most).min(left).min(long);
+        if pace.saturating_mul(n.into()) > demand.time {
+            n = u32::try_from(demand.time.checked_div(pace).unwrap_or(0)).unwrap_or(n);
+        }
+        let least = left.clamp(2, u32::from(FEW).saturating_add(1));
+        while n >= least {
             let x = step.saturating_mul(n.into());
             let (w, y) = (w.saturating_mul(n.into()), y.saturating_mul(u64::from(n).wrapping_mul(n.into())));
             // Half of the way to rest, or as far again as from there, by the greater speed at either end: beyond it the derivative is too far from the same everywhere.
@@ -320,11 +421,11 @@ impl Part {
                 n = n.saturating_sub((n >> 2).max(1));
                 continue;
             }
-            let about = along(x, high(x, w), self.back).saturating_add(high(x, high(w, w)) << 1);
-            let about = along(about, high(x, y), !self.grows);
-            let there = along(time, about, !self.back);
+            let ahead = along(x, high(x, w), self.back).saturating_add(high(x, high(w, w)) << 1);
+            let ahead = along(ahead, high(x, y), !self.grows);
+            let there = along(time, ahead, !self.back);
             // The end of the piece is as far as a place can be; where they lead beyond it, that is missed, too.
-            let beyond = about.saturating_sub(if self.back { time } else { !time });
+            let beyond = ahead.saturating_sub(if self.back { time } else { !time });
             let Place { p, v, half } = self.at(there);
             let way = self.target(count.saturating_add(n).saturating_sub(1));
             let miss = Inverse::new(v).of(p.abs_diff(way));
@@ -432,7 +533,7 @@ fn along(x: u64, by: u64, up: bool) -> u64 {
 }
 
 /// About as many steps as the two terms left out allow to be off by `most`, from those of one step.
-fn few(step: u64, w: u64, y: u64, most: u64) -> u32 {
+fn about(step: u64, w: u64, y: u64, most: u64) -> u32 {
     // Of 16 steps, lest they are too small; of one where those are too large.
     let many = if step >> 60 | w >> 58 | y >> 52 == 0 { 4 } else { 0 };
     let (x, w, y) = (step << many, w << many, y << (many << 1));

@@ -1,13 +1,14 @@
 //! An axis that can be told something else at any time.
 
-use crate::cutter::{Demand, Stretch};
+pub(super) mod cutting;
+mod planning;
+
+use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::phases::{Frame, P, Phases, steps};
+use crate::phases::Phases;
 use crate::plan::{Setpoint, checked};
-use crate::planner::{Goal, Motion, plan_into};
-use crate::real::Real;
-use crate::stepper::{Stepper, tick};
+use crate::stepper::Stepper;
 use servowire_core::Direction;
 
 /// A step: when, and which way.
@@ -31,6 +32,17 @@ enum Aim {
     At(i64),
     /// Keep a speed in steps/s.
     Run(Direction, u32),
+}
+
+/// All that has been asked for.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Wish {
+    aim: Aim,
+    held: bool,
+    percent: u16,
+    /// What a quick stop that is under way may use, until the axis is at rest.
+    quick: Option<Bounds>,
 }
 
 /// An axis whose target, speed and override may change at any tick.
@@ -64,6 +76,8 @@ pub struct Mover {
     stepper: Stepper,
     /// Its steps are cut into stretches, not taken one by one.
     cuts: bool,
+    /// The stretch that comes next, if that is known.
+    left: Option<Stretch>,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
@@ -72,9 +86,7 @@ pub struct Mover {
     due: Option<u64>,
     /// Tick from which on it may come.
     free: u64,
-    aim: Aim,
-    held: bool,
-    percent: u16,
+    wish: Wish,
     soft: Option<(i64, i64)>,
     /// Ticks of rest before the direction changes.
     pause: u32,
@@ -85,8 +97,6 @@ pub struct Mover {
     dir: Option<Direction>,
     /// What is under way is a stop.
     braking: bool,
-    /// What a quick stop that is under way may use, until the axis is at rest.
-    quick: Option<Bounds>,
     halted: bool,
 }
 
@@ -103,21 +113,19 @@ impl Mover {
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
             cuts: false,
+            left: None,
             direction: Direction::Forward,
             origin: 0,
             commanded: 0,
             due: None,
             free: 0,
-            aim: Aim::Rest,
-            held: false,
-            percent: 100,
+            wish: Wish { aim: Aim::Rest, held: false, percent: 100, quick: None },
             soft: None,
             pause: 0,
             turn: None,
             idle: 0,
             dir: Some(Direction::Forward),
             braking: false,
-            quick: None,
             halted: false,
         })
     }
@@ -195,17 +203,9 @@ impl Mover {
     /// [`Error::SoftLimit`] outside the soft limits, [`Error::Moving`] during a [`quick_stop`](Self::quick_stop),
     /// [`Error::TooManySteps`] more than 2^31 - 1 steps away.
     pub fn move_to(&mut self, target: i64, now: u64) -> Result<(), Error> {
-        self.ready(now)?;
-        if let Some((low, high)) = self.soft {
-            if target < low || target > high {
-                return Err(Error::SoftLimit { target: clamp(target) });
-            }
-        }
-        let away = target.abs_diff(self.commanded);
-        if away > u64::from(u32::MAX / 2) {
-            return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
-        }
-        self.aim_at(Aim::At(target), now);
+        self.ready(self.is_at_rest(now))?;
+        self.ask_move(target, self.commanded)?;
+        self.replan(self.moment(now));
         Ok(())
     }
 
@@ -214,32 +214,33 @@ impl Mover {
     /// # Errors
     /// [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn run(&mut self, direction: Direction, speed: u32, now: u64) -> Result<(), Error> {
-        self.ready(now)?;
-        self.aim_at(if speed == 0 { Aim::Rest } else { Aim::Run(direction, speed) }, now);
+        self.ready(self.is_at_rest(now))?;
+        self.ask_run(direction, speed);
+        self.replan(self.moment(now));
         Ok(())
     }
 
     /// Feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); more than 100 is 100. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
-        self.percent = percent.min(100);
+        self.ask_override(percent);
         self.change(now);
     }
 
     /// Feed hold: slows down to rest and keeps the target.
     pub fn hold(&mut self, now: u64) {
-        self.held = true;
+        self.ask_hold(true);
         self.change(now);
     }
 
     /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
-        self.held = false;
+        self.ask_hold(false);
         self.change(now);
     }
 
     /// Slows down to rest and forgets the target.
     pub fn stop(&mut self, now: u64) {
-        self.aim = Aim::Rest;
+        self.ask_stop();
         self.change(now);
     }
 
@@ -247,22 +248,16 @@ impl Mover {
     /// are refused. Where its own limits, or those of a quick stop under way, are higher, those are used: a quick stop is never
     /// longer than a normal one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
-        self.aim = Aim::Rest;
-        let moment = self.moment(now);
-        if self.is_moving(moment) {
-            let bounds = limits.bounds(self.clock).or_higher(self.quick.as_ref().unwrap_or(&self.bounds));
-            self.quick = Some(bounds);
-            self.replan_within(moment, &bounds);
-        } else {
-            self.change(now);
-        }
+        self.ask_quick_stop(limits);
+        self.stop_quickly(now);
     }
 
     /// No further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
         let moment = self.clock.moment(now.max(self.free));
         self.halted = !self.is_at_rest(now);
-        (self.aim, self.held, self.quick, self.due, self.turn) = (Aim::Rest, false, None, None, None);
+        self.wish = Wish { aim: Aim::Rest, held: false, quick: None, ..self.wish };
+        (self.due, self.turn) = (None, None);
         self.rest(moment);
     }
 
@@ -275,7 +270,7 @@ impl Mover {
             return Err(Error::Moving);
         }
         self.commanded = steps;
-        self.aim = Aim::Rest;
+        self.wish.aim = Aim::Rest;
         self.rest(self.phases.end());
         Ok(())
     }
@@ -298,293 +293,52 @@ impl Mover {
         self.limits
     }
 
-    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
-    pub(super) const fn cutting(self) -> Self {
-        Self { cuts: true, ..self }
-    }
+    // What is asked for is written down first, and planned then.
 
-    /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
-    pub(super) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
-        if self.due.is_none() {
-            return Cut::Rest;
-        }
-        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.stepper.cutter);
-        let Some(stretch) = cutter.next(curve, frame, demand) else {
-            self.due = None;
-            self.go_on();
-            return Cut::Rest;
-        };
-        let first = tick(stretch.first);
-        if first >= until {
-            self.due = Some(first.max(self.free));
-            return Cut::Later;
-        }
-        let (endless, all) = (frame.endless, steps(frame.last(curve)));
-        let (direction, count) = (self.direction, i64::from(stretch.count));
-        self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
-        self.stepper.cutter = cutter;
-        let last = tick(stretch.last()).max(self.free);
-        self.free = last.saturating_add(1);
-        (self.turn, self.dir) = (None, Some(direction));
-        self.due = Some(self.free);
-        if !endless && cutter.count() >= all {
-            self.due = None;
-            self.go_on();
-        } else if endless && cutter.count() >= 1 << 30 {
-            self.replan(self.clock.moment(last));
-        }
-        Cut::Steps(stretch, direction)
-    }
-
-    /// The tick at which the plan under way ends; the greatest for one without end.
-    pub(super) fn over(&self) -> u64 {
-        if self.phases.frame.endless { u64::MAX } else { self.phases.end().div_ceil(self.clock.moment(1)) }
-    }
-
-    /// At rest at a position since a tick, after a stop that nobody asked for: it goes on from there.
-    pub(super) fn rest_at(&mut self, position: i64, now: u64) {
-        (self.commanded, self.due, self.quick) = (position, None, None);
-        self.free = now.saturating_add(1);
-        self.rest(self.clock.moment(now));
-        if self.has_work() {
-            self.replan(self.clock.moment(now));
-        }
-    }
-
-    /// Halted at a position, DIR not known.
-    pub(super) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
-        self.halt(now);
-        (self.commanded, self.halted, self.dir) = (position, was_moving, None);
-        self.rest(self.phases.end());
-    }
-
-    fn ready(&mut self, now: u64) -> Result<(), Error> {
-        if self.quick.is_some() && !self.is_at_rest(now) {
+    /// Refuses moves in a quick stop, which is over at rest.
+    pub(super) fn ready(&mut self, at_rest: bool) -> Result<(), Error> {
+        if self.wish.quick.is_some() && !at_rest {
             return Err(Error::Moving);
         }
-        self.quick = None;
+        self.wish.quick = None;
         Ok(())
     }
 
-    /// The moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the caller's
-    /// clock says: an earlier or later time would plan steps that are over, or make those that are missing in a burst.
-    fn moment(&self, now: u64) -> u64 {
-        let now = now.max(self.free.saturating_sub(1));
-        self.clock.moment(self.due.map_or(now, |due| now.min(due)))
-    }
-
-    /// A request that changes what is under way, unless that is a quick stop.
-    fn change(&mut self, now: u64) {
-        let moment = self.moment(now);
-        // A stop that is under way is the same one whoever asks for it.
-        let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
-        if !self.is_moving(moment) || self.quick.is_none() && !same {
-            self.replan(moment);
-        }
-    }
-
-    fn is_moving(&self, moment: u64) -> bool {
-        self.phases.frame.endless || moment < self.phases.end()
-    }
-
-    fn aim_at(&mut self, aim: Aim, now: u64) {
-        (self.aim, self.halted) = (aim, false);
-        self.replan(self.moment(now));
-    }
-
-    /// At rest, the position of the plan is 0 where the motor is.
-    fn rest(&mut self, moment: u64) {
-        self.origin = self.commanded;
-        self.phases = Phases::rest(self.clock.shift(), moment, 0);
-        self.stepper = Stepper::new();
-    }
-
-    /// A plan is over: on to the aim if that is somewhere else.
-    fn go_on(&mut self) {
-        let end = self.phases.end();
-        if self.has_work() {
-            self.replan(end);
-        }
-    }
-
-    fn has_work(&self) -> bool {
-        !self.held
-            && self.percent > 0
-            && match self.aim {
-                Aim::Rest => false,
-                Aim::At(target) => target != self.commanded,
-                Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.commanded),
-            }
-    }
-
-    fn replan(&mut self, moment: u64) {
-        let bounds = self.bounds;
-        self.replan_within(moment, &bounds);
-    }
-
-    /// From the state at a moment to the aim.
-    fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
-        let moment = moment.max(self.phases.frame.begin);
-        if self.is_moving(moment) {
-            self.onward(moment, bounds);
-        } else {
-            self.anew(moment, bounds);
-        }
-        if self.due.is_none() && self.has_work() {
-            // No step on the way to rest: what follows begins there.
-            self.anew(self.phases.end(), bounds);
-        }
-    }
-
-    /// Begins with the plan that there is.
-    fn adopt(&mut self) {
-        self.origin = self.commanded;
-        self.stepper = Stepper::new();
-        let Phases { curve, frame } = &self.phases;
-        let begin = frame.begin.div_ceil(self.clock.moment(1));
-        let due = if self.cuts {
-            // Not after the next step is enough.
-            (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
-        } else {
-            self.stepper.next(curve, frame)
-        };
-        self.due = due.map(|due| due.max(self.free).max(begin));
-        self.turn = None;
-        if self.dir != Some(self.direction) {
-            self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
-            self.dir = None;
-        }
-    }
-
-    /// Plans on from the motion that there is. Positions count from the steps made.
-    fn onward(&mut self, moment: u64, bounds: &Bounds) {
-        let (state, last) = (self.phases.at(moment), self.phases.last());
-        let made = i64::try_from(self.commanded.abs_diff(self.origin)).unwrap_or(0) << 32;
-        let p = state.p.wrapping_sub(made);
-        let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
-        let bounds = &bounds.holding(state.v, state.a);
-        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
-        let again = self.braking;
-        self.braking = !self.plan(self.direction, start, frame, bounds);
-        if self.braking {
-            self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
-            let Phases { curve, frame } = &mut self.phases;
-            // A stop has always room.
-            let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
-            if again {
-                // Rounding makes no step more of a stop within higher limits.
-                frame.to = Some(frame.last(curve).min(last.saturating_sub(made)));
+    pub(super) fn ask_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
+        if let Some((low, high)) = self.soft {
+            if target < low || target > high {
+                return Err(Error::SoftLimit { target: clamp(target) });
             }
         }
-        self.adopt();
+        let away = target.abs_diff(from);
+        if away > u64::from(u32::MAX / 2) {
+            return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
+        }
+        (self.wish.aim, self.halted) = (Aim::At(target), false);
+        Ok(())
     }
 
-    /// Plans from rest.
-    fn anew(&mut self, moment: u64, bounds: &Bounds) {
-        let end = self.phases.end();
-        self.rest(end);
-        (self.due, self.turn) = (None, None);
-        let mut begin = moment.max(end);
-        if let Some(last) = self.free.checked_sub(1) {
-            // The axis has come to rest up to half a step behind that step, and begins at it.
-            let half = (Real::ONE.half() / bounds.v).to_fixed(0);
-            begin = begin.max(self.clock.moment(last).saturating_add(half));
-        }
-        self.braking = false;
-        if !self.has_work() {
-            return;
-        }
-        self.idle = begin.div_ceil(self.clock.moment(1));
-        let direction = match self.aim {
-            Aim::At(target) if target < self.commanded => Direction::Reverse,
-            Aim::Run(direction, _) => direction,
-            _ => Direction::Forward,
-        };
-        if self.dir != Some(direction) {
-            begin = begin.saturating_add(self.clock.moment(self.pause.into()));
-        }
-        self.direction = direction;
-        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
-        if self.plan(direction, Motion::steady(Real::ZERO), frame, bounds) {
-            self.adopt();
-        } else {
-            self.rest(end);
-        }
+    pub(super) const fn ask_run(&mut self, direction: Direction, speed: u32) {
+        self.wish.aim = if speed == 0 { Aim::Rest } else { Aim::Run(direction, speed) };
+        self.halted = false;
     }
 
-    /// Puts a plan to the aim in the place of the one that there is; false if that is a stop, or cannot be reached any more.
-    fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
-        let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
-        self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
-        let Phases { curve, frame } = &mut self.phases;
-        let goal = match want {
-            Want::At(target) => {
-                let Some(left) = ahead(self.commanded, target, direction) else { return false };
-                let to = i64::from(left) << 32;
-                frame.to = Some(to);
-                let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
-                Goal::At(Real::fixed(way, P), Real::ZERO)
-            }
-            Want::Speed(v) => {
-                frame.endless = true;
-                Goal::Speed(v)
-            }
-        };
-        plan_into(curve, start, goal, &bounds).is_ok()
+    pub(super) fn ask_override(&mut self, percent: u16) {
+        self.wish.percent = percent.min(100);
     }
 
-    /// What to do in this direction; `None` if that is a stop.
-    fn goal(&self, direction: Direction, bounds: &Bounds) -> Option<(Want, Bounds)> {
-        if self.held || self.percent == 0 {
-            return None;
-        }
-        let part = Real::new(self.percent.into()) / Real::new(100);
-        match self.aim {
-            Aim::Rest => None,
-            Aim::At(target) => Some((Want::At(target), bounds.slower(bounds.v * part))),
-            Aim::Run(way, _) if way != direction => None,
-            Aim::Run(_, speed) => {
-                let v = Real::new(speed.into()) / Real::new(self.clock.moments().into());
-                let v = v.min(bounds.v) * part;
-                match self.soft {
-                    Some(soft) => Some((Want::At(edge(soft, direction)), bounds.slower(v))),
-                    None => Some((Want::Speed(v), *bounds)),
-                }
-            }
-        }
+    pub(super) const fn ask_hold(&mut self, held: bool) {
+        self.wish.held = held;
     }
-}
 
-/// What [`Mover::cut`] gives.
-pub(super) enum Cut {
-    /// Steps, and which way.
-    Steps(Stretch, Direction),
-    /// The next step is later.
-    Later,
-    /// There is no step to come.
-    Rest,
-}
+    pub(super) const fn ask_stop(&mut self) {
+        self.wish.aim = Aim::Rest;
+    }
 
-/// Where a plan leads.
-enum Want {
-    At(i64),
-    Speed(Real),
-}
-
-/// Steps from here to there in a direction; `None` if there is behind.
-fn ahead(position: i64, target: i64, direction: Direction) -> Option<u32> {
-    let steps = match direction {
-        Direction::Forward => target.checked_sub(position)?,
-        Direction::Reverse => position.checked_sub(target)?,
-    };
-    u32::try_from(steps).ok().filter(|steps| *steps <= u32::MAX / 2)
-}
-
-/// The end of a range in a direction.
-const fn edge((low, high): (i64, i64), direction: Direction) -> i64 {
-    match direction {
-        Direction::Forward => high,
-        Direction::Reverse => low,
+    pub(super) fn ask_quick_stop(&mut self, limits: Limits) {
+        self.ask_stop();
+        let bounds = limits.bounds(self.clock).or_higher(self.wish.quick.as_ref().unwrap_or(&self.bounds));
+        self.wish.quick = Some(bounds);
     }
 }
 

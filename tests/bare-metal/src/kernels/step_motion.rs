@@ -1,7 +1,7 @@
 //! step-motion: plans, their steps, an axis that is told something new, lines of two axes.
 
 use step_motion::{
-    Axis, AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Queue, Reloads, Setpoint,
+    AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint,
 };
 
 use super::kernels;
@@ -21,7 +21,6 @@ const S_SHORT: Limited = Limited { steps: 20, ..S_CURVE };
 const S_ENTRY: Limited = Limited { steps: 100, ends: [1000, 500], ..S_CURVE };
 const S_ENTRY_FAST: Limited = Limited { steps: 120, ends: [1900, 500], ..S_CURVE };
 const CRUISE: Limited = Limited { steps: 500, ends: [20_000; 2], ..TRAPEZOID };
-const LONG_S_CURVE: Limited = Limited { steps: 5000, speed: 50_000, jerk: 1_000_000, ..TRAPEZOID };
 const TRAPEZOID_64: Limited = Limited { steps: 64, ..TRAPEZOID };
 const S_CURVE_64: Limited = Limited { steps: 64, ..S_CURVE };
 const FAST: Limited = Limited { speed: 250_000, acceleration: 100_000_000, ..TRAPEZOID };
@@ -118,11 +117,4 @@ kernels! {
         }
         Some(sum)
     } over [TRAPEZOID, S_CURVE];
-
-    /// A request to an axis at rest, with its plan.
-    fn step_motion_axis_request(move_: &Limited) -> Option<bool> {
-        let queue = Queue::<9>::new();
-        let (mut axis, _) = Axis::new(&queue, Clock::MICROSECONDS, limits(move_)?).ok()?;
-        Some(axis.move_to(i64::from(move_.steps)).is_ok())
-    } over [S_SHORT, LONG_S_CURVE];
 }

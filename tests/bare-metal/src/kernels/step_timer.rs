@@ -18,6 +18,7 @@ static ALL: AxesQueue<3, 11> = AxesQueue::new();
 static LINES: AxesQueue<3, 257> = AxesQueue::new();
 static LONG: Queue<129> = Queue::new();
 static SHORT: Queue<129> = Queue::new();
+static ASKED: Queue<9> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
 
 /// An axis that goes back and forth, with its interrupt, and how far.
@@ -166,5 +167,16 @@ kernels_on_states! {
             }
             _ => _ = own.timer.fire(),
         })
+    }
+
+    /// A request to an axis at rest, with its plan: of 20 steps and of 5000 of an S-curve.
+    fn step_motion_axis_request(axis: &mut Axis<'static, 9>, steps: &i64) -> bool {
+        axis.move_to(*steps).is_ok()
+    } as {
+        let Some(limits) = Limits::new(50_000, 100_000).ok().and_then(|limits| limits.with_jerk(1_000_000).ok()) else {
+            return 0;
+        };
+        let Ok((mut axis, _)) = Axis::new(&ASKED, Clock::MICROSECONDS, limits) else { return 0 };
+        tenths_on(&mut axis, step_motion_axis_request, &[20, 5000])
     }
 }

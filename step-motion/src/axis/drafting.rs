@@ -1,0 +1,411 @@
+//! The blocks of an axis: where one is joined to what is out, what is cut for it, and when the interrupt is let in.
+
+use core::sync::atomic::Ordering;
+
+use crate::cutter::Demand;
+use crate::mover::cutting::{Cut, News};
+use crate::queue::{IDLE, Queue, TICKET};
+use crate::writer::{TICK, Writer, tick};
+
+use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work};
+
+/// Slots for the steps of a block before those of its stop, at least.
+const LEAST_ROOM: usize = 4;
+/// Nothing that the interrupt tells.
+pub(super) const UNSEEN: u32 = u32::MAX;
+/// A wait ends so many ticks before a step may come.
+const BEFORE: u64 = 2;
+
+impl<const N: usize> Axis<'_, N> {
+    /// Slots for the steps of a block before those of its stop, at most.
+    pub(super) const ROOM: usize = if Queue::<N>::BLOCK > 2 * LEAST_ROOM { Queue::<N>::BLOCK / 2 } else { LEAST_ROOM };
+
+    /// A slice of the background's work: a segment, a stop that is planned, or a look at the interrupt. Call it until it says
+    /// other than [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often where the slots of
+    /// a block hold less than that.
+    pub fn poll(&mut self) -> Work {
+        if let Some(ticket) = self.halt {
+            return self.confirm(ticket);
+        }
+        let current = self.queue.current.load(Ordering::Acquire);
+        if current == self.seen {
+            return self.waits;
+        }
+        let work = self.slice();
+        let waits = matches!(work, Work::Start | Work::Later | Work::Rest);
+        (self.seen, self.waits) = (if waits { current } else { UNSEEN }, work);
+        work
+    }
+
+    fn slice(&mut self) -> Work {
+        if self.look() {
+            return Work::Later;
+        }
+        let (running, slot) = self.current();
+        let waits = if running.is_some() { Work::Later } else { Work::Rest };
+        if self.lost {
+            if running.is_some() {
+                return Work::Later;
+            }
+            self.mover.rest_at(self.position, tick(self.end.end));
+            self.lost = false;
+        }
+        match self.stage {
+            Stage::Idle => {
+                let more = self.news != News::None || self.mover.has_more();
+                if more && self.begin() { Work::More } else { waits }
+            }
+            Stage::Block => self.cut(),
+            Stage::Stop => self.cut_stop(),
+            Stage::Ready => self.link(running, slot),
+            Stage::Linked if running.is_some() => Work::Later,
+            Stage::Linked => Work::Start,
+        }
+    }
+
+    /// Something has been asked for: it is planned at once, where it is known where it begins.
+    pub(super) fn asked(&mut self, news: News) {
+        self.news = self.news.max(news);
+        self.seen = UNSEEN;
+        if self.halt.is_none() && !self.look() && self.stage != Stage::Linked && !self.lost {
+            self.begin();
+        }
+    }
+
+    /// Where the interrupt is: in which place of which block, or `None` if it stands; and at which slot.
+    pub(super) fn current(&self) -> (Option<(usize, usize)>, usize) {
+        let current = self.queue.current.load(Ordering::Acquire);
+        let slot = (current & 0xffff) as usize;
+        (Queue::<N>::place(slot).filter(|_| current & IDLE == 0), slot)
+    }
+
+    /// Returns whether a slot is one of the steps of the block that was linked last.
+    pub(super) fn is_in(&self, slot: usize) -> bool {
+        let out = |block: usize| self.out.get(block).map_or(0, |out| out.len);
+        Queue::<N>::place(slot).is_some_and(|(block, at)| block == self.block && at < out(block))
+    }
+
+    /// Takes notice of where the interrupt is. Returns whether it is in a stop that nobody asked for.
+    pub(super) fn look(&mut self) -> bool {
+        let made = self.queue.made.load(Ordering::Acquire);
+        #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
+        let since = made.wrapping_sub(self.made) as i32;
+        (self.position, self.made) = (self.position.wrapping_add(since.into()), made);
+        let (running, slot) = self.current();
+        let Some((block, place)) = Queue::<N>::place(slot) else { return false };
+        if self.stage == Stage::Linked && block == self.block {
+            self.go_over();
+        }
+        if self.out.get(block).is_some_and(|out| place >= out.len) {
+            if running.is_some() {
+                return true;
+            }
+            self.recover(block, slot);
+        } else if self.stage == Stage::Linked && block != self.block && slot > self.joint {
+            self.miss();
+        }
+        false
+    }
+
+    /// The interrupt is in the block that was linked.
+    fn go_over(&mut self) {
+        self.work.wish_as(&self.mover);
+        self.mover.clone_from(&self.work);
+        let len = self.out.get(self.block).map_or(0, |out| out.len);
+        (self.end, self.last) = (self.writer, Queue::<N>::slot(self.block, len.saturating_sub(1)));
+        self.block = 1_usize.wrapping_sub(self.block);
+        (self.stage, self.told, self.missed) = (Stage::Idle, News::None, 0);
+    }
+
+    /// It was beyond the joint before the block was there: once more, further on.
+    fn miss(&mut self) {
+        self.missed = self.missed.saturating_add(1);
+        self.forget();
+    }
+
+    /// What was made of the block is of no use; what it was told is still to be done.
+    fn forget(&mut self) {
+        self.news = self.news.max(self.told);
+        (self.stage, self.told, self.stop) = (Stage::Idle, News::None, None);
+    }
+
+    /// From the end of the stop of a block, where the interrupt stands.
+    fn recover(&mut self, block: usize, slot: usize) {
+        self.forget();
+        let Some(out) = self.out.get_mut(block) else { return };
+        // It stands at a slot that counts as one before the stop from now on.
+        out.len = usize::MAX;
+        (self.end, self.last) = (Writer { len: 0, ..out.rest }, slot);
+        self.mover.rest_at(out.position, tick(self.end.end));
+    }
+
+    /// The interrupt stands for a halt.
+    fn confirm(&mut self, ticket: u32) -> Work {
+        if self.queue.current.load(Ordering::Acquire) != IDLE | ticket << TICKET {
+            return Work::Start;
+        }
+        self.look();
+        let now = tick(self.end.end).max(self.mover.free());
+        let was_moving = self.position != self.mover.commanded() || !self.mover.is_at_rest(now);
+        self.mover.halt_at(self.position, now, was_moving);
+        (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
+        self.end = Writer::new(i128::from(now) << 32, None);
+        self.queue.halt.store(0, Ordering::Release);
+        (self.halt, self.lost) = (None, false);
+        Work::More
+    }
+
+    /// What a segment lasts at most. A block is joined half of that ahead of the interrupt at least.
+    ///
+    /// A request waits for the interrupt to enter a block that is linked: not longer than its distance then, a segment, and until it is seen.
+    /// From there it acts after two segments and a half. All this is within twice the reach: 0.6 + 0.25 + 0.5 + 0.625.
+    const fn part(&self) -> u64 {
+        self.reach as u64 >> 2
+    }
+
+    /// A block that only goes on is linked when it is this near: a little more than the time between two calls.
+    fn near(&self) -> u64 {
+        u64::from(self.reach).saturating_mul(3) / 5
+    }
+
+    /// Begins a block: with what has been asked for, if there is something, behind the next segment that is far enough ahead of the
+    /// interrupt, or else with what follows all that is out. Returns whether there is something to cut.
+    fn begin(&mut self) -> bool {
+        self.forget();
+        let news = core::mem::replace(&mut self.news, News::None);
+        let (running, _) = self.current();
+        self.work.clone_from(&self.mover);
+        (self.joint, self.writer) = (self.last, Writer { len: 0, ..self.end });
+        if let Some((block, place)) = running.filter(|_| news != News::None) {
+            self.join(block, place);
+        }
+        let now = tick(self.writer.end);
+        let blocks = if news == News::None || running.is_none() { 8 } else { 2 };
+        self.until = now.saturating_add(u64::from(self.reach).saturating_mul(blocks));
+        let free = self.work.free();
+        let other = if news == News::None {
+            self.work.proceed();
+            true
+        } else {
+            self.work.pursue(news, now)
+        };
+        let brakes = self.out.get(1_usize.wrapping_sub(self.block)).is_some_and(|out| out.brakes);
+        let ends_here = self.joint == self.last && (running.is_none() || !brakes);
+        if !other || ends_here && !self.work.has_steps() {
+            return false;
+        }
+        if let Some(out) = self.out.get_mut(self.block) {
+            *out = Out { begin: self.writer.end, free, ..Out::NONE };
+        }
+        (self.stage, self.told) = (Stage::Block, news);
+        true
+    }
+
+    /// Joins behind a segment that is far enough ahead.
+    fn join(&mut self, block: usize, place: usize) {
+        let Some(out) = self.out.get(block).copied() else { return };
+        let mark = |at| self.marks.get(Queue::<N>::slot(block, at)).copied().unwrap_or_default();
+        let lead = self.part() << 31;
+        let lead = lead.checked_shl(self.missed).filter(|far| far.checked_shr(self.missed) == Some(lead));
+        let Some(from) = lead.and_then(|lead| lead.checked_add(self.ends(block, place))) else { return };
+        let Some(at) = (place..out.len.saturating_sub(1)).find(|at| mark(*at).end >= from) else { return };
+        let Mark { end, steps } = mark(at);
+        // The tick after the last step before it.
+        let (mut free, mut seen) = (out.free, 0);
+        for Mark { end, steps } in (0..=at).map(mark).filter(|mark| mark.end > 0) {
+            if steps > seen {
+                (free, seen) = (tick(out.begin.saturating_add(end.into())).saturating_add(1), steps);
+            }
+        }
+        let dir = self.end.dir.filter(|_| steps > 0);
+        self.joint = Queue::<N>::slot(block, at);
+        self.writer = Writer::new(out.begin.saturating_add(end.into()), dir);
+        self.work.back_to(out.steps.saturating_sub(steps), tick(self.writer.end), (free, dir));
+    }
+
+    /// When the segment in a place ends at the latest, from the begin of its block.
+    fn ends(&self, block: usize, place: usize) -> u64 {
+        let len = self.out.get(block).map_or(0, |out| out.len);
+        let mut slots = (place..len).filter_map(|at| self.marks.get(Queue::<N>::slot(block, at)));
+        slots.find(|mark| mark.end > 0).map_or(u64::MAX, |mark| mark.end)
+    }
+
+    /// A segment of the block.
+    fn cut(&mut self) -> Work {
+        let (now, before) = (tick(self.writer.end), self.writer.len);
+        if before > 0 && self.work.has_steps() && self.is_long_enough(now) {
+            return Work::More;
+        }
+        let until = now.saturating_add(self.part());
+        let to = (self.queue, self.block);
+        match self.work.cut(&Demand { off: self.off, coarse: None, time: self.part() << 32 }, until) {
+            Cut::Steps(stretch, direction) => {
+                self.writer.put_steps(to, &stretch, direction);
+                if let Some(out) = self.out.get_mut(self.block) {
+                    out.steps = out.steps.saturating_add(stretch.count.into());
+                }
+            }
+            Cut::More => return Work::More,
+            Cut::Later => self.writer.put_wait(to, i128::from(until.saturating_sub(BEFORE)) << 32),
+            Cut::Rest => {
+                let over = i128::from(self.work.over().saturating_add(1)) << 32;
+                let least = if before == 0 { self.writer.end.saturating_add(2 * TICK) } else { over };
+                self.writer.put_wait(to, over.max(least));
+                self.mark(before);
+                return self.complete(None);
+            }
+        }
+        self.mark(before);
+        Work::More
+    }
+
+    /// Returns whether the block is to have no more steps: it has as many as it is to have, and does not come to rest soon after, in
+    /// the slots that a stop would take.
+    fn is_long_enough(&mut self, now: u64) -> bool {
+        let len = self.writer.len.saturating_add(3);
+        let Some(Tail { mover, writer, steps, .. }) = &self.stop else {
+            if len <= self.room && now < self.until {
+                return false;
+            }
+            self.close();
+            if self.runs_out(now) {
+                self.stage = Stage::Block;
+            }
+            return true;
+        };
+        if len <= Queue::<N>::BLOCK {
+            return false;
+        }
+        // It has not come to rest: back to where the stop may begin.
+        self.work.clone_from(mover);
+        self.writer = *writer;
+        if let Some(out) = self.out.get_mut(self.block) {
+            out.steps = *steps;
+        }
+        self.close();
+        true
+    }
+
+    /// Returns whether the plan is likely to come to rest within the slots that are left, and soon.
+    fn runs_out(&self, now: u64) -> bool {
+        let left = self.work.over().saturating_sub(now);
+        let begin = self.out.get(self.block).map_or(0, |out| tick(out.begin));
+        let len = u64::try_from(self.writer.len).unwrap_or(u64::MAX);
+        let room = u64::try_from(Queue::<N>::BLOCK).unwrap_or(0).saturating_sub(len);
+        // As many segments in a time as before, and those of the last steps.
+        let slots = left.saturating_mul(len).checked_div(now.saturating_sub(begin)).unwrap_or(u64::MAX);
+        left <= u64::from(self.reach) << 2 && slots.saturating_add(8) <= room
+    }
+
+    /// Writes down where the events of the last slot end.
+    fn mark(&mut self, before: usize) {
+        let Some(out) = self.out.get(self.block) else { return };
+        let end = u64::try_from(self.writer.end.saturating_sub(out.begin)).unwrap_or(0);
+        for at in before..self.writer.len {
+            let end = if at.saturating_add(1) == self.writer.len { end } else { 0 };
+            if let Some(mark) = self.marks.get_mut(Queue::<N>::slot(self.block, at)) {
+                *mark = Mark { end, steps: out.steps };
+            }
+        }
+    }
+
+    /// The block is as long as it is to be: what comes behind it.
+    fn close(&mut self) {
+        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
+        let steps = self.out.get(self.block).map_or(0, |out| out.steps);
+        self.stop = Some(Tail { mover: self.work.clone(), moves: true, demand, writer: self.writer, steps });
+        self.stage = Stage::Stop;
+    }
+
+    /// A segment of the stop behind the block.
+    fn cut_stop(&mut self) -> Work {
+        let Some(tail) = &mut self.stop else { return self.complete(None) };
+        if core::mem::take(&mut tail.moves) {
+            tail.mover.ask_stop();
+            tail.mover.pursue(News::Change, tick(tail.writer.end));
+            return Work::More;
+        }
+        let to = (self.queue, self.block);
+        let more = match tail.mover.cut(&tail.demand, u64::MAX) {
+            Cut::Steps(stretch, direction) => {
+                tail.writer.put_steps(to, &stretch, direction);
+                true
+            }
+            Cut::More => true,
+            Cut::Later | Cut::Rest => {
+                tail.writer.put_wait(to, i128::from(tail.mover.over()) << 32);
+                false
+            }
+        };
+        if tail.writer.len > Queue::<N>::BLOCK {
+            return self.stop_shorter();
+        }
+        if more {
+            return Work::More;
+        }
+        let rest = (tail.mover.commanded(), tail.writer);
+        // Stops that follow each other have about as many segments.
+        let slots = rest.1.len.saturating_sub(self.writer.len);
+        self.room = Queue::<N>::BLOCK.saturating_sub(slots.saturating_add(slots >> 3)).clamp(LEAST_ROOM, Self::ROOM);
+        if rest.1.len < Queue::<N>::BLOCK / 2 && self.coarse < COARSE {
+            self.coarse = self.coarse.saturating_add(1);
+        }
+        self.complete(Some(rest))
+    }
+
+    /// There are too few slots for the stop: once more with fewer segments of it, or with fewer before it.
+    fn stop_shorter(&mut self) -> Work {
+        if self.coarse > COARSEST {
+            self.coarse = self.coarse.saturating_sub(1);
+            self.close();
+            return Work::More;
+        }
+        if self.room > LEAST_ROOM {
+            self.room = (self.room / 2).max(LEAST_ROOM);
+            self.forget();
+            return Work::More;
+        }
+        self.give_up()
+    }
+
+    /// The block cannot be run: what was cut of it is forgotten, and the axis comes to rest where the interrupt does.
+    fn give_up(&mut self) -> Work {
+        self.forget();
+        self.mover.ask_stop();
+        (self.lost, self.news) = (true, News::None);
+        Work::TooFewSlots
+    }
+
+    /// The block is there; with where its stop ends, if there is one.
+    fn complete(&mut self, stop: Option<(i64, Writer)>) -> Work {
+        let len = self.writer.len;
+        if len > Queue::<N>::BLOCK {
+            return self.give_up();
+        }
+        let (position, rest) = stop.unwrap_or((self.work.commanded(), self.writer));
+        if let Some(out) = self.out.get_mut(self.block) {
+            *out = Out { len, position, rest, brakes: stop.is_some(), ..*out };
+        }
+        (self.stage, self.stop) = (Stage::Ready, None);
+        Work::More
+    }
+
+    /// Lets the interrupt in. What only goes on waits until it is near, lest there is no room for what is asked for meanwhile.
+    fn link(&mut self, running: Option<(usize, usize)>, slot: usize) -> Work {
+        if let Some((block, place)) = running {
+            if slot > self.joint {
+                self.miss();
+                return Work::More;
+            }
+            let begin = self.out.get(block).map_or(0, |out| out.begin);
+            let near = i128::from(self.ends(block, place)).saturating_add(begin);
+            let near = near.saturating_add(i128::from(self.near()) << 32);
+            if self.told == News::None && near < self.end.end {
+                return Work::Later;
+            }
+        }
+        self.queue.link(self.joint, Queue::<N>::slot(self.block, 0));
+        self.stage = Stage::Linked;
+        Work::More
+    }
+}

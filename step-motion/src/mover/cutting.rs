@@ -1,0 +1,141 @@
+//! Steps of an axis as stretches, for [`Axis`](crate::Axis): what has been asked for is planned when it says so.
+
+use crate::cutter::{Demand, Slice, Stretch};
+use crate::phases::{Phases, steps};
+use crate::stepper::tick;
+use servowire_core::Direction;
+
+use super::Mover;
+
+/// What [`Mover::cut`] gives.
+#[derive(Debug)]
+pub(crate) enum Cut {
+    /// Steps, and which way.
+    Steps(Stretch, Direction),
+    /// That was a part of the work.
+    More,
+    /// The next step is later.
+    Later,
+    /// There is no step to come.
+    Rest,
+}
+
+/// What has been asked for and is not planned; of two, the greater one is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum News {
+    None,
+    /// Something that a stop under way takes no notice of.
+    Change,
+    /// Another aim.
+    Aim,
+    /// A quick stop.
+    Quick,
+}
+
+impl Mover {
+    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
+    pub(crate) const fn cutting(self) -> Self {
+        Self { cuts: true, ..self }
+    }
+
+    /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
+    pub(crate) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
+        let Some(due) = self.due else { return Cut::Rest };
+        if due >= until {
+            return Cut::Later;
+        }
+        let (Phases { curve, frame }, cutter) = (&self.phases, &mut self.stepper.cutter);
+        let next = self.left.take().map_or_else(|| cutter.slice(curve, frame, demand), Slice::Steps);
+        let stretch = match next {
+            Slice::Steps(stretch) => stretch,
+            Slice::More => return Cut::More,
+            Slice::End => {
+                self.due = None;
+                return Cut::Rest;
+            }
+        };
+        let first = tick(stretch.first);
+        if first >= until {
+            (self.due, self.left) = (Some(first.max(self.free)), Some(stretch));
+            return Cut::Later;
+        }
+        let all = steps(frame.last(curve));
+        let (direction, count) = (self.direction, i64::from(stretch.count));
+        self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
+        let last = tick(stretch.last()).max(self.free);
+        self.free = last.saturating_add(1);
+        (self.turn, self.dir) = (None, Some(direction));
+        self.due = (frame.endless || cutter.count() < all).then_some(self.free);
+        Cut::Steps(stretch, direction)
+    }
+
+    /// The tick after the last step.
+    pub(crate) const fn free(&self) -> u64 {
+        self.free
+    }
+
+    /// The tick at which the plan under way ends; the greatest for one without end.
+    pub(crate) fn over(&self) -> u64 {
+        if self.phases.frame.endless { u64::MAX } else { self.phases.end().div_ceil(self.clock.moment(1)) }
+    }
+
+    /// Returns whether the plan has more steps.
+    pub(crate) const fn has_steps(&self) -> bool {
+        self.due.is_some()
+    }
+
+    /// Returns whether steps are to come: of the plan under way, or of one that is to follow.
+    pub(crate) fn has_more(&self) -> bool {
+        self.due.is_some() || self.has_work()
+    }
+
+    /// Goes on with the plan, or with the one that follows.
+    pub(crate) fn proceed(&mut self) {
+        if self.due.is_none() {
+            self.go_on();
+        } else if self.phases.frame.endless && self.stepper.count() >= 1 << 29 {
+            // The steps of a plan are counted in 32 bits.
+            self.replan(self.clock.moment(self.free.saturating_sub(1)));
+        }
+    }
+
+    /// Plans what has been asked for, from a tick on. Returns whether there is another plan.
+    pub(crate) fn pursue(&mut self, news: News, now: u64) -> bool {
+        match news {
+            News::None => return false,
+            News::Change => return self.change(now),
+            News::Aim => self.replan(self.moment(now)),
+            News::Quick => self.stop_quickly(now),
+        }
+        true
+    }
+
+    /// Before the last steps of the plan under way, at a tick; `free` is the one after the last step that is left, and DIR may be
+    /// another one if none is.
+    pub(crate) fn back_to(&mut self, steps: u32, now: u64, (free, dir): (u64, Option<Direction>)) {
+        let back = i64::from(steps);
+        let back = if self.direction.dir() { back } else { back.wrapping_neg() };
+        self.commanded = self.commanded.saturating_add(back);
+        (self.free, self.dir) = (free, dir);
+        self.due = Some(now.saturating_add(1).max(free));
+    }
+
+    /// What has been asked of another one, too.
+    pub(crate) const fn wish_as(&mut self, other: &Self) {
+        (self.wish, self.halted) = (other.wish, other.halted);
+    }
+
+    /// At rest at a position since a tick, after a stop that nobody asked for.
+    pub(crate) fn rest_at(&mut self, position: i64, now: u64) {
+        (self.commanded, self.due, self.wish.quick) = (position, None, None);
+        self.free = now.saturating_add(1);
+        self.rest(self.clock.moment(now));
+    }
+
+    /// Halted at a position, DIR not known.
+    pub(crate) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
+        self.halt(now);
+        (self.commanded, self.halted, self.dir) = (position, was_moving, None);
+        self.rest(self.phases.end());
+    }
+}

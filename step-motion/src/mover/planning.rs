@@ -1,0 +1,231 @@
+//! Plans of an axis, from the motion that there is to what has been asked for.
+
+use crate::limits::Bounds;
+use crate::phases::{Frame, P, Phases, steps};
+use crate::planner::{Goal, Motion, plan_into};
+use crate::real::Real;
+use crate::stepper::Stepper;
+use servowire_core::Direction;
+
+use super::{Aim, Mover};
+
+impl Mover {
+    /// The moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the caller's
+    /// clock says: an earlier or later time would plan steps that are over, or make those that are missing in a burst.
+    pub(super) fn moment(&self, now: u64) -> u64 {
+        let now = now.max(self.free.saturating_sub(1));
+        self.clock.moment(self.due.map_or(now, |due| now.min(due)))
+    }
+
+    /// A request that changes what is under way, unless that is a quick stop. Returns whether there is another plan.
+    pub(super) fn change(&mut self, now: u64) -> bool {
+        let moment = self.moment(now);
+        // A stop that is under way is the same one whoever asks for it.
+        let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
+        let other = !self.is_moving(moment) || self.wish.quick.is_none() && !same;
+        if other {
+            self.replan(moment);
+        }
+        other
+    }
+
+    /// A quick stop has been asked for.
+    pub(super) fn stop_quickly(&mut self, now: u64) {
+        let moment = self.moment(now);
+        if let Some(bounds) = self.wish.quick.filter(|_| self.is_moving(moment)) {
+            self.replan_within(moment, &bounds);
+        } else {
+            self.wish.quick = None;
+            self.change(now);
+        }
+    }
+
+    pub(super) fn is_moving(&self, moment: u64) -> bool {
+        self.phases.frame.endless || moment < self.phases.end()
+    }
+
+    /// At rest, the position of the plan is 0 where the motor is.
+    pub(super) fn rest(&mut self, moment: u64) {
+        self.origin = self.commanded;
+        self.phases = Phases::rest(self.clock.shift(), moment, 0);
+        (self.stepper, self.left) = (Stepper::new(), None);
+    }
+
+    /// A plan is over: on to the aim if that is somewhere else.
+    pub(super) fn go_on(&mut self) {
+        let end = self.phases.end();
+        if self.has_work() {
+            self.replan(end);
+        }
+    }
+
+    pub(super) fn has_work(&self) -> bool {
+        !self.wish.held
+            && self.wish.percent > 0
+            && match self.wish.aim {
+                Aim::Rest => false,
+                Aim::At(target) => target != self.commanded,
+                Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.commanded),
+            }
+    }
+
+    pub(super) fn replan(&mut self, moment: u64) {
+        let bounds = self.bounds;
+        self.replan_within(moment, &bounds);
+    }
+
+    /// From the state at a moment to the aim.
+    fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
+        let moment = moment.max(self.phases.frame.begin);
+        if self.is_moving(moment) {
+            self.onward(moment, bounds);
+        } else {
+            self.anew(moment, bounds);
+        }
+        if self.due.is_none() && self.has_work() {
+            // No step on the way to rest: what follows begins there.
+            self.anew(self.phases.end(), bounds);
+        }
+    }
+
+    /// Begins with the plan that there is.
+    pub(super) fn adopt(&mut self) {
+        self.origin = self.commanded;
+        (self.stepper, self.left) = (Stepper::new(), None);
+        let Phases { curve, frame } = &self.phases;
+        let begin = frame.begin.div_ceil(self.clock.moment(1));
+        let due = if self.cuts {
+            // Not after the next step is enough.
+            (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
+        } else {
+            self.stepper.next(curve, frame)
+        };
+        self.due = due.map(|due| due.max(self.free).max(begin));
+        self.turn = None;
+        if self.dir != Some(self.direction) {
+            self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
+            self.dir = None;
+        }
+    }
+
+    /// Plans on from the motion that there is. Positions count from the steps made.
+    fn onward(&mut self, moment: u64, bounds: &Bounds) {
+        let (state, last) = (self.phases.at(moment), self.phases.last());
+        let made = i64::try_from(self.commanded.abs_diff(self.origin)).unwrap_or(0) << 32;
+        let p = state.p.wrapping_sub(made);
+        let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
+        let bounds = &bounds.holding(state.v, state.a);
+        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
+        let again = self.braking;
+        self.braking = !self.plan(self.direction, start, frame, bounds);
+        if self.braking {
+            self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
+            let Phases { curve, frame } = &mut self.phases;
+            // A stop has always room.
+            let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
+            if again {
+                // Rounding makes no step more of a stop within higher limits.
+                frame.to = Some(frame.last(curve).min(last.saturating_sub(made)));
+            }
+        }
+        self.adopt();
+    }
+
+    /// Plans from rest.
+    fn anew(&mut self, moment: u64, bounds: &Bounds) {
+        let end = self.phases.end();
+        self.rest(end);
+        (self.due, self.turn) = (None, None);
+        let mut begin = moment.max(end);
+        if let Some(last) = self.free.checked_sub(1) {
+            // The axis has come to rest up to half a step behind that step, and begins at it.
+            let half = (Real::ONE.half() / bounds.v).to_fixed(0);
+            begin = begin.max(self.clock.moment(last).saturating_add(half));
+        }
+        self.braking = false;
+        if !self.has_work() {
+            return;
+        }
+        self.idle = begin.div_ceil(self.clock.moment(1));
+        let direction = match self.wish.aim {
+            Aim::At(target) if target < self.commanded => Direction::Reverse,
+            Aim::Run(direction, _) => direction,
+            _ => Direction::Forward,
+        };
+        if self.dir != Some(direction) {
+            begin = begin.saturating_add(self.clock.moment(self.pause.into()));
+        }
+        self.direction = direction;
+        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
+        if self.plan(direction, Motion::steady(Real::ZERO), frame, bounds) {
+            self.adopt();
+        } else {
+            self.rest(end);
+        }
+    }
+
+    /// Puts a plan to the aim in the place of the one that there is; false if that is a stop, or cannot be reached any more.
+    fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
+        let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
+        self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
+        let Phases { curve, frame } = &mut self.phases;
+        let goal = match want {
+            Want::At(target) => {
+                let Some(left) = ahead(self.commanded, target, direction) else { return false };
+                let to = i64::from(left) << 32;
+                frame.to = Some(to);
+                let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
+                Goal::At(Real::fixed(way, P), Real::ZERO)
+            }
+            Want::Speed(v) => {
+                frame.endless = true;
+                Goal::Speed(v)
+            }
+        };
+        plan_into(curve, start, goal, &bounds).is_ok()
+    }
+
+    /// What to do in this direction; `None` if that is a stop.
+    fn goal(&self, direction: Direction, bounds: &Bounds) -> Option<(Want, Bounds)> {
+        if self.wish.held || self.wish.percent == 0 {
+            return None;
+        }
+        let part = Real::new(self.wish.percent.into()) / Real::new(100);
+        match self.wish.aim {
+            Aim::Rest => None,
+            Aim::At(target) => Some((Want::At(target), bounds.slower(bounds.v * part))),
+            Aim::Run(way, _) if way != direction => None,
+            Aim::Run(_, speed) => {
+                let v = Real::new(speed.into()) / Real::new(self.clock.moments().into());
+                let v = v.min(bounds.v) * part;
+                match self.soft {
+                    Some(soft) => Some((Want::At(edge(soft, direction)), bounds.slower(v))),
+                    None => Some((Want::Speed(v), *bounds)),
+                }
+            }
+        }
+    }
+}
+
+/// Where a plan leads.
+enum Want {
+    At(i64),
+    Speed(Real),
+}
+
+/// Steps from here to there in a direction; `None` if there is behind.
+fn ahead(position: i64, target: i64, direction: Direction) -> Option<u32> {
+    let steps = match direction {
+        Direction::Forward => target.checked_sub(position)?,
+        Direction::Reverse => position.checked_sub(target)?,
+    };
+    u32::try_from(steps).ok().filter(|steps| *steps <= u32::MAX / 2)
+}
+
+/// The end of a range in a direction.
+const fn edge((low, high): (i64, i64), direction: Direction) -> i64 {
+    match direction {
+        Direction::Forward => high,
+        Direction::Reverse => low,
+    }
+}
