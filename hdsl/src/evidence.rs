@@ -29,11 +29,10 @@ impl Tolerated {
     /// Tolerates nothing: every doubt counts.
     pub const NOTHING: Self = Self { words: 0, acceleration: 0 };
 
-    /// Tolerates at most this many missing acceleration words since the position was exact, in answers of which something could
-    /// be read (a silent encoder may not have heard the head, and then it has not sampled). `acceleration` is the largest of the
-    /// shaft, in
-    /// either direction, in steps per frame²; 1024 is the most that the link can carry. [`Sample::bound`] holds for this
-    /// acceleration.
+    /// Tolerates at most this many missing acceleration words since the position was exact, in answers of which something
+    /// could be read (a silent encoder may not have heard the head, and then it has not sampled). `acceleration` is the
+    /// largest of the shaft, in either direction, in steps per frame²; 1024 is the most that the link can carry.
+    /// [`Sample::bound`] holds for this acceleration.
     pub const fn missing_words(words: u8, acceleration: u16) -> Self {
         Self { words, acceleration }
     }

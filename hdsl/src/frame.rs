@@ -7,9 +7,9 @@
 //!                          ^ the encoder samples          1 bit      cable
 //! ```
 //!
-//! The falling edge inside SAMPLE is the instant for which the encoder reports its position. A free-running frame has no EXTRA
-//! window and no stuffing, and takes 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and
-//! 0..=26 stuffing blocks stretch it (HDSL Protocol Design; SICK manual, p. 31).
+//! The falling edge inside SAMPLE is the instant for which the encoder reports its position. A free-running frame has no
+//! EXTRA window and no stuffing, and takes 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and 0..=26 stuffing
+//! blocks stretch it (HDSL Protocol Design; SICK manual, p. 31).
 
 use nrz_line::Window;
 

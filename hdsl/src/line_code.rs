@@ -136,9 +136,8 @@ static BALANCED: [u16; 256] = {
     table
 };
 
-/// Returns the block itself if it is neutral or `d` requires zeros, otherwise its inverse; and its balance. Neutral blocks are
-/// marked in the
-/// tables.
+/// Returns the block itself if it is neutral or `d` requires zeros, otherwise its inverse; and its balance. Neutral blocks
+/// are marked in the tables.
 const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
     if block & NEUTRAL != 0 {
         (block & mask, 0)

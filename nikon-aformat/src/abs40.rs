@@ -48,8 +48,7 @@ impl Abs40 {
     }
 
     /// Decodes the response from its four frames, the 16 content bits of each in a word; words after them are ignored.
-    /// `expected` is of layout
-    /// [`Layout::Abs40`]; its address and command are checked.
+    /// `expected` is of layout [`Layout::Abs40`]; its address and command are checked.
     ///
     /// # Errors
     /// As [`Response::parse_words`](crate::Response::parse_words).

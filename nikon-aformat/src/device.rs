@@ -4,11 +4,10 @@
 //! several of them on one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold
 //! resets and busy times are built in. Faults can be switched on to see how a master handles them.
 //!
-//! The points that the documents leave open are set by a [`Behaviour`]. A damaged request, a command of a later version and a
-//! write to the
-//! maker's addresses are not answered. A reset takes effect with the eighth request in succession; the responses of other
-//! encoders do not restart the count. While the encoder is busy, writes are repeated in the response but not carried out. An
-//! EEPROM access without a bank uses bank 0.
+//! The points that the documents leave open are set by a [`Behaviour`]. A damaged request, a command of a later version and
+//! a write to the maker's addresses are not answered. A reset takes effect with the eighth request in succession; the
+//! responses of other encoders do not restart the count. While the encoder is busy, writes are repeated in the response but
+//! not carried out. An EEPROM access without a bank uses bank 0.
 //!
 //! ```
 //! use nikon_aformat::device::Device;

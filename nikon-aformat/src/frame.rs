@@ -16,9 +16,9 @@ use crate::number::EncoderAddress;
 ///  content bit        0  1  2   3   4     5   6   7     8   9   10  11  12    13   14   15
 /// ```
 ///
-/// Frame codes: 0 CDF, 1 MDF0, 2 MDF1, 3 MDF2; in version 3.0 also 3 for a CDF that opens a bank or coefficient
-/// access, and 0 for MDF3. So a frame can only be identified by its place in the request.
-/// Every field is sent least significant bit first, the CRC-3 most significant bit first.
+/// Frame codes: 0 CDF, 1 MDF0, 2 MDF1, 3 MDF2; in version 3.0 also 3 for a CDF that opens a bank or coefficient access, and
+/// 0 for MDF3. So a frame can only be identified by its place in the request. Every field is sent least significant bit
+/// first, the CRC-3 most significant bit first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
 pub struct RequestFrame(u16);

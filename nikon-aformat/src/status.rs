@@ -10,8 +10,8 @@ use crate::command::Version;
 ///                BUSY or MEMBUSY    BATT     OVSPD, MEMERR or OVTEMP    STERR, PSERR, MTERR or INCERR
 /// ```
 ///
-/// ES0 is sent first; release 9.2 of the AM243x Motor Control SDK shows the four bits in reverse order.
-/// It is not documented which bit OVFLOW sets; here it sets none.
+/// ES0 is sent first; release 9.2 of the AM243x Motor Control SDK shows the four bits in reverse order. It is not documented
+/// which bit OVFLOW sets; here it sets none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
 pub struct EncoderStatus(u8);

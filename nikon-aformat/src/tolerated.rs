@@ -26,10 +26,8 @@ impl Tolerated {
     pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
     /// The faults that one drive tolerates when turns are not used: an encoder without its battery shows BATT. The turns are
-    /// then not
-    /// judged, and
-    /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
-    /// is about to fail.
+    /// then not judged, and the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be
+    /// wrong or that something is about to fail.
     pub const SINGLE_TURN: Self = Self(NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
 
     /// Also tolerates these status bits.

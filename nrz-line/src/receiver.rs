@@ -17,10 +17,10 @@ pub struct Field {
 
 /// Start-stop reception of a sampled line, with the clock recovered from every edge.
 ///
-/// A falling edge on an idle line starts a field. A counter of N samples restarts at *every* edge, and a bit is sampled when it
-/// reaches N / 2. A start bit that reads 1 at that point was a spike and is dropped; a delimiter that
-/// reads 0 is a framing error. After the delimiter the receiver looks for the next falling edge, so fields may follow each other
-/// with or without a pause.
+/// A falling edge on an idle line starts a field. A counter of N samples restarts at *every* edge, and a bit is sampled when
+/// it reaches N / 2. A start bit that reads 1 at that point was a spike and is dropped; a delimiter that reads 0 is a
+/// framing error. After the delimiter the receiver looks for the next falling edge, so fields may follow each other with or
+/// without a pause.
 ///
 /// The line may be fed sample by sample ([`push`](Self::push)), as runs of equal samples ([`run`](Self::run)) or
 /// as packed words ([`feed`](Self::feed)); the results are identical, and the three may be mixed.

@@ -2,8 +2,8 @@ use crate::BitOrder;
 
 /// Up to 128 consecutive bits of a line, the first one in bit 0.
 ///
-/// One bounds check and one load turn a whole frame into an integer; a protocol crate then tests its
-/// framing with constant masks and takes every field with a constant shift.
+/// One bounds check and one load turn a whole frame into an integer; a protocol crate then tests its framing with constant
+/// masks and takes every field with a constant shift.
 ///
 /// ```text
 /// bytes (LsbFirst)   |7 6 5 4 3 2 1 0|7 6 5 4 3 2 1 0|7 6 ...

@@ -144,8 +144,8 @@ impl Tracker {
     ///
     /// Two samples determine the speed only if the shaft has moved less than half a turn between them, because 0.7 of a turn
     /// looks like 0.3 of a turn backward. At 100 turns per second (6000 rpm), half a turn takes 5 ms. After a longer gap the
-    /// next sample
-    /// counts as a first one. `None` if there are fewer than 3 counts, or if the speed is not between 1 and 7000.
+    /// next sample counts as a first one. `None` if there are fewer than 3 counts, or if the speed is not between 1 and
+    /// 7000.
     pub const fn new(counts_per_turn: u32, max_turns_per_s: u32) -> Option<Self> {
         if counts_per_turn < 3 || max_turns_per_s > 7_000 {
             return None;

@@ -27,9 +27,8 @@ impl Leaving {
     /// Notes that a `write`, which had begun by the reading `before_ns` and ended by `after_ns`, has taken this many fields.
     ///
     /// The first `write` is not asked to take more than one field. It waits for nothing, so whatever time it took may have
-    /// passed before the
-    /// UART had the field, and nothing else would keep the last bit of a request of one field from being cut off. A later
-    /// `write` that took a field time or more has waited for room.
+    /// passed before the UART had the field, and nothing else would keep the last bit of a request of one field from being
+    /// cut off. A later `write` that took a field time or more has waited for room.
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64, after_ns: u64) {
         let fields_ns = self.field_ns.saturating_mul(fields as u64);
         let waited = self.ends.is_some() && after_ns.saturating_sub(before_ns) >= self.field_ns;

@@ -4,8 +4,7 @@
 //! sampling SPI ([`spi`](crate::spi)), or a FIFO in an FPGA.
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds per call; `asynch` (feature `async`) yields to the executor.
-//! Both have the same
-//! `Driver` with the same calls.
+//! Both have the same `Driver` with the same calls.
 
 #[macro_use]
 mod driver;

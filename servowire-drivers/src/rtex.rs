@@ -14,12 +14,11 @@
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC switches it at XSYNC if the exchange is late. Half of the blocks would then be of another
-//! frame. The counter
-//! echoes of one frame are equal, so the exchange compares those of what it has read, reads one block again, looks at
-//! [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails again, each axis
-//! takes its block only if it is on time
-//! ([`Arrival`](rtex_block::master::Arrival)); if two frames have the same counter (two communications per update period) and
-//! the bank was switched in between, none is taken. System Design Guide for Master, chapters 1 and 2.
+//! frame. The counter echoes of one frame are equal, so the exchange compares those of what it has read, reads one block
+//! again, looks at [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails
+//! again, each axis takes its block only if it is on time ([`Arrival`](rtex_block::master::Arrival)); if two frames have the
+//! same counter (two communications per update period) and the bank was switched in between, none is taken. System Design
+//! Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
 //! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place
@@ -186,10 +185,9 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         }
     }
 
-    /// Performs the exchange of an update period: reads the blocks of the last reception and writes the next commands. Call it
-    /// from the NC interrupt, before anything else is calculated. `began_ns` is the start of the frame that began the period, by
-    /// the driver's clock:
-    /// the time of the interrupt.
+    /// Performs the exchange of an update period: reads the blocks of the last reception and writes the next commands. Call
+    /// it from the NC interrupt, before anything else is calculated. `began_ns` is the start of the frame that began the
+    /// period, by the driver's clock: the time of the interrupt.
     ///
     /// # Errors
     /// [`Error::Io`] and [`Error::Clock`], the first of them; every block that could be read or written was, and the next

@@ -29,8 +29,8 @@ pub(crate) struct Sent {
     pub(crate) late_ns: u64,
 }
 
-/// Sees to it that the line driver is off, before anybody listens. A future that was forgotten while its request was going out has left it
-/// on: then not before that request has left, however long nobody has looked.
+/// Sees to it that the line driver is off, before anybody listens. A future that was forgotten while its request was going
+/// out has left it on: then not before that request has left, however long nobody has looked.
 #[inline]
 pub(crate) fn off<D: Direction>(
     switch: &mut Switch<D>,

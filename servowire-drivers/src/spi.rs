@@ -1,10 +1,9 @@
 //! An SPI as transmitter and sampler, if no UART is suitable: [`SpiUart`] for T-Format, `SpiFrames` for A-format.
 //!
 //! Connect MISO to the receiver's output and MOSI to the driver's input, leave SCK open, and set it to 4 to 80 times the bit
-//! rate. [`Order`] says where each sample lies in memory. A request is one transfer, in which every bit becomes several equal
-//! samples; then the line driver is switched off, and a second transfer, the window, samples the line until the buffer is full.
-//! It begins after the
-//! request has left the line, so nothing in it can be older than the request.
+//! rate. [`Order`] says where each sample lies in memory. A request is one transfer, in which every bit becomes several
+//! equal samples; then the line driver is switched off, and a second transfer, the window, samples the line until the buffer
+//! is full. It begins after the request has left the line, so nothing in it can be older than the request.
 //!
 //! ```text
 //!  MOSI  1111 | request | 1111          1111111111111111111111111111111111 ...

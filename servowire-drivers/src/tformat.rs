@@ -1,8 +1,7 @@
 //! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, on a plain UART (8N1).
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds per call; `asynch` (feature `async`) yields to the executor.
-//! Both have the same
-//! `Driver` with the same calls.
+//! Both have the same `Driver` with the same calls.
 
 #[macro_use]
 mod driver;

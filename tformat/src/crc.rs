@@ -2,9 +2,9 @@ use crate::error::Error;
 
 /// Computes the check field over `bytes`: the data bits of all fields before it, in line order.
 ///
-/// Generator x^8 + 1, width 8, initial value 0, no final XOR (TIDM-1011, section 2.3.1). Because
-/// x^8 = 1 modulo the generator, the remainder is the **XOR of the bytes**; bit order and reflection make no
-/// difference. Over a whole frame including its check field, the result is 0.
+/// Generator x^8 + 1, width 8, initial value 0, no final XOR (TIDM-1011, section 2.3.1). Because x^8 = 1 modulo the
+/// generator, the remainder is the **XOR of the bytes**; bit order and reflection make no difference. Over a whole frame
+/// including its check field, the result is 0.
 ///
 /// It detects every odd number of wrong bits and every burst of up to eight data bits. It does not detect:
 ///

@@ -211,8 +211,7 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// Takes bytes that were received back to back without a framing error; the delimiter of the last one ended at `end_ns`.
-    /// Returns
-    /// the response once a request is complete.
+    /// Returns the response once a request is complete.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Option<Transmission> {
         let field_ns = u64::from(self.rate.fields_ns(1));
         let (mut reply, mut after) = (None, bytes.len() as u64);

@@ -31,9 +31,8 @@ impl Tolerated {
     pub const NOTHING: Self = Self(0);
     /// The alarms that one drive tolerates when it counts turns: an overflow of the turns is ignored, a low battery is a warning.
     pub const MULTI_TURN: Self = Self::NOTHING.alarms(Almc::OF.union(Almc::BA));
-    /// The alarms that the same drive tolerates when turns are not used: everything about the turns and the battery. The turns
-    /// are then
-    /// not judged, and the [`Sample`](crate::Sample) does not have them.
+    /// The alarms that the same drive tolerates when turns are not used: everything about the turns and the battery. The
+    /// turns are then not judged, and the [`Sample`](crate::Sample) does not have them.
     pub const SINGLE_TURN: Self =
         Self(Self::MULTI_TURN.0 | NO_TURNS | WIDE_TURNS).alarms(Almc::BE.union(Almc::ME).union(Almc::OS));
 

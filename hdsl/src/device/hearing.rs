@@ -23,10 +23,8 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// Looks for a head in samples, one byte per bit time of the master, with the first sample in bit 7. The line is high before
-    /// and
-    /// after
-    /// them. `None` if there is no readable head.
+    /// Looks for a head in samples, one byte per bit time of the master, with the first sample in bit 7. The line is high
+    /// before and after them. `None` if there is no readable head.
     pub fn on_line(samples: &[u8]) -> Option<Self> {
         // The shortest head has 26 bits.
         let last = samples.len().checked_sub(26)?.saturating_mul(8);

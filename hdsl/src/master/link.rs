@@ -79,8 +79,7 @@ impl Link {
     }
 
     /// Handles a frame whose answer is not heard: its word is missing, and so is a byte of each safe block. Returns whether
-    /// another V-frame
-    /// begins after it.
+    /// another V-frame begins after it.
     pub(super) fn skip(&mut self) -> bool {
         self.fast.step(None);
         // What comes later in this V-frame is not in order any more.

@@ -63,8 +63,7 @@ impl LongRequest {
     }
 
     /// Returns whether this request makes the encoder lose something or leave the link: reset, shut-down, counting
-    /// direction, access
-    /// keys, user counter, deletion of files.
+    /// direction, access keys, user counter, deletion of files.
     pub fn is_dangerous(&self) -> bool {
         let Access::Write(_) = self.access else { return false };
         match self.address {

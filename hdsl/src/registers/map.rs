@@ -50,9 +50,8 @@ servowire_core::codes! {
         PipeS = 0x2d => "PIPE_S",
         /// PIPE_D: the entry that was taken out; in the SDK the last byte of the pipe channel.
         PipeD = 0x2e => "PIPE_D",
-        /// PC_DATA: data of short messages at the drive interface of the SICK core; S_PC_DATA is the one at its safe interface.
-        /// Not in the
-        /// SDK.
+        /// PC_DATA: data of short messages at the drive interface of the SICK core; S_PC_DATA is the one at its safe
+        /// interface. Not in the SDK.
         PcData = 0x2f => "PC_DATA",
         /// SAFE_CTRL: like SYS_CTRL.
         SafeCtrl = 0x35 => "SAFE_CTRL",

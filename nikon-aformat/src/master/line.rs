@@ -26,10 +26,9 @@ pub struct Line {
     pub idle_in_response_ns: u32,
     /// Longest idle time between two responses on a bus, in ns. Default twice [`BitRate::response_gap_ns`].
     pub idle_between_responses_ns: u32,
-    /// Longest time from the end of a frame on the line to its hand-over to the master, if the hand-over is taken as its end, in
-    /// ns:
-    /// the [latency budget](Self::latency_budget_ns). A response that begins sooner than this after the request is not taken,
-    /// because it may have begun before it.
+    /// Longest time from the end of a frame on the line to its hand-over to the master, if the hand-over is taken as its
+    /// end, in ns: the [latency budget](Self::latency_budget_ns). A response that begins sooner than this after the request
+    /// is not taken, because it may have begun before it.
     ///
     /// Default a quarter of [`BitRate::response_gap_ns`], 375 ns to 750 ns, which is below seven bits, the turn-around time of
     /// one vendor's simulated encoder.

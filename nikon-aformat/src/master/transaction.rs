@@ -75,9 +75,8 @@ pub struct Transaction {
 }
 
 impl Transaction {
-    /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that ended
-    /// with
-    /// [`Error::NoResponse`], and its line is free at any time.
+    /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that
+    /// ended with [`Error::NoResponse`], and its line is free at any time.
     #[inline]
     pub const fn idle() -> Self {
         Self {
@@ -371,8 +370,7 @@ impl BusTransaction {
     }
 
     /// Returns how it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) tells which
-    /// encoders did
-    /// not answer.
+    /// encoders did not answer.
     pub const fn outcome(&self) -> Option<Result<(), Error>> {
         match (self.refused, self.ended) {
             (Some(error), _) => Some(Err(error)),

@@ -21,10 +21,9 @@ use super::{ClockError, TickRate};
 /// A counter that counts down (SysTick) is read inverted: `!SYST::get_current()`. Bits above `BITS` are ignored.
 ///
 /// **The counter has to be read within half of its range** ([`read_within_ns`](Self::read_within_ns)). A larger step forward
-/// cannot be told from a step back. [`ClockError::Backwards`] reports both: a counter that was reset or set back, and one that
-/// was not read for too long.
-/// Two faults are not detected: a reset of a counter that was beyond the middle of its range, which looks like a wrap, and whole
-/// wraps between two readings.
+/// cannot be told from a step back. [`ClockError::Backwards`] reports both: a counter that was reset or set back, and one
+/// that was not read for too long. Two faults are not detected: a reset of a counter that was beyond the middle of its
+/// range, which looks like a wrap, and whole wraps between two readings.
 ///
 /// If several priorities read one time base, read the counter and call [`now_ns`](Self::now_ns) in one critical section: a
 /// reading older than the last one looks like a clock that went back.

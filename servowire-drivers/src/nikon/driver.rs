@@ -46,9 +46,8 @@ macro_rules! driver {
             }
 
             /// Reads the position of an encoder, if it may be used now, and when it was sampled:
-            /// [`read_evidence`](Self::read_evidence), judged at once by the rules of [`Evidence::at`]. The answer alone lasts
-            /// 72 bits, so the position is never younger
-            /// than that.
+            /// [`read_evidence`](Self::read_evidence), judged at once by the rules of [`Evidence::at`]. The answer alone
+            /// lasts 72 bits, so the position is never younger than that.
             ///
             /// # Errors
             /// [`Error`], [`Error::Doubt`] among them.

@@ -4,8 +4,7 @@ pub use rtex_block::pack::Word;
 /// The communication ASIC as the driver uses it.
 ///
 /// The memory must not be cached, and a write has to have reached the ASIC when its call returns, so drain the write buffer.
-/// Volatile
-/// access belongs in the firmware. A bus whose addresses count 16-bit units needs half of the vendor's addresses.
+/// Volatile access belongs in the firmware. A bus whose addresses count 16-bit units needs half of the vendor's addresses.
 pub trait Port {
     /// The word type of the bus.
     type Word: Word;

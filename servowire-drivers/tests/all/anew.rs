@@ -1,5 +1,5 @@
-//! A driver that is made anew, after a restart of the controller or because its port was needed elsewhere, knows nothing of the line: the
-//! answer to a request that left before is nobody's.
+//! A driver that is made anew, after a restart of the controller or because its port was needed elsewhere, knows nothing of
+//! the line: the answer to a request that left before is nobody's.
 
 use embedded_io::Write;
 use nikon_aformat::{EncoderAddress, Operation, Request, Resolution};

@@ -11,8 +11,7 @@ pub struct Line {
     /// Bit rate.
     pub rate: BitRate,
     /// A hint that the receiver is enabled while the request is sent. It only makes failures more specific: an echo is
-    /// recognised by
-    /// its time and its content, regardless of this setting.
+    /// recognised by its time and its content, regardless of this setting.
     pub echo: bool,
     /// Longest wait from the end of the request to the *start bit* of the response, in ns. Default 10 000: the nominal
     /// 3 us, 1 us for 100 m of cable, and margin.

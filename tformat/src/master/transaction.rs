@@ -64,11 +64,11 @@ pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// One request and its response, as a UART receives them: byte by byte, or in blocks.
 ///
-/// The time of every byte of a block is found by counting back from the end of the block. No byte that began before the request
-/// had left the line is
-/// ever part of the response, as long as the end times passed to the machine are late by less than the [latency
-/// budget](Line::latency_budget_ns). An echo of the request is recognised by its time, and if that is not conclusive, by its
-/// content. Anything before or after a sound response is harmless; two sound responses in one block are [`Error::TwoResponses`].
+/// The time of every byte of a block is found by counting back from the end of the block. No byte that began before the
+/// request had left the line is ever part of the response, as long as the end times passed to the machine are late by less
+/// than the [latency budget](Line::latency_budget_ns). An echo of the request is recognised by its time, and if that is not
+/// conclusive, by its content. Anything before or after a sound response is harmless; two sound responses in one block are
+/// [`Error::TwoResponses`].
 ///
 /// A transaction that is done or has failed stays so. Keep handing over what arrives until `ready_ns`; it is discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -255,8 +255,7 @@ impl Transaction {
     /// Takes the UART's report of a framing error in the byte that ended at `end_ns`.
     ///
     /// Within a response it ends the transaction with [`Error::Delimiter`]. Before a response it is only remembered: the
-    /// response may
-    /// still come.
+    /// response may still come.
     pub fn framing_error(&mut self, end_ns: u64) -> Progress {
         if self.end.is_none() {
             self.heard_ns = end_ns;
