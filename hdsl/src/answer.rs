@@ -379,7 +379,7 @@ pub(crate) mod tests {
             prop_assert_eq!(answer.switch_ok(), bits >> 49 & 1 != bits >> 50 & 1);
         }
 
-        /// One flipped bit is seen in the word it is in and in no other, or gives another good word there.
+        /// One flipped bit is seen in the word it is in and in no other, or turns it into another good word.
         #[test]
         fn a_flip_stays_in_its_word(content in contents(), plus: bool, at in 0..61_u32) {
             let bits = content.emit(column(plus)).bits;

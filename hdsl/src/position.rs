@@ -261,7 +261,7 @@ impl PositionTracker {
         if eighth < 24 { u32::from_le_bytes([a, b, c, d]) & VELOCITY } else { self.velocity }
     }
 
-    /// The velocity with its sign.
+    /// The signed velocity.
     const fn velocity(&self) -> i32 {
         i32::from_le_bytes((self.velocity << 8).to_le_bytes()) >> 8
     }

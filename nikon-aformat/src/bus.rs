@@ -105,7 +105,7 @@ impl Addresses {
 
 servowire_core::listed!(Addresses { |addresses| addresses.iter() => "{}" });
 
-/// What came from one address.
+/// What arrived from one address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {

@@ -18,7 +18,7 @@ pub enum Doubt {
     Absent,
     /// Bits are set above the widths of the encoder: another encoder, or a wrong [`Resolution`](crate::Resolution).
     UpperBits {
-        /// Single-turn and turn bits together.
+        /// Number of single-turn and turn bits together.
         width: u8,
     },
     /// The single status bit of commands 21 and 22 is set; it does not say which of the four it stands for.

@@ -95,7 +95,7 @@ impl Evidence {
         self
     }
 
-    /// Returns the reason why it must not be used; off the hot path.
+    /// Returns why it must not be used; off the hot path.
     #[cold]
     #[inline(never)]
     const fn doubt(&self, now_ns: u64, policy: Policy) -> Doubt {

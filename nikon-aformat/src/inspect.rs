@@ -155,7 +155,7 @@ pub fn inspect(request: Request, resolution: Resolution, line: Window) -> Report
     report
 }
 
-/// Looks for the usual mistakes: those of the line, and somebody else's response.
+/// Looks for the usual mistakes: those of the line, and the response of another encoder.
 fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
     if let Some(stuck) = LineCause::stuck(line) {
         return (Some(stuck.into()), None);

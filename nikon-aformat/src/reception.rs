@@ -36,7 +36,7 @@ use crate::raw_response::RawResponse;
 pub struct LineReceiver {
     receiver: Receiver,
     layout: Layout,
-    /// Whether idle bits may stand between the frames of a response.
+    /// Whether idle bits are allowed between the frames of a response.
     idle_allowed: bool,
     contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
@@ -76,7 +76,7 @@ impl LineReceiver {
 
     /// Accepts any gap between the frames of a response, for a line on which idle bits separate them.
     ///
-    /// **One wrong bit can then give a wrong position**: if the start bit of a frame is lost, a later edge is mistaken for it,
+    /// **One wrong bit can then lead to a wrong position**: if the start bit of a frame is lost, a later edge is mistaken for it,
     /// and one such frame in 256 at the end of a response passes the CRC-8. A response that lost a frame also swallows the first
     /// frame of the next one.
     ///

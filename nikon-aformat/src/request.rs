@@ -139,7 +139,7 @@ impl Request {
     /// Returns the layout of the response from an encoder of this resolution.
     ///
     /// The same request can have different responses: version 3.0 encoders may be set in the factory to answer commands 1
-    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell which.
+    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not say which.
     pub const fn layout(self, resolution: Resolution) -> Layout {
         match self.operation {
             Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
@@ -218,7 +218,7 @@ const fn mdf3(byte: u8) -> RequestFrame {
     RequestFrame::mdf(FrameCode::Fc0, byte)
 }
 
-/// Checks that memory frames come in the order of a request: MDF0, MDF1, MDF3, MDF2, as far as it has them.
+/// Checks that memory frames come in the order of a request: MDF0, MDF1, MDF3, MDF2, leaving out those that it does not have.
 fn check_order(memory: &[RequestFrame]) -> Result<(), Error> {
     let order: &[FrameCode] = match memory.len() {
         1 => &[FrameCode::Fc3],

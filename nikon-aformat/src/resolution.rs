@@ -3,7 +3,7 @@ use servowire_core::OutOfRange;
 use crate::command::Version;
 use crate::number::U40;
 
-/// The properties of an encoder that the line does not tell: its widths, its version and its factory settings.
+/// The properties of an encoder that are not transmitted: its widths, its version and its factory settings.
 ///
 /// ```text
 ///  abs   |39 ... st + mt| st + mt - 1 ... st | st - 1 ... 0 |

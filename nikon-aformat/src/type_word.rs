@@ -115,7 +115,7 @@ impl TypeWord {
         }
     }
 
-    /// The widths as a resolution of version 2.1; `None` for codes without a known meaning. The word does not tell the version.
+    /// The widths as a resolution of version 2.1; `None` for codes without a known meaning. The word does not contain the version.
     pub const fn resolution(self) -> Option<Resolution> {
         match (self.st_bits(), self.mt_bits()) {
             (Some(st_bits), Some(mt_bits)) => match Resolution::new(st_bits, mt_bits) {

@@ -1,6 +1,6 @@
 use crate::Window;
 
-/// The most likely cause of damage to a refused message, as far as the line alone shows it.
+/// The most likely cause of damage to a refused message, as far as the line alone can show it.
 ///
 /// [`Search::find`] returns it; a protocol crate adds the causes that only its protocol knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -126,7 +126,7 @@ impl Search {
         after_echo.filter(|rest| rest.is_empty()).map(|_| Found { cause: Cause::OnlyEcho, message: None })
     }
 
-    /// Returns what follows the own request and the idle line after it; nothing is left if nobody answers.
+    /// Returns what follows the master's own request and the idle line after it; nothing is left if nobody answers.
     fn after_echo(&self, line: Window) -> Option<Window> {
         let sent = self.sent?;
         let rest = line.skip(sent.len())?;

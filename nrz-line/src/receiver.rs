@@ -274,7 +274,7 @@ impl Receiver {
         Some(Field { content, delimiter, start: self.start, spikes })
     }
 
-    /// Counts from the next sample on.
+    /// Starts counting at the next sample.
     #[inline]
     const fn move_origin(&mut self) {
         let here = self.here();

@@ -25,7 +25,7 @@ pub trait Machine {
     /// Reports a framing error in a unit that ended at `end_ns`.
     fn framing_error(&mut self, end_ns: u64) -> Progress<Self::Value, Self::Error>;
 
-    /// Ends the exchange if its time is over at `now_ns`. Hand over everything that was received before calling it.
+    /// Ends the exchange if its time has run out at `now_ns`. Hand over everything that was received before calling it.
     fn poll(&mut self, now_ns: u64) -> Progress<Self::Value, Self::Error>;
 
     /// Returns the state of the exchange.

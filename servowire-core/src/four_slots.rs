@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     /// Slots that a reader may be in are left alone, whatever pairs it announced before: the announced pair, and in the other
-    /// pair the newest slot, where a reader goes that announces late.
+    /// pair the newest slot, which a reader enters if it announces late.
     #[test]
     fn the_writer_keeps_off_the_slot_of_the_reader() {
         for announcements in 0_u32..256 {

@@ -12,7 +12,7 @@ pub trait Shaft: Feedback {
     fn shaft(sample: &Self::Sample) -> (Angle, u64);
 }
 
-/// A [`Cell`](crate::Cell) that carries the motion of the shaft beside the evidence: for a control loop that runs more
+/// A [`Cell`](crate::Cell) that carries the motion of the shaft in addition to the evidence, for a control loop that runs more
 /// often than the encoder is read, or at other times.
 ///
 /// The writer computes angle and speed, with divisions; the reader computes the electrical angle at this instant and the bound

@@ -44,7 +44,7 @@ impl Direction for Automatic {
 /// executor, which a library cannot know, so none of them has a default.
 ///
 /// The driver has to be switched off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
-/// 2.5 Mbit/s, 0.8 us at 5) if `turn_around_ns` of the line says nothing else. `uart_start_ns + wake_ns + 2 * clock_ns` has to
+/// 2.5 Mbit/s, 0.8 us at 5) unless `turn_around_ns` of the line says otherwise. `uart_start_ns + wake_ns + 2 * clock_ns` has to
 /// fit in between: the time is read once when the request begins and once when it ends. If it does not fit, creating the
 /// [`Driver`](crate::tformat::blocking::Driver) fails with [`PinTooSlow`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -43,7 +43,7 @@ impl Leaving {
     }
 
     /// The reading at which to switch the driver off: in the middle of the time in which it is neither too early nor too late,
-    /// or if there is no such time, not too early.
+    /// or if there is none, rather too late than too early.
     pub(crate) fn off_ns(&self) -> Option<u64> {
         let Ends { earliest_ns, latest_ns } = self.ends?;
         let slack_ns = u64::from(self.worst.wake_ns).saturating_add(self.worst.clock_ns.into());

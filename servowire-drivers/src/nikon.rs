@@ -50,7 +50,7 @@ fn longest_ns(line: Line, request: Request, resolution: Resolution) -> u64 {
     line.longest_ns(request, &request.expected(resolution)).into()
 }
 
-/// The same of a request that nobody knows of: the longest one, and the longest answers of all encoders.
+/// Returns the same for an unknown request: the longest request and the longest answers of all encoders.
 const fn unknown_ns(line: Line, resolution: Resolution) -> u64 {
     let write = Request::new(EncoderAddress::ZERO, Operation::EepromWriteBank { bank: 0, address: 0, data: 0 });
     let all = Request::new(EncoderAddress::MAX, Operation::Abs24VelAccMt);

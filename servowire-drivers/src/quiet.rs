@@ -53,8 +53,8 @@ pub(crate) struct Settling {
 }
 
 impl Line {
-    /// A line of which nothing is known yet: somebody may just have sent a request, and somebody may be talking for so long
-    /// after it.
+    /// Creates the state of a line about which nothing is known yet: a request may just have been sent, and somebody may be
+    /// transmitting for `unknown_ns` after it.
     pub(crate) const fn new(silence_ns: u32, unknown_ns: u64) -> Self {
         let check = ClockCheck::new(MAX_LOOKS);
         Self { check, ready_ns: 0, leaving_ns: Some(unknown_ns), silence_ns: silence_ns as u64, shifted: false }

@@ -77,7 +77,7 @@ pub const fn lut0(full_bit: bool, any_edge: bool, state: State) -> bool {
     full_bit | (any_edge & state.s1())
 }
 
-/// LUT_1: gives e0. i0 | (i1 & !s0 & s1), with i0 = rising edge of START_OPERATION and i1 = falling edge of the
+/// LUT_1: computes e0. i0 | (i1 & !s0 & s1), with i0 = rising edge of START_OPERATION and i1 = falling edge of the
 /// response.
 pub const fn lut1(start: bool, falling_edge: bool, state: State) -> bool {
     start | (falling_edge & !state.s0() & state.s1())

@@ -89,7 +89,7 @@ impl Evidence {
         marks
     }
 
-    /// Returns the reason why it must not be used; off the hot path.
+    /// Returns why it must not be used; off the hot path.
     #[cold]
     #[inline(never)]
     #[expect(clippy::cast_sign_loss, reason = "a field that was stored there")]

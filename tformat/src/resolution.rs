@@ -98,7 +98,7 @@ impl Resolution {
     /// | 0x14 | 20 | 16 | not documented: the same rule |
     /// | 0x18 | 24 | 16 | not documented: the same rule |
     ///
-    /// `None` for all other IDs. A model name says nothing: TIDM-1011 gives the TS5700N8501 24 bits, a widely used motor
+    /// `None` for all other IDs. A model name proves nothing: TIDM-1011 states 24 bits for the TS5700N8501, a widely used motor
     /// controller 17.
     pub const fn from_enid(enid: u8) -> Option<Hint> {
         let (abm_bits, documented) = match enid {

@@ -2,7 +2,7 @@
 
 use nrz_line::Window;
 
-/// SYNC 001011 and the two ones after it, eight samples a bit, the first in bit 63.
+/// SYNC 001011 and the two ones after it, at eight samples per bit, the first in bit 63.
 const LOCK: u64 = 0x0000_ff00_ffff_ffff;
 /// How many samples of [`LOCK`] may differ: two for each of its four edges would be eight, and so would one wrong bit.
 const TOLERANCE: u32 = 7;

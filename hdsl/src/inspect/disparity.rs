@@ -52,17 +52,17 @@ impl Chain {
         self.holds
     }
 
-    /// The running disparity before the first word, if the words tell it, including those before a damaged one.
+    /// The running disparity before the first word, if the words determine it; this includes the words before a damaged one.
     pub const fn before(self) -> Option<RunningDisparity> {
         self.before
     }
 
-    /// The running disparity after the last word, if the words tell it, including those after a damaged one.
+    /// The running disparity after the last word, if the words determine it; this includes the words after a damaged one.
     pub const fn after(self) -> Option<RunningDisparity> {
         self.after
     }
 
-    /// Returns whether `next` begins with the disparity with which this one ends; `None` if one of the two does not tell.
+    /// Returns whether `next` begins with the disparity with which this one ends; `None` if either is unknown.
     pub fn goes_on_in(self, next: Self) -> Option<bool> {
         Some(self.after? == next.before?)
     }

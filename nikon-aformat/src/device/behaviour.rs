@@ -16,7 +16,7 @@ pub struct Behaviour {
     pub reset_shows: Shows,
     /// The meaning of EA in a multi-response request. Default [`Ea::Highest`].
     pub ea: Ea,
-    /// Place among the responses to a multi-response request, 0..=7; `None` stands for its own address, regardless of the other
+    /// Place among the responses to a multi-response request, 0..=7; `None` means its own address, regardless of the other
     /// encoders. Set other numbers if the responses close up.
     pub place: Option<u8>,
     /// Which address the responses to commands 11 and 20 show. Default [`ShownAddress::New`].
@@ -57,7 +57,7 @@ pub enum ShownAddress {
 pub enum Restart {
     /// Any other request on the line, and a damaged frame.
     Any,
-    /// Nothing else.
+    /// Only that.
     Own,
 }
 

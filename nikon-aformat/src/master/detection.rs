@@ -10,7 +10,7 @@ use crate::type_word::TypeWord;
 
 /// Finds an encoder and its widths: command 4, then the type word of the EEPROM.
 ///
-/// The bit rate is part of the encoder's order code and the caller has to try the rates: no response means that it is another one.
+/// The bit rate is part of the encoder's order code and the caller has to try the rates: no response means that the rate is wrong.
 /// One drive maker tries 4 Mbit/s first, then 2.5.
 ///
 /// After power-on, an encoder needs [`POWER_UP_NS`](crate::POWER_UP_NS) before the first request.
@@ -32,7 +32,8 @@ pub struct Detected {
     pub ea: EncoderAddress,
     /// Its type word.
     pub type_word: TypeWord,
-    /// Its widths, if the type word is a known one, in a resolution of version 2.1, because nothing on the line tells the version.
+    /// Its widths, if the type word is a known one, in a resolution of version 2.1, because nothing on the line says which
+    /// version it is.
     pub resolution: Option<Resolution>,
 }
 

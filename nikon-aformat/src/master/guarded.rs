@@ -11,7 +11,7 @@ use crate::timing::REQUEST_GAP_NS;
 /// An encoder counts equal requests, no matter who sends them and when: after seven requests of an interrupted reset, the first
 /// request of a new one takes effect. So another command, which restarts the count, is sent first until it is answered and ES0
 /// is clear. Then the eight requests follow, as one operation that is never repeated in part. Before a zero preset, MEMERR has
-/// to be clear too, so that afterwards it tells about this preset.
+/// to be clear too, so that afterwards it refers to this preset.
 ///
 /// `Done` rests on the eight responses. An encoder that hears something else in between, such as noise at its end of the line,
 /// may restart its count and answer all the same. If a wrong zero is dangerous, compare the position before and after.

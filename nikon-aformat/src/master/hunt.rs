@@ -11,7 +11,7 @@ use crate::response::Response;
 ///
 /// It keeps the last received frames, as many as a response has. They are taken as a response if they pass all checks and cannot
 /// have begun before the request had left the line; otherwise the oldest one is dropped. So a good response is found whatever
-/// came before it: the own request, an older answer, noise, the rest of a damaged response.
+/// came before it: the master's own request, an older answer, noise, the rest of a damaged response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Hunt {
@@ -206,7 +206,8 @@ impl Hunt {
     }
 }
 
-/// Returns whether a frame has the sync code of a response. The frames of the own request, received as an echo, have a different
+/// Returns whether a frame has the sync code of a response. The frames of the master's own request, received as an echo, have a
+/// different
 /// one.
 const fn begins_a_response(content: u16) -> bool {
     content & 7 == SYNC_CODE as u16

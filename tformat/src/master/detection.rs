@@ -48,7 +48,7 @@ impl Detection {
         Step::Send { request: Request::ReadAll, not_before_ns }
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    /// Takes the outcome of a transaction; the line is free from `ready_ns`.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<AllData> {
         let error = match outcome {
             Ok(Response::ReadAll(value)) => return Step::Done { value, ready_ns },

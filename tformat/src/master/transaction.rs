@@ -89,7 +89,7 @@ pub struct Transaction {
     /// The bytes that may be the response.
     received: [u8; Frame::MAX_FIELDS],
     len: u8,
-    /// Bytes of the own request that came back, and the first one that came back changed.
+    /// Bytes of the master's own request that came back, and the first one that came back changed.
     echoed: u8,
     echo_fault: Option<u8>,
     /// Why the first run of bytes with the length of a response was not one.
@@ -349,7 +349,7 @@ impl Transaction {
         (first == CF3 || !eeprom) && self.begins_a_response(second)
     }
 
-    /// Handles a first byte that was the last one of the own request.
+    /// Handles a first byte that was the last one of the master's own request.
     fn forget_echo(&mut self) {
         let [first, ..] = self.received;
         if self.frame.as_bytes().last() == Some(&first) {
@@ -447,7 +447,7 @@ impl Transaction {
         }
     }
 
-    /// Ends with what was refused, if nothing else was found.
+    /// Ends with the error of what was refused, if nothing else was found.
     fn refuse(&mut self) {
         if let (Some(error), None) = (self.refused, self.end) {
             self.end = Some(Err(error));
@@ -473,8 +473,8 @@ const fn is_sound(outcome: &Result<Response, Error>) -> bool {
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
-/// Decodes everything that a UART received since the request began, with the receiver always on: the own request, then the
-/// response. For buffers without times; bytes after the response are ignored.
+/// Decodes everything that a UART received since the request began, with the receiver always on: the master's own request, then
+/// the response. For buffers without times; bytes after the response are ignored.
 ///
 /// # Errors
 /// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;

@@ -47,7 +47,7 @@ impl MultiTurnZero {
         self.witness.start(now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    /// Takes the outcome of a transaction; the line is free from `ready_ns`.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<MultiTurn> {
         if let Some(end) = self.end {
             return end;

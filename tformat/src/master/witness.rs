@@ -45,7 +45,7 @@ impl Witness {
         self.enter(Phase::Before, now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. `value` extracts the message and the value
+    /// Takes the outcome of a transaction; the line is free from `ready_ns`. `value` extracts the message and the value
     /// from a response, and `near` says whether two values may be the same.
     pub(super) fn receive<T>(
         &mut self,

@@ -43,7 +43,7 @@ impl SingleTurnZero {
         self.witness.start(now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    /// Takes the outcome of a transaction; the line is free from `ready_ns`.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
         if let Some(end) = self.end {
             return end;
