@@ -24,7 +24,7 @@ impl DeltaDelta {
     /// No change of speed.
     pub const ZERO: Self = Self(0);
 
-    /// `None` outside -1024..=1023.
+    /// Creates an acceleration; `None` outside -1024..=1023.
     pub const fn new(value: i16) -> Option<Self> {
         if value < Self::MIN.0 || value > Self::MAX.0 { None } else { Some(Self(value)) }
     }

@@ -84,7 +84,7 @@ impl Extra {
     }
 }
 
-/// EXTRA_EDGE for TIME_REST (0..=7): that many ones from bit 7 down.
+/// Returns EXTRA_EDGE for TIME_REST (0..=7): that many ones from bit 7 down.
 pub(crate) const fn edge_register(time_rest: u8) -> u8 {
     match 0xff_u8.checked_shr(time_rest as u32) {
         Some(zeros) => !zeros,

@@ -392,7 +392,7 @@ impl Master {
         self.go_on()
     }
 
-    /// The usual end: what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
+    /// Ends a frame in the usual way: what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
     fn go_on(&mut self) -> &HFrame {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
@@ -440,7 +440,7 @@ impl Master {
         &self.h_frame
     }
 
-    /// Sets how the frames of a free-running link that is up end, and how long they are.
+    /// Sets how frames end on a free-running link that is up, and how long they are.
     const fn usual(&mut self) {
         self.longest_ns = self.usual_ns;
         self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };

@@ -98,7 +98,7 @@ impl ParameterByte {
     const FIRST: u8 = 0x80;
     const MSYNC: u8 = 0x40;
 
-    /// Any byte.
+    /// Creates a parameter byte from any byte.
     pub const fn new(raw: u8) -> Self {
         Self(raw)
     }
@@ -178,7 +178,7 @@ pub struct EncoderByte(u8);
 impl EncoderByte {
     const VSYNC: u8 = 0x80;
 
-    /// Any byte.
+    /// Creates a parameter byte from any byte.
     pub const fn new(raw: u8) -> Self {
         Self(raw)
     }

@@ -15,7 +15,7 @@ macro_rules! ranged {
             /// The largest value.
             pub const MAX: Self = Self($max);
 
-            /// `None` outside [`MIN`](Self::MIN) and [`MAX`](Self::MAX).
+            /// Creates the number; `None` outside [`MIN`](Self::MIN) and [`MAX`](Self::MAX).
             #[inline]
             pub const fn new(value: u8) -> Option<Self> {
                 if matches!(value, $min..=$max) { Some(Self(value)) } else { None }

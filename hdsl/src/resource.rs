@@ -188,7 +188,7 @@ codes! {
 }
 
 impl ResourceError {
-    /// Any code.
+    /// Creates an error from any code.
     pub const fn new(class: u8, detail: u8) -> Self {
         Self { class, detail }
     }

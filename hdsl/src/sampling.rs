@@ -169,7 +169,7 @@ impl Alignment {
         found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.get() })
     }
 
-    /// The 61 bits of an answer, the first in bit 0.
+    /// Returns the 61 bits of an answer, the first in bit 0.
     ///
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
@@ -180,7 +180,7 @@ impl Alignment {
         }
     }
 
-    /// Bits and edges of the answer.
+    /// Returns bits and edges of the answer.
     ///
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.

@@ -144,12 +144,12 @@ servowire_core::codes! {
 pub struct Character(u16);
 
 impl Character {
-    /// The data character D.x.y of a byte.
+    /// Creates the data character D.x.y of a byte.
     pub const fn data(byte: u8) -> Self {
         Self(byte as u16)
     }
 
-    /// A special character.
+    /// Creates a special character.
     pub const fn control(control: Control) -> Self {
         Self(control as u16 | SPECIAL)
     }
@@ -257,7 +257,7 @@ impl Entry {
         self.0.to_le_bytes()[0]
     }
 
-    /// The flags of both, for a test of several words at once.
+    /// Returns the flags of both, for a test of several words at once.
     #[inline]
     pub(crate) const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)

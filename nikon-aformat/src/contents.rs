@@ -136,7 +136,7 @@ pub(crate) const fn apart([p0, p1, p2]: Contents) -> [u16; MAX_FRAMES as usize] 
     [p0 as u16, (p0 >> 16) as u16, p1 as u16, (p1 >> 16) as u16, p2 as u16, (p2 >> 16) as u16]
 }
 
-/// One word for each frame as content bits.
+/// Joins one word for each frame to content bits.
 #[inline(always)]
 pub(crate) const fn together([c0, c1, c2, c3, c4, c5]: [u16; MAX_FRAMES as usize]) -> Contents {
     [pair(c0 as u32, c1 as u32), pair(c2 as u32, c3 as u32), pair(c4 as u32, c5 as u32)]

@@ -181,7 +181,7 @@ const fn mirror3(bits: u8) -> u8 {
     (bits & 7).reverse_bits() >> 5
 }
 
-/// The line bits of six frames.
+/// Returns the line bits of six frames.
 pub(crate) const fn pack(content: [u16; MAX_FRAMES as usize]) -> u128 {
     let [c0, c1, c2, c3, c4, c5] = content;
     DELIMITER

@@ -104,7 +104,7 @@ impl UserAddress {
     /// The highest address that can be written.
     pub const MAX: Self = Self(0xef);
 
-    /// `None` above 0xef.
+    /// Creates the address; `None` above 0xef.
     pub const fn new(address: u8) -> Option<Self> {
         if address > Self::MAX.0 { None } else { Some(Self(address)) }
     }

@@ -34,7 +34,7 @@ impl RawResponse {
     /// Maximum number of frames of a response.
     pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
 
-    /// `contents` are 0 after the frames of the layout.
+    /// Creates the response; `contents` must be 0 after the frames of the layout.
     pub(crate) const fn of(contents: [u16; MAX_FRAMES as usize], layout: Layout) -> Self {
         Self { contents, frames: layout.frames() }
     }

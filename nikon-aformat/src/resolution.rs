@@ -24,7 +24,7 @@ pub struct Resolution {
 }
 
 impl Default for Resolution {
-    /// 20 + 16 bits, version 3.0, responses as in version 2.1.
+    /// Returns 20 + 16 bits, version 3.0, with responses as in version 2.1.
     fn default() -> Self {
         Self { st_bits: 20, mt_bits: 16, version: Version::V3_0, ..Self::NARROWEST }
     }

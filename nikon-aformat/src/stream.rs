@@ -118,7 +118,7 @@ where
     }
 }
 
-/// The first bit at or after `offset` that is 0.
+/// Returns the first bit at or after `offset` that is 0.
 fn start_bit(bytes: &[u8], offset: usize, order: BitOrder) -> Option<usize> {
     let mut at = offset;
     loop {

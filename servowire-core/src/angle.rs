@@ -65,14 +65,14 @@ impl Angle {
         Self(self.0.wrapping_sub(other.0))
     }
 
-    /// The shorter path to this angle from another one, in units of 2^-32 turn: positive if this one is ahead. Half a turn is
-    /// `i32::MIN`.
+    /// Returns the shorter path to this angle from another one, in units of 2^-32 turn: positive if this one is ahead. Half
+    /// a turn is `i32::MIN`.
     pub const fn difference(self, from: Self) -> i32 {
         0_i32.wrapping_add_unsigned(self.0.wrapping_sub(from.0))
     }
 }
 
-/// The lower half.
+/// Returns the lower half.
 #[expect(clippy::cast_possible_truncation, reason = "what is above is whole turns")]
 const fn low(bits: u64) -> u32 {
     bits as u32

@@ -1,6 +1,6 @@
 use core::fmt::Debug;
 
-/// The kind of an error: what counters count and statistics list. [`errors!`](crate::errors) makes one for each crate.
+/// The kind of an error, which counters count and statistics list. [`errors!`](crate::errors) makes one for each crate.
 pub trait Class: Copy + Eq + Debug + 'static {
     /// All classes, in the order of the checks.
     const ALL: &'static [Self];

@@ -55,7 +55,7 @@ macro_rules! codes {
                 self as $code
             }
 
-            /// `None` for a code that is not defined.
+            /// Returns the value with this code; `None` for a code that is not defined.
             #[inline]
             pub const fn from_code(code: $code) -> Option<Self> {
                 match code {

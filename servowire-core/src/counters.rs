@@ -11,7 +11,7 @@ pub struct Counters<const N: usize> {
 }
 
 impl<const N: usize> Counters<N> {
-    /// All at 0.
+    /// Creates counters that are all 0.
     pub const fn new() -> Self {
         Self { good: 0, errors: [0; N] }
     }

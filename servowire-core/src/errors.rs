@@ -113,7 +113,7 @@ macro_rules! errors {
                 self as u8
             }
 
-            /// The class of this number.
+            /// Returns the class with this number.
             pub const fn from_number(number: u8) -> Option<Self> {
                 match number {
                     $($number => Some(Self::$variant),)*

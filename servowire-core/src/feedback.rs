@@ -52,8 +52,8 @@ impl<T: Tolerance> Policy<T> {
     /// Checks the age of a value.
     ///
     /// If the instant of sampling lies after `now_ns`, the age is the distance between them, so a clock that was set back
-    /// does not make a value look young. A short distance is normal: a reader looks at its clock, and the writer interrupts
-    /// it before it reads.
+    /// does not make a value look young. A short distance is normal, because the writer may interrupt a reader between reading
+    /// its clock and reading the value.
     ///
     /// # Errors The age in ns, if it exceeds the maximum.
     pub const fn check_age(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {

@@ -35,7 +35,7 @@ impl<C: Class> Findings<C> {
     }
 }
 
-/// 0 for a class beyond the 64th, which no crate has.
+/// Returns the bit of a class; 0 for a class beyond the 64th, which no crate has.
 fn bit<C: Class>(class: C) -> u64 {
     u32::try_from(class.index()).ok().and_then(|at| 1_u64.checked_shl(at)).unwrap_or(0)
 }

@@ -42,7 +42,7 @@ const NEWEST: u32 = 2;
 /// Any slot.
 const SLOT: u32 = 3;
 
-/// What keeps the loads and stores of one end in their order for the other end.
+/// The barriers that keep the loads and stores of one end in order as seen by the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Barrier {
     /// The writer: the previous value is visible to the reader before the writer looks which pair is announced.
@@ -165,7 +165,7 @@ impl<const W: usize, const E: usize> Slot<W, E> {
     }
 }
 
-/// The newest slot of a pair.
+/// Returns the newest slot of a pair.
 const fn newest(control: u32, pair: u32) -> u32 {
     (control.wrapping_shr(pair) >> NEWEST) & SLOT
 }

@@ -32,7 +32,7 @@ macro_rules! number {
             /// The largest value.
             pub const MAX: Self = Self(<$crate::private::UInt<$inner, $bits> as $crate::private::Integer>::MAX);
 
-            /// `None` above [`MAX`](Self::MAX).
+            /// Creates the number; `None` above [`MAX`](Self::MAX).
             #[inline]
             pub const fn new(value: $inner) -> Option<Self> {
                 match $crate::private::UInt::<$inner, $bits>::try_new(value) {

@@ -13,7 +13,7 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
-    /// `got` is above `max`.
+    /// Reports that `got` is above `max`.
     #[cold]
     pub const fn above(got: u64, max: u64) -> Self {
         Self { got: clamp(got), max: clamp(max) }

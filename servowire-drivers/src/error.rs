@@ -14,7 +14,7 @@ use crate::PinTooSlow;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Error<IO, PIN, P, D> {
-    /// The port reports a fault: noise, framing or overrun on a UART, or the bus of an ASIC that does not answer. The exchange
+    /// The port reports a fault: noise, framing or overrun on a UART, or an ASIC whose bus does not answer. The exchange
     /// is lost.
     #[error("the port reports a fault")]
     Io(IO),

@@ -162,7 +162,7 @@ impl Line {
         self.shifted = false;
     }
 
-    /// Whether a request may be on its way out of which nobody has seen the end.
+    /// Returns whether a request may still be leaving whose end has not been observed.
     #[cfg(feature = "tformat")]
     pub(crate) const fn is_leaving(&self) -> bool {
         self.leaving_ns.is_some()

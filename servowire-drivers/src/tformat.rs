@@ -36,7 +36,7 @@ fn longest_ns(line: &Line, request: &Frame) -> u64 {
     answered_ns(line, request.fields())
 }
 
-/// The same of a request that nobody knows of: the longest one.
+/// Returns the same for an unknown request: the longest one.
 fn unknown_ns(line: &Line) -> u64 {
     answered_ns(line, 4)
 }

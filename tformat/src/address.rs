@@ -53,7 +53,7 @@ pub struct Adf(u8);
 impl Adf {
     const BUSY: u8 = 0x80;
 
-    /// Every byte is a valid address field.
+    /// Creates the field from any byte; every byte is a valid address field.
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
     }

@@ -56,7 +56,7 @@ impl State {
         self.s1() | self.s0()
     }
 
-    /// The next state.
+    /// Returns the next state.
     pub const fn next(self, events: Events) -> Self {
         let Events { clock_count_complete: e1, started: e0 } = events;
         let (s1, s0) = (self.s1(), self.s0());
@@ -71,13 +71,13 @@ impl State {
     }
 }
 
-/// LUT_0: resets the bit counter. i3 | (i0 & s1), with i3 = the counter reached a full bit and i0 = any edge of the
+/// Computes LUT_0, which resets the bit counter: i3 | (i0 & s1), with i3 = the counter reached a full bit and i0 = any edge of the
 /// response.
 pub const fn lut0(full_bit: bool, any_edge: bool, state: State) -> bool {
     full_bit | (any_edge & state.s1())
 }
 
-/// LUT_1: computes e0. i0 | (i1 & !s0 & s1), with i0 = rising edge of START_OPERATION and i1 = falling edge of the
+/// Computes LUT_1, which is e0: i0 | (i1 & !s0 & s1), with i0 = rising edge of START_OPERATION and i1 = falling edge of the
 /// response.
 pub const fn lut1(start: bool, falling_edge: bool, state: State) -> bool {
     start | (falling_edge & !state.s0() & state.s1())

@@ -346,7 +346,7 @@ impl<const PAGES: usize> Device<PAGES> {
         AllData { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
     }
 
-    /// The ID 3 frame that answers a damaged request.
+    /// Returns the ID 3 frame that answers a damaged request.
     fn rejection(&self, damage: StatusField) -> Response {
         Response::ReadAll(self.all_data(self.sf().union(damage)))
     }
@@ -413,7 +413,7 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// A cell of the selected page.
+    /// Returns a cell of the selected page.
     fn cell(&mut self, address: Address) -> Option<&mut u8> {
         self.eeprom.get_mut(usize::from(self.page))?.get_mut(usize::from(address.get()))
     }

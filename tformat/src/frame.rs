@@ -49,27 +49,27 @@ impl Frame {
     /// No field at all, which no frame of a line has.
     pub(crate) const NONE: Self = Self { bytes: [0; Self::MAX_FIELDS], len: 0 };
 
-    /// A frame of 1 field.
+    /// Creates a frame of 1 field.
     pub(crate) const fn of1(a: u8) -> Self {
         Self { bytes: [a, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], len: 1 }
     }
 
-    /// A frame of 3 fields.
+    /// Creates a frame of 3 fields.
     pub(crate) const fn of3([a, b, c]: [u8; 3]) -> Self {
         Self { bytes: [a, b, c, 0, 0, 0, 0, 0, 0, 0, 0], len: 3 }
     }
 
-    /// A frame of 4 fields.
+    /// Creates a frame of 4 fields.
     pub(crate) const fn of4([a, b, c, d]: [u8; 4]) -> Self {
         Self { bytes: [a, b, c, d, 0, 0, 0, 0, 0, 0, 0], len: 4 }
     }
 
-    /// A frame of 6 fields.
+    /// Creates a frame of 6 fields.
     pub(crate) const fn of6([a, b, c, d, e, f]: [u8; 6]) -> Self {
         Self { bytes: [a, b, c, d, e, f, 0, 0, 0, 0, 0], len: 6 }
     }
 
-    /// A frame of 11 fields.
+    /// Creates a frame of 11 fields.
     pub(crate) const fn of11(bytes: [u8; 11]) -> Self {
         Self { bytes, len: 11 }
     }
@@ -133,7 +133,7 @@ impl Frame {
 }
 
 impl fmt::Display for Frame {
-    /// The bytes in hexadecimal: `1A 20 29`.
+    /// Writes the bytes in hexadecimal: `1A 20 29`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (at, byte) in self.as_bytes().iter().enumerate() {
             write!(f, "{}{byte:02X}", if at > 0 { " " } else { "" })?;
@@ -152,7 +152,7 @@ impl defmt::Format for Frame {
     }
 }
 
-/// The mask of the first `bits` bits.
+/// Returns the mask of the first `bits` bits.
 const fn first(bits: u32) -> u128 {
     match 1_u128.checked_shl(bits) {
         Some(one) => one.wrapping_sub(1),
@@ -160,14 +160,14 @@ const fn first(bits: u32) -> u128 {
     }
 }
 
-/// Whether the start bits and delimiters among the first `bits` bits are right.
+/// Returns whether the start bits and delimiters among the first `bits` bits are right.
 pub(crate) const fn is_framed(line: u128, bits: u32) -> bool {
     (line ^ DELIMITER) & (START | DELIMITER) & first(bits) == 0
 }
 
 /// The line bits of eleven fields in four groups of three, 30 bits each: every field has the same place in each group.
 ///
-/// The place of a twelfth field holds a framed one with the data bits 0.
+/// In place of a twelfth field there is a correctly framed one whose data bits are 0.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "a group is the low 30 bits")]
 const fn groups(line: u128) -> [u32; 4] {

@@ -173,7 +173,7 @@ fn raw_fields(line: Window, want: u8) -> ([RawField; Frame::MAX_FIELDS], u8) {
     (fields, len)
 }
 
-/// Every kind of fault that the fields show.
+/// Returns every kind of fault that the fields show.
 fn findings(request: Request, report: &Report) -> Findings {
     let mut found = Findings::default();
     if let Some(error) = report.error {

@@ -149,12 +149,12 @@ impl Resolution {
         1_u32.wrapping_shl(self.abs_bits as u32)
     }
 
-    /// The single-turn position in counts.
+    /// Returns the single-turn position in counts.
     pub(crate) const fn single_turn(self, abs: Abs) -> Result<u32, Error> {
         self.cut(abs.get(), self.abs_bits)
     }
 
-    /// The number of turns.
+    /// Returns the number of turns.
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
     pub(crate) const fn turns(self, abm: Abm) -> Result<i32, Error> {
         match self.cut(abm.get(), self.abm_bits) {

@@ -25,8 +25,8 @@ pub struct Behaviour {
     pub bad_head: BadHead,
     /// The acknowledgement of a long write.
     pub acknowledgement: Acknowledgement,
-    /// Time from the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The
-    /// manual promises less than 100 ns, so up to 7 (SICK manual, p. 12).
+    /// Time from the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The manual
+    /// promises less than 100 ns, so this is at most 7 (SICK manual, p. 12).
     pub sampling_lag: u8,
     /// Number of H-frames between a request and the first symbol of its answer.
     pub latency_frames: u16,

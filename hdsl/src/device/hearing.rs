@@ -1,4 +1,4 @@
-//! The encoder's ear: from a sampled line to the bits of a head, and the instant at which the position is taken.
+//! The encoder's reception: finds the bits of a head on a sampled line, and the instant at which the position is taken.
 
 use nrz_line::Window;
 

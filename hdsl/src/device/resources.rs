@@ -59,7 +59,7 @@ const OFFSET_TOO_HIGH: [u8; 2] = [0x40, 0x13];
 const NOT_WRITABLE: [u8; 2] = [0x41, 0x10];
 
 impl Resources {
-    /// ROOT, RESOLUTN (8388608 steps per turn), EESIZE, and a user file of eight bytes at 131h. SRSSI is 7, PING 1.
+    /// Creates ROOT, RESOLUTN (8388608 steps per turn), EESIZE, and a user file of eight bytes at 131h. SRSSI is 7, PING 1.
     pub const fn new() -> Self {
         let mut registers = [0; 64];
         let [.., srssi, _, _, ping] = &mut registers;

@@ -97,12 +97,13 @@ impl HeadRules {
         !self.ended.holds(ends_with_trailer(front))
     }
 
-    /// In a free-running link the count of the line is 0 before each head that follows an answered frame.
+    /// Checks whether the head is coded for a balanced line: in a free-running link the count of the line is 0 before each head
+    /// that follows an answered frame.
     fn is_balanced(&mut self, head: ParsedHead, line: Window) -> bool {
         head.extra_bits > 0 || !self.answered || self.balanced.holds(is_coded_for_balance(head, line))
     }
 
-    /// FIRST is 0 during start-up, then 1, except with masters that send it only in the frames after a pulse.
+    /// Checks FIRST, which is 0 during start-up, then 1, except with masters that send it only in the frames after a pulse.
     fn is_first(&mut self, head: ParsedHead, symbol: Option<MasterSymbol>) -> bool {
         match symbol {
             None => true,
@@ -113,7 +114,7 @@ impl HeadRules {
         }
     }
 
-    /// MSYNC is the same in the eight frames of a V-frame and changes from one to the next.
+    /// Checks MSYNC, which is the same in the eight frames of a V-frame and changes from one to the next.
     fn goes_with_v_frame(&mut self, head: ParsedHead, at: Option<u8>) -> bool {
         let said = head.byte.msync();
         let Some(at) = at else {

@@ -96,7 +96,7 @@ impl HFrame {
         short_free: false,
     };
 
-    /// Clears what a link has brought, at its end.
+    /// Clears the data of a link that has ended.
     pub(super) const fn clear(&mut self) {
         self.quality = QualityMonitor::START;
         self.acceleration = None;

@@ -15,7 +15,7 @@ use crate::resource::{Offset, ResourceAddress};
 pub struct FileName([u8; 8]);
 
 impl FileName {
-    /// `None` unless `name` has 1 to 8 characters 20h..=7Eh.
+    /// Creates a file name; `None` unless `name` has 1 to 8 characters 20h..=7Eh.
     pub fn new(name: &str) -> Option<Self> {
         let mut bytes = [0; 8];
         if name.is_empty() || name.len() > bytes.len() || !name.bytes().all(|byte| matches!(byte, 0x20..=0x7e)) {
@@ -135,7 +135,7 @@ impl LongRequest {
         Self::write_file_resource(ResourceAddress::MAKEFILE, 0x100 | rights(write, read), Data::eight(name.0))
     }
 
-    /// **Deletes the loaded file.**
+    /// Deletes the loaded file, **for good**.
     pub fn delete_loaded_file_for_good(name: FileName) -> Self {
         Self::write_file_resource(ResourceAddress::MAKEFILE, 0x000, Data::eight(name.0))
     }

@@ -72,7 +72,7 @@ impl Data {
         Ok(data)
     }
 
-    /// Eight bytes.
+    /// Creates data of eight bytes.
     pub const fn eight(bytes: [u8; 8]) -> Self {
         Self { bytes, length: Length::Eight }
     }
@@ -96,7 +96,7 @@ impl Data {
 impl TryFrom<(Length, [u8; 8])> for Data {
     type Error = Error;
 
-    /// The bytes after the data have to be 0.
+    /// Creates data from a length and eight bytes; the bytes after the data have to be 0.
     fn try_from((length, bytes): (Length, [u8; 8])) -> Result<Self, Error> {
         let data = Self::new(bytes.get(..length.bytes()).unwrap_or(&bytes))?;
         if data.bytes == bytes { Ok(data) } else { Err(Error::DataLength { len: 8 }) }

@@ -18,7 +18,7 @@ impl RemoteRegister {
     /// PING, keeps what is written; holds the hardware version after a start.
     pub const PING: Self = Self(0x7f);
 
-    /// `None` outside 40h..=7Fh.
+    /// Creates the address of a register; `None` outside 40h..=7Fh.
     pub const fn new(address: u8) -> Option<Self> {
         if address >> 6 == 1 { Some(Self(address)) } else { None }
     }

@@ -66,7 +66,7 @@ impl PipeFifo {
     pub const PSCI: u8 = 1;
     const SIZE: u8 = 8;
 
-    /// Empty.
+    /// Creates an empty FIFO.
     pub const fn new() -> Self {
         Self { entries: [Entry { byte: 0, flags: 0 }; 8], first: 0, len: 0, dropped: false }
     }

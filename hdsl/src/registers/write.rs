@@ -23,8 +23,8 @@ const SLAVE_REG_CTRL: u8 = Register::SlaveRegCtrl as u8;
 const ACC_ERR_CNT: u8 = Register::AccErrCnt as u8;
 const ACC_ERR_CNT_THRESH: u8 = Register::AccErrCntThresh as u8;
 
-/// The registers that only the receiver writes (SICK manual, p. 41-54); S_PC_DATA is written by the application before a short
-/// write.
+/// Returns whether only the receiver writes a register (SICK manual, p. 41-54); S_PC_DATA is written by the application
+/// before a short write.
 const fn is_read_only(address: u8) -> bool {
     matches!(address, 0x03 | 0x09..=0x1f | 0x2d..=0x2f | 0x36 | 0x44..=0x55)
 }
@@ -103,7 +103,7 @@ impl Registers {
         Ok(())
     }
 
-    /// PRST and MRST. Before the link is up, there is no message to drop.
+    /// Handles PRST and MRST. Before the link is up, there is no message to drop.
     fn control(&mut self, master: &mut Master, address: u8, value: u8) {
         if value & 0x40 != 0 && master.reset_messages().is_ok() {
             self.put(Register::SlaveRegCtrl, [0x3f]);

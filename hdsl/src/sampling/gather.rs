@@ -84,7 +84,7 @@ impl<'a> Words<Copied<Iter<'a, u32>>> {
 }
 
 impl<I: Iterator<Item = u32>> Words<I> {
-    /// Bits and edges of the answer.
+    /// Returns bits and edges of the answer.
     #[inline(always)]
     pub(super) fn read(self, alignment: Alignment) -> SampledAnswer {
         // Bytes of the first word before the answer; in the last word one more is of the answer.
@@ -102,7 +102,7 @@ impl<I: Iterator<Item = u32>> Words<I> {
         SampledAnswer { bits: whole(low, gather.after(high, self.last), lead), edges: watch.finish(lead) }
     }
 
-    /// The bits alone.
+    /// Returns the bits alone.
     #[inline(always)]
     pub(super) fn bits(self, alignment: Alignment) -> u64 {
         let gather = Gather::new(alignment.index);

@@ -86,7 +86,7 @@ pub enum Ea {
 }
 
 impl Behaviour {
-    /// The default readings.
+    /// Returns the default readings.
     pub const fn new() -> Self {
         Self {
             response_delay_ns: 2_800,

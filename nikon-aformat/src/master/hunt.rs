@@ -51,7 +51,7 @@ pub(super) struct Block<'a> {
 }
 
 impl Hunt {
-    /// Anything that began before `from_ns` is not an answer.
+    /// Creates a hunt in which anything that began before `from_ns` is not an answer.
     pub(super) const fn new(from_ns: u64) -> Self {
         Self {
             from_ns,
@@ -206,9 +206,8 @@ impl Hunt {
     }
 }
 
-/// Returns whether a frame has the sync code of a response. The frames of the master's own request, received as an echo, have a
-/// different
-/// one.
+/// Returns whether a frame has the sync code of a response. The frames of the master's own request, received as an echo,
+/// have a different one.
 const fn begins_a_response(content: u16) -> bool {
     content & 7 == SYNC_CODE as u16
 }

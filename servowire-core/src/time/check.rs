@@ -28,8 +28,8 @@ pub struct ClockCheck {
 }
 
 impl ClockCheck {
-    /// A clock counts as stopped when a reading is repeated more than `max_looks` times: choose more than a fast processor can
-    /// make within one tick.
+    /// Creates the check. A clock counts as stopped when a reading is repeated more than `max_looks` times; choose more than
+    /// a fast processor can make within one tick.
     pub const fn new(max_looks: u32) -> Self {
         Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
     }

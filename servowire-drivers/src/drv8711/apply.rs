@@ -43,7 +43,7 @@ pub struct Apply {
 }
 
 impl Apply {
-    /// RSTEP is written unchanged, so it should be clear: it clears itself and would not read back.
+    /// Writes these registers. RSTEP is written unchanged, so it should be clear: it clears itself and would not read back.
     pub const fn new(configuration: Configuration) -> Self {
         Self { configuration, done: 0, written: false }
     }

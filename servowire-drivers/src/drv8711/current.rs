@@ -2,8 +2,8 @@
 
 use super::codes::IsGain;
 
-/// Full-scale current of a winding in µA, rounded down: 2.75 V x TORQUE / (256 x ISGAIN x R). `sense_milliohm` is the sense
-/// resistor. `None` for 0 mOhm.
+/// Returns the full-scale current of a winding in µA, rounded down: 2.75 V x TORQUE / (256 x ISGAIN x R). `sense_milliohm`
+/// is the sense resistor. `None` for 0 mOhm.
 ///
 /// ```
 /// use servowire_drivers::drv8711::{IsGain, full_scale_microamps};

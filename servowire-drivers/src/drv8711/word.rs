@@ -85,7 +85,7 @@ impl Word {
         self.0.to_be_bytes()
     }
 
-    /// Data in the answer to a read. Its upper four bits are undefined.
+    /// Returns the data in the answer to a read. Its upper four bits are undefined.
     pub const fn answer(miso: [u8; 2]) -> u16 {
         u16::from_be_bytes(miso) & 0xfff
     }

@@ -30,7 +30,7 @@ impl Detection {
         Self::on([Line::new(BitRate::Mbit5), Line::new(BitRate::Mbit2_5)])
     }
 
-    /// Tries these two lines, in this order, for a host that hands over in blocks or a longer cable.
+    /// Tries these two lines, in this order, for a host that hands over in blocks, or for a longer cable.
     pub const fn on(lines: [Line; 2]) -> Self {
         Self { lines, second: false, tries: 0 }
     }

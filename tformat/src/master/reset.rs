@@ -40,17 +40,17 @@ impl Reset {
     /// Number of refused responses that ends clearing errors.
     pub const MAX_REFUSED: u8 = 3;
 
-    /// ID 7: clears all latched errors. Position and turns are unchanged.
+    /// Clears all latched errors (ID 7). Position and turns are unchanged.
     pub const fn clear_errors() -> Self {
         Self::of(Request::ResetErrors)
     }
 
-    /// ID C: sets the turns to 0 and clears all errors. **The multi-turn reference of the machine is lost.**
+    /// Sets the turns to 0 and clears all errors (ID C). **The multi-turn reference of the machine is lost.**
     pub const fn clear_turns_and_lose_multi_turn_reference() -> Self {
         Self::of(Request::ResetTurnsAndErrors)
     }
 
-    /// ID 8: makes the present position the zero of the turn. **This shifts the commutation angle of the motor.**
+    /// Makes the present position the zero of the turn (ID 8). **This shifts the commutation angle of the motor.**
     ///
     /// A drive that uses the encoder for commutation will then drive the current into the wrong phases; drive manuals
     /// forbid it on a motor in service. It is meant for encoders that are being fitted.

@@ -394,7 +394,7 @@ impl Transaction {
         }));
     }
 
-    /// A whole refusal by the encoder.
+    /// Returns a complete refusal by the encoder.
     #[cold]
     #[inline(never)]
     fn rejected(&mut self, sf: StatusField) {
