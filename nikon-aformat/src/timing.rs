@@ -20,13 +20,13 @@ pub enum BitRate {
     Mbit16,
 }
 
-/// Least time between two frames of a request, in ns.
+/// Shortest time between two frames of a request, in ns.
 ///
 /// Later releases of the AM243x Motor Control SDK use 1 us and list the 10 us of release 9.2 as a defect; an upper limit is
 /// not documented.
 pub const FRAME_GAP_NS: u32 = 1_000;
 
-/// Least time from the end of a transaction to the next request, in ns, as used by one drive maker.
+/// Shortest time from the end of a transaction to the next request, in ns, as used by one drive maker.
 pub const REQUEST_GAP_NS: u32 = 10_000;
 
 /// Longest time that the EEPROM is busy with a read, in ns ("Nikon Protocol Design").

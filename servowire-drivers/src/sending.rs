@@ -8,7 +8,8 @@ use crate::leaving::{self, Leaving};
 use crate::quiet;
 use crate::{Clock, Direction, Worst};
 
-/// The line driver is on as long as this lives. When dropped, it waits until everything that was handed over has left, because a
+/// The line driver is on for as long as this value lives. When dropped, it waits until everything that was handed over has left,
+/// because a
 /// request whose end is cut off may be a different request.
 #[derive(Debug)]
 pub(crate) struct Sending<'a, D: Direction, C: Clock> {

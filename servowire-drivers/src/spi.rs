@@ -278,7 +278,7 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
     }
 }
 
-/// A request is sent as by the blocking ones, in 4 to 20 us, because a dropped transfer is cut off, and ID 0 without its end is
+/// A request is sent in blocking mode, in 4 to 20 us, because a dropped transfer is cut off, and ID 0 without its end is
 /// ID 8. Only the window yields to the executor.
 #[cfg(feature = "async")]
 impl<S: SpiBus + AsyncSpiBus, D: Direction> Sampler<'_, S, D> {

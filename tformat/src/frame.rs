@@ -46,7 +46,7 @@ impl Frame {
     /// Bytes that hold the line bits of the longest frame: 110 bits in 14 bytes.
     pub const MAX_LINE_BYTES: usize = 14;
 
-    /// No field at all, which no frame of a line has.
+    /// A frame without fields, which never occurs on a line.
     pub(crate) const NONE: Self = Self { bytes: [0; Self::MAX_FIELDS], len: 0 };
 
     /// Creates a frame of 1 field.

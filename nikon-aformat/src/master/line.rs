@@ -15,7 +15,7 @@ pub struct Line {
     pub rate: BitRate,
     /// Idle time between two frames of a request, in ns. Default [`FRAME_GAP_NS`].
     pub frame_gap_ns: u32,
-    /// Least time from the end of the request to the *start bit* of the response, in ns: anything that begins earlier is not an
+    /// Shortest time from the end of the request to the *start bit* of the response, in ns: anything that begins earlier is not an
     /// answer.
     /// Default 0, because the turn-around time is not documented.
     pub turn_around_ns: u32,
@@ -33,7 +33,7 @@ pub struct Line {
     /// Default a quarter of [`BitRate::response_gap_ns`], 375 ns to 750 ns, which is below seven bits, the turn-around time of
     /// one vendor's simulated encoder.
     pub hand_over_ns: u32,
-    /// Least time from the end of a transaction to the next request, in ns. Default [`REQUEST_GAP_NS`].
+    /// Shortest time from the end of a transaction to the next request, in ns. Default [`REQUEST_GAP_NS`].
     pub request_gap_ns: u32,
     /// The highest address on the line, requested or not. The meaning of EA in a multi-response request is not documented, so
     /// encoders that were not requested may answer; the line is free when this address can no longer answer. Default 7.

@@ -15,8 +15,8 @@ const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has
 
 /// How fast a clock counts, as the length of its tick: whole nanoseconds and a fraction of 32 bits.
 ///
-/// The tick is rounded by 2^-33 ns at most, which is at most 0.5 ppb up to the highest rate, 0.005 ppb at 170 MHz, and nothing if the
-/// tick is a whole number of ns, or of a fraction that ends in binary: 1, 8, 10, 64, 125 or 200 MHz, 32.768 MHz.
+/// The tick is rounded by 2^-33 ns at most, which is at most 0.5 ppb up to the highest rate, 0.005 ppb at 170 MHz, and zero if
+/// the tick is a whole number of ns, or a fraction that terminates in binary: 1, 8, 10, 64, 125 or 200 MHz, 32.768 MHz.
 ///
 /// ```
 /// use servowire_core::{ClockError, TickRate};
