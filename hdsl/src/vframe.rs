@@ -98,7 +98,7 @@ impl SafeBlock {
         matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
-    /// VPOS or VPOS2, 40 bits, as a number without a sign. For a position to use see [`Master::safe`](crate::master::Master::safe).
+    /// VPOS or VPOS2, 40 bits, as an unsigned number. For a position to use see [`Master::safe`](crate::master::Master::safe).
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,

@@ -103,7 +103,7 @@ pub struct ShaftWriter<'a, F, const W: usize> {
 impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
     /// Stores the newest evidence, replacing all earlier evidence.
     ///
-    /// The policy, as a rule that of the reader, decides which evidence is used for the speed. After a doubt the speed is not
+    /// The policy, usually that of the reader, decides which evidence is used for the speed. After a doubt the speed is not
     /// known until there are two good samples again, as at the start.
     pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
         let motion = if let Ok(sample) = evidence.at(now_ns, policy) {

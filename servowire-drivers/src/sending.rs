@@ -8,9 +8,8 @@ use crate::leaving::{self, Leaving};
 use crate::quiet;
 use crate::{Clock, Direction, Worst};
 
-/// The line driver is on for as long as this value lives. When dropped, it waits until everything that was handed over has left,
-/// because a
-/// request whose end is cut off may be a different request.
+/// The line driver is on for as long as this value lives. When dropped, it waits until everything that was handed over has
+/// left, because a request whose end is cut off may be a different request.
 #[derive(Debug)]
 pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     switch: &'a mut Switch<D>,
@@ -30,7 +29,7 @@ pub(crate) struct Sent {
     pub(crate) late_ns: u64,
 }
 
-/// Sees to it that the line driver is off, before anybody listens. A future that was forgotten while its request was going
+/// Makes sure that the line driver is off, before listening. A future that was forgotten while its request was going
 /// out has left it on: then not before that request has left, however long nobody has looked.
 #[inline]
 pub(crate) fn off<D: Direction>(

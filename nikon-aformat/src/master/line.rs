@@ -15,9 +15,8 @@ pub struct Line {
     pub rate: BitRate,
     /// Idle time between two frames of a request, in ns. Default [`FRAME_GAP_NS`].
     pub frame_gap_ns: u32,
-    /// Shortest time from the end of the request to the *start bit* of the response, in ns: anything that begins earlier is not an
-    /// answer.
-    /// Default 0, because the turn-around time is not documented.
+    /// Shortest time from the end of the request to the *start bit* of the response, in ns: anything that begins earlier is
+    /// not an answer. Default 0, because the turn-around time is not documented.
     pub turn_around_ns: u32,
     /// Longest time from the end of the request to the *start bit* of the response, in ns. Default 1000 bits, as in one maker's
     /// master. Others wait 3 ms and 35 ms.

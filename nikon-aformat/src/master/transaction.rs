@@ -97,7 +97,7 @@ impl Transaction {
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
-    /// [`Error::Line`]: it must not be sent.
+    /// [`Error::Line`]. Such a request must not be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         Self::begun(request, resolution, line, start_ns)
     }
