@@ -255,7 +255,7 @@ pub(crate) fn spin<T>(
 mod tests {
     use super::*;
 
-    /// A line on which everything is known to be over.
+    /// Creates the state of a line on which everything is known to have ended.
     fn clean() -> Line {
         Line { leaving_ns: None, ..Line::new(8_000, 0) }
     }
@@ -289,7 +289,7 @@ mod tests {
         assert_eq!(line.settle(107_000).next(false, 107_000), Settle::Quiet);
     }
 
-    /// After a request of 10 us an answer may be talking until 100 us, unless it is known better.
+    /// After a request of 10 us an answer may be on the line until 100 us, unless it is known better.
     #[test]
     fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
         let sent = || {

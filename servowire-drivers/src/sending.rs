@@ -29,8 +29,8 @@ pub(crate) struct Sent {
     pub(crate) late_ns: u64,
 }
 
-/// Makes sure that the line driver is off, before listening. A future that was forgotten while its request was going
-/// out has left it on: then not before that request has left, however long nobody has looked.
+/// Makes sure that the line driver is off, before listening. A future that was forgotten while its request was being sent has
+/// left the driver on; it is then not switched off before that request has left, however long ago the last look was.
 #[inline]
 pub(crate) fn off<D: Direction>(
     switch: &mut Switch<D>,
@@ -44,7 +44,7 @@ pub(crate) fn off<D: Direction>(
     Ok(waited)
 }
 
-/// Waits until nothing of a request is on its way out, whenever it began.
+/// Waits until no part of a request is still leaving, whenever it began.
 #[cold]
 #[inline(never)]
 fn outlast(clock: &mut impl Clock, state: &mut quiet::Line, line: &Line) -> Result<(), ClockError> {

@@ -87,7 +87,7 @@ impl Frame {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
     }
 
-    /// All eleven bytes: the data bytes, then zeros. A copy of constant length, for firmware.
+    /// Returns all eleven bytes: the data bytes, then zeros. This is a copy of constant length, for firmware.
     pub const fn to_array(self) -> [u8; Self::MAX_FIELDS] {
         self.bytes
     }

@@ -35,7 +35,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// No line: the settings of a transaction that has not begun.
+    /// A placeholder: the settings of a transaction that has not begun.
     pub(super) const NONE: Self = Self {
         rate: BitRate::Mbit2_5,
         echo: false,

@@ -432,7 +432,7 @@ impl Transaction {
         self.finish();
     }
 
-    /// Why what was heard until the time was over is no response.
+    /// Returns why what was received until the time ran out is not a response.
     fn reason(&self) -> Error {
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
         match (heard, self.echo_fault) {
