@@ -10,7 +10,7 @@ use std::io::{BufRead, Read};
 
 use super::input::Input;
 use super::recording::{Change, Line};
-use super::table::cell::Threshold;
+use super::table::threshold::Threshold;
 use crate::fault::{At, Fault};
 use crate::time::Time;
 
@@ -247,6 +247,7 @@ impl Line for Isf {
         }
         for volts in &samples {
             let level = self.threshold.level(*volts, self.level);
+            self.threshold.follow(*volts);
             if self.level != Some(level) {
                 self.level = Some(level);
                 changes.push(Change { time: self.reached(), channel: 0, level });

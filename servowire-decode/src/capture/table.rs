@@ -7,6 +7,7 @@
 
 pub(super) mod cell;
 mod heading;
+pub(super) mod threshold;
 
 use std::collections::VecDeque;
 
@@ -15,9 +16,10 @@ use super::input::Input;
 use super::recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
 use crate::time::{Clock, SECOND, Time};
-use cell::{Cell, Threshold};
+use cell::Cell;
 use heading::{Heading, Times};
 pub(super) use heading::{separator, titles, unit};
+use threshold::Threshold;
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
@@ -216,9 +218,15 @@ impl Table {
         Ok(if self.backwards { -time } else { time })
     }
 
-    /// The level of a column in a row; none where its cell is empty.
-    fn level(&self, column: &Column, cells: &[&[u8]]) -> Result<Option<bool>, String> {
+    /// The level of a column in a row and its voltage; no level where its cell is empty.
+    fn level(&self, column: &Column, cells: &[&[u8]]) -> Result<(Option<bool>, Option<f64>), String> {
+        let volts = |text| cell::number(text, self.heading.comma());
         let text = cells.get(column.index).copied().unwrap_or_default();
+        let level = self.of_cell(column, text)?;
+        Ok((level, column.threshold.and_then(|_| volts(text))))
+    }
+
+    fn of_cell(&self, column: &Column, text: &[u8]) -> Result<Option<bool>, String> {
         let shown = || String::from_utf8_lossy(text);
         match (cell::level(text), &column.threshold) {
             (Cell::Other, None) if column.bit.is_some() => match (cell::word(text), column.bit) {
@@ -250,7 +258,7 @@ impl Table {
         let levels = self.columns.iter().map(|column| self.level(column, &cells)).collect::<Result<Vec<_>, _>>()?;
         self.rows += 1;
         self.now = Some(time);
-        if levels.iter().all(Option::is_none) {
+        if levels.iter().all(|(level, _)| level.is_none()) {
             // No data from here on.
             self.since.get_or_insert(time);
             return Ok(());
@@ -259,7 +267,10 @@ impl Table {
             self.hole = Some(Hole { from, to: time });
             self.columns.iter_mut().for_each(|column| column.level = None);
         }
-        for ((channel, column), level) in (0_u16..).zip(&mut self.columns).zip(levels) {
+        for ((channel, column), (level, volts)) in (0_u16..).zip(&mut self.columns).zip(levels) {
+            if let (Some(threshold), Some(volts)) = (&mut column.threshold, volts) {
+                threshold.follow(volts);
+            }
             if let Some(level) = level.filter(|level| column.level != Some(*level)) {
                 column.level = Some(level);
                 changes.push(Change { time, channel, level });

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::common;
-use crate::common::{Bench, GOOD_FRAMES, good_traffic};
+use crate::common::{Bench, GOOD_FRAMES, Wave, good_traffic, id3};
 
 /// Samples a second, and the time of the first.
 const RATE: f64 = 20e6;
@@ -306,4 +306,29 @@ fn beyond_the_range() {
     });
     assert!(text.matches('\u{221e}').count() > 1000);
     is_read("PicoScope", &text);
+}
+
+/// A line that drifts by three times its swing, as an input coupled by a capacitor does; what a person has said stays.
+#[test]
+fn a_line_that_drifts() {
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(200.0);
+    for k in 0..400 {
+        wave.exchange(&[0x1a], &id3(k, 0, 0));
+        if k % 50 == 0 {
+            wave.idle_us(300.0);
+        }
+    }
+    let samples = wave.samples(25e6);
+    let mut text = "Time(s),CH1(V)\n".to_owned();
+    for (k, level) in samples.iter().enumerate() {
+        let drift = 6.0 * k as f64 / samples.len() as f64;
+        writeln!(text, "{:.8},{:.3}", k as f64 / 25e6, f64::from(u8::from(*level)) * 2.0 - drift).unwrap();
+    }
+    let bench = Bench::new();
+    let run = bench.decode("drift.csv", &text, &["--json"]);
+    run.is_good();
+    assert_eq!(run.json().len(), 800);
+    let said = bench.decode("drift.csv", &text, &["--json", "--threshold", "1"]);
+    assert!(said.json().len() < 700, "{}", said.json().len());
 }

@@ -82,42 +82,6 @@ pub(crate) fn date(text: &str) -> Option<Time> {
     Some(Time::from_ps(i128::from(before) * i128::from(time::SECOND) + seconds.ps()))
 }
 
-/// Makes levels of voltages.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Threshold {
-    low: f64,
-    high: f64,
-}
-
-impl Threshold {
-    /// Half-way between the levels of some values, or as the user has it; the hysteresis is a tenth of the swing.
-    pub(crate) fn find(values: &mut [f64], said: Option<f64>) -> Self {
-        values.sort_by(f64::total_cmp);
-        // What is beyond the instrument's range was at its end at least.
-        let inside = |value: &&f64| value.abs() < f64::MAX;
-        if let (Some(&bottom), Some(&top)) = (values.iter().find(inside), values.iter().rfind(inside)) {
-            for value in values.iter_mut() {
-                *value = value.clamp(bottom, top);
-            }
-        }
-        // The few values beyond are overshoot.
-        let at = |share: usize| values.get(values.len() * share / 200).copied().unwrap_or(0.0);
-        let (least, most) =
-            (at(1), values.get(values.len().saturating_sub(1 + values.len() / 200)).copied().unwrap_or(0.0));
-        let (middle, swing) = (said.unwrap_or(f64::midpoint(least, most)), most - least);
-        Self { low: middle - swing / 20.0, high: middle + swing / 20.0 }
-    }
-
-    /// The level of a voltage after another level.
-    pub(crate) fn level(&self, volts: f64, before: Option<bool>) -> bool {
-        match before {
-            Some(true) => volts >= self.low,
-            Some(false) => volts > self.high,
-            None => volts > f64::midpoint(self.low, self.high),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
