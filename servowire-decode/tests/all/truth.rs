@@ -5,6 +5,7 @@
 mod bus;
 mod buses;
 mod dsl;
+mod exports;
 mod line;
 mod links;
 mod logs;
@@ -94,13 +95,17 @@ impl Outcome {
     }
 }
 
-/// All events of a line, found without a hint.
-fn decode(edges: &[(i64, bool)], end: f64) -> (Vec<Event>, String) {
+/// A recording of one line in memory.
+fn memory(edges: &[(i64, bool)], end: f64) -> Capture {
     let change =
         |(time, level): &(i64, bool)| Change { time: Time::from_ps((*time).into()), channel: 0, level: *level };
     let changes = edges.iter().map(change).collect();
-    let memory = Memory::new(vec!["LINE".to_owned()], changes, Time::from_ps(end as i128));
-    read(Capture::Edges(Box::new(memory)), None, &Settings::default())
+    Capture::Edges(Box::new(Memory::new(vec!["LINE".to_owned()], changes, Time::from_ps(end as i128))))
+}
+
+/// All events of a line, found without a hint.
+fn decode(edges: &[(i64, bool)], end: f64) -> (Vec<Event>, String) {
+    read(memory(edges, end), None, &Settings::default())
 }
 
 /// All events of a capture, and what was said beside them.
