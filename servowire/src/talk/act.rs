@@ -1,25 +1,26 @@
 //! The commands.
 
 pub(super) mod memory;
+mod watch;
 
 use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, IsTerminal, Write};
+use std::io::{self, BufRead};
 use std::path::Path;
 use std::process::ExitCode;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde_json::{Value, json};
 use tformat::{AllData, Almc, BitRate, Evidence, Hint, Policy, Resolution, Response, Sample, Tolerated};
 
-use super::Watch;
 use super::encoder::{Changed, Encoder};
 use super::fault::Fault;
 use super::link::Link;
 use super::port::{self, Port};
 use super::relay::{self, Said};
 use crate::terminal;
+
+pub(super) use watch::watch;
 
 type Done = Result<ExitCode, Fault>;
 
@@ -102,62 +103,6 @@ fn object(all: &AllData) -> Value {
 
 fn names(almc: Almc) -> Vec<&'static str> {
     almc.iter_names().map(|(name, _)| name).collect()
-}
-
-pub(super) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Print) -> Done {
-    let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
-    let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
-    let (mut gone, mut out) = (None, io::stdout());
-    // Over the line before, to the end of the line; in a file or pipe a line each.
-    let (from, to) = if out.is_terminal() { ("\r", "\x1b[K") } else { ("", "\n") };
-    while watch.count.is_none_or(|count| good + bad < count) {
-        let reading = match encoder.read() {
-            Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
-                gone = Some(fault);
-                break;
-            }
-            reading => reading,
-        };
-        let time = begin.elapsed().as_secs_f64();
-        let (text, record) = match &reading {
-            Ok(all) => {
-                good += 1;
-                (
-                    line(all),
-                    [all.abs.to_string(), all.abm.to_string(), format!("{:#04x}", all.almc.bits()), String::new()],
-                )
-            }
-            Err(fault) => {
-                bad += 1;
-                (fault.to_string(), [String::new(), String::new(), String::new(), fault.to_string()])
-            }
-        };
-        if let Some((csv, path)) = &mut csv {
-            let record = std::iter::once(format!("{time:.6}")).chain(record);
-            csv.write_record(record).map_err(io::Error::from).map_err(Fault::file(path))?;
-        }
-        let errors = bad as f64 * 100.0 / (good + bad) as f64;
-        let written = match (print, &reading) {
-            (Print::Text, _) => write!(out, "{from}{text}  {errors:.1} % errors{to}"),
-            (Print::Json, Ok(all)) => writeln!(out, "{}", json!({ "time_s": time, "reading": object(all) })),
-            (Print::Json, Err(fault)) => writeln!(out, "{}", json!({ "time_s": time, "fault": fault.to_string() })),
-        };
-        match written.and_then(|()| out.flush()) {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
-            written => written.map_err(Fault::Output)?,
-        }
-        thread::sleep(Duration::from_millis(watch.period));
-    }
-    let said = format!("{}{good} good, {bad} refused or missing", if from.is_empty() { "" } else { "\n" });
-    print.say(said, || json!({ "good": good, "bad": bad }))?;
-    if let Some((mut csv, path)) = csv {
-        csv.flush().map_err(Fault::file(path))?;
-    }
-    match gone {
-        Some(fault) => Err(fault),
-        None if bad == 0 => Ok(ExitCode::SUCCESS),
-        None => Ok(ExitCode::FAILURE),
-    }
 }
 
 /// A table in this file, if there is one.

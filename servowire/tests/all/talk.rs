@@ -120,8 +120,24 @@ fn the_program_reads_what_its_own_encoder_says() {
     let output = bench.talk(&["watch", "--count", "3", "--period", "1", "--csv", csv.to_str().unwrap()]);
     assert!(text(&output).ends_with("3 good, 0 refused or missing\n"), "{}", text(&output));
     // In a pipe a line each, and no escape code.
-    assert!(text(&output).lines().count() == 4 && !text(&output).contains(['\x1b', '\r']), "{}", text(&output));
+    assert!(text(&output).lines().count() == 5 && !text(&output).contains(['\x1b', '\r']), "{}", text(&output));
     assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 4);
+    // How long answers took, and how often there was one.
+    let said = text(&output);
+    assert!(said.contains("\nanswers took ") && said.contains(" ms on average; one reading every "), "{said}");
+    // Ctrl-C ends it with the figures.
+    let watch = Command::new(env!("CARGO_BIN_EXE_servowire"))
+        .args(["talk", "--port", &bench.name, "watch", "--json"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_millis(700));
+    assert!(Command::new("kill").args(["-INT", &watch.id().to_string()]).status().unwrap().success());
+    let output = watch.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let last: serde_json::Value = serde_json::from_str(text(&output).lines().last().unwrap()).unwrap();
+    assert!(last["good"].as_u64().unwrap() > 1 && last["answer_ms"]["mean"].as_f64().unwrap() > 0.0, "{last}");
+    assert!(last["bad"] == 0 && last["cycle_ms"]["max"].is_f64(), "{last}");
     bench.end();
 }
 
