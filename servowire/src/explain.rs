@@ -84,8 +84,8 @@ pub(crate) fn heading(clip: &Clip) -> String {
     let Event { direction, kind, .. } = &clip.event;
     let side = match direction {
         Some(Direction::Request) => "request ",
-        Some(Direction::Answer) => "answer ",
-        None => "",
+        Some(Direction::Answer) if kind != "answer" => "answer ",
+        _ => "",
     };
     let (start, end) = clip.span();
     format!("{side}{kind}, {:.3} us to {:.3} us: {}", start.us(), end.us(), verdict(&clip.event.verdict))

@@ -341,6 +341,13 @@ mod tests {
         for address in 0..8 {
             assert!(svg.contains(&format!("line, address {address}: position ABS in turns")), "{address}");
         }
+        // A position that was read once is seen too.
+        let mut once = Picture::new("once");
+        let (speaker, event) = answer(1_000_000, 1, 4711, Verdict::Ok);
+        once.add(speaker, &event);
+        let svg = once.draw().unwrap();
+        nothing_is_covered(&svg);
+        assert!(svg.contains("<circle"), "{svg}");
         // Without anything in it, and with the date of a network card.
         nothing_is_covered(&Picture::new("nothing").draw().unwrap());
         let mut late = Picture::new("late");

@@ -8,6 +8,8 @@ use crate::drawing::{Chart, Drawn, Share, Sheet, Stroke};
 
 /// Points of a curve.
 const POINTS: usize = 2000;
+/// A speed is counted over this time at least, in ns: a step in a cycle is no speed.
+const SPAN: u64 = 250_000;
 /// Samples a second of the sound.
 const SAMPLE_RATE: u32 = 44_100;
 /// Steps of a full step at 1/256: what a motor sounds with.
@@ -38,6 +40,19 @@ impl Curves {
         }
     }
 
+    /// The speed of an axis in steps/ms, in the middle of the time over which it was counted.
+    fn speeds(&self, axis: usize) -> Vec<(f64, f64)> {
+        let ms = |cycle: u64| cycle as f64 * f64::from(self.cycle_ns) * 1e-6;
+        let apart = SPAN.div_ceil(u64::from(self.cycle_ns.max(1)) * self.every).max(1) as usize;
+        let later = self.points.iter().skip(apart);
+        let pairs = self.points.iter().zip(later);
+        let speed = pairs.filter_map(|((c0, p0), (c1, p1))| {
+            let steps = p1.get(axis)? - p0.get(axis)?;
+            Some((f64::midpoint(ms(*c0), ms(*c1)) / 1000.0, steps as f64 / (ms(*c1) - ms(*c0))))
+        });
+        speed.collect()
+    }
+
     /// The first `axes` axes, each with its speed and its position.
     pub(super) fn draw(&self, axes: usize) -> Drawn<String> {
         let seconds = |cycle: u64| cycle as f64 * f64::from(self.cycle_ns) * 1e-9;
@@ -46,17 +61,12 @@ impl Curves {
         for axis in 0..axes {
             let position =
                 self.points.iter().map(|(cycle, p)| (seconds(*cycle), p.get(axis).copied().unwrap_or(0) as f64));
-            let speed = self.points.windows(2).filter_map(|pair| {
-                let [(c0, p0), (c1, p1)] = pair else { return None };
-                let steps = p1.get(axis)? - p0.get(axis)?;
-                Some((seconds(*c1), steps as f64 / (seconds(*c1) - seconds(*c0)) / 1000.0))
-            });
             let panel = |what: &str, points: Vec<(f64, f64)>| -> Share {
                 let title = format!("axis {}: {what}", axis + 1);
                 (1, Box::new(Chart::new(title, "time in s", 0.0..end).with(Stroke::ONLY, points)))
             };
             let panels =
-                vec![panel("speed in steps/ms", speed.collect()), panel("position in steps", position.collect())];
+                vec![panel("speed in steps/ms", self.speeds(axis)), panel("position in steps", position.collect())];
             sheet.beside(240, panels);
         }
         sheet.svg()
@@ -124,5 +134,16 @@ mod tests {
         nothing_is_covered(&svg);
         assert!((1..=4).all(|axis| svg.contains(&format!("axis {axis}: speed in steps/ms"))), "{svg}");
         nothing_is_covered(&Curves::new(4000).draw(1).unwrap());
+    }
+
+    /// A step in every 16th cycle of 4 us: 15.6 steps/ms, and neither 250 nor 0.
+    #[test]
+    fn a_step_in_a_cycle_is_no_speed() {
+        for cycles in [2_000, 100_000] {
+            let mut curves = Curves::new(4000);
+            (0..cycles).for_each(|cycle| curves.add(cycle, [cycle as i64 / 16, 0, 0, 0]));
+            let speeds = curves.speeds(0);
+            assert!(speeds.len() > 100 && speeds.iter().all(|(_, speed)| (speed - 15.625).abs() < 4.0), "{speeds:?}");
+        }
     }
 }

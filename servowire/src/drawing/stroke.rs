@@ -13,6 +13,9 @@ pub(crate) struct Stroke {
     dash: (u32, u32),
 }
 
+/// Points of a curve that are marked, each a few times.
+const FEW: usize = 160;
+
 /// What is wrong.
 pub(crate) const ALARM: Stroke = Stroke { colour: RGBColor(176, 0, 32), width: 2, dash: (1, 0) };
 
@@ -47,6 +50,12 @@ impl Stroke {
         C: CoordTranslate<From = (f64, f64)>,
     {
         let (drawn, gap) = self.dash;
+        // A line through few points does not show where they are, and one point is none.
+        if self == Self::ONLY && points.len() <= FEW {
+            let mut places: Vec<(f64, f64)> = points.to_vec();
+            places.dedup();
+            chart.draw_series(places.into_iter().map(|place| Circle::new(place, 3, self.filled())))?;
+        }
         let points = points.iter().copied();
         if gap == 0 {
             chart.draw_series(LineSeries::new(points, self.style()))?;
