@@ -47,6 +47,18 @@ fn read(
     })
 }
 
+/// Before a window that is asked for, so much is decoded, in picoseconds: a link of HIPERFACE DSL has its position again by then.
+const LEAD: i64 = 100_000_000_000;
+
+/// Goes on shortly before what is wanted, if the recording can be skipped and its lines are known: what their decoders have learnt
+/// so far stays.
+fn skip(line: &mut dyn Line, decoder: &PushDecoder, out: &Output<'_>) -> Result<bool, Fault> {
+    match out.from() {
+        Some(from) if decoder.is_settled() && line.reached() < from - 2 * LEAD => line.skip(from - LEAD),
+        _ => Ok(false),
+    }
+}
+
 /// Decodes what is said on the lines of a capture.
 pub(crate) fn decode(
     file: &str,
@@ -64,6 +76,9 @@ pub(crate) fn decode(
         }
         if out.is_done() {
             break Ok(());
+        }
+        if let Err(fault) = skip(line, &decoder, out) {
+            break Err(fault);
         }
         let more = read(line, &mut decoder, &mut changes, out)?;
         if let Some(hole) = line.hole() {

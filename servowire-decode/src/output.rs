@@ -160,6 +160,11 @@ impl<'a> Output<'a> {
         (!both.is_empty()).then_some(both)
     }
 
+    /// The first instant of which anything is wanted.
+    pub(crate) fn from(&self) -> Option<Time> {
+        self.filter.as_ref().and_then(|filter| filter.from())
+    }
+
     /// Returns whether nothing that was requested can follow once a recording was read up to `time`.
     pub fn is_over(&self, time: Time) -> bool {
         self.is_done()

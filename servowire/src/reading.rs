@@ -278,6 +278,8 @@ pub(crate) struct Read {
     pub(crate) fault: Option<String>,
     /// The refused frames in a sentence.
     pub(crate) refusals: Option<String>,
+    /// When it was recorded, as the file says it.
+    pub(crate) date: Option<String>,
 }
 
 impl Reading {
@@ -292,6 +294,7 @@ impl Reading {
         let input = files::open(path, false)?;
         let name = input.name().to_owned();
         let capture = capture::open(input, self.hints())?;
+        let date = capture.date().map(str::to_owned);
         let notes = RefCell::new(Vec::new());
         let note = |note: &Note| notes.borrow_mut().push(note.to_string());
         let mut out = Output::new(&name, first).with_notes(&note).with_enough(&interrupt::asked);
@@ -310,6 +313,6 @@ impl Reading {
         out.end()?;
         let refusals = out.refusals();
         drop(out);
-        Ok(Read { notes: notes.into_inner(), fault, refusals })
+        Ok(Read { notes: notes.into_inner(), fault, refusals, date })
     }
 }

@@ -46,6 +46,7 @@ fn unwrapped(mut input: Input) -> Result<Input, Fault> {
 /// An FST file after its hierarchy.
 pub struct Fst {
     name: String,
+    date: Option<String>,
     guard: Option<Guard>,
     reader: FstReader<Box<dyn SeekRead>>,
     channels: Vec<String>,
@@ -100,9 +101,11 @@ impl Fst {
         let channels: Vec<String> = found.iter().map(full).collect();
         let of_handle = (0..).zip(&found).map(|(channel, (.., handle))| (handle.get_index(), channel)).collect();
         let step = (header.end_time.saturating_sub(header.start_time) / PARTS).max(1);
+        let date = Some(header.date.trim().to_owned()).filter(|date| !date.is_empty());
         Ok(Self {
             name,
             guard,
+            date,
             reader,
             last: vec![None; channels.len()],
             channels,
@@ -128,6 +131,10 @@ fn picoseconds(stamp: u64, exponent: i32) -> Option<Time> {
 impl Line for Fst {
     fn channels(&self) -> &[String] {
         &self.channels
+    }
+
+    fn date(&self) -> Option<&str> {
+        self.date.as_deref()
     }
 
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {

@@ -207,6 +207,25 @@ impl Input {
         self.fault(at, format!("cannot be read: {}", plain(error)))
     }
 
+    /// Leaves out so many bytes of a file, without reading them; not of what comes as a stream, nor of what was looked at before.
+    pub(super) fn skip(&mut self, bytes: u64) -> io::Result<bool> {
+        let buffered = self.reader.buffer().len();
+        let Some(rest) = bytes.checked_sub(buffered as u64).and_then(|rest| i64::try_from(rest).ok()) else {
+            return Ok(false);
+        };
+        if self.head_taken < self.head.len() || !matches!(self.reader.get_ref(), Source::File(_)) {
+            return Ok(false);
+        }
+        self.reader.consume(buffered);
+        if let Source::File(file) = self.reader.get_mut() {
+            file.seek(SeekFrom::Current(rest))?;
+        }
+        if !self.quiet {
+            self.taken.set(self.taken.get().saturating_add(bytes));
+        }
+        Ok(true)
+    }
+
     fn count(&self, bytes: usize) {
         if !self.quiet {
             self.taken.set(self.taken.get() + bytes as u64);

@@ -30,6 +30,16 @@ pub enum ByteLog {
     Table(ByteTable),
 }
 
+impl Capture {
+    /// When it was recorded, in the words of the file.
+    pub fn date(&self) -> Option<&str> {
+        match self {
+            Self::Edges(line) => line.date(),
+            _ => None,
+        }
+    }
+}
+
 impl ByteLog {
     /// The next burst; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {

@@ -1,7 +1,7 @@
 //! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the inside of a session.
 
 use super::input::Input;
-use super::recording::{Change, Line};
+use super::recording::{Change, Hole, Line};
 use super::samples::{Samples, little_endian};
 use crate::fault::{At, Fault};
 use crate::time::{Clock, Time};
@@ -32,6 +32,8 @@ pub struct Raw {
     samples: u64,
     /// Reported when the whole samples before it have been taken.
     ragged: Option<Fault>,
+    /// What was left out before what is read next.
+    hole: Option<Hole>,
 }
 
 impl Raw {
@@ -67,6 +69,7 @@ impl Raw {
             last: None,
             samples: 0,
             ragged: None,
+            hole: None,
         }
     }
 
@@ -191,5 +194,28 @@ impl Line for Raw {
 
     fn reached(&self) -> Time {
         self.clock.time(self.samples)
+    }
+
+    fn hole(&mut self) -> Option<Hole> {
+        self.hole.take()
+    }
+
+    /// By whole blocks of 64 samples, in a file that can go forward.
+    fn skip(&mut self, to: Time) -> Result<bool, Fault> {
+        let (from, next) = (self.samples, self.clock.index(to) / 64 * 64);
+        let bytes = |samples: u64| match self.unit {
+            Unit::Bit => samples / 8,
+            Unit::Bytes(n) => samples.saturating_mul(n as u64),
+        };
+        if next <= from || from % 64 != 0 || self.ragged.is_some() {
+            return Ok(false);
+        }
+        let at = At::Byte(bytes(from));
+        if !self.input.skip(bytes(next - from)).map_err(|e| self.input.io_fault(at, &e))? {
+            return Ok(false);
+        }
+        self.hole = Some(Hole { from: self.clock.time(from), to: self.clock.time(next) });
+        (self.samples, self.last) = (next, None);
+        Ok(true)
     }
 }

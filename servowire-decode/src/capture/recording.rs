@@ -50,6 +50,16 @@ pub trait Line {
         None
     }
 
+    /// When it was recorded, in the words of the file, which rarely say of which time zone.
+    fn date(&self) -> Option<&str> {
+        None
+    }
+
+    /// Goes on at a time instead of reading what is before it, if that can be; the levels that the channels have then come next.
+    fn skip(&mut self, _to: Time) -> Result<bool, Fault> {
+        Ok(false)
+    }
+
     /// What is read, if it is read as it comes.
     fn input(&mut self) -> Option<&mut Input> {
         None

@@ -32,6 +32,7 @@ pub struct Vcd {
     to: usize,
     /// The line at the beginning of the buffer.
     line: u64,
+    date: Option<String>,
     channels: Vec<String>,
     codes: Codes,
     tick: Tick,
@@ -56,13 +57,14 @@ impl Vcd {
     pub fn new(mut input: Input) -> Result<Self, Fault> {
         let header = Header::read(&mut input)?;
         let (channels, codes) = header.channels(&input)?;
-        let Header { tick, line, .. } = header;
+        let Header { tick, line, date, .. } = header;
         Ok(Self {
             input,
             buffer: vec![0; BUFFER],
             from: 0,
             to: 0,
             line,
+            date,
             channels,
             codes,
             tick: Tick::new(tick),
@@ -337,6 +339,10 @@ impl Line for Vcd {
 
     fn channels(&self) -> &[String] {
         &self.channels
+    }
+
+    fn date(&self) -> Option<&str> {
+        self.date.as_deref()
     }
 
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {

@@ -157,6 +157,11 @@ impl PushDecoder {
         Ok(())
     }
 
+    /// Whether the first survey is over and has found something.
+    pub(super) fn is_settled(&self) -> bool {
+        self.held.is_none() && !self.lines.is_empty()
+    }
+
     /// Whether all there is is one channel whose line is decoded, so that nobody else needs its changes.
     pub(super) fn takes_samples(&self, out: &Output<'_>) -> bool {
         self.held.is_none() && matches!(self.states.as_slice(), [State::Taken(_)]) && !out.wants_changes()

@@ -45,6 +45,11 @@ impl Filter {
         self.choice.from.is_some() || self.choice.to.is_some()
     }
 
+    /// The first instant that is shown.
+    pub(super) fn from(&self) -> Option<Time> {
+        self.choice.from
+    }
+
     /// Returns whether only refused frames are shown.
     pub(super) fn wants_errors_only(&self) -> bool {
         self.choice.errors

@@ -21,7 +21,7 @@ h1 { font-size: 1.5em } h2 { font-size: 1.2em; margin-top: 2em; border-bottom: 1
 table { border-collapse: collapse; width: 100%; font-size: 0.93em }
 td, th { text-align: left; vertical-align: top; padding: 0.15em 0.8em 0.15em 0; border-bottom: 1px solid #ddd }
 th { white-space: nowrap; font-weight: 600 } td { overflow-wrap: anywhere }
-td.at { white-space: nowrap; text-align: right } thead { display: table-header-group }
+.at { white-space: nowrap; text-align: right } thead { display: table-header-group }
 figure { margin: 0 0 1.5em } svg { max-width: 100%; height: auto } code { overflow-wrap: anywhere }
 .bad { color: #b00020 } .good { color: #006b3a }
 @media screen and (prefers-color-scheme: dark) {
@@ -71,9 +71,13 @@ fn about(report: &Report) -> Vec<(&'static str, String)> {
         ("size", format!("{} bytes", report.bytes)),
         ("SHA-256", report.sha256.clone()),
     ];
+    if let Some(date) = &report.read.date {
+        rows.push(("recorded", format!("{date} (as the file says, which names no time zone unless it stands there)")));
+    }
     if let Some((first, last)) = report.extent {
         if let Some(date) = dated(first) {
             rows.push(("first frame", date));
+            rows.push(("last frame", dated(last).unwrap_or_default()));
         } else {
             rows.push(("first frame", format!("{:.3} us of the capture, which has no date", first.us())));
         }
@@ -141,7 +145,7 @@ fn events(report: &Report, out: &mut String) {
     }
     let _ = write!(
         out,
-        "<h2>What was refused</h2>\n<table>\n<thead><tr><th>at</th><th>encoder</th><th>frame</th><th>class</th>\
+        "<h2>What was refused</h2>\n<table>\n<thead><tr><th class=\"at\">at</th><th>encoder</th><th>frame</th><th>class</th>\
          <th>reason</th></tr></thead>\n"
     );
     for listed in &report.listed {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use crate::common;
+use crate::common::{Bench, Run, Wave, id3, servowire};
 
 fn sample(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/samples").join(name)
@@ -76,4 +77,39 @@ fn a_line_in_a_vector() {
     assert_eq!((run.json().len(), run.json()[0]["channel"].as_str()), (common::GOOD_FRAMES, Some("bus[7]")));
     let run = bench.decode("bus.vcd", text + "#10", &["--json"]);
     run.fails_with("the file ends in the middle of a time: it was cut off");
+}
+
+/// A window far inside a long recording is decoded from shortly before it, with what was learnt at the beginning; nothing between
+/// is read, so that nothing of it is seen although it is damaged.
+#[test]
+fn a_window_in_the_middle() {
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(100.0);
+    let mut starts = Vec::new();
+    for k in 0..9_000_u32 {
+        starts.push(wave.end);
+        wave.exchange(&[0x1a], &id3(k, 5, 0));
+    }
+    let bench = Bench::new();
+    for (format, packed) in [(&["--format", "packed"][..], true), (&["--channel", "3"], false)] {
+        let samples = if packed { wave.packed(20e6) } else { wave.raw(20e6, 3) };
+        let path = bench.file("long.bin", &samples);
+        let path = path.to_str().unwrap();
+        let (from, to) = (format!("{}ps", starts[8_000]), format!("{}ps", starts[8_010]));
+        let window = [&["decode", path, "--rate", "20M", "--json", "--from", &from, "--to", &to][..], format].concat();
+        let whole = servowire(&window);
+        let shown = |run: &Run| {
+            let position = |event: &serde_json::Value| event["position"]["counts"].as_u64();
+            run.json().iter().filter_map(position).collect::<Vec<_>>()
+        };
+        let due: Vec<u64> = (8_000..8_010).map(|k| 5 << 23 | k).collect();
+        assert_eq!(shown(whole.is_good()), due);
+        // Whatever was in between.
+        let mut spoilt = samples.clone();
+        let (begin, end) = (samples.len() / 3, samples.len() / 2);
+        spoilt[begin..end].iter_mut().enumerate().for_each(|(k, byte)| *byte = (k / 3 % 251) as u8);
+        let again =
+            servowire(&[&window[..1], &[bench.file("spoilt.bin", spoilt).to_str().unwrap()], &window[2..]].concat());
+        assert_eq!(again.is_good().out.replace("spoilt.bin", "long.bin"), whole.out);
+    }
 }

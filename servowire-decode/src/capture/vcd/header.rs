@@ -21,6 +21,8 @@ pub(super) struct Header {
     pub(super) tick: u128,
     /// Lines read.
     pub(super) line: u64,
+    /// What `$date` says.
+    pub(super) date: Option<String>,
     variables: Vec<Variable>,
 }
 
@@ -104,7 +106,7 @@ impl Header {
     pub(super) fn read(input: &mut Input) -> Result<Self, Fault> {
         let mut words = Words { input, line: 1, taken: 0 };
         // What most tools mean when they leave it out.
-        let mut header = Self { tick: 1_000_000, line: 1, variables: Vec::new() };
+        let mut header = Self { tick: 1_000_000, line: 1, date: None, variables: Vec::new() };
         let mut scopes: Vec<String> = Vec::new();
         let mut first = true;
         loop {
@@ -130,6 +132,7 @@ impl Header {
                     })?;
                     header.tick = tick;
                 }
+                b"$date" => header.date = Some(text(&words.body()?)).filter(|date| !date.is_empty()),
                 b"$scope" => {
                     let body = words.body()?;
                     scopes.push(text(body.get(1..).unwrap_or_default()));
