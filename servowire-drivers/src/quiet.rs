@@ -114,7 +114,6 @@ impl Line {
             self.shifted = true;
             let left_ns = self.ready_ns.saturating_sub(last_ns);
             self.leaving_ns = Some(self.leaving_ns.unwrap_or(0).max(left_ns));
-            self.ready_ns = 0;
         }
         error
     }
@@ -336,6 +335,27 @@ mod tests {
         assert_eq!(line.now_ns(&mut || 0), Err(ClockError::Backwards { by_ns: 500 }));
         assert_eq!(line.settle(100).next(false, 90_099), Settle::Until(90_100));
         assert_eq!(line.settle(90_100).next(false, 90_100), Settle::Quiet);
+    }
+
+    /// A clock that stands is not a shifted one: what is known of the line stays known.
+    #[test]
+    fn a_clock_that_stands_leaves_the_end_of_a_request_where_it_was() {
+        let mut line = clean();
+        line.begin(90_000);
+        line.sent(10_000);
+        assert_eq!(line.wait_until(&mut || 10_000, 20_000), Err(ClockError::Stopped));
+        assert_eq!(line.settle(50_000).next(false, 99_999), Settle::Until(100_000));
+    }
+
+    #[test]
+    fn a_wait_ends_with_its_time() {
+        let (mut line, mut now_ns) = (clean(), 0);
+        let mut clock = || {
+            now_ns += 5;
+            now_ns
+        };
+        let heard = spin::<()>(&mut line, &mut clock, 20, || None).unwrap();
+        assert_eq!((heard.what, heard.now_ns), (None, 20));
     }
 
     /// Five seconds of a clock that jumps are no time that has passed; between two calls, or after a wait until then, they may have.

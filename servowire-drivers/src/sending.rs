@@ -153,3 +153,105 @@ impl<D: Direction, C: Clock> Drop for Sending<'_, D, C> {
         let _: Result<(), _> = self.switch.off();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+    use core::convert::Infallible;
+    use tformat::BitRate;
+
+    /// A look lasts so long.
+    const LOOK_NS: u64 = 10;
+    const LINE: Line = Line::new(BitRate::Mbit2_5);
+
+    /// A pin that notes when it was switched off.
+    struct Pin<'a> {
+        now_ns: &'a Cell<u64>,
+        off_ns: &'a Cell<u64>,
+    }
+
+    impl Direction for Pin<'_> {
+        type Error = Infallible;
+
+        fn transmit(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+
+        fn receive(&mut self) -> Result<(), Infallible> {
+            self.off_ns.set(self.now_ns.get());
+            Ok(())
+        }
+
+        fn worst(&self) -> Option<Worst> {
+            Some(Worst { uart_start_ns: 100, wake_ns: 100, clock_ns: 10 })
+        }
+    }
+
+    /// What is done with a request whose driver was switched on at 1 ms; when it began, and when the driver went off.
+    fn send(
+        act: impl FnOnce(Sending<'_, Pin<'_>, &mut dyn FnMut() -> u64>, &Cell<u64>) -> Option<u64>,
+    ) -> (Option<u64>, u64) {
+        let (now_ns, off_ns) = (Cell::new(1_000_000), Cell::new(0));
+        let mut look = || {
+            now_ns.set(now_ns.get() + LOOK_NS);
+            now_ns.get()
+        };
+        let mut clock: &mut dyn FnMut() -> u64 = &mut look;
+        let mut switch = Switch::new(Pin { now_ns: &now_ns, off_ns: &off_ns });
+        let mut state = quiet::Line::new(8_000, 0);
+        let _ = state.first_ns(&mut clock);
+        let sending = Sending::begin(&mut switch, &mut clock, &mut state, &LINE).unwrap();
+        let began_ns = act(sending, &now_ns);
+        (began_ns, off_ns.get())
+    }
+
+    /// One field, whose `write` lasts this long: when the request began, after it was asked for.
+    fn began_after(write_ns: u64) -> u64 {
+        let mut asked = 0;
+        let (began_ns, _) = send(|mut sending, now_ns| {
+            let asked_ns = sending.ask(&[0x1a]).unwrap();
+            // The look after it is part of it.
+            now_ns.set(now_ns.get() + write_ns - LOOK_NS);
+            sending.taken(1, asked_ns).unwrap();
+            asked = asked_ns;
+            Some(sending.end().unwrap().unwrap().start_ns)
+        });
+        began_ns.unwrap() - asked
+    }
+
+    /// Nothing that came before a request had left is an answer to it. A `write` that was held up for longer than four bits may have handed
+    /// it over at its end; one that was not is taken by its beginning, so that no answer is too early.
+    #[test]
+    fn a_request_that_was_held_up_begins_at_the_end_of_its_write() {
+        assert_eq!([40, 1_600].map(began_after), [0, 0]);
+        assert_eq!([1_610, 100_000].map(began_after), [1_610, 100_000]);
+    }
+
+    #[test]
+    fn a_driver_that_nothing_was_asked_of_goes_off_at_once() {
+        let (_, off_ns) = send(|sending, _| {
+            drop(sending);
+            None
+        });
+        assert_eq!(off_ns, 1_000_010);
+    }
+
+    /// A field and the margins after the last `write`, which is known to have ended; one field more if nobody knows.
+    #[test]
+    fn what_was_taken_is_waited_for_once() {
+        for (known, least_ns) in [(true, 4_000), (false, 8_000)] {
+            let (_, off_ns) = send(|mut sending, _| {
+                let asked_ns = sending.ask(&[0x32]).unwrap();
+                sending.taken(1, asked_ns).unwrap();
+                if !known {
+                    let _ = sending.ask(&[0x01]).unwrap();
+                }
+                drop(sending);
+                None
+            });
+            let after_ns = off_ns - 1_000_000;
+            assert!((least_ns + 100..least_ns + 1_600).contains(&after_ns), "{known}: {after_ns}");
+        }
+    }
+}

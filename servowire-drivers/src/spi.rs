@@ -232,11 +232,9 @@ impl<'b, S, D> Sampler<'b, S, D> {
         (self.len, self.at) = (0, 0);
     }
 
-    /// Returns whether any sample was 0, and discards the samples.
-    fn is_busy(&mut self) -> bool {
-        let busy = self.rx.get(..self.len).is_some_and(|window| window.iter().any(|byte| *byte != 0xff));
-        self.forget();
-        busy
+    /// Returns whether any sample was 0.
+    fn is_busy(&self) -> bool {
+        self.rx.get(..self.len).is_some_and(|window| window.iter().any(|byte| *byte != 0xff))
     }
 }
 
@@ -347,6 +345,27 @@ mod tests {
         assert_eq!(sampling.ns(8), 400);
         assert_eq!(sampling.bytes(u32::MAX), 10_737_419);
         assert!(Sampling::new(Order::MsbFirst8, 3, 8, 1).is_err());
+    }
+
+    /// What one window leaves does not shift the times of the next one.
+    #[test]
+    fn a_window_begins_with_its_first_sample() {
+        let sampling = Sampling::new(Order::LsbFirst8, 8, 8, 2_500_000).unwrap();
+        let (mut tx, mut rx) = ([0; 48], [0; 48]);
+        let mut sampler = Sampler::new((), crate::Automatic, sampling, &mut tx, &mut rx);
+        for skipped in 0..8 {
+            // So many ones, and a field.
+            sampler.idle(48);
+            let bits = core::iter::repeat_n(true, skipped).chain(line_bits([(0x1a, 8)], 0));
+            let len = write(bits, 8, Order::LsbFirst8, sampler.rx).unwrap();
+            sampler.sampled(len);
+            let field = sampler.field().unwrap();
+            assert_eq!((field.content, field.start), (0x1a, 8 + 8 * skipped as u64));
+        }
+        // Nor is anything of it left when the next request goes out, should that fail.
+        sampler.sampled(48);
+        assert!(sampler.prepare([true]).is_ok());
+        assert_eq!((sampler.field(), sampler.is_busy()), (None, false));
     }
 
     #[test]

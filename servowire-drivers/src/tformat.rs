@@ -70,3 +70,19 @@ fn all_data(response: Response) -> Result<AllData, Error> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tformat::{Address, BitRate};
+
+    /// A field lasts 4 us, the longest answer has eleven, which begin after 10 us; one more, and what the host needs.
+    #[test]
+    fn how_long_the_line_may_be_in_use() {
+        let line = Line::new(BitRate::Mbit2_5).with_hand_over_ns(3_000);
+        let write = Request::write_eeprom(Address::truncate(1), 2);
+        assert_eq!(longest_ns(&line, &Request::ReadAll.emit()), 4_000 + 10_000 + 48_000 + 3_000);
+        assert_eq!(longest_ns(&line, &write.emit()), 16_000 + 10_000 + 48_000 + 3_000);
+        assert_eq!(unknown_ns(&line), 16_000 + 10_000 + 48_000 + 3_000);
+    }
+}

@@ -246,6 +246,24 @@ mod asynch {
         assert!(on > 20, "forgotten with the driver on: {on}");
     }
 
+    #[test]
+    fn an_spi_does_not_listen_with_the_driver_on() {
+        for (refuses, high) in [(0, true), (1, false), (2, false), (3, true), (5, true)] {
+            let bench = Bench::new();
+            (bench.0.borrow_mut().on, bench.0.borrow_mut().refuses) = (high, refuses);
+            let (mut tx, mut rx) = ([0; 48], [0; 160]);
+            let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
+            let uart = SpiUart::new(bench.clone(), DirectionPin::new(bench.clone(), WORST), sampling, &mut tx, &mut rx);
+            let line = Line::new(BitRate::Mbit2_5);
+            let mut encoder = Driver::new(uart, Automatic, Looks(bench.clone()), line).unwrap();
+            for _ in 0..6 {
+                let _ = run(encoder.transact(Request::ReadAll), FOR_EVER);
+                assert!(!bench.0.borrow().deaf, "{refuses} {high}");
+            }
+            assert!(!bench.0.borrow().on, "{refuses} {high}");
+        }
+    }
+
     /// An SPI sends without giving the time back, so nobody can forget it with the driver on.
     #[test]
     fn nor_at_an_spi() {

@@ -51,6 +51,8 @@ mod rtex;
 mod spi;
 #[cfg(all(feature = "tformat", feature = "async"))]
 mod spi_dropped;
+#[cfg(feature = "tformat")]
+mod spi_parts;
 #[cfg(all(feature = "tformat", feature = "async"))]
 mod tformat_asynch;
 #[cfg(feature = "tformat")]
