@@ -2,11 +2,11 @@
 //! next. Time is a count of nanoseconds from any origin.
 //!
 //! * [`Transaction`] handles one request and its response, [`BusTransaction`] one request and the responses of several encoders,
-//! with time-outs and all checks.
+//!   with time-outs and all checks.
 //! * [`GuardedReset`] and [`VerifiedWrite`] do once what cannot be undone, and end as done, not done, or with an unknown effect;
-//! they are built on [`Reset`], [`Write`] and [`EepromRead`].
+//!   they are built on [`Reset`], [`Write`] and [`EepromRead`].
 //! * [`Detection`] finds an encoder and its widths. All of these consist of several transactions and drive them by [`Step`];
-//! `servowire_core::run` runs any of them to its end.
+//!   `servowire_core::run` runs any of them to its end.
 //! * [`Cycle`] repeats a readout at a fixed period.
 //! * [`Counters`] and [`ErrorRate`] keep track of what was refused.
 //!

@@ -3,10 +3,10 @@
 /// Given the variants with their messages (`thiserror`) and documentation, it declares
 ///
 /// * `Error`, `Copy`, `#[non_exhaustive]`, at most 16 bytes, with `defmt::Format` and serde behind the calling crate's features
-/// of these names, and `class()`;
+///   of these names, and `class()`;
 /// * `ErrorClass` with a variant of the same name for each, [`Class`](crate::Class) and [`Classified`](crate::Classified),
 ///   `ALL` in the order of declaration, `name()` in `snake_case`, and `number()`, which is written beside the variant and never
-/// changes, because logs and programs in other languages store it. 0 is reserved for "no error".
+///   changes, because logs and programs in other languages store it. 0 is reserved for "no error".
 ///
 /// ```
 /// servowire_core::errors! {

@@ -8,12 +8,12 @@
 //! Why this holds, in whatever order two cores see each other's stores:
 //!
 //! * A reading is never older than the one before it, nor older than the last complete value: both loads of a reading are of
-//! `control` alone, and the loads of one variable never go back.
+//!   `control` alone, and the loads of one variable never go back.
 //! * No slot is read while it is written. The reader in pair p at its slot i has announced p, passed `Chooses`, and seen in
 //!   `control` that i is the newest of p. The writer comes back to this slot with the second value that it puts into p after
-//! that. The reader had not seen the first one, so the reader's `Chooses` came before the writer's
+//!   that. The reader had not seen the first one, so the reader's `Chooses` came before the writer's
 //!   `Begins` of the second, and the writer sees p announced: it takes the other pair. If it sees a later announcement instead,
-//! that one was made after `Announces`, when the slot had been read, and the writer writes after `Writes`.
+//!   that one was made after `Announces`, when the slot had been read, and the writer writes after `Writes`.
 //! * A slot is whole: it is written before `Publishes` and read after `Reads`.
 
 #[cfg(all(test, loom))]

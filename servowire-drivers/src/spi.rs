@@ -12,12 +12,12 @@
 //! ```
 //!
 //! * The window has to begin before the answer does: a T-Format encoder answers after 3 us, so use DMA or a HAL that starts a
-//! transfer quickly.
+//!   transfer quickly.
 //! * The clock must run through a transfer without gaps. The RP2040's SPI pauses between words with CPHA = 0; use CPHA = 1.
 //! * The window has to hold the wait for the answer and the longest answer: at 2.5 Mbit/s and 8 samples per bit, T-Format needs
 //!   10 us and 110 bits, 135 bytes; [`Sampling::bytes`] counts them.
 //! * Futures need an SPI that supports both blocking and async transfers, as those of embassy do: a request is sent without
-//! yielding (4 to 16 us for T-Format and up to 45 us for A-format at 2.5 Mbit/s), so that no dropped future cuts it off.
+//!   yielding (4 to 16 us for T-Format and up to 45 us for A-format at 2.5 Mbit/s), so that no dropped future cuts it off.
 //! * While nothing is expected, the line is sampled only for one field or frame at a time, so each call takes that much longer.
 
 #[cfg(feature = "nikon")]

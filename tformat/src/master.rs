@@ -3,7 +3,7 @@
 //!
 //! * [`Transaction`] handles one request and its response: time-outs, echoes, late interrupts, all checks.
 //! * [`Reset`], [`SingleTurnZero`], [`MultiTurnZero`], [`EepromAccess`] and [`Detection`] consist of several transactions and
-//! drive them by [`Step`].
+//!   drive them by [`Step`].
 //! * [`Counters`] and [`ErrorRate`] keep track of what was refused.
 //!
 //! ```

@@ -12,9 +12,8 @@ use crate::status::Alm;
 /// A [`Write`] that ends as done, not done, or with an unknown effect.
 ///
 /// 1. STATUS, until ES0 is clear: a busy encoder repeats the arguments and does nothing. MEMERR must be clear, so that
-/// afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
-/// If an encoder is
-/// chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
+///    afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
+///    If an encoder is chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
 /// 2. The write, **once**, 30 ms, STATUS. MEMERR must still be clear.
 /// 3. What was written is read back, even if the response to the write is missing.
 ///

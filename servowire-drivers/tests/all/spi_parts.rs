@@ -182,7 +182,9 @@ fn the_driver_goes_off_when_the_bits_have_left() {
 /// sends its request.
 #[test]
 fn every_fault_is_told_and_leaves_the_driver_off() {
-    WAYS.iter().for_each(|transact| faults_are_told(*transact));
+    for transact in WAYS {
+        faults_are_told(*transact);
+    }
 }
 
 fn faults_are_told(transact: Transact) {

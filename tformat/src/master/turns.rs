@@ -19,7 +19,7 @@ use crate::response::Response;
 ///
 /// * [`Error::NotDone`]: the count is what it was before;
 /// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it is inconclusive: it was at or near 0 before, or is
-/// now neither there nor where it was;
+///   now neither there nor where it was;
 /// * the error of the exchange, if the count could not be read before: nothing was sent.
 ///
 /// The result is judged only by the two counts, so the procedure may follow any history. ID C is sent at most ten times. A

@@ -15,7 +15,7 @@ use crate::response::Response;
 ///
 /// * [`Error::NotDone`]: the position is what it was before;
 /// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it is inconclusive: it was at zero before, or is
-/// now neither there nor where it was;
+///   now neither there nor where it was;
 /// * the error of the exchange, if the position could not be read before: nothing was sent.
 ///
 /// The result is judged by the two positions alone, so the procedure may follow any history: an abandoned attempt, a controller
