@@ -2,7 +2,7 @@
 # The C side of this crate: `.ci/run c` runs all of it.
 #
 #   servowire-c/check.sh           all steps
-#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host, rows, hostile, targets, flash, emulated, archive
+#   servowire-c/check.sh STEP...   header (writes include/servowire.h), stale, host, rows, hostile, targets, flash, emulated, cost, archive
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -137,12 +137,20 @@ emulated() {
     local sources=(examples/tformat_uart.c tests/firmware/run_tformat.c)
     image tformat "${sources[@]}"
     run_image tformat
-    image cost tests/firmware/cost.c
-    run_image cost -icount shift=0
+    cost
     rustc --edition 2024 --crate-type staticlib --target thumbv7em-none-eabihf -C panic=abort -O -o "$out/libother.a" tests/firmware/other.rs
     arm-none-eabi-gcc "${m4[@]}" "${firmware[@]}" "${sources[@]}" -Wl,-u,other_divide "$out/libother.a" \
         "$out/lib/thumbv7em-none-eabihf/libservowire_c.a" -lc_nano -lgcc -o "$out/two.elf"
     run_image two
+}
+
+# The instructions of a call, and of the same call of the crates in the same image.
+cost() {
+    local target=thumbv7em-none-eabihf
+    cargo rustc --quiet --release --example cost --features panic-handler --target "$target"
+    arm-none-eabi-gcc "${m4[@]}" "${firmware[@]}" tests/firmware/cost.c "${small[@]}" "$built/$target/release/examples/libcost.a" \
+        -lc_nano -lgcc -o "$out/cost.elf"
+    run_image cost -icount shift=0
 }
 
 run_image() {

@@ -3,6 +3,8 @@
 //! The calls are C's: pointers and lengths, and states that the caller owns. So they are `unsafe` here as nowhere else in this crate;
 //! each place says why what it hands over is as large as it claims.
 
+pub mod codecs;
+
 use core::mem::MaybeUninit;
 
 use servowire_c::tformat::{

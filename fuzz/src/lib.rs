@@ -20,6 +20,7 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("c_codecs", c::codecs::codecs),
     ("c_tformat", c::tformat),
     ("capture_vcd", capture::vcd),
     ("capture_table", capture::table),

@@ -192,6 +192,7 @@ impl Bus {
 
     /// Takes the words of a response that [`Abs40`] decodes, for a bus on which only positions are requested: it takes less
     /// flash than [`push_words`](Self::push_words), which knows all layouts.
+    #[inline(always)]
     pub fn push_abs40(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         let outcome = Abs40::parse_words(&self.expected, words, order);
         let command = self.expected.command();

@@ -67,6 +67,11 @@
 #define SW_SORTE_DATA_AT 2
 
 /**
+ * Length of the output for the four devices of the published application, in bytes.
+ */
+#define SW_SORTE_PAYLOAD 16
+
+/**
  * Bytes of a DISCOVERY frame, from its destination to its check sequence.
  */
 #define SW_SORTE_DISCOVERY 1030
@@ -75,6 +80,11 @@
  * The last step with which sw_step_steps() begins.
  */
 #define SW_STEP_FIRST (1 << 20)
+
+/**
+ * Tones of the published application.
+ */
+#define SW_STEP_TONES 10
 
 /**
  * The release of this header, before the first dot.
@@ -3653,6 +3663,62 @@ typedef struct {
 } sw_step_step_t;
 
 /**
+ * What a micro-step profile of the published application does with a motor of 200 full steps a turn.
+ */
+typedef struct {
+    /**
+     * Micro-steps a full step.
+     */
+    uint32_t microsteps;
+    /**
+     * Steps of a quarter turn.
+     */
+    uint32_t quarter_turn;
+    /**
+     * Steps of a turn.
+     */
+    uint32_t turn;
+    /**
+     * Steps of ten turns.
+     */
+    uint32_t ten_turns;
+    /**
+     * The mode bits of the DRV8711's CTRL register, in their place.
+     */
+    uint16_t ctrl_field;
+} sw_step_microstep_t;
+
+/**
+ * A tone that the motors play.
+ */
+typedef struct {
+    /**
+     * Speed constant: sw_step_speed().
+     */
+    uint32_t speed;
+    /**
+     * Steps of 125 ms.
+     */
+    uint32_t p125;
+    /**
+     * Steps of 250 ms.
+     */
+    uint32_t p250;
+    /**
+     * Step frequency in Hz, exactly: this by `denominator`.
+     */
+    uint32_t numerator;
+    /**
+     * See `numerator`.
+     */
+    uint16_t denominator;
+    /**
+     * The tone in 0.1 Hz, cut.
+     */
+    uint16_t tenths_hz;
+} sw_step_tone_t;
+
+/**
  * What a master sends.
  */
 typedef struct {
@@ -5135,6 +5201,33 @@ sw_result_t sw_rtex_drive_hear(sw_rtex_drive_t *drive,
 sw_result_t sw_rtex_drive_position(const sw_rtex_drive_t *drive, int32_t *position);
 
 /**
+ * Packs a block into words for an ASIC on a 16-bit bus: the byte that is sent first is in the low bits, on every host. SW_E_ARGUMENT
+ * unless `count` words hold exactly `len` bytes.
+ */
+sw_result_t sw_rtex_to_words16(const uint8_t *bytes,
+                               size_t len,
+                               uint16_t *words,
+                               size_t count);
+
+/**
+ * Packs a block into words for an ASIC on a 32-bit bus, as sw_rtex_to_words16().
+ */
+sw_result_t sw_rtex_to_words32(const uint8_t *bytes, size_t len, uint32_t *words, size_t count);
+
+/**
+ * Unpacks the words of a 16-bit bus into a block. SW_E_ARGUMENT unless `count` words hold exactly `len` bytes.
+ */
+sw_result_t sw_rtex_from_words16(const uint16_t *words,
+                                 size_t count,
+                                 uint8_t *bytes,
+                                 size_t len);
+
+/**
+ * Unpacks the words of a 32-bit bus into a block, as sw_rtex_from_words16().
+ */
+sw_result_t sw_rtex_from_words32(const uint32_t *words, size_t count, uint8_t *bytes, size_t len);
+
+/**
  * Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer has to come within `limit` update periods.
  * `attributes` 1: of SW_RTEX_ALARM_COMMAND the attributes of the alarm that is being issued. Normal and profile commands are no handshakes:
  * SW_E_ARGUMENT.
@@ -5333,6 +5426,25 @@ sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *
 sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
 
 /**
+ * The output for four axes, SW_SORTE_PAYLOAD bytes: a PTO word for each, commands 0. `count` is 4.
+ */
+sw_result_t sw_sorte_build_payload(const uint16_t *words, size_t count, uint8_t *bytes, size_t size);
+
+/**
+ * The output for one word, sent to the motors whose bit is set in `motors` (bit 0 is device 1). The others hold with the direction of
+ * the word; without any motor all drivers are off.
+ */
+sw_result_t sw_sorte_build_shared_payload(uint16_t word,
+                                          uint8_t motors,
+                                          uint8_t *bytes,
+                                          size_t size);
+
+/**
+ * The PTO words of an output of SW_SORTE_PAYLOAD bytes; reserved words are not refused.
+ */
+sw_result_t sw_sorte_parse_payload(const uint8_t *bytes, size_t len, uint16_t (*words)[4]);
+
+/**
  * The CRC-8 of the IO exchange over more bytes, behind those that gave `crc`; 0 at the begin.
  */
 sw_result_t sw_sorte_crc8(const uint8_t *bytes, size_t len, uint8_t *crc);
@@ -5451,6 +5563,16 @@ sw_result_t sw_step_steps(const uint32_t *table,
                           sw_step_step_t *steps,
                           size_t size,
                           size_t *count);
+
+/**
+ * Micro-step profile 0 (full steps) to 8 (256 micro-steps).
+ */
+sw_result_t sw_step_microstep(uint8_t code, sw_step_microstep_t *profile);
+
+/**
+ * Tone 0 to SW_STEP_TONES - 1: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
+ */
+sw_result_t sw_step_tone(uint8_t number, sw_step_tone_t *tone);
 
 /**
  * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.

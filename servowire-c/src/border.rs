@@ -55,19 +55,23 @@ pub(crate) unsafe fn room<'a, T>(start: *mut T, size: usize) -> Result<&'a mut [
     Ok(unsafe { core::slice::from_raw_parts_mut(start.cast(), size) })
 }
 
-/// The first `want` bytes of a caller's buffer of `size`, cleared: for what writes into bytes that are there.
+/// The first `want` values of a caller's buffer of `size`, cleared: for what writes into values that are there.
 ///
 /// # Safety
 /// As for [`room`].
 #[inline(always)]
-pub(crate) unsafe fn cleared<'a>(start: *mut u8, size: usize, want: usize) -> Result<&'a mut [u8], Refused> {
+pub(crate) unsafe fn cleared<'a, T: Copy + Default>(
+    start: *mut T,
+    size: usize,
+    want: usize,
+) -> Result<&'a mut [T], Refused> {
     // SAFETY: the caller vouches for it.
-    let room = unsafe { room::<u8>(start, size)? };
+    let room = unsafe { room::<T>(start, size)? };
     let room = room.get_mut(..want).ok_or(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t)?;
-    for byte in room.iter_mut() {
-        byte.write(0);
+    for place in room.iter_mut() {
+        place.write(T::default());
     }
-    // SAFETY: every byte has just been written.
+    // SAFETY: every value has just been written.
     Ok(unsafe { core::slice::from_raw_parts_mut(room.as_mut_ptr().cast(), room.len()) })
 }
 
@@ -92,6 +96,66 @@ pub(crate) fn fill<T: Copy>(to: &mut [MaybeUninit<T>], from: &[T]) -> Result<(),
     Ok(())
 }
 
+/// Decodes the caller's bytes: the value is written if there is one.
+///
+/// # Safety
+/// As for [`read`].
+#[inline(always)]
+pub(crate) unsafe fn parsed<T>(
+    bytes: *const u8,
+    len: usize,
+    out: Option<&mut MaybeUninit<T>>,
+    parse: impl FnOnce(&[u8]) -> Result<T, Refused>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        let (bytes, out) = (unsafe { read(bytes, len)? }, there(out)?);
+        out.write(parse(bytes)?);
+        OK
+    })
+}
+
+/// Encodes a block of constant length into the caller's buffer.
+///
+/// # Safety
+/// As for [`room`].
+#[inline(always)]
+pub(crate) unsafe fn filled<const N: usize>(
+    bytes: *mut u8,
+    size: usize,
+    make: impl FnOnce() -> Result<[u8; N], Refused>,
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        let bytes = unsafe { room(bytes, size)? };
+        fill(bytes, &make()?)?;
+        OK
+    })
+}
+
+/// Encodes something of any length into the caller's buffer, and says how long it is.
+///
+/// # Safety
+/// As for [`room`].
+#[inline(always)]
+pub(crate) unsafe fn given<T>(
+    bytes: *mut u8,
+    size: usize,
+    len: Option<&mut MaybeUninit<usize>>,
+    make: impl FnOnce() -> Result<T, Refused>,
+    as_bytes: impl FnOnce(&T) -> &[u8],
+) -> sw_result_t {
+    border(|| {
+        // SAFETY: the caller vouches for it.
+        let (bytes, len) = (unsafe { room(bytes, size)? }, there(len)?);
+        let made = make()?;
+        let from = as_bytes(&made);
+        fill(bytes, from)?;
+        len.write(from.len());
+        OK
+    })
+}
+
 /// What stands in the memory of a state: a mark that `start` writes, and the state.
 #[repr(C)]
 pub(crate) struct Started<T> {
@@ -112,7 +176,7 @@ pub(crate) fn place<C, T>(memory: *mut C) -> *mut Started<T> {
 /// Gives a C type of fixed size, `[u64; K]`, the state that lives in it.
 ///
 /// A layout of Rust may change with the compiler, so the size is compared by `<=` with a tenth as margin. A state that is `pinned` is
-/// never copied, so it may stand at any place of its memory.
+/// never copied, so it may stand at any place of its memory. The mark is a byte of which no other state has the same.
 macro_rules! state {
     ($c:ty, $rust:ty, $mark:literal) => {
         const _: () = {
@@ -131,7 +195,8 @@ macro_rules! state {
         };
 
         impl $c {
-            const MARK: u32 = u32::from_le_bytes(*$mark);
+            /// Four equal bytes, which a Cortex-M compares in one instruction.
+            pub(crate) const MARK: u32 = u32::from_le_bytes([$mark; 4]);
 
             /// Puts a state in place.
             #[inline(always)]

@@ -17,7 +17,7 @@ pub const SW_NO_TIME: u64 = u64::MAX;
 pub struct sw_clock_t {
     pub(crate) _private: [MaybeUninit<u64>; 6],
 }
-state!(sw_clock_t, TimeBase<32>, b"SWck");
+state!(sw_clock_t, TimeBase<32>, 0x81);
 
 /// Tells the rate of the timer, once: at least 1 MHz (a coarser one cannot tell one field from the next: SW_E_ARGUMENT). The time is
 /// 0 ns now, when the timer reads `ticks`.

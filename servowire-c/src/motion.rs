@@ -59,7 +59,7 @@ const _: () = assert!(align_of::<Queue<SLOTS>>() <= align_of::<sw_motion_queue_t
 pub struct sw_motion_axis_t {
     pub(crate) _private: [MaybeUninit<u64>; 1040],
 }
-state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, b"SWma");
+state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, 0x61);
 
 /// The end of the interrupt. It belongs to its queue: it is not copied.
 #[repr(C)]
@@ -68,7 +68,7 @@ state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, b"SWma");
 pub struct sw_motion_timer_t {
     pub(crate) _private: [MaybeUninit<u64>; 9],
 }
-state!(sw_motion_timer_t, StepTimer<'static, SLOTS>, b"SWmt");
+state!(sw_motion_timer_t, StepTimer<'static, SLOTS>, 0x62);
 
 /// How fast an axis may go.
 #[repr(C)]

@@ -13,7 +13,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_nrz_t {
     pub(crate) _private: [MaybeUninit<u64>; 9],
 }
-state!(sw_nrz_t, Receiver, b"SWnr");
+state!(sw_nrz_t, Receiver, 0x91);
 
 /// A field that was received.
 #[repr(C)]

@@ -6,6 +6,7 @@ mod block32;
 mod control;
 mod drive;
 pub(crate) mod names;
+mod pack;
 mod procedure;
 mod ring;
 
@@ -15,5 +16,6 @@ pub use block32::*;
 pub use control::*;
 pub use drive::*;
 pub use names::*;
+pub use pack::*;
 pub use procedure::*;
 pub use ring::*;

@@ -5,10 +5,11 @@ mod startup;
 use core::mem::MaybeUninit;
 
 use sorte_proto::{
-    DeviceAddress, DeviceFrame, DeviceFrameView, Direction, Error, MasterFrameView, Pto, Status, emit_master_frame_into,
+    DeviceAddress, DeviceFrame, DeviceFrameView, Direction, Error, MasterFrameView, MotorMask, Payload, Pto, Status,
+    emit_master_frame_into,
 };
 
-use crate::border::{OK, Refused, border, cleared, in_range, read, there};
+use crate::border::{OK, Refused, border, cleared, filled, in_range, parsed, read, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
 pub use startup::*;
@@ -211,4 +212,54 @@ pub extern "C" fn sw_sorte_parse_pto(word: u16, pto: Option<&mut MaybeUninit<sw_
             Err(refusal) => Err(error(refusal)),
         }
     })
+}
+
+/// Length of the output for the four devices of the published application, in bytes.
+pub const SW_SORTE_PAYLOAD: usize = 16;
+const _: () = assert!(SW_SORTE_PAYLOAD == Payload::LEN);
+
+/// The output for four axes, SW_SORTE_PAYLOAD bytes: a PTO word for each, commands 0. `count` is 4.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_sorte_build_payload(
+    words: *const u16,
+    count: usize,
+    bytes: *mut u8,
+    size: usize,
+) -> sw_result_t {
+    let make = || {
+        // SAFETY: the caller of the C function vouches for his memory.
+        let words: [u16; 4] = in_range(unsafe { read(words, count)? }.try_into().ok())?;
+        Ok(Payload::independent(words.map(Pto::from_word)).emit())
+    };
+    // SAFETY: as above.
+    unsafe { filled(bytes, size, make) }
+}
+
+/// The output for one word, sent to the motors whose bit is set in `motors` (bit 0 is device 1). The others hold with the direction of
+/// the word; without any motor all drivers are off.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_sorte_build_shared_payload(
+    word: u16,
+    motors: u8,
+    bytes: *mut u8,
+    size: usize,
+) -> sw_result_t {
+    let make = || Ok(Payload::shared(Pto::from_word(word), in_range(MotorMask::from_bits(motors))?).emit());
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, make) }
+}
+
+/// The PTO words of an output of SW_SORTE_PAYLOAD bytes; reserved words are not refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sw_sorte_parse_payload(
+    bytes: *const u8,
+    len: usize,
+    words: Option<&mut MaybeUninit<[u16; 4]>>,
+) -> sw_result_t {
+    let parse = |bytes: &[u8]| {
+        let payload = Payload::parse(in_range(bytes.try_into().ok())?);
+        Ok(payload.0.map(|slice| slice.pto.word()))
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, words, parse) }
 }

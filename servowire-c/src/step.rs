@@ -3,7 +3,8 @@
 use core::mem::MaybeUninit;
 
 use step_profile::{
-    Arithmetic, Error, Parameters, Profile, RampStep, RampTable, Speed, corrected, pru_exact, step_time_ns,
+    Arithmetic, Error, Microstep, Parameters, Profile, RampStep, RampTable, Speed, Tone, Turn, corrected, pru_exact,
+    step_time_ns,
 };
 
 use crate::border::{OK, Refused, border, in_range, read, room, there};
@@ -257,3 +258,75 @@ pub unsafe extern "C" fn sw_step_steps(
 
 /// A ramp has as many entries as the functions above say.
 const _: () = assert!(RampTable::LEN == 32);
+
+/// What a micro-step profile of the published application does with a motor of 200 full steps a turn.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_step_microstep_t {
+    /// Micro-steps a full step.
+    pub microsteps: u32,
+    /// Steps of a quarter turn.
+    pub quarter_turn: u32,
+    /// Steps of a turn.
+    pub turn: u32,
+    /// Steps of ten turns.
+    pub ten_turns: u32,
+    /// The mode bits of the DRV8711's CTRL register, in their place.
+    pub ctrl_field: u16,
+}
+
+/// Micro-step profile 0 (full steps) to 8 (256 micro-steps).
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_step_microstep(code: u8, profile: Option<&mut MaybeUninit<sw_step_microstep_t>>) -> sw_result_t {
+    border(|| {
+        let (it, out) = (in_range(Microstep::from_code(code))?, there(profile)?);
+        out.write(sw_step_microstep_t {
+            microsteps: it.microsteps(),
+            quarter_turn: it.steps(Turn::Quarter),
+            turn: it.steps(Turn::Full),
+            ten_turns: it.steps(Turn::Ten),
+            ctrl_field: it.ctrl_field(),
+        });
+        OK
+    })
+}
+
+/// Tones of the published application.
+pub const SW_STEP_TONES: u8 = 10;
+const _: () = assert!(SW_STEP_TONES as usize == Tone::ALL.len());
+
+/// A tone that the motors play.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_step_tone_t {
+    /// Speed constant: sw_step_speed().
+    pub speed: u32,
+    /// Steps of 125 ms.
+    pub p125: u32,
+    /// Steps of 250 ms.
+    pub p250: u32,
+    /// Step frequency in Hz, exactly: this by `denominator`.
+    pub numerator: u32,
+    /// See `numerator`.
+    pub denominator: u16,
+    /// The tone in 0.1 Hz, cut.
+    pub tenths_hz: u16,
+}
+
+/// Tone 0 to SW_STEP_TONES - 1: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_step_tone(number: u8, tone: Option<&mut MaybeUninit<sw_step_tone_t>>) -> sw_result_t {
+    border(|| {
+        let (it, out) = (*in_range(Tone::ALL.get(usize::from(number)))?, there(tone)?);
+        let frequency = it.frequency();
+        out.write(sw_step_tone_t {
+            speed: it.speed().raw(),
+            p125: it.p125(),
+            p250: it.p250(),
+            numerator: frequency.numerator(),
+            denominator: frequency.denominator(),
+            tenths_hz: it.tenths_hz(),
+        });
+        OK
+    })
+}

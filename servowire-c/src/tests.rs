@@ -3,6 +3,7 @@
 
 use core::mem::MaybeUninit;
 use core::ptr::{null, null_mut};
+use std::vec;
 use std::vec::Vec;
 
 use tformat::{Adf, DataId, Request, Response};
@@ -158,4 +159,153 @@ fn both_ends_of_a_motion() {
     assert_eq!((steps, unsafe { commanded.assume_init() }), (3, 3));
     // SAFETY: nobody uses it any more.
     drop(unsafe { std::boxed::Box::from_raw(place) });
+}
+
+/// A state of one kind is refused by the functions of another.
+#[test]
+fn no_two_kinds_of_state_have_the_same_mark() {
+    let mut marks = [
+        crate::aformat::sw_aformat_bus_t::MARK,
+        crate::aformat::sw_aformat_device_t::MARK,
+        crate::aformat::sw_aformat_procedure_t::MARK,
+        crate::aformat::sw_aformat_receiver_t::MARK,
+        crate::aformat::sw_aformat_t::MARK,
+        crate::sw_clock_t::MARK,
+        crate::hdsl::sw_hdsl_device_t::MARK,
+        crate::hdsl::sw_hdsl_pipe_t::MARK,
+        crate::hdsl::sw_hdsl_quality_t::MARK,
+        crate::hdsl::sw_hdsl_registers_t::MARK,
+        crate::hdsl::sw_hdsl_t::MARK,
+        crate::hdsl::sw_hdsl_tracker_t::MARK,
+        crate::motion::sw_motion_axis_t::MARK,
+        crate::motion::sw_motion_timer_t::MARK,
+        crate::nrz::sw_nrz_t::MARK,
+        crate::rtex::sw_rtex_axis_t::MARK,
+        crate::rtex::sw_rtex_counter_t::MARK,
+        crate::rtex::sw_rtex_drive_t::MARK,
+        crate::rtex::sw_rtex_echo_t::MARK,
+        crate::rtex::sw_rtex_handshake_t::MARK,
+        crate::rtex::sw_rtex_move_t::MARK,
+        crate::rtex::sw_rtex_phases_t::MARK,
+        crate::rtex::sw_rtex_ring_t::MARK,
+        crate::rtex::sw_rtex_sub_handshake_t::MARK,
+        crate::tformat::sw_tformat_device_t::MARK,
+        crate::tformat::sw_tformat_procedure_t::MARK,
+        crate::tformat::sw_tformat_t::MARK,
+    ];
+    marks.sort_unstable();
+    assert!(marks.windows(2).all(|two| two[0] < two[1]) && marks[0] != 0);
+}
+
+/// What every decoder reads lies in its block: each has one of exactly this length.
+#[test]
+fn decoders_of_all_protocols_take_every_length() {
+    use crate::{aformat::*, hdsl::*, rtex::*, sorte::*};
+    let lengths = if cfg!(miri) { 0..=33_usize } else { 0..=1040 };
+    for len in lengths {
+        let block: Vec<u8> = (0..=u8::MAX).cycle().take(len).collect();
+        let (start, len) = (block.as_ptr(), block.len());
+        let words: Vec<u16> = block.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect();
+        let (mut wide, mut narrow, mut back) = (vec![0_u32; len / 4], vec![0_u16; len / 2], vec![0_u8; len]);
+        // SAFETY: the blocks with their lengths.
+        let results = unsafe {
+            [
+                sw_hdsl_parse_short(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_hdsl_parse_long(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_rtex_parse_response(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_rtex_parse_command_strict(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_rtex_parse_command32(start, len, Some(&mut MaybeUninit::uninit()), Some(&mut MaybeUninit::uninit())),
+                sw_rtex_to_words16(start, len, narrow.as_mut_ptr(), narrow.len()),
+                sw_rtex_to_words32(start, len, wide.as_mut_ptr(), wide.len()),
+                sw_sorte_parse_device_frame(start, len, 3, Some(&mut MaybeUninit::uninit())),
+                sw_sorte_parse_master_frame(start, len, 16, Some(&mut MaybeUninit::uninit())),
+                sw_sorte_parse_header(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_sorte_parse_discovery(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_sorte_strip_preamble(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_sorte_parse_payload(start, len, Some(&mut MaybeUninit::uninit())),
+                sw_aformat_parse_as(0, 0, 255, words.as_ptr(), words.len(), 1, Some(&mut MaybeUninit::uninit())),
+                sw_aformat_parse_abs40(0, 255, words.as_ptr(), words.len(), 0, Some(&mut MaybeUninit::uninit())),
+            ]
+        };
+        assert!(results.iter().all(|result| *result <= 0), "{results:?}");
+        assert_eq!((results[5] == 0, results[6] == 0), (len % 2 == 0, len % 4 == 0));
+        assert_eq!(results[12] == 0, len == 16);
+        // SAFETY: as above.
+        let unpacked = unsafe { sw_rtex_from_words16(narrow.as_ptr(), narrow.len(), back.as_mut_ptr(), len) };
+        assert_eq!((unpacked == 0, unpacked != 0 || back == block), (len % 2 == 0, true));
+    }
+}
+
+/// States of all protocols in memory that was not started, through a few calls, and copied.
+#[test]
+fn states_of_all_protocols_are_started_used_and_copied() {
+    use crate::{hdsl::*, rtex::*};
+    let mut place = MaybeUninit::zeroed();
+    // SAFETY: plain words, and 0 stands for a state that was not started.
+    assert_eq!(sw_hdsl_hear_bits(Some(unsafe { place.assume_init_mut() }), u64::MAX, 0), -3);
+    assert_eq!(sw_hdsl_start(Some(&mut place), 0, 0), 0);
+    // SAFETY: it was started.
+    let mut m: sw_hdsl_t = unsafe { place.assume_init() };
+    for frame in 0..20 {
+        assert!(sw_hdsl_transmission(Some(&m), Some(&mut MaybeUninit::uninit())) == 0);
+        assert!(sw_hdsl_hear_bits(Some(&mut m), u64::MAX, frame * 11_500) >= 0);
+        assert_eq!(sw_hdsl_finished(Some(&m), Some(&mut MaybeUninit::uninit())), 0);
+        m = *std::boxed::Box::new(m);
+    }
+    let config = sw_rtex_config_t {
+        update_ns: 500_000,
+        invalid: 2,
+        wait: 10,
+        ready: 0,
+        inactive: 0,
+        gear_numerator: 1,
+        gear_denominator: 1,
+        echo: 3,
+        command_errors: 3,
+        mac_id: 5,
+        mode: 2,
+    };
+    let mut place = MaybeUninit::zeroed();
+    assert_eq!(sw_rtex_axis_start(Some(&mut place), Some(&config)), 0);
+    // SAFETY: it was started.
+    let mut axis: sw_rtex_axis_t = unsafe { place.assume_init() };
+    let mut drive = MaybeUninit::zeroed();
+    for period in 1..20 {
+        let mut block = [0_u8; 16];
+        // SAFETY: 16 bytes, and an answer of 16.
+        unsafe {
+            assert_eq!(sw_rtex_axis_transmit(Some(&mut axis), block.as_mut_ptr(), 15), -4);
+            assert_eq!(sw_rtex_axis_transmit(Some(&mut axis), block.as_mut_ptr(), 16), 0);
+            assert_eq!(sw_rtex_axis_hear(Some(&mut axis), block.as_ptr(), period % 17, period as u64 * 500_000), 0);
+            assert_eq!(sw_rtex_axis_hear(Some(&mut axis), null(), 0, period as u64 * 500_000 + 1), 0);
+        }
+        axis = *std::boxed::Box::new(axis);
+    }
+    assert!(!sw_rtex_feedback(Some(&axis), 1, 1, Some(&mut MaybeUninit::uninit())));
+    // SAFETY: as above.
+    let unstarted: &mut sw_rtex_drive_t = unsafe { drive.assume_init_mut() };
+    let answer = [0_u8; 32];
+    // SAFETY: 16 and 32 bytes.
+    let refused = unsafe { sw_rtex_drive_hear(Some(unstarted), answer.as_ptr(), 16, null_mut(), 0) };
+    assert!(refused < 0 && answer == [0; 32]);
+}
+
+/// A position that was dropped stays so: a late poll does not bring it back.
+#[test]
+fn what_was_dropped_does_not_come_back() {
+    let mut place = MaybeUninit::zeroed();
+    assert_eq!(sw_tformat_init(Some(&mut place), 2_500_000, 23, 16), 0);
+    // SAFETY: it was started.
+    let mut m: sw_tformat_t = unsafe { place.assume_init() };
+    assert_eq!(sw_tformat_poll(Some(&mut m), 0), -6);
+    assert_eq!(sw_tformat_read(Some(&mut m), 3, 0, Some(&mut MaybeUninit::uninit())), 2);
+    // SAFETY: as long as it says.
+    assert_eq!(unsafe { sw_tformat_hear(Some(&mut m), ANSWER.as_ptr(), ANSWER.len(), 51_000) }, 0);
+    let angle = |m: &sw_tformat_t| sw_tformat_angle(Some(m), 60_000, 100_000, Some(&mut MaybeUninit::uninit()));
+    assert!(angle(&m));
+    assert_eq!(sw_tformat_poll(Some(&mut m), 52_000), 0);
+    assert!(angle(&m));
+    assert_eq!(sw_tformat_set_resolution(Some(&mut m), 23, 12, 0), 0);
+    assert_eq!(sw_tformat_poll(Some(&mut m), 53_000), 0);
+    assert!(!angle(&m));
 }

@@ -166,19 +166,6 @@ pub(crate) const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     (sum ^ sum >> 8) & 0xff == 0 && b0 == CF3
 }
 
-/// Checks control field, length and check field of a response to `id`.
-fn checked(id: DataId, bytes: &[u8]) -> Result<(), Error> {
-    let want = id.response_fields();
-    let truncated = Error::Truncated { got: count(bytes), want: want.into() };
-    let Some(&cf) = bytes.first() else { return Err(truncated) };
-    let wanted = id.control_field();
-    if cf != wanted.get() {
-        let got = ControlField::parse(cf)?.get();
-        return Err(if got == CF3 { rejection(bytes) } else { Error::CfMismatch { got, want: wanted.get() } });
-    }
-    check(bytes.get(..usize::from(want)).ok_or(truncated)?)
-}
-
 /// Returns the error that an unrequested ID 3 frame stands for.
 #[cold]
 fn rejection(bytes: &[u8]) -> Error {
@@ -200,13 +187,24 @@ fn line_refusal(line: u128) -> Error {
     }
 }
 
-/// Returns why a response to `id` is refused; off the hot path.
+/// Returns why a response to `id` is refused: by its control field, length or check field, in this order. Off the hot path.
 #[cold]
 #[inline(never)]
 pub(crate) fn refusal(id: DataId, bytes: &[u8]) -> Error {
-    match checked(id, bytes) {
-        Err(error) => error,
-        // Never: the caller saw a fault.
-        Ok(()) => Error::Truncated { got: count(bytes), want: id.response_fields().into() },
+    let want = id.response_fields();
+    let truncated = Error::Truncated { got: count(bytes), want: want.into() };
+    let Some(&cf) = bytes.first() else { return truncated };
+    let wanted = id.control_field();
+    if cf != wanted.get() {
+        return match ControlField::parse(cf).map(ControlField::get) {
+            Err(error) => error,
+            Ok(CF3) => rejection(bytes),
+            Ok(got) => Error::CfMismatch { got, want: wanted.get() },
+        };
+    }
+    match bytes.get(..usize::from(want)).map(check) {
+        Some(Err(error)) => error,
+        // A whole response without a fault never comes here: the caller saw one.
+        None | Some(Ok(())) => truncated,
     }
 }

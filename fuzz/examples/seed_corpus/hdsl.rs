@@ -5,6 +5,8 @@ use serde_json::Value;
 use crate::Source;
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_codecs", "hdsl/short_message.jsonl", |row| hex(&row["request"])),
+    ("c_codecs", "hdsl/long_message.jsonl", |row| hex(&row["request"])),
     ("hdsl_symbol", "hdsl/8b10b_stream.jsonl", symbols),
     ("hdsl_answer", "hdsl/answer.jsonl", answer),
     ("hdsl_head", "hdsl/master_header.jsonl", head),

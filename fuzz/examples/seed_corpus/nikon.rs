@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::{Source, hex, packed};
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_codecs", "nikon/rx_responses.jsonl", words),
     ("nikon_request", "nikon/tx_transactions.jsonl", request),
     ("nikon_reply", "nikon/rx_responses.jsonl", reply),
     ("nikon_reply", "nikon/rx_negative.jsonl", reply),
@@ -15,6 +16,12 @@ pub(crate) const SOURCES: &[Source] = &[
     ("nikon_inspect", "nikon/rx_negative.jsonl", inspected),
     ("nikon_world", "nikon/tx_transactions.jsonl", world),
 ];
+
+/// 16-bit words, low byte first.
+fn words(row: &Value) -> Option<Vec<u8>> {
+    let words = row["words"].as_array()?.iter().filter_map(Value::as_str);
+    Some(words.flat_map(|word| hex(word).into_iter().rev()).collect())
+}
 
 fn request(row: &Value) -> Option<Vec<u8>> {
     let words = row["frames"].as_array()?.iter().filter_map(|frame| frame["word16"].as_str());

@@ -5,6 +5,9 @@ use serde_json::Value;
 use crate::{Source, hex};
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_codecs", "rtex/commands32.jsonl", block),
+    ("c_codecs", "rtex/responses16.jsonl", block),
+    ("c_codecs", "rtex/responses32.jsonl", block),
     ("rtex_block", "rtex/commands16.jsonl", block),
     ("rtex_block", "rtex/commands32.jsonl", block),
     ("rtex_block", "rtex/responses16.jsonl", block),

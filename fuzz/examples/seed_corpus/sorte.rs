@@ -5,6 +5,9 @@ use serde_json::Value;
 use crate::{Source, hex};
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_codecs", "sorte/ioex_device.jsonl", frame),
+    ("c_codecs", "sorte/ioex_master.jsonl", frame),
+    ("c_codecs", "sorte/param.jsonl", frame),
     ("sorte_frame", "sorte/negative.jsonl", frame),
     ("sorte_frame", "sorte/ioex_master.jsonl", frame),
     ("sorte_frame", "sorte/ioex_device.jsonl", frame),

@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::{Source, hex, packed};
 
 pub(crate) const SOURCES: &[Source] = &[
+    ("c_codecs", "tformat/responses.jsonl", |row| row["bytes"].as_str().map(hex)),
     ("c_tformat", "tformat/responses.jsonl", bytes),
     ("c_tformat", "tformat/procedures.jsonl", procedure),
     ("tformat_request", "tformat/request_decode.jsonl", request),

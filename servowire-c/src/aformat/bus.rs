@@ -21,7 +21,7 @@ use crate::tformat::sw_position_t;
 pub struct sw_aformat_t {
     pub(crate) _private: [MaybeUninit<u64>; 112],
 }
-state!(sw_aformat_t, Master, b"SWaf");
+state!(sw_aformat_t, Master, 0x21);
 
 #[derive(Clone, Copy)]
 pub(crate) struct Master {

@@ -17,7 +17,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_aformat_device_t {
     pub(crate) _private: [MaybeUninit<u64>; 92],
 }
-state!(sw_aformat_device_t, Device<1>, b"SWad");
+state!(sw_aformat_device_t, Device<1>, 0x25);
 
 /// What an encoder sends, and when.
 #[repr(C)]

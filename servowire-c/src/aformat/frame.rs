@@ -35,7 +35,7 @@ pub struct sw_aformat_frame_t {
 pub struct sw_aformat_receiver_t {
     pub(crate) _private: [MaybeUninit<u64>; 16],
 }
-state!(sw_aformat_receiver_t, LineReceiver, b"SWal");
+state!(sw_aformat_receiver_t, LineReceiver, 0x24);
 
 fn frame(it: sw_aformat_frame_t) -> Result<RequestFrame, Refused> {
     let code = in_range(FrameCode::from_code(it.fc))?;

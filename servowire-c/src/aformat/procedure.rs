@@ -21,7 +21,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_aformat_procedure_t {
     pub(crate) _private: [MaybeUninit<u64>; 80],
 }
-state!(sw_aformat_procedure_t, Procedure, b"SWap");
+state!(sw_aformat_procedure_t, Procedure, 0x22);
 
 #[derive(Clone, Copy)]
 enum Kind {

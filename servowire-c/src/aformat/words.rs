@@ -20,7 +20,7 @@ use crate::result::sw_result_t;
 pub struct sw_aformat_bus_t {
     pub(crate) _private: [MaybeUninit<u64>; 36],
 }
-state!(sw_aformat_bus_t, Bus, b"SWab");
+state!(sw_aformat_bus_t, Bus, 0x23);
 
 /// The response with the whole position.
 #[repr(C)]

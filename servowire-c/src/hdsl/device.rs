@@ -15,7 +15,7 @@ use crate::result::sw_result_t;
 pub struct sw_hdsl_device_t {
     pub(crate) _private: [MaybeUninit<u64>; 54],
 }
-state!(sw_hdsl_device_t, Device, b"SWhe");
+state!(sw_hdsl_device_t, Device, 0x32);
 
 /// Switches a modelled encoder on, with an encoder identifier.
 #[unsafe(no_mangle)]

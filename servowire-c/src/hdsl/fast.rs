@@ -15,7 +15,7 @@ use crate::result::sw_result_t;
 pub struct sw_hdsl_tracker_t {
     pub(crate) _private: [MaybeUninit<u64>; 14],
 }
-state!(sw_hdsl_tracker_t, PositionTracker, b"SWht");
+state!(sw_hdsl_tracker_t, PositionTracker, 0x33);
 
 /// A quality monitor. Its content is private; it may be copied.
 #[repr(C)]
@@ -23,7 +23,7 @@ state!(sw_hdsl_tracker_t, PositionTracker, b"SWht");
 pub struct sw_hdsl_quality_t {
     pub(crate) _private: [MaybeUninit<u64>; 2],
 }
-state!(sw_hdsl_quality_t, QualityMonitor, b"SWhq");
+state!(sw_hdsl_quality_t, QualityMonitor, 0x34);
 
 /// Registers of the fast position.
 #[repr(C)]

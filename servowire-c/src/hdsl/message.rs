@@ -10,7 +10,7 @@ use hdsl::message::{
 
 use super::error;
 use super::receiver::sw_hdsl_t;
-use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
+use crate::border::{OK, Refused, border, given, in_range, parsed, read, there};
 use crate::result::{sw_code_t, sw_result_t};
 
 /// Bytes of the longest message.
@@ -117,13 +117,6 @@ fn code_of(it: ResourceError) -> sw_hdsl_data_t {
     sw_hdsl_data_t { len: 2, data: [it.detail(), it.class_code(), 0, 0, 0, 0, 0, 0] }
 }
 
-/// Bytes of a message into the caller's buffer.
-fn put(to: &mut [MaybeUninit<u8>], len: &mut MaybeUninit<usize>, from: &MessageBytes) -> Result<sw_result_t, Refused> {
-    fill(to, from.as_bytes())?;
-    len.write(from.as_bytes().len());
-    OK
-}
-
 /// The bytes of a short message with their CRC.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_hdsl_build_short(
@@ -132,11 +125,8 @@ pub unsafe extern "C" fn sw_hdsl_build_short(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes, len) = (there(it)?, unsafe { room(bytes, size)? }, there(len)?);
-        put(bytes, len, &short(*it)?.emit())
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { given(bytes, size, len, || Ok(short(*there(it)?)?.emit()), MessageBytes::as_bytes) }
 }
 
 /// A short message as an encoder receives it.
@@ -146,16 +136,15 @@ pub unsafe extern "C" fn sw_hdsl_parse_short(
     len: usize,
     it: Option<&mut MaybeUninit<sw_hdsl_short_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (bytes, out) = (unsafe { read(bytes, len)? }, there(it)?);
+    let parse = |bytes: &[u8]| {
         let (register, write, value) = match ShortRequest::parse(bytes).map_err(error)? {
             ShortRequest::Read(register) => (register, 0, 0),
             ShortRequest::Write(register, value) => (register, 1, value),
         };
-        out.write(sw_hdsl_short_t { register_address: register.address(), write, value });
-        OK
-    })
+        Ok(sw_hdsl_short_t { register_address: register.address(), write, value })
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, it, parse) }
 }
 
 /// What the encoder answers to a short message, with the value that was read.
@@ -167,12 +156,13 @@ pub unsafe extern "C" fn sw_hdsl_build_short_answer(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes, len) = (there(it)?, unsafe { room(bytes, size)? }, there(len)?);
+    let make = || {
+        let it = there(it)?;
         let data = if flag(it.write)? { None } else { Some(value) };
-        put(bytes, len, &ShortAnswer { register: register(it.register_address)?, data }.emit())
-    })
+        Ok(ShortAnswer { register: register(it.register_address)?, data }.emit())
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { given(bytes, size, len, make, MessageBytes::as_bytes) }
 }
 
 /// The answer to a short message: the value that was read, 0 after a write.
@@ -183,12 +173,9 @@ pub unsafe extern "C" fn sw_hdsl_parse_short_answer(
     len: usize,
     value: Option<&mut MaybeUninit<u8>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes, value) = (there(it)?, unsafe { read(bytes, len)? }, there(value)?);
-        value.write(short(*it)?.parse_answer(bytes).map_err(error)?.data.unwrap_or(0));
-        OK
-    })
+    let parse = |bytes: &[u8]| Ok(short(*there(it)?)?.parse_answer(bytes).map_err(error)?.data.unwrap_or(0));
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, value, parse) }
 }
 
 /// The bytes of a long message with their CRC.
@@ -199,11 +186,8 @@ pub unsafe extern "C" fn sw_hdsl_build_long(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes, len) = (there(it)?, unsafe { room(bytes, size)? }, there(len)?);
-        put(bytes, len, &long(it)?.emit())
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { given(bytes, size, len, || Ok(long(there(it)?)?.emit()), MessageBytes::as_bytes) }
 }
 
 /// A long message as an encoder receives it.
@@ -213,9 +197,7 @@ pub unsafe extern "C" fn sw_hdsl_parse_long(
     len: usize,
     it: Option<&mut MaybeUninit<sw_hdsl_long_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (bytes, out) = (unsafe { read(bytes, len)? }, there(it)?);
+    let parse = |bytes: &[u8]| {
         let request = LongRequest::parse(bytes).map_err(error)?;
         let (write, data) = match request.access {
             Access::Read(length) => {
@@ -223,16 +205,17 @@ pub unsafe extern "C" fn sw_hdsl_parse_long(
             }
             Access::Write(data) => (1, data_of(&data)),
         };
-        out.write(sw_hdsl_long_t {
+        Ok(sw_hdsl_long_t {
             address: request.address.get(),
             offset: request.offset.map_or(SW_HDSL_NO_OFFSET, Offset::get),
             write,
             indirect: request.indirect.into(),
             len: data.len,
             data: data.data,
-        });
-        OK
-    })
+        })
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, it, parse) }
 }
 
 /// What the encoder answers to a long message: data, or (`refuses` is 1) its error code, detail and class.
@@ -245,14 +228,15 @@ pub unsafe extern "C" fn sw_hdsl_build_long_answer(
     size: usize,
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, answer, bytes, len) = (there(it)?, there(answer)?, unsafe { room(bytes, size)? }, there(len)?);
+    let make = || {
+        let (it, answer) = (there(it)?, there(answer)?);
         let [detail, class, ..] = answer.data;
         let result =
             if flag(refuses)? { Err(ResourceError::new(class, detail)) } else { Ok(data(answer.len, answer.data)?) };
-        put(bytes, len, &LongAnswer::to(&long(it)?, result).emit())
-    })
+        Ok(LongAnswer::to(&long(it)?, result).emit())
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { given(bytes, size, len, make, MessageBytes::as_bytes) }
 }
 
 /// The answer to a long message. Of SW_E_HDSL_RESOURCE the code of the encoder is written too.

@@ -24,7 +24,7 @@ const _: () = assert!(SW_HDSL_WINDOW == hdsl::sampling::WINDOW);
 pub struct sw_hdsl_t {
     pub(crate) _private: [MaybeUninit<u64>; 84],
 }
-state!(sw_hdsl_t, Master, b"SWhd");
+state!(sw_hdsl_t, Master, 0x31);
 
 /// What is to be sent from the start of an H-frame.
 #[repr(C)]

@@ -17,7 +17,7 @@ use crate::result::sw_result_t;
 pub struct sw_hdsl_registers_t {
     pub(crate) _private: [MaybeUninit<u64>; 64],
 }
-state!(sw_hdsl_registers_t, Registers, b"SWhg");
+state!(sw_hdsl_registers_t, Registers, 0x35);
 
 /// The FIFO of eight bytes that PIPE_S and PIPE_D read. Its content is private; it may be copied.
 #[repr(C)]
@@ -25,7 +25,7 @@ state!(sw_hdsl_registers_t, Registers, b"SWhg");
 pub struct sw_hdsl_pipe_t {
     pub(crate) _private: [MaybeUninit<u64>; 5],
 }
-state!(sw_hdsl_pipe_t, PipeFifo, b"SWhp");
+state!(sw_hdsl_pipe_t, PipeFifo, 0x36);
 
 /// The registers of a receiver of this dialect (sw_hdsl_dialect_t) before its first frame.
 #[unsafe(no_mangle)]

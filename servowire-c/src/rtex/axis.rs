@@ -22,7 +22,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_rtex_axis_t {
     pub(crate) _private: [MaybeUninit<u64>; 60],
 }
-state!(sw_rtex_axis_t, Master, b"SWrt");
+state!(sw_rtex_axis_t, Master, 0x41);
 
 #[derive(Clone, Copy)]
 pub(crate) struct Master {

@@ -3,12 +3,12 @@
 use core::mem::MaybeUninit;
 
 use rtex_block::{
-    Code, Command, Command32, ControlBits, Execution, LEN32, MacId, Nibble, Response, Response32, StatusFlags, SubCode,
+    Code, Command, Command32, ControlBits, Execution, MacId, Nibble, Response, Response32, StatusFlags, SubCode,
     SubCommand, SubResponse, UpdateCounter,
 };
 
 use super::block::{command, error, sw_rtex_command_t, sw_rtex_response_t, written_command, written_response};
-use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
+use crate::border::{OK, Refused, border, filled, in_range, parsed, read, there};
 use crate::result::sw_result_t;
 
 /// The sub block of a command, bytes 16 to 31.
@@ -112,12 +112,9 @@ pub unsafe extern "C" fn sw_rtex_parse_command_strict(
     len: usize,
     command: Option<&mut MaybeUninit<sw_rtex_command_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (bytes, out) = (unsafe { read(bytes, len)? }, there(command)?);
-        out.write(written_command(&Command::parse_strict(bytes).map_err(error)?));
-        OK
-    })
+    let parse = |bytes: &[u8]| Ok(written_command(&Command::parse_strict(bytes).map_err(error)?));
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, command, parse) }
 }
 
 /// The command in a block of 32 bytes.
@@ -153,13 +150,9 @@ pub unsafe extern "C" fn sw_rtex_build_command32(
     bytes: *mut u8,
     size: usize,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, sub, bytes) = (there(it)?, there(sub)?, unsafe { room(bytes, size)? });
-        let block: [u8; LEN32] = Command32 { main: command(it)?, sub: sub_command(sub)? }.emit();
-        fill(bytes, &block)?;
-        OK
-    })
+    let make = || Ok(Command32 { main: command(there(it)?)?, sub: sub_command(there(sub)?)? }.emit());
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, make) }
 }
 
 /// The response in a block of 32 bytes.
@@ -187,12 +180,8 @@ pub unsafe extern "C" fn sw_rtex_build_response(
     bytes: *mut u8,
     size: usize,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes) = (there(it)?, unsafe { room(bytes, size)? });
-        fill(bytes, &response(it)?.emit())?;
-        OK
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, || Ok(response(there(it)?)?.emit())) }
 }
 
 /// The block of a response of the 32-byte mode, as a drive sends it.
@@ -203,12 +192,9 @@ pub unsafe extern "C" fn sw_rtex_build_response32(
     bytes: *mut u8,
     size: usize,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let (it, sub, bytes) = (there(it)?, there(sub)?, unsafe { room(bytes, size)? });
-        fill(bytes, &Response32 { main: response(it)?, sub: sub_response(sub)? }.emit())?;
-        OK
-    })
+    let make = || Ok(Response32 { main: response(there(it)?)?, sub: sub_response(there(sub)?)? }.emit());
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, make) }
 }
 
 /// The control bits that a drive knows, of bytes 2 and 3 (byte 2 is the low one); the others are reserved.

@@ -17,7 +17,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_rtex_phases_t {
     pub(crate) _private: [MaybeUninit<u64>; 2],
 }
-state!(sw_rtex_phases_t, PhaseControl, b"SWrp");
+state!(sw_rtex_phases_t, PhaseControl, 0x46);
 
 /// What the phases depend on.
 #[repr(C)]

@@ -15,7 +15,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_rtex_drive_t {
     pub(crate) _private: [MaybeUninit<u64>; 84],
 }
-state!(sw_rtex_drive_t, Drive, b"SWrd");
+state!(sw_rtex_drive_t, Drive, 0x42);
 
 /// Switches a drive on: update period 0.5 ms, one communication an update, gear 1/1.
 #[unsafe(no_mangle)]

@@ -18,7 +18,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_rtex_handshake_t {
     pub(crate) _private: [MaybeUninit<u64>; 6],
 }
-state!(sw_rtex_handshake_t, Handshake, b"SWrh");
+state!(sw_rtex_handshake_t, Handshake, 0x47);
 
 /// A sub-command under way. Its content is private; it may be copied.
 #[repr(C)]
@@ -26,7 +26,7 @@ state!(sw_rtex_handshake_t, Handshake, b"SWrh");
 pub struct sw_rtex_sub_handshake_t {
     pub(crate) _private: [MaybeUninit<u64>; 4],
 }
-state!(sw_rtex_sub_handshake_t, SubHandshake, b"SWrs");
+state!(sw_rtex_sub_handshake_t, SubHandshake, 0x48);
 
 /// A profile motion under way. Its content is private; it may be copied.
 #[repr(C)]
@@ -34,7 +34,7 @@ state!(sw_rtex_sub_handshake_t, SubHandshake, b"SWrs");
 pub struct sw_rtex_move_t {
     pub(crate) _private: [MaybeUninit<u64>; 10],
 }
-state!(sw_rtex_move_t, ProfileMove, b"SWrm");
+state!(sw_rtex_move_t, ProfileMove, 0x49);
 
 /// How a procedure ended.
 #[repr(C)]
@@ -90,16 +90,24 @@ fn executed(value: &NonCyclicResponse) -> sw_rtex_done_t {
     sw_rtex_done_t { data: value.data().unwrap_or(0), index, warning, in_position: 0 }
 }
 
-/// The block of an update period, `None` for a NULL and for a block that is refused: the period passes without an answer.
+/// Gives a procedure the block of an update period, `None` for a NULL and for a block that is refused: the period passes without an
+/// answer.
 ///
 /// # Safety
 /// As for [`read`].
-unsafe fn heard(bytes: *const u8, len: usize) -> Result<Option<Response>, Refused> {
-    if bytes.is_null() {
-        return Ok(None);
-    }
-    // SAFETY: the caller vouches for it.
-    Ok(Response::parse(unsafe { read(bytes, len)? }).ok())
+unsafe fn hear<T>(
+    bytes: *const u8,
+    len: usize,
+    receive: impl FnOnce(Option<&Response>) -> Result<Progress<T>, Refused>,
+    out: Option<&mut MaybeUninit<sw_rtex_done_t>>,
+    done: impl FnOnce(&T) -> sw_rtex_done_t,
+) -> sw_result_t {
+    border(|| {
+        let out = there(out)?;
+        // SAFETY: the caller vouches for it.
+        let heard = if bytes.is_null() { None } else { Response::parse(unsafe { read(bytes, len)? }).ok() };
+        ended(&receive(heard.as_ref())?, out, done)
+    })
 }
 
 /// Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer has to come within `limit` update periods.
@@ -152,12 +160,9 @@ pub unsafe extern "C" fn sw_rtex_handshake_hear(
     len: usize,
     done: Option<&mut MaybeUninit<sw_rtex_done_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let heard = unsafe { heard(bytes, len)? };
-        let (it, done) = (sw_rtex_handshake_t::get(handshake)?, there(done)?);
-        ended(&it.receive(heard.as_ref()), done, executed)
-    })
+    let receive = |heard: Option<&Response>| Ok(sw_rtex_handshake_t::get(handshake)?.receive(heard));
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { hear(bytes, len, receive, done, executed) }
 }
 
 /// Begins a sub-command of the 32-byte mode: 2 system ID, 10 monitor.
@@ -247,14 +252,13 @@ pub unsafe extern "C" fn sw_rtex_move_hear(
     len: usize,
     done: Option<&mut MaybeUninit<sw_rtex_done_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let heard = unsafe { heard(bytes, len)? };
-        let (it, done) = (sw_rtex_move_t::get(motion)?, there(done)?);
-        ended(&it.receive(heard.as_ref()), done, |value| sw_rtex_done_t {
+    let receive = |heard: Option<&Response>| Ok(sw_rtex_move_t::get(motion)?.receive(heard));
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe {
+        hear(bytes, len, receive, done, |value| sw_rtex_done_t {
             warning: value.warning.into(),
             in_position: value.in_position.into(),
             ..NOTHING
         })
-    })
+    }
 }

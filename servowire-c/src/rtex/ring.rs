@@ -23,7 +23,7 @@ const _: () = assert!(SW_RTEX_AXES == MacId::COUNT);
 pub struct sw_rtex_ring_t {
     pub(crate) _private: [MaybeUninit<u64>; 5],
 }
-state!(sw_rtex_ring_t, Ring, b"SWrr");
+state!(sw_rtex_ring_t, Ring, 0x43);
 
 #[derive(Clone, Copy)]
 pub(crate) struct Ring {
@@ -39,7 +39,7 @@ pub(crate) struct Ring {
 pub struct sw_rtex_echo_t {
     pub(crate) _private: [MaybeUninit<u64>; 4],
 }
-state!(sw_rtex_echo_t, EchoWatch, b"SWre");
+state!(sw_rtex_echo_t, EchoWatch, 0x44);
 
 /// The counter of the commands. Its content is private; it may be copied.
 #[repr(C)]
@@ -47,7 +47,7 @@ state!(sw_rtex_echo_t, EchoWatch, b"SWre");
 pub struct sw_rtex_counter_t {
     pub(crate) _private: [MaybeUninit<u64>; 2],
 }
-state!(sw_rtex_counter_t, CommandCounter, b"SWrc");
+state!(sw_rtex_counter_t, CommandCounter, 0x45);
 
 /// What a drive finds in a command.
 #[repr(C)]

@@ -8,7 +8,7 @@ use tformat::{
     Request, Resolution, Response, SingleTurn, StatusField, Window,
 };
 
-use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
+use crate::border::{OK, Refused, border, fill, given, in_range, read, room, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
 /// What a master sends.
@@ -260,26 +260,6 @@ pub unsafe extern "C" fn sw_tformat_why(
     })
 }
 
-/// Copies a frame to the caller.
-///
-/// # Safety
-/// As for [`room`].
-unsafe fn give(
-    frame: impl FnOnce() -> Result<Frame, Refused>,
-    bytes: *mut u8,
-    size: usize,
-    len: Option<&mut MaybeUninit<usize>>,
-) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller vouches for it.
-        let bytes = unsafe { room(bytes, size)? };
-        let (frame, len) = (frame()?, there(len)?);
-        fill(bytes, frame.as_bytes())?;
-        len.write(frame.as_bytes().len());
-        OK
-    })
-}
-
 /// The fields to send for a request, at most 4 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_build(
@@ -289,7 +269,7 @@ pub unsafe extern "C" fn sw_tformat_build(
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
     // SAFETY: the caller of the C function vouches for his memory.
-    unsafe { give(|| Ok(request(*there(asked)?)?.emit()), bytes, size, len) }
+    unsafe { given(bytes, size, len, || Ok(request(*there(asked)?)?.emit()), Frame::as_bytes) }
 }
 
 /// The line bits of a request, start bits and delimiters included, in the order of sw_bit_order_t, at most 40 bits in 5 bytes; `bits`
@@ -323,7 +303,7 @@ pub unsafe extern "C" fn sw_tformat_build_response(
     len: Option<&mut MaybeUninit<usize>>,
 ) -> sw_result_t {
     // SAFETY: the caller of the C function vouches for his memory.
-    unsafe { give(|| Ok(deep(*there(response)?)?.emit()), bytes, size, len) }
+    unsafe { given(bytes, size, len, || Ok(deep(*there(response)?)?.emit()), Frame::as_bytes) }
 }
 
 /// The control field of a data ID, 0..15: sink code, ID and parity. IDs above 15 are cut.

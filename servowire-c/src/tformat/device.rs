@@ -16,7 +16,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_tformat_device_t {
     pub(crate) _private: [MaybeUninit<u64>; 128],
 }
-state!(sw_tformat_device_t, Device<6>, b"SWtd");
+state!(sw_tformat_device_t, Device<6>, 0x13);
 
 /// What an encoder sends, and when.
 #[repr(C)]

@@ -19,16 +19,16 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_tformat_t {
     pub(crate) _private: [MaybeUninit<u64>; 36],
 }
-state!(sw_tformat_t, Master, b"SWtf");
+state!(sw_tformat_t, Master, 0x11);
 
 #[derive(Clone, Copy)]
 pub(crate) struct Master {
     pub(super) line: Line,
     resolution: Resolution,
-    tolerated: Almc,
+    /// What is tolerated where the motor is commutated, and where turns are counted.
+    commutating: Tolerated,
+    positioning: Tolerated,
     pub(super) transaction: Transaction,
-    /// The transaction is one that was asked for.
-    pub(super) asked: bool,
     evidence: Evidence,
 }
 
@@ -107,7 +107,6 @@ impl Master {
             // What was heard before counts from another zero.
             self.evidence = Evidence::NEVER;
         }
-        self.asked = true;
         self.transaction.restart(request, self.line, start_ns);
         if let Some(Err(refusal)) = self.transaction.outcome() {
             return Err(error(*refusal));
@@ -126,36 +125,40 @@ impl Master {
         Ok(sw_code_t::SW_SEND as sw_result_t)
     }
 
-    /// The transaction, if one was asked for.
-    #[inline(always)]
-    fn told(&mut self) -> Result<&mut Transaction, Refused> {
-        if self.asked { Ok(&mut self.transaction) } else { Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) }
+    /// The transaction is one that was asked for: a request has fields.
+    pub(super) fn asked(&self) -> bool {
+        self.transaction.transmission().frame.fields() > 0
     }
 
-    /// Out of line: what the caller is refused for costs no frame on the stack.
-    #[inline(never)]
-    fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Result<sw_result_t, Refused> {
-        self.told()?.push(bytes, end_ns);
-        self.result()
-    }
-
-    /// What became of it, and the position that came of it. Out of line: three functions need it.
-    #[inline(never)]
-    fn result(&mut self) -> Result<sw_result_t, Refused> {
+    /// What became of it, and the position that came of it if it was pending until now.
+    #[inline]
+    fn result(&mut self, pending: bool) -> Result<sw_result_t, Refused> {
         match self.transaction.outcome() {
             None => Ok(sw_code_t::SW_PENDING as sw_result_t),
-            Some(Ok(value)) => {
-                if matches!(value.response, Response::ReadSingleTurn(_) | Response::ReadAll(_)) {
-                    self.evidence = value.evidence(self.resolution);
+            // A transaction that nobody has asked for counts as one that failed.
+            Some(Err(_)) if !self.asked() => Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
+            Some(Err(refusal)) => Err(error(*refusal)),
+            Some(Ok(_)) => {
+                if pending {
+                    self.take();
                 }
                 OK
             }
-            Some(Err(refusal)) => Err(error(*refusal)),
+        }
+    }
+
+    /// Takes the position of an exchange that has just ended. Out of line: three functions need it.
+    #[inline(never)]
+    fn take(&mut self) {
+        if let Some(Ok(value)) = self.transaction.outcome() {
+            if matches!(value.response, Response::ReadSingleTurn(_) | Response::ReadAll(_)) {
+                self.evidence = value.evidence(self.resolution);
+            }
         }
     }
 
     fn commutation(&self, max_age_ns: u64) -> Policy {
-        Policy::new(max_age_ns).tolerating(Tolerated::SINGLE_TURN.alarms(self.tolerated))
+        Policy::new(max_age_ns).tolerating(self.commutating)
     }
 }
 
@@ -178,9 +181,9 @@ pub extern "C" fn sw_tformat_init(
         let state = Master {
             line,
             resolution,
-            tolerated: Almc::empty(),
+            commutating: Tolerated::SINGLE_TURN,
+            positioning: Tolerated::MULTI_TURN,
             transaction: Transaction::idle(),
-            asked: false,
             evidence: Evidence::NEVER,
         };
         sw_tformat_t::start(m, state)?;
@@ -256,7 +259,9 @@ pub extern "C" fn sw_tformat_set_line(m: Option<&mut sw_tformat_t>, line: Option
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_tolerate(m: Option<&mut sw_tformat_t>, almc: u8) -> sw_result_t {
     border(|| {
-        sw_tformat_t::get(m)?.tolerated = Almc::from_bits_retain(almc);
+        let (m, alarms) = (sw_tformat_t::get(m)?, Almc::from_bits_retain(almc));
+        m.commutating = Tolerated::SINGLE_TURN.alarms(alarms);
+        m.positioning = Tolerated::MULTI_TURN.alarms(alarms);
         OK
     })
 }
@@ -310,7 +315,10 @@ pub unsafe extern "C" fn sw_tformat_hear(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let end_ns = time(end_ns)?;
-        sw_tformat_t::get(m)?.hear(bytes, end_ns)
+        let m = sw_tformat_t::get(m)?;
+        let pending = m.transaction.outcome().is_none();
+        m.transaction.push(bytes, end_ns);
+        m.result(pending)
     })
 }
 
@@ -320,8 +328,9 @@ pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns:
     border(|| {
         let end_ns = time(end_ns)?;
         let m = sw_tformat_t::get(m)?;
-        let _ = m.told()?.framing_error(end_ns);
-        m.result()
+        let pending = m.transaction.outcome().is_none();
+        let _ = m.transaction.framing_error(end_ns);
+        m.result(pending)
     })
 }
 
@@ -331,8 +340,11 @@ pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> 
     border(|| {
         let now_ns = time(now_ns)?;
         let m = sw_tformat_t::get(m)?;
-        let _ = m.told()?.poll(now_ns);
-        m.result()
+        if m.transaction.outcome().is_some() {
+            return m.result(false);
+        }
+        let _ = m.transaction.poll(now_ns);
+        m.result(true)
     })
 }
 
@@ -390,7 +402,7 @@ pub extern "C" fn sw_tformat_position(
     position: Option<&mut MaybeUninit<sw_position_t>>,
 ) -> bool {
     let (Ok(m), Some(position), Ok(now_ns)) = (sw_tformat_t::look(m), position, time(now_ns)) else { return false };
-    let policy = Policy::new(max_age_ns).tolerating(Tolerated::MULTI_TURN.alarms(m.tolerated));
+    let policy = Policy::new(max_age_ns).tolerating(m.positioning);
     let Ok(sample) = m.evidence.at(now_ns, policy) else { return false };
     let (Some(counts), Some(turns)) = (sample.counts(), sample.turns()) else { return false };
     let (sampled_ns, single_turn) = (sample.sampled_ns(), sample.single_turn());

@@ -18,7 +18,7 @@ use crate::result::{sw_code_t, sw_result_t};
 pub struct sw_tformat_procedure_t {
     pub(crate) _private: [MaybeUninit<u64>; 20],
 }
-state!(sw_tformat_procedure_t, Procedure, b"SWtp");
+state!(sw_tformat_procedure_t, Procedure, 0x12);
 
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
@@ -164,7 +164,7 @@ pub extern "C" fn sw_tformat_next(
         let (p, m) = (sw_tformat_procedure_t::get(p)?, sw_tformat_t::get(m)?);
         let (now_ns, to_send) = (time(now_ns)?, there(to_send)?);
         if p.asked {
-            if !m.asked {
+            if !m.asked() {
                 return Err(sw_code_t::SW_E_NO_VALUE as sw_result_t);
             }
             let Some(outcome) = m.transaction.outcome() else { return Ok(sw_code_t::SW_PENDING as sw_result_t) };

@@ -5,7 +5,7 @@ use core::mem::MaybeUninit;
 use tformat::{AllData, Request, Response};
 
 use super::codec::error;
-use crate::border::{OK, border, read, there};
+use crate::border::parsed;
 use crate::result::{sw_code_t, sw_result_t};
 
 /// ID 0.
@@ -64,19 +64,12 @@ pub unsafe extern "C" fn sw_tformat_parse_single_turn(
     len: usize,
     data: Option<&mut MaybeUninit<sw_tformat_single_turn_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        let data = there(data)?;
-        match Response::parse(Request::ReadSingleTurn, bytes) {
-            Ok(Response::ReadSingleTurn(it)) => {
-                data.write(sw_tformat_single_turn_t { abs: it.abs.get(), sf: it.sf.bits() });
-                OK
-            }
-            Ok(_) => Err(OTHER_KIND),
-            Err(refusal) => Err(error(refusal)),
-        }
-    })
+    let parse = |bytes: &[u8]| match Response::parse(Request::ReadSingleTurn, bytes).map_err(error)? {
+        Response::ReadSingleTurn(it) => Ok(sw_tformat_single_turn_t { abs: it.abs.get(), sf: it.sf.bits() }),
+        _ => Err(OTHER_KIND),
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, data, parse) }
 }
 
 /// The response to ID 1 from UART bytes.
@@ -86,19 +79,12 @@ pub unsafe extern "C" fn sw_tformat_parse_multi_turn(
     len: usize,
     data: Option<&mut MaybeUninit<sw_tformat_multi_turn_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        let data = there(data)?;
-        match Response::parse(Request::ReadMultiTurn, bytes) {
-            Ok(Response::ReadMultiTurn(it)) => {
-                data.write(sw_tformat_multi_turn_t { abm: it.abm.get(), sf: it.sf.bits() });
-                OK
-            }
-            Ok(_) => Err(OTHER_KIND),
-            Err(refusal) => Err(error(refusal)),
-        }
-    })
+    let parse = |bytes: &[u8]| match Response::parse(Request::ReadMultiTurn, bytes).map_err(error)? {
+        Response::ReadMultiTurn(it) => Ok(sw_tformat_multi_turn_t { abm: it.abm.get(), sf: it.sf.bits() }),
+        _ => Err(OTHER_KIND),
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, data, parse) }
 }
 
 /// The response to ID 2 from UART bytes.
@@ -108,19 +94,12 @@ pub unsafe extern "C" fn sw_tformat_parse_encoder_id(
     len: usize,
     data: Option<&mut MaybeUninit<sw_tformat_encoder_id_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        let data = there(data)?;
-        match Response::parse(Request::ReadEncoderId, bytes) {
-            Ok(Response::ReadEncoderId(it)) => {
-                data.write(sw_tformat_encoder_id_t { sf: it.sf.bits(), enid: it.enid });
-                OK
-            }
-            Ok(_) => Err(OTHER_KIND),
-            Err(refusal) => Err(error(refusal)),
-        }
-    })
+    let parse = |bytes: &[u8]| match Response::parse(Request::ReadEncoderId, bytes).map_err(error)? {
+        Response::ReadEncoderId(it) => Ok(sw_tformat_encoder_id_t { sf: it.sf.bits(), enid: it.enid }),
+        _ => Err(OTHER_KIND),
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, data, parse) }
 }
 
 /// The response to ID 3 from UART bytes.
@@ -130,22 +109,16 @@ pub unsafe extern "C" fn sw_tformat_parse_all(
     len: usize,
     data: Option<&mut MaybeUninit<sw_tformat_all_t>>,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { read(bytes, len)? };
-        let data = there(data)?;
-        match AllData::parse(bytes) {
-            Ok(it) => {
-                data.write(sw_tformat_all_t {
-                    abs: it.abs.get(),
-                    abm: it.abm.get(),
-                    sf: it.sf.bits(),
-                    enid: it.enid,
-                    almc: it.almc.bits(),
-                });
-                OK
-            }
-            Err(refusal) => Err(error(refusal)),
-        }
-    })
+    let parse = |bytes: &[u8]| {
+        let it = AllData::parse(bytes).map_err(error)?;
+        Ok(sw_tformat_all_t {
+            abs: it.abs.get(),
+            abm: it.abm.get(),
+            sf: it.sf.bits(),
+            enid: it.enid,
+            almc: it.almc.bits(),
+        })
+    };
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { parsed(bytes, len, data, parse) }
 }

@@ -404,7 +404,33 @@ static void constant(char **a, int n)
     }
 }
 
+/* A block: its words, and the block that they make again. */
+static void words(char **a, int n)
+{
+    block_t block = hex(a[0]);
+    uint32_t wide[8];
+    uint16_t narrow[16];
+    uint8_t back[32];
+    size_t k, count = block.len / 4;
+    (void)n;
+    say("%s", sw_text(sw_rtex_to_words32(block.at, block.len, wide, count)));
+    for (k = 0; k < count; k++) {
+        say(" %08x", wide[k]);
+    }
+    say(" %s", sw_text(sw_rtex_from_words32(wide, count, back, block.len)));
+    say(" %d", memcmp(back, block.at, block.len) == 0);
+    memset(back, 0, sizeof back);
+    say(" %s", sw_text(sw_rtex_to_words16(block.at, block.len, narrow, 2 * count)));
+    for (k = 0; k < 2 * count; k++) {
+        say(" %04x", narrow[k]);
+    }
+    say(" %s", sw_text(sw_rtex_from_words16(narrow, 2 * count, back, block.len)));
+    say(" %d", memcmp(back, block.at, block.len) == 0);
+    say(" %s", sw_text(sw_rtex_to_words32(block.at, block.len, wide, count - 1)));
+}
+
 const entry_t rtex_more_commands[] = {
+    {"rtex_words", words},
     {"rtex_command32", command32}, {"rtex_response32", response32}, {"rtex_rebuilt", rebuilt}, {"rtex_check", check},
     {"rtex_drive", drive}, {"rtex_byte0", byte0}, {"rtex_byte1", byte1}, {"rtex_control", control}, {"rtex_servo_off", servo_off},
     {"rtex_echo", echo}, {"rtex_counter", counter}, {"rtex_handshake", handshake}, {"rtex_sub", sub}, {"rtex_move", move},

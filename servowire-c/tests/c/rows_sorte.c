@@ -336,7 +336,64 @@ static void param(char **a, int n)
     say_hex(back, sizeof back);
 }
 
+/* WORD MASK for a shared word, or four words: the payload, and its words again. */
+static void payload(char **a, int n)
+{
+    uint8_t bytes[SW_SORTE_PAYLOAD];
+    uint16_t words[4] = {0, 0, 0, 0};
+    int k;
+    for (k = 0; n == 4 && k < 4; k++) {
+        words[k] = (uint16_t)strtoul(a[k], NULL, 16);
+    }
+    say("%s", sw_text(n == 4 ? sw_sorte_build_payload(words, 4, bytes, sizeof bytes)
+                             : sw_sorte_build_shared_payload((uint16_t)strtoul(a[0], NULL, 16), U8(a[1]), bytes, sizeof bytes)));
+    say_hex(bytes, sizeof bytes);
+    memset(words, 0, sizeof words);
+    say(" %s", sw_text(sw_sorte_parse_payload(bytes, sizeof bytes, &words)));
+    say(" %04x %04x %04x %04x", words[0], words[1], words[2], words[3]);
+}
+
+static void microstep(char **a, int n)
+{
+    sw_step_microstep_t it;
+    (void)n;
+    say("%s", sw_text(sw_step_microstep(U8(a[0]), &it)));
+    say(" %u %u %u %u %u", it.microsteps, it.turn, it.quarter_turn, it.ten_turns, it.ctrl_field);
+}
+
+/* TENTHS_HZ: the tone, and what follows from it by the other calls. */
+static void tone(char **a, int n)
+{
+    sw_step_tone_t it;
+    uint32_t full, x, y;
+    uint64_t p125 = 0, p250 = 0, hundredths;
+    uint8_t at = 0;
+    (void)n;
+    while (sw_step_tone(at, &it) == SW_OK && it.tenths_hz != number(a[0])) {
+        at++;
+    }
+    if (at == SW_STEP_TONES) {
+        say("no such tone");
+        return;
+    }
+    x = it.numerator;
+    y = it.denominator * 1000u;
+    while (y > 0) {
+        uint32_t rest = x % y;
+        x = y;
+        y = rest;
+    }
+    hundredths = (it.numerator + it.denominator * 5ull) / (it.denominator * 10ull);
+    say("%u/%u %u.%02u", it.numerator / x, it.denominator * 1000u / x, (unsigned)(hundredths / 100), (unsigned)(hundredths % 100));
+    full = sw_step_time_ns(sw_step_ramp(31), it.speed);
+    (void)sw_step_duration_ns(it.speed, 1, 0, it.p125, &p125);
+    (void)sw_step_duration_ns(it.speed, 1, 0, it.p250, &p250);
+    say(" %u %u %u %u ppm %.3f %llu %llu", it.speed, it.p125, it.p250, full, (1000.0 * it.speed / 65536.0 - full) / full * 1e6,
+        (unsigned long long)p125, (unsigned long long)p250);
+}
+
 const entry_t sorte_commands[] = {
+    {"sorte_payload", payload}, {"step_microstep", microstep}, {"step_tone", tone},
     {"sorte_crc8", crc8}, {"sorte_lut", lut}, {"sorte_startup", startup}, {"sorte_preamble", preamble}, {"sorte_param", param},
     {"sorte_master", master}, {"sorte_device", device}, {"sorte_pto", pto}, {"sorte_pto_of_step", pto_of_step}, {"step_next", step},
     {"step_ramp", ramp}, {"step_speed", speed}, {"step_params", params}, {"step_duration", duration}, {"step_move", whole_move}, {"step_own_ramp", own_ramp}, {"step_listed", listed},

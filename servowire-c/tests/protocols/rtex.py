@@ -6,7 +6,7 @@ CONTROL = ("servo_on", "gain_sw", "tl_sw", "homing_ctrl", "hard_stop", "smooth_s
 STATUS = ("servo_active", "servo_ready", "alarm", "warning", "torque_limited", "homing_complete", "in_progress", "in_position", "si_mon5",
           "si_mon4", "si_mon3", "si_mon2", "si_mon1", "home", "pot", "not")
 
-NOT_IN_C = {"packing": "blocks are bytes; words are a matter of the memory of the ASIC"}
+NOT_IN_C = {}
 
 
 def whole(command, direction, head, flags, names):
@@ -126,12 +126,19 @@ def header_byte1(row):
     return [(f"rtex_byte1 {byte}", f"{row['bit7']} {cyclic} {noncyclic} {byte} {row['error_code'] or '0000'} {sent}")]
 
 
+def packing(row):
+    assert row["mode"] == len(row["hex"]) // 2
+    return [(f"rtex_words {row['hex']}", f"ok {' '.join(row['words32'])} ok 1 ok {' '.join(row['words16'])} ok 1 argument")]
+
+
 def control_bits(row):
     bits, sent, reserved = row["bits"], row["bytes2_3"], row.get("reserved_set") or 0
     block = f"0020{sent}" + 24 * "0"
     shown = "".join(f" {name} {int(name in bits)}" for name in CONTROL)
     known = "..." if reserved else f"{sent} ok ok"
-    head = f"ok mac 0 counter 0 tmg 0 cyclic 2 noncyclic 0 data1 0{shown} ..."
+    # Reserved bits are sent as 0, so only a block without them is built again as it was.
+    again = " ok ..." if reserved else f" ok {block}"
+    head = f"ok mac 0 counter 0 tmg 0 cyclic 2 noncyclic 0 data1 0{shown} {block[16:]}{again}"
     return [(f"rtex_control {sent}", f"{sent} ok ok" if not reserved else "0000 ok reserved" if not bits else known),
             (f"rtex_command {block}", head)]
 
@@ -140,7 +147,7 @@ def status_flags(row):
     bits, sent = row["bits"], row["bytes2_3"]
     block = f"8020{sent}" + 24 * "0"
     shown = "".join(f" {name} {int(name in bits)}" for name in STATUS)
-    return [(f"rtex_response {block}", f"ok mac 0 echo 0 error 0 cyclic 2 noncyclic 0 data1 0{shown} ..."),
+    return [(f"rtex_response {block}", f"ok mac 0 echo 0 error 0 cyclic 2 noncyclic 0 data1 0{shown} {block[16:]}"),
             (f"rtex_rebuilt {block}", f"ok ok {block}")]
 
 

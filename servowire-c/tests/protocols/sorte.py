@@ -19,15 +19,25 @@ CLASSES = {"BadCrc8": "bad_crc8", "Truncated": "truncated", "WrongSource": "wron
 
 
 def ioex_master(row):
-    # The preamble and the sums of time stamp and delay are the program's.
-    row.ignore("origin", "wire", "devices", "out_offsets", "crc8")
-    frame = row["frame"]
+    row.ignore("origin")
+    frame, stamp = row["frame"], row["tx_timestamp"]
+    # The check byte stands before the time stamp, and the frame is parsed with it.
+    assert row.get("crc8", frame[-6:-4]) == frame[-6:-4]
     size = len(frame) // 2 - 5
     if (lengths := row.get("out_lengths")) is not None:
         assert sum(lengths) == size
+        assert row["out_offsets"] == [sum(lengths[:at]) for at in range(len(lengths))]
     output = row.get("out_data") or frame[4:-6]
     assert len(output) // 2 == size
-    return [(f"sorte_master {size} {frame}", f"ok {row['tx_timestamp']} status {frame[2:4]} ok {frame} {output}")]
+    commands = [(f"sorte_master {size} {frame}", f"ok {stamp} status {frame[2:4]} ok {frame} {output}")]
+    if (wire := row.get("wire")) is not None:
+        assert wire.endswith(frame)
+        commands.append((f"sorte_preamble {wire}", f"ok {(len(wire) - len(frame)) // 2}"))
+    for at, device in enumerate(row.get("devices") or []):
+        # Sums of time stamp and delay are the program's.
+        assert device["master_ts_plus_delay"] == stamp + device["line_delay_previous"] and device["address"] == at + 1
+        assert output[2 * device["out_offset"]:].startswith(device["slice"])
+    return commands
 
 
 def ioex_master_negative(row):
@@ -41,18 +51,25 @@ def ioex_master_negative(row):
 
 
 def ioex_device(row):
-    row.ignore("origin", "last", "error", "wire", "drv_status", "wire_without_crc", "send_time_ns")
+    row.ignore("origin", "last", "error", "drv_status", "wire_without_crc", "send_time_ns")
     layout, frame = row["layout"], row.get("frame")
     if not layout.endswith("-byte payload"):
-        row.ignore("address")
+        row.ignore("address", "wire")
         return []  # Nothing can be checked in the frame of the published image.
     size = int(layout.split("-")[0])
     assert size == 3
     if (expect := row.get("expect")) is not None and expect != "Ok":
         return [(f"sorte_device {size} {frame or '-'}", CLASSES[expect])]
     if expect == "Ok":
-        return [(f"sorte_device {size} {frame}", "ok ...")]
-    return [(f"sorte_device {size} {frame}", f"ok address {row['address']} status {row['status']} ok {frame} {row['payload']}")]
+        address, status, payload, wire = int(frame[:2], 16), int(frame[2:4], 16), frame[4:10], None
+    else:
+        address, status, payload, wire = row["address"], row["status"], row["payload"], row["wire"]
+        assert status == row["last"] + 4 * row["error"]
+    commands = [(f"sorte_device {size} {frame}", f"ok address {address} status {status} ok {frame} {payload}")]
+    if wire is not None:
+        assert wire.endswith(frame)
+        commands.append((f"sorte_preamble {wire}", f"ok {(len(wire) - len(frame)) // 2}"))
+    return commands
 
 
 KINDS = {"NoPulse": "no_pulse", "Pulse": "pulse", "DriverOff": "driver_off", "OutOfRange": "reserved"}

@@ -3,10 +3,7 @@
 import re
 
 NOT_IN_C = {
-    "microstep": "the stepper driver is not in the C interface",
-    "payload": "four words a device are the program's",
-    "pru_step_core_words": "machine code of the PRU",
-    "tones": "names of tones are not in the C interface",
+    "pru_step_core_words": "machine code of the PRU, which runs no C",
 }
 
 
@@ -98,6 +95,30 @@ def pto_word(row):
         return [(f"sorte_pto {word}", f"{snake(error)} ...")]
     name = {"disable_driver": "driver_off"}.get(kind, kind)
     return [(f"sorte_pto {word}", f"ok {name} start {row.get('sync') or 0} direction {row.get('dir') or 0}")]
+
+
+def payload(row):
+    words, mask = " ".join(row["device_words"]), row.get("mask")
+    if row.get("independent"):
+        assert mask is None and row.get("word") is None
+        command = f"sorte_payload {words}"
+    else:
+        command = f"sorte_payload {row['word']} {mask}"
+    return [(command, f"ok {row['payload']} ok {words}")]
+
+
+def microstep(row):
+    code = row["profile_code"]
+    assert int(row["drv8711_mode_bits"], 2) == code
+    text = f"ok {row['microsteps']} {row['steps_per_rev']} {row['quarter_turn']} {row['ten_turns']} {row['ctrl_field']}"
+    return [(f"step_microstep {code}", text)]
+
+
+def tones(row):
+    whole, tenth = row["tone_hz"].split(".")
+    text = f"{row['fstep_khz_exact']} {row['fstep_khz_2dp']} {row['speed_const']} {row['p125']} {row['p250']} {row['t_step_ns_full_speed']}"
+    text += f" ppm {row['ppm_fast_from_ns_truncation']:.3f} {row['move_ns_p125_k1']} {row['move_ns_p250_k1']}"
+    return [(f"step_tone {int(whole) * 10 + int(tenth)}", text)]
 
 
 step_trace_edge = step_trace
