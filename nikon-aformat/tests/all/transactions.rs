@@ -353,6 +353,34 @@ fn a_bus_counts_what_is_damaged() {
 }
 
 /// Two responses in one block that began after the request; the first of them follows a piece of another one.
+/// The second frame of this response looks like the first one of another: what follows it after a pause, damaged or not, does not
+/// make it the beginning of a damaged response.
+#[test]
+fn what_a_good_response_holds_is_not_damaged() {
+    let first = response(Command::Abs40Mt, 0, 4).emit().contents().to_vec();
+    assert_eq!(first.iter().map(|content| content & 7 == 4).collect::<Vec<_>>(), [true, true, false, false]);
+    let second = frames(Command::Abs40Mt, 1);
+    for broken in [false, true] {
+        let request = Request::new(ea(1), Operation::Abs40Mt);
+        let mut bus = BusTransaction::start(request, Resolution::default(), Addresses::first(2), LINE, 0);
+        let hear = |bus: &mut BusTransaction, contents: &[u16], begin_ns: u64| {
+            for (k, content) in (1..).zip(contents) {
+                let _ = bus.hear(&[Some(*content)], begin_ns + k * FRAME_NS);
+            }
+        };
+        hear(&mut bus, &first, 10_000);
+        let behind_ns = 10_000 + 4 * FRAME_NS + 4_000;
+        if broken {
+            let _ = bus.framing_error(behind_ns + FRAME_NS);
+            let _ = bus.poll(u64::MAX);
+        } else {
+            hear(&mut bus, &second, behind_ns);
+        }
+        assert_eq!((bus.bus().damaged(), bus.exchange(ea(0)).is_some()), (u8::from(broken), true), "{broken}");
+        assert_eq!(bus.exchange(ea(1)).is_some(), !broken);
+    }
+}
+
 #[test]
 fn several_responses_in_a_block() {
     let piece = frames(Command::Abs40Mt, 0)[..2].to_vec();
