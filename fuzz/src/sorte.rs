@@ -7,8 +7,9 @@ use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, Reaction, 
 use sorte_proto::iep::Channel;
 use sorte_proto::sync0::{CMP7_NS, MAX_LATENCY_NS, PULSE_NS, Variant};
 use sorte_proto::{
-    DelayReq, DeviceFrame, DeviceFrameView, Discovery, Entry, Error, FrameType, Link, LongFrame, MasterFrame,
-    MasterFrameView, Param, Parameters, Place, StartTime, Status, Sync, fcs, stream, strip_preamble,
+    Assignment, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Discovery, Entry, Error, FrameType, Link,
+    LongFrame, MasterFrame, MasterFrameView, Param, Parameters, Place, StartTime, Status, Sync, fcs, stream,
+    strip_preamble,
 };
 
 use crate::byte;
@@ -71,22 +72,28 @@ pub fn cut_through(mut data: &[u8]) {
     let lengths = Entry { input: number.into(), output: u16::from(number) << 8 | 1 };
     let mut passed = frame.clone();
     let told = Rewriter::discovery(lengths, adds).pass(&mut passed);
-    if let Ok(mut buffered) = Discovery::parse(&frame) {
-        let status = buffered.status;
-        let assignment = buffered.pass(lengths, adds);
+    if let Ok(buffered) = Discovery::parse(&frame) {
+        let (assignment, after) = discovery_passed(&buffered, lengths, adds);
         // A device says nothing about SA.
+        let status = buffered.status;
         assert_eq!(told, assignment.map(|assignment| Passed::Discovery { status, assignment }));
-        assert_eq!(passed, buffered.emit());
+        assert_eq!(passed, after.emit());
     } else {
         assert!(!matches!(told, Ok(Passed::Discovery { .. })) && Discovery::parse(&passed).is_err());
     }
 
     let mut passed = frame.clone();
     let told = Rewriter::sync(number.into(), adds).pass(&mut passed);
-    if let Ok(mut buffered) = Sync::parse(&frame) {
+    if let Ok(buffered) = Sync::parse(&frame) {
         assert_eq!(told, Ok(Passed::Sync(buffered)));
-        buffered.pass(number.into(), adds);
-        assert_eq!(passed, buffered.emit());
+        let hop = 355 + u32::from(number);
+        let after = Sync {
+            status: buffered.status | adds,
+            time_stamp_ns: buffered.time_stamp_ns.wrapping_add(hop),
+            delay_ns: buffered.delay_ns.wrapping_add(hop as u16),
+            ..buffered
+        };
+        assert_eq!(passed, after.emit());
     } else {
         assert!(!matches!(told, Ok(Passed::Sync(_))) && Sync::parse(&passed).is_err());
     }
@@ -94,6 +101,23 @@ pub fn cut_through(mut data: &[u8]) {
     let mut passed = frame.clone();
     assert_eq!(Rewriter::unchanged().pass(&mut passed).is_ok(), LongFrame::parse(&frame).is_ok());
     assert_eq!(passed, frame);
+}
+
+/// What a device makes of DISCOVERY, in the values of the frame.
+fn discovery_passed(before: &Discovery, lengths: Entry, adds: Status) -> (Result<Assignment, Error>, Discovery) {
+    let Discovery { count, input_total: in_offset, output_total: out_offset, .. } = *before;
+    let mut after = Discovery { status: before.status | adds, ..*before };
+    if count >= 254 {
+        // A passing frame shows its low byte first, so nothing is carried.
+        after.count = if count & 0xff == 0xff { count } else { count + 1 };
+        return (Err(Error::TooManyDevices { count: count.saturating_add(1) }), after);
+    }
+    after.count += 1;
+    after.entries[usize::from(count)] = lengths;
+    after.input_total = in_offset.wrapping_add(lengths.input);
+    after.output_total = out_offset.wrapping_add(lengths.output);
+    let address = DeviceAddress::new(after.count as u8).expect("1 to 254");
+    (Ok(Assignment { address, in_offset, out_offset }), after)
 }
 
 /// A device and a series of frames and times.

@@ -9,6 +9,7 @@ use core::error::Error as AnyError;
 
 use nom::Parser;
 use sorte_proto::Place;
+use sorte_proto::cut_through::Rewriter;
 use sorte_proto::stream::{device_frame, long_frame, master_frame, preamble};
 use sorte_proto::{
     DeviceAddress, DeviceFrame, Discovery, DiscoveryView, Entry, Error, FrameType, Member, Network, Preamble,
@@ -16,12 +17,12 @@ use sorte_proto::{
 };
 
 fn recording() -> Result<Vec<u8>, Error> {
-    let mut discovery = Discovery::published_request(Place::Last);
+    let mut discovery = Discovery::published_request(Place::Last).emit();
     for adds in [Status::empty(), Status::LAST] {
-        discovery.pass(Entry::STOCK, adds)?;
+        Rewriter::discovery(Entry::STOCK, adds).pass(&mut discovery)?;
     }
     let mut wire = Preamble::Long.bytes().to_vec();
-    wire.extend(discovery.emit());
+    wire.extend(discovery);
     let mut master = [0; 21];
     emit_master_frame_into(&[7; 16], 40_500, &mut master)?;
     wire.extend(Preamble::Short.bytes());

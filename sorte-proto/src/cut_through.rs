@@ -39,7 +39,7 @@ pub enum Passed {
     Unchanged(FrameType),
 }
 
-/// A device's part of DISCOVERY or of SYNC, byte by byte: the same bytes as [`Discovery::pass`] and [`Sync::pass`].
+/// A device's part of DISCOVERY or of SYNC, byte by byte, or [`pass`](Self::pass) for a frame in a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rewriter {
@@ -87,8 +87,12 @@ impl Rewriter {
         }
     }
 
-    /// For DISCOVERY. `adds`: what the device sets in STATUS, LAST if it is the last one and ERROR if it has seen a wrong checksum
-    /// since its previous STATUS byte.
+    /// For DISCOVERY: the device takes the next address and the present totals as its offsets, and adds its lengths.
+    /// `adds`: what it sets in STATUS, LAST if it is the last one and ERROR if it has seen a wrong checksum since its previous
+    /// STATUS byte.
+    ///
+    /// A device that finds 254 devices before it, or more, makes the count 255 and takes nothing: the master then refuses the
+    /// network.
     pub const fn discovery(lengths: Entry, adds: Status) -> Self {
         let ([i0, i1], [o0, o1]) = (lengths.input.to_le_bytes(), lengths.output.to_le_bytes());
         Self {
@@ -102,7 +106,8 @@ impl Rewriter {
         }
     }
 
-    /// For SYNC. `line_delay_next_ns`: the line to the next device, in ns; `adds` as with [`discovery`](Self::discovery).
+    /// For SYNC: the device's own transit, 355 ns, and the line to the next device are added to both times, which wrap.
+    /// `line_delay_next_ns`: that line, in ns; `adds` as with [`discovery`](Self::discovery).
     pub const fn sync(line_delay_next_ns: u16, adds: Status) -> Self {
         let [h0, h1, h2, h3] = hop_ns(line_delay_next_ns).to_le_bytes();
         Self {
@@ -299,29 +304,49 @@ mod tests {
         assert!(size_of::<Rewriter>() <= 84);
     }
 
+    /// What a device has to make of DISCOVERY, by arithmetic on the numbers of the frame, and what it takes: address and offsets.
+    fn by_hand(before: &Discovery, lengths: Entry, adds: Status) -> (Option<[u16; 3]>, Discovery) {
+        let mut after = *before;
+        after.status |= adds;
+        // A passing frame shows its low byte first, so nothing is carried into the high one.
+        let [low, high] = before.count.to_le_bytes();
+        after.count = u16::from_le_bytes([if low == 255 { 255 } else { low + 1 }, high]);
+        if before.count >= 254 {
+            return (None, after);
+        }
+        after.entries[usize::from(before.count)] = lengths;
+        after.input_total = (u32::from(before.input_total) + u32::from(lengths.input)) as u16;
+        after.output_total = (u32::from(before.output_total) + u32::from(lengths.output)) as u16;
+        (Some([before.count + 1, before.input_total, before.output_total]), after)
+    }
+
+    fn told(rewriter: Rewriter) -> Result<[u16; 3], Error> {
+        assignment(rewriter).map(|told| [told.address.get().into(), told.in_offset, told.out_offset])
+    }
+
     #[test]
-    fn a_line_of_300_devices_gives_the_bytes_of_the_buffered_form() {
-        let mut buffered = Discovery::request(Place::Last);
-        let mut passing = buffered.emit().to_vec();
+    fn a_line_of_300_devices_gives_the_bytes_made_by_hand() {
+        let mut sent = Discovery::request(Place::Last);
+        let mut passing = sent.emit().to_vec();
         let devices = if cfg!(miri) { 2 } else { 300 };
         for k in 0..devices {
             let lengths = Entry { input: k, output: 300 - k };
             let (out, rewriter) = discovery(&passing, lengths, k + 1 == devices, k % 3 == 0);
-            let want = buffered.pass(lengths, Status::of_device(k + 1 == devices, k % 3 == 0));
-            assert_eq!((out.as_slice(), assignment(rewriter)), (&buffered.emit()[..], want));
-            assert_eq!(want.is_ok(), k < 254);
-            passing = out;
+            let (want, after) = by_hand(&sent, lengths, Status::of_device(k + 1 == devices, k % 3 == 0));
+            assert_eq!(told(rewriter), want.ok_or(Error::TooManyDevices { count: sent.count + 1 }));
+            assert_eq!((out.as_slice(), want.is_some()), (&after.emit()[..], k < 254));
+            (passing, sent) = (out, after);
         }
     }
 
     #[test]
-    fn every_count_passes_as_in_the_buffered_form() {
+    fn every_count_passes_as_by_hand() {
         for count in (0..300).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]).step_by(crate::stride(300)) {
-            let mut buffered = Discovery { count, input_total: 0xfffe, ..Discovery::request(Place::Inner) };
-            let (out, rewriter) = discovery(&buffered.emit(), Entry::STOCK, true, false);
-            let want = buffered.pass(Entry::STOCK, Status::LAST);
-            assert_eq!(out, buffered.emit(), "{count}");
-            assert_eq!(assignment(rewriter), want);
+            let sent = Discovery { count, input_total: 0xfffe, ..Discovery::request(Place::Inner) };
+            let (out, rewriter) = discovery(&sent.emit(), Entry::STOCK, true, false);
+            let (want, after) = by_hand(&sent, Entry::STOCK, Status::LAST);
+            assert_eq!(out, after.emit(), "{count}");
+            assert_eq!(told(rewriter), want.ok_or(Error::TooManyDevices { count: count.saturating_add(1) }));
         }
     }
 
@@ -380,14 +405,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sync_gives_the_bytes_of_the_buffered_form(
+        fn both_times_of_sync_grow_by_the_hop(
             source: u8, status: u8, time_stamp_ns: u32, delay_ns: u16, line: u16, last: bool, error: bool,
         ) {
             let received = Sync { source, status: Status::from_bits_retain(status), time_stamp_ns, delay_ns };
             let (out, rewriter) = sync(&received.emit(), line, last, error);
-            let mut buffered = received;
-            buffered.pass(line, Status::of_device(last, error));
-            prop_assert_eq!(out, buffered.emit());
+            let status = received.status | Status::of_device(last, error);
+            let time_stamp_ns = (u64::from(time_stamp_ns) + u64::from(line) + 355) as u32;
+            let delay_ns = (u64::from(delay_ns) + u64::from(line) + 355) as u16;
+            let after = Sync { status, time_stamp_ns, delay_ns, ..received };
+            prop_assert_eq!(out, after.emit());
             prop_assert_eq!(rewriter.finish(), Ok(Passed::Sync(received)));
         }
     }

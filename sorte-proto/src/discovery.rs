@@ -45,6 +45,9 @@ impl Entry {
 ///
 /// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
 /// sends a debug pattern there.
+///
+/// A device takes the next address and the present totals as its offsets, adds its lengths, and LAST and ERROR to STATUS: see
+/// [`Rewriter::discovery`](crate::cut_through::Rewriter::discovery).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DiscoveryView<'a> {
     frame: LongFrame<'a>,
@@ -236,31 +239,6 @@ impl Discovery {
             to.iter_mut().zip(entry.emit()).for_each(|(to, from)| *to = from);
         }
         emit(self.source, FrameType::Discovery, self.status, &payload)
-    }
-
-    /// What a device does to the frame that passes: it takes the next address and the present totals as its offsets,
-    /// adds its lengths, and `adds` to STATUS: LAST if it is the last one, ERROR if it has seen a wrong checksum since its previous
-    /// STATUS byte. [`cut_through`](crate::cut_through) does the same byte by byte.
-    ///
-    /// A device that finds 254 devices before it, or more, makes the count 255 and takes nothing: the master then
-    /// refuses the network.
-    ///
-    /// # Errors
-    /// [`Error::TooManyDevices`]
-    pub fn pass(&mut self, lengths: Entry, adds: Status) -> Result<Assignment, Error> {
-        self.status |= adds;
-        let before = usize::from(self.count);
-        let (Some(entry), Some(address)) = (self.entries.get_mut(before), next_address(self.count)) else {
-            let count = self.count.saturating_add(1);
-            self.count = count_after(self.count);
-            return Err(Error::TooManyDevices { count });
-        };
-        let assignment = Assignment { address, in_offset: self.input_total, out_offset: self.output_total };
-        *entry = lengths;
-        self.count = count_after(self.count);
-        self.input_total = self.input_total.wrapping_add(lengths.input);
-        self.output_total = self.output_total.wrapping_add(lengths.output);
-        Ok(assignment)
     }
 }
 

@@ -158,17 +158,6 @@ impl Sync {
         let mut fitting = (0..=8_u32).map(|wraps| wraps << 16 | u32::from(self.delay_ns)).filter(fits);
         fitting.next().filter(|_| fitting.next().is_none())
     }
-
-    /// What a device does to the frame that passes: its own transit and the line to the next device are added to both
-    /// times, which wrap, and `adds` to STATUS: LAST if the device is the last one, ERROR if it has seen a wrong checksum since its
-    /// previous STATUS byte. [`cut_through`](crate::cut_through) does the same byte by byte.
-    pub fn pass(&mut self, line_delay_next_ns: u16, adds: Status) {
-        let hop = hop_ns(line_delay_next_ns);
-        self.status |= adds;
-        self.time_stamp_ns = self.time_stamp_ns.wrapping_add(hop);
-        let [low, high, ..] = hop.to_le_bytes();
-        self.delay_ns = self.delay_ns.wrapping_add(u16::from_le_bytes([low, high]));
-    }
 }
 
 /// Way from one device's receiver to the next one's in ns.
@@ -205,18 +194,10 @@ mod tests {
             let mut delay = 85;
             for line in hops {
                 prop_assert_eq!(frame.long_delay_ns(10_000), Some(delay));
-                frame.pass(line, Status::empty());
+                frame.time_stamp_ns += 355 + u32::from(line);
+                frame.delay_ns = frame.delay_ns.wrapping_add(355 + line);
                 delay += 355 + u32::from(line);
             }
-        }
-
-        #[test]
-        fn both_times_grow_by_the_hop(time_stamp_ns: u32, delay_ns: u16, line: u16, last: bool, error: bool) {
-            let mut frame = Sync { source: 0, status: Status::SYNC, time_stamp_ns, delay_ns };
-            frame.pass(line, Status::of_device(last, error));
-            prop_assert_eq!(frame.time_stamp_ns, (u64::from(time_stamp_ns) + u64::from(line) + 355) as u32);
-            prop_assert_eq!(frame.delay_ns, (u64::from(delay_ns) + u64::from(line) + 355) as u16);
-            prop_assert_eq!((frame.status.contains(Status::LAST), frame.status.contains(Status::ERROR)), (last, error));
         }
     }
 }

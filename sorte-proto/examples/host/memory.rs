@@ -225,6 +225,7 @@ impl<'a> DeviceMemory<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sorte_proto::cut_through::Rewriter;
     use sorte_proto::{Entry, ErrorClass, Place, Status};
 
     #[test]
@@ -242,12 +243,12 @@ mod tests {
     fn the_master_shows_its_state_and_the_line() {
         let mut ram = vec![0_u8; 0x1000];
         ram[0x000..0x010].copy_from_slice(&[0x41, 0, 0, 0, 0x0d, 0, 0, 0, 0x03, 0x03, 0, 0, 0x78, 0x56, 0x34, 0x12]);
-        let mut answer = Discovery::request(Place::Last);
-        for last in [false, false, true] {
-            answer.pass(Entry::STOCK, if last { Status::LAST } else { Status::empty() }).unwrap();
+        let mut answer = Discovery::request(Place::Last).emit();
+        for adds in [Status::empty(), Status::empty(), Status::LAST] {
+            Rewriter::discovery(Entry::STOCK, adds).pass(&mut answer).unwrap();
         }
         ram[0x200..0x208].copy_from_slice(&[0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0xd5]);
-        ram[0x208..0x60e].copy_from_slice(&answer.emit());
+        ram[0x208..0x60e].copy_from_slice(&answer);
         ram[0x700..0x704].copy_from_slice(&[1, 2, 3, 4]);
         ram[0x800] = 0x55;
         let host = MasterMemory::new(&ram);

@@ -2,15 +2,17 @@ use proptest::prelude::*;
 use std::vec::Vec;
 
 use super::*;
+use crate::cut_through::Rewriter;
 use crate::place::Place;
 use crate::status::Status;
 
 fn pass_all(lengths: &[Entry]) -> Discovery {
-    let mut frame = Discovery::request(Place::Inner);
+    let mut bytes = Discovery::request(Place::Inner).emit();
     for (k, entry) in lengths.iter().enumerate() {
-        frame.pass(*entry, Status::of_device(k + 1 == lengths.len(), false)).unwrap();
+        let adds = Status::of_device(k + 1 == lengths.len(), false);
+        Rewriter::discovery(*entry, adds).pass(&mut bytes).unwrap();
     }
-    frame
+    Discovery::parse(&bytes).unwrap()
 }
 
 #[test]
@@ -37,13 +39,13 @@ fn a_request_without_a_copy_is_the_same() {
 
 #[test]
 fn the_255th_device_is_an_error_that_the_master_sees() {
-    let mut frame = pass_all(&[Entry::STOCK; 254]);
+    let mut bytes = pass_all(&[Entry::STOCK; 254]).emit();
     for _ in 0..2 {
-        assert!(matches!(frame.pass(Entry::STOCK, Status::LAST), Err(Error::TooManyDevices { .. })));
-        let bytes = frame.emit();
+        let told = Rewriter::discovery(Entry::STOCK, Status::LAST).pass(&mut bytes);
+        assert!(matches!(told, Err(Error::TooManyDevices { .. })));
         let answer = DiscoveryView::parse(&bytes).unwrap();
         assert_eq!(Network::new(answer), Err(Error::TooManyDevices { count: 255 }));
-        assert_eq!(frame.output_total, 1016);
+        assert_eq!(answer.output_total(), 1016);
     }
 }
 

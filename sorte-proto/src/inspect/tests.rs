@@ -3,6 +3,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::address::DeviceAddress;
+use crate::cut_through::Rewriter;
 use crate::delay_req::DelayReq;
 use crate::discovery::{Discovery, Entry};
 use crate::exchange::{DeviceFrame, emit_master_frame_into};
@@ -12,12 +13,17 @@ use crate::preamble::Preamble;
 use crate::status::Status;
 use crate::sync::Sync;
 
+/// DISCOVERY behind one device.
+fn answer() -> Discovery {
+    let mut bytes = Discovery::request(Place::Last).emit();
+    Rewriter::discovery(Entry::STOCK, Status::LAST).pass(&mut bytes).unwrap();
+    Discovery::parse(&bytes).unwrap()
+}
+
 /// As the master and the devices of the published firmware send them.
 fn start_up() -> [Vec<u8>; 4] {
-    let mut discovery = Discovery::request(Place::Last);
-    discovery.pass(Entry::STOCK, Status::LAST).unwrap();
     [
-        discovery.emit().to_vec(),
+        answer().emit().to_vec(),
         Param::request(Parameters::STOCK, Place::Inner).emit().to_vec(),
         DelayReq::of_master(Place::Inner).emit().to_vec(),
         Sync::of_master(500, 76, Place::Inner).emit().to_vec(),
@@ -99,8 +105,7 @@ fn every_fault_of_a_long_header_frame_is_found() {
 /// A decoder gives these values; only an inspection says that they cannot be.
 #[test]
 fn contents_that_cannot_be_are_findings() {
-    let mut frame = Discovery::request(Place::Last);
-    frame.pass(Entry::STOCK, Status::LAST).unwrap();
+    let mut frame = answer();
     frame.output_total = 5;
     let bytes = frame.emit();
     let report = inspect(During::StartUp, &bytes);

@@ -1,8 +1,11 @@
 //! A device on its way through the start-up, and a line that answers a master.
 
+use sorte_proto::cut_through::Rewriter;
 use sorte_proto::device::{Config, Device, FrameTimes, PortId, State, Trigger};
 use sorte_proto::master::Outgoing;
-use sorte_proto::{DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Link, Param, Parameters, Place, Status};
+use sorte_proto::{
+    DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Link, Param, Parameters, Place, Status, Sync,
+};
 
 /// A device in the state that waits for a frame, the last of the line or not. Its frames begin at 77,000 ns of its counter.
 pub(crate) fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
@@ -48,11 +51,20 @@ pub(crate) fn last_of(n: u8, devices: u8) -> Status {
 
 /// DISCOVERY behind this many devices.
 pub(crate) fn discovery(devices: u8, place: Place) -> Vec<u8> {
-    let mut frame = Discovery::request(place);
+    let mut frame = Discovery::request(place).emit();
     for n in 1..=devices {
-        frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
+        Rewriter::discovery(Entry::STOCK, last_of(n, devices)).pass(&mut frame).unwrap();
     }
-    frame.emit().to_vec()
+    frame.to_vec()
+}
+
+/// SYNC behind as many devices as there are cables after them, in ns.
+pub(crate) fn sync(frame: Sync, cables: &[u16]) -> Sync {
+    let mut bytes = frame.emit();
+    for (n, cable) in (1..).zip(cables) {
+        Rewriter::sync(*cable, last_of(n, cables.len() as u8)).pass(&mut bytes).unwrap();
+    }
+    Sync::parse(&bytes).unwrap()
 }
 
 /// What a line of this many devices without cables between them answers.
@@ -61,11 +73,9 @@ pub(crate) fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
         Outgoing::Discovery { place } => discovery(devices, place),
         Outgoing::Param(frame) => frame.emit().to_vec(),
         Outgoing::DelayReq(frame) => frame.emit().to_vec(),
-        Outgoing::Sync(mut frame) => {
-            for n in 1..=devices {
-                frame.pass(0, last_of(n, devices));
-            }
-            frame.emit().to_vec()
+        Outgoing::Sync(frame) => {
+            let cables: Vec<u16> = vec![0; devices.into()];
+            sync(frame, &cables).emit().to_vec()
         }
     }
 }

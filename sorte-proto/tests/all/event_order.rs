@@ -1,9 +1,10 @@
 //! What comes twice, late, early or not at all, and machines that are asked too late: the order of events that a line and a
 //! busy processor can bring about.
 
-use crate::common::{answer, capture_ns, device_in};
+use crate::common::{answer, capture_ns, device_in, sync};
 use sorte_proto::Link;
 use sorte_proto::Place;
+use sorte_proto::cut_through::Rewriter;
 use sorte_proto::device::{self, Device, FrameTimes, Path, PortId};
 use sorte_proto::master::{Action, Config, Master, Outgoing, State};
 use sorte_proto::{
@@ -125,9 +126,7 @@ fn old_answers_of_discovery_and_sync_are_refused_and_end_nothing() {
     assert_eq!((discovering.state(), discovering.network().devices()), (State::Discovery, 0));
     // The answer to the last SYNC of the start-up before, which is the same byte for byte.
     let mut syncing = master(Config::new().with_sync_frames(3));
-    let mut final_answer = Sync::of_master(20_500, 76, Place::Last);
-    final_answer.pass(0, Status::empty());
-    final_answer.pass(0, Status::LAST);
+    let final_answer = sync(Sync::of_master(20_500, 76, Place::Last), &[0, 0]);
     let (_, end) = run(
         &mut syncing,
         || 0,
@@ -363,11 +362,11 @@ fn only_one_port_faces_the_master() {
     // The second round: counted on the way out, and not again on the way back.
     let mut frame = Discovery::request(Place::Inner).emit();
     device.hear(PortId::A, &mut frame, ARRIVAL).result.unwrap();
-    let mut returning = Discovery::parse(&frame).unwrap();
-    returning.pass(Entry::STOCK, Status::LAST).unwrap();
-    let mut bytes = returning.emit();
+    let mut returning = frame;
+    Rewriter::discovery(Entry::STOCK, Status::LAST).pass(&mut returning).unwrap();
+    let mut bytes = returning;
     device.hear(PortId::B, &mut bytes, ARRIVAL).result.unwrap();
-    assert_eq!(Discovery::parse(&bytes).unwrap(), returning);
+    assert_eq!(bytes, returning);
     assert_eq!(device.assignment().map(|place| place.address.get()), Some(1));
     assert_eq!(device.master_port(), Some(PortId::A));
 }

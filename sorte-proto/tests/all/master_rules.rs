@@ -1,6 +1,6 @@
 //! Rules of the master, one by one: when it waits, what it counts as an answer, why it gives up, and what it counts.
 
-use crate::common::{answer, capture_ns, device_frame, discovery};
+use crate::common::{answer, capture_ns, device_frame, discovery, sync};
 use crate::master_bench::{Bench, FOREVER, ROUND_TRIP, running};
 use sorte_proto::Link;
 use sorte_proto::Place;
@@ -207,7 +207,7 @@ fn the_longest_line_is_the_one_that_the_delay_field_holds() {
         let mut bench = Bench::new(config.with_cycle_ns(1_000_000).with_sync_frames(2));
         bench.run(|_, frame| match frame {
             Outgoing::Sync(mut frame) => {
-                frame.pass(0, Status::LAST);
+                frame = sync(frame, &[0]);
                 frame.time_stamp_ns += beyond_ns;
                 Some(frame.emit().to_vec())
             }
@@ -226,11 +226,7 @@ fn the_cycle_is_looked_at_with_the_measured_cables() {
     let run = |cycle_ns| {
         let mut bench = Bench::new(Config::new().with_cycle_ns(cycle_ns).with_sync_frames(2));
         bench.run(|_, frame| match frame {
-            Outgoing::Sync(mut frame) => {
-                frame.pass(1000, Status::empty());
-                frame.pass(0, Status::LAST);
-                Some(frame.emit().to_vec())
-            }
+            Outgoing::Sync(frame) => Some(sync(frame, &[1000, 0]).emit().to_vec()),
             frame => Some(answer(frame, 2)),
         })
     };

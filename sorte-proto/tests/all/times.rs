@@ -1,6 +1,6 @@
 //! Times and limits of master and device as numbers of the published firmware, not of the functions under test.
 
-use crate::common::{EXCHANGE_CAPTURE_NS, answer, capture_ns, device_frame, device_in};
+use crate::common::{EXCHANGE_CAPTURE_NS, answer, capture_ns, device_frame, device_in, sync};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, PortId};
@@ -137,7 +137,7 @@ fn the_last_sync_needs_last_and_state_change() {
             match master.poll(now_ns) {
                 Action::Wait { until_ns } => now_ns = until_ns,
                 Action::Send { at_ns, frame: Outgoing::Sync(mut frame) } => {
-                    frame.pass(0, Status::empty());
+                    frame = sync(frame, &[0]);
                     frame.status = Status::from_bits_retain(status);
                     let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 280 + 472);
                 }

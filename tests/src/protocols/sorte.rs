@@ -11,7 +11,7 @@ mod time;
 
 use sorte_proto::Error;
 
-use crate::row::Check;
+use crate::row::{Check, Fault};
 
 pub(super) const TOPICS: &[(&str, Check)] = &[
     ("crc8", frames::crc8),
@@ -43,6 +43,11 @@ enum Origin {
     Both,
     #[serde(rename = "model")]
     Model,
+}
+
+/// A frame of a row that is refused where it should be read.
+fn refused(error: Error) -> Fault {
+    Fault::Differs { what: "parse", expected: "a frame".to_owned(), real: error.to_string() }
 }
 
 /// The class of a refusal as the rows name it, or "Ok". They have one word for a frame that is too long and for one that

@@ -237,9 +237,7 @@ kernels! {
 
     /// SYNC read and written.
     fn sorte_sync_frame(frame: &[u8; 14]) -> Result<[u8; 14], Error> {
-        let mut sync = Sync::parse(frame)?;
-        sync.pass(85, Status::LAST);
-        Ok(sync.emit())
+        Sync::parse(frame).map(|sync| sync.emit())
     } over [SYNC];
 
     /// DELAY_REQ read and written.
@@ -254,9 +252,8 @@ kernels! {
 
     /// DISCOVERY of one device: written, passed, read, and the network it tells.
     fn sorte_discovery(lengths: &Entry) -> Result<(u8, u16), Error> {
-        let mut frame = Discovery::request(Place::Last);
-        frame.pass(*lengths, Status::LAST)?;
-        let bytes = frame.emit();
+        let mut bytes = Discovery::request(Place::Last).emit();
+        Rewriter::discovery(*lengths, Status::LAST).pass(&mut bytes)?;
         let network = Network::new(DiscoveryView::parse(&bytes)?)?;
         let last = network.members().last().map_or(0, |member| member.assignment.out_offset);
         Ok((network.devices(), network.output_total().saturating_add(last)))

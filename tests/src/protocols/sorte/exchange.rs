@@ -1,14 +1,15 @@
 //! The frames of the IO exchange and the process data in them.
 
 use serde::Deserialize;
+use sorte_proto::cut_through::{Passed, Rewriter};
 use sorte_proto::timing::published_send_time_ns;
 use sorte_proto::{
-    DeviceAddress, DeviceFrame, DeviceFrameView, Entry, Error, MasterFrameView, Place, Preamble, Pto,
-    PublishedDeviceFrame, Slice, Status, emit_master_frame_into, strip_preamble,
+    DeviceAddress, DeviceFrame, DeviceFrameView, Discovery, DiscoveryView, Entry, MasterFrameView, Place, Preamble,
+    Pto, PublishedDeviceFrame, Slice, Status, emit_master_frame_into, strip_preamble,
 };
 
 use super::chain::adds;
-use super::{Origin, outcome};
+use super::{Origin, outcome, refused};
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
 
@@ -64,10 +65,6 @@ pub(super) fn on_wire(preamble: Preamble, frame: &[u8]) -> Vec<u8> {
     [preamble.bytes(), frame].concat()
 }
 
-fn refused(error: Error) -> Fault {
-    Fault::Differs { what: "parse", expected: "a frame".to_owned(), real: error.to_string() }
-}
-
 pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterRow| match row {
         MasterRow::Stock(row) => {
@@ -90,12 +87,16 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
             Ok(())
         }
         MasterRow::Sized(row) => {
-            let mut discovery = sorte_proto::Discovery::request(Place::Inner);
+            let mut discovery = Discovery::request(Place::Inner).emit();
             for (&output, &offset) in row.out_lengths.iter().zip(&row.out_offsets) {
-                let assignment = discovery.pass(Entry { input: 0, output }, Status::empty());
-                same("out_offsets", &Ok(offset), &assignment.map(|a| a.out_offset))?;
+                let told = Rewriter::discovery(Entry { input: 0, output }, Status::empty()).pass(&mut discovery);
+                let got = match told {
+                    Ok(Passed::Discovery { assignment, .. }) => Ok(assignment.out_offset),
+                    other => Err(other),
+                };
+                same("out_offsets", &Ok(offset), &got)?;
             }
-            let total = discovery.output_total;
+            let total = DiscoveryView::parse(&discovery).map_err(refused)?.output_total();
             let view = MasterFrameView::parse(total.into(), &row.frame.0).map_err(refused)?;
             same("frame", &row.frame.0, &build(view.output(), row.tx_timestamp))?;
             same("crc8", &row.frame.0.get(usize::from(total) + 2).map(|&crc| crc.into()), &Some(row.crc8.0))?;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
+use sorte_proto::cut_through::Rewriter;
 use sorte_proto::master::{Action, Config, Heard, Master, Outgoing};
 use sorte_proto::{
     Discovery, Entry, FrameType, LineDelay, Link, MasterFrameView, Parameters, Place, Preamble, Status, Sync,
@@ -123,15 +124,16 @@ fn last_of<T: PartialEq>(n: T, devices: T) -> Status {
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
         Outgoing::Discovery { place } => {
-            let mut frame = Discovery::request(place);
+            let mut frame = Discovery::request(place).emit();
             for n in 1..=devices {
-                assert!(frame.pass(Entry::STOCK, last_of(n, devices)).is_ok());
+                assert!(Rewriter::discovery(Entry::STOCK, last_of(n, devices)).pass(&mut frame).is_ok());
             }
-            frame.emit().to_vec()
+            frame.to_vec()
         }
-        Outgoing::Sync(mut frame) => {
-            frame.pass(0, Status::LAST);
-            frame.emit().to_vec()
+        Outgoing::Sync(frame) => {
+            let mut frame = frame.emit();
+            assert!(Rewriter::sync(0, Status::LAST).pass(&mut frame).is_ok());
+            frame.to_vec()
         }
         Outgoing::Param(frame) => frame.emit().to_vec(),
         Outgoing::DelayReq(frame) => frame.emit().to_vec(),
@@ -222,12 +224,12 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
             let count = image.get(at..at + 2).and_then(|b| <[u8; 2]>::try_from(b).ok()).map(u16::from_le_bytes);
             same("count", &Some(row.count), &count)?;
             // The answer that our master gets from as many devices begins the same way.
-            let mut frame = Discovery::published_request(Place::Last);
+            let mut frame = Discovery::published_request(Place::Last).emit();
             for n in 1..=row.count {
-                let _: Result<_, _> = frame.pass(Entry::STOCK, last_of(n, row.count));
+                let _: Result<_, _> = Rewriter::discovery(Entry::STOCK, last_of(n, row.count)).pass(&mut frame);
             }
             let head = strip_preamble(image).unwrap_or_default();
-            same("rx_image_head", &Some(head), &frame.emit().get(..head.len()))
+            same("rx_image_head", &Some(head), &frame.get(..head.len()))
         }
     })
 }
