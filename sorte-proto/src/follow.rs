@@ -261,6 +261,24 @@ mod tests {
         assert_eq!((device.next(Some(asked.slice(word(1)))).start(), device.lag()), (None, 1));
     }
 
+    /// What a device says it has made, in steps of the master's count: the nearest one, beyond 16 bits and below zero too.
+    #[test]
+    fn the_lag_and_the_position_in_all_bits() {
+        for (steps, ordered, lag) in
+            [(70_000_i64, 4_464_u16, 0), (70_000, 4_460, 4), (65_536, 65_535, 1), (-3, 0, -3), (-3, 65_530, 3)]
+        {
+            let asked = Asked { steps };
+            assert_eq!(asked.lag(ordered), lag, "{steps} {ordered}");
+            let [low, high] = ordered.to_le_bytes();
+            let mut bytes = [1, 0, 0, low, high, 0];
+            bytes[5] = crate::crc::crc8(&bytes[..5]);
+            let frame = crate::exchange::DeviceFrameView::parse(3, &bytes).unwrap();
+            let evidence = crate::evidence::Evidence::of(frame, crate::evidence::Positions::taken_before_ns(0), 1000);
+            let sample = evidence.at(1000, crate::evidence::Policy::new(0)).unwrap();
+            assert_eq!(asked.position(sample), steps - i64::from(lag));
+        }
+    }
+
     proptest! {
         /// Whatever is lost: nothing is made twice, steps stay 4 us apart, and after some rest all are made.
         #[test]

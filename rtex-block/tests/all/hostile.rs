@@ -1,7 +1,7 @@
 //! A master and four impolite drives over lines that lose, delay and repeat blocks, with faults that last.
 //!
 //! `HOSTILE_EVENTS=100000 cargo test --release -p rtex-block --test all hostile:: -- --nocapture` puts a hundred thousand faults;
-//! with `HOSTILE_SEED=1` they are others.
+//! with `SEED=1` they are others.
 
 use core::num::NonZeroU16;
 
@@ -16,7 +16,7 @@ use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{
     Alarm, Arguments, BlockSize, CommandBlock, MacId, NonCyclicCommand, Policy, SubCode, Tolerated, TypeCode, pack,
 };
-use servowire_world::{Cable, Draw, Kind, Rates, Scenario, Tally, wanted_events};
+use servowire_world::{Cable, Draw, Kind, Rates, Scenario, Seed, Tally, first_seed, wanted_events};
 
 const AXES: usize = 4;
 const PERIOD_NS: u64 = 500_000;
@@ -52,14 +52,14 @@ struct Line {
 }
 
 impl Line {
-    fn new(seed: u64) -> Self {
+    fn new(draw: &mut Draw) -> Self {
         let rates = Rates { longest_ns: 1_200_000, ..Rates::QUIET }
             .with(Kind::Drop, 2_000)
             .with(Kind::Delay, 2_000)
             .with(Kind::Repeat, 1_000)
             .with(Kind::Cut, 500)
             .with(Kind::Foreign, 500);
-        Self { cable: Cable::new(20_000, Scenario::random(seed, rates)), late: Vec::new() }
+        Self { cable: Cable::new(20_000, Scenario::random(draw.below(1 << 31), rates)), late: Vec::new() }
     }
 
     /// What the memory at the other end holds of this period: the block that came last.
@@ -143,8 +143,8 @@ impl Bench {
                 drive.set_behaviour(behaviour(draw));
                 drive
             }),
-            down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
-            up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
+            down: core::array::from_fn(|_| Line::new(draw)),
+            up: core::array::from_fn(|_| Line::new(draw)),
             cut: [false; AXES],
             turned: [false; AXES],
             refused: [false; AXES],
@@ -399,9 +399,8 @@ const KINDS: usize = 17;
 
 #[test]
 fn hostile_every_servo_is_off_in_time() {
-    let (wanted, mut draw) = (wanted_events(1_000), Draw::default());
-    let seed = std::env::var("HOSTILE_SEED").map_or(0, |text| text.parse().unwrap());
-    (0..seed).for_each(|_| _ = draw.below(1));
+    let (wanted, seed) = (wanted_events(1_000), first_seed());
+    let (_said, mut draw) = (Seed(seed), Draw::seeded(seed));
     let mut bench = Bench::new(&mut draw);
     let mut faults = [0_u64; KINDS];
     let mut spurious = 0_u32;

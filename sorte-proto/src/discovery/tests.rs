@@ -65,6 +65,26 @@ fn totals_that_are_not_the_sums_are_refused() {
     assert!(matches!(DiscoveryView::parse(&huge).and_then(Network::new), Err(Error::TableMismatch { .. })));
 }
 
+#[test]
+fn entries_of_the_devices_counted() {
+    let bytes = pass_all(&[Entry { input: 2, output: 6 }, Entry { input: 1, output: 3 }]).emit();
+    let answer = DiscoveryView::parse(&bytes).unwrap();
+    let entry = |n| answer.entry(DeviceAddress::new(n).unwrap());
+    assert_eq!(
+        [entry(1), entry(2), entry(3)],
+        [Some(Entry { input: 2, output: 6 }), Some(Entry { input: 1, output: 3 }), None]
+    );
+}
+
+/// 31 blocks of 32 bytes with the words 16, 48, 80 ..., then 0xBEEF: 248 entries and six more.
+#[test]
+fn the_debug_pattern_of_the_published_master() {
+    let bytes = Discovery::published_request(Place::Inner).emit();
+    let words: Vec<u16> = bytes[10..1026].chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect();
+    let want = (0..31).flat_map(|block| [16 + 32 * block; 16]).chain([0xbeef; 12]);
+    assert!(words.into_iter().eq(want));
+}
+
 fn entries() -> impl Strategy<Value = Vec<Entry>> {
     proptest::collection::vec((0u16..200, 0u16..200).prop_map(|(input, output)| Entry { input, output }), 0..=254)
 }

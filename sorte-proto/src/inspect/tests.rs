@@ -52,6 +52,14 @@ fn sound_frames_have_values_and_no_findings() {
         assert_eq!(said(During::StartUp, &bytes), (name, "-".into(), None));
         let report = inspect(During::StartUp, &bytes);
         assert!(report.error().is_none() && report.to_string().starts_with(name), "{report}");
+        let kind = match report.frame().unwrap() {
+            Frame::Discovery(_) => "DISCOVERY",
+            Frame::Param(_) => "PARAM",
+            Frame::DelayReq(_) => "DELAY_REQ",
+            Frame::Sync(_) => "SYNC",
+            other => panic!("{other}"),
+        };
+        assert_eq!(kind, name);
     }
     let texts = ["master, 16 output bytes at 500, STATUS 30h", "device 1, [00, 00, 00], STATUS LAST"];
     for ((name, text), bytes) in ["master", "device"].into_iter().zip(texts).zip(exchange()) {
@@ -100,6 +108,48 @@ fn every_fault_of_a_long_header_frame_is_found() {
     for frame in exchange() {
         assert_eq!(said(During::StartUp, &frame).2, Some(Cause::ExchangeFrame));
     }
+}
+
+/// Four bytes a device of up to four devices may be the CNC machine; nothing else is taken for it.
+#[test]
+fn slices_of_the_cnc_machine() {
+    for (len, slices) in [(0, Some(0)), (4, Some(1)), (6, None), (16, Some(4)), (20, None)] {
+        let output: Vec<u8> = (1..=len).collect();
+        let mut bytes = std::vec![0; usize::from(len) + 5];
+        emit_master_frame_into(&output, 500, &mut bytes).unwrap();
+        let report = inspect(During::Exchange, &bytes);
+        let got: Option<Vec<_>> = report.frame().unwrap().cnc_slices().map(Iterator::collect);
+        assert_eq!(got.as_ref().map(Vec::len), slices, "{len}");
+        let first = got.and_then(|slices| slices.first().copied());
+        assert_eq!(first.map(|slice| slice.command), (slices > Some(0)).then_some(0x0403));
+    }
+    let [_, device] = exchange();
+    assert!(inspect(During::Exchange, &device).frame().unwrap().cnc_slices().is_none());
+}
+
+/// 254 devices fit, 255 do not; the length of a frame has a name.
+#[test]
+fn the_longest_line_and_wrong_lengths() {
+    let mut frame = Discovery { count: 254, ..Discovery::request(Place::Last) };
+    assert_eq!(said(During::StartUp, &frame.emit()).1, "-");
+    frame.count = 300;
+    assert_eq!(said(During::StartUp, &frame.emit()).1, "too_many_devices");
+    for bytes in start_up() {
+        let mut long = [&bytes[..], &[7]].concat();
+        crate::frame::refresh_fcs(&mut long);
+        assert_eq!(said(During::StartUp, &long).1, "too_long");
+    }
+}
+
+/// The shortest frames that can have been one of the exchange: a header and a checksum are none.
+#[test]
+fn the_shortest_disturbed_frames() {
+    // Master: header, CRC-8 and stamp are five bytes; device: header and CRC-8 are three.
+    let cause = |bytes: &[u8]| said(During::Exchange, bytes).2;
+    assert_eq!(cause(&[0, 0x30, 1, 2, 3]), None);
+    assert_eq!(cause(&[0, 0x30, 1, 2, 3, 4]), Some(Cause::Disturbed));
+    assert_eq!(cause(&[1, 0, 0]), None);
+    assert_eq!(cause(&[1, 0, 7, 0]), Some(Cause::Disturbed));
 }
 
 /// A decoder gives these values; only an inspection says that they cannot be.

@@ -118,6 +118,52 @@ fn an_error_outlives_a_restart() {
     assert!(Discovery::parse(&frame).unwrap().status.contains(Status::ERROR));
 }
 
+/// What has gone wrong is told once, however often it has.
+#[test]
+fn errors_do_not_cancel_each_other() {
+    for wrong in 1..4 {
+        let mut device = between(State::Param);
+        for _ in 0..wrong {
+            let mut damaged = param(Parameters::STOCK, Place::Inner);
+            damaged[9] ^= 1;
+            assert!(device.hear(PortId::A, &mut damaged, at(0)).result.is_err());
+        }
+        device.reset();
+        device.set_links(Link::Up, Link::Down);
+        for told in [true, false] {
+            let mut frame = Discovery::request(Place::Inner).emit();
+            device.hear(PortId::A, &mut frame, at(0)).result.unwrap();
+            assert_eq!(Discovery::parse(&frame).unwrap().status.contains(Status::ERROR), told, "{wrong}");
+        }
+    }
+}
+
+/// DISCOVERY that a patient master sends again keeps a device in PARAM, and only one that is patient too.
+#[test]
+fn a_repeated_discovery_keeps_a_patient_device() {
+    for (patient, want) in [(true, State::Param), (false, State::Idle)] {
+        let mut device = Device::new(Config::new().with_patient_discovery(patient));
+        device.set_links(Link::Up, Link::Down);
+        for (place, now_ns) in [(Place::Inner, 0), (Place::Last, 0), (Place::Last, 19_000_000)] {
+            feed(&mut device, PortId::A, &Discovery::request(place).emit(), now_ns);
+        }
+        let _action = device.poll(0, 30_000_000);
+        assert_eq!(device.state(), want);
+    }
+}
+
+/// Firmware that does not know where its axis is.
+#[test]
+fn a_flagged_error_is_told_once() {
+    let mut device = last_in_exchange(Parameters::CNC, Sync::of_master(30_500, 76, Place::Last));
+    device.flag_error();
+    device.reset();
+    device.set_links(Link::Up, Link::Down);
+    let mut frame = Discovery::request(Place::Inner).emit();
+    device.hear(PortId::A, &mut frame, at(0)).result.unwrap();
+    assert!(Discovery::parse(&frame).unwrap().status.contains(Status::ERROR));
+}
+
 /// Only the frame that the state waits for, at the port that faces the master, keeps a start-up state alive.
 #[test]
 fn a_start_up_state_waits_20_ms_for_its_own_frame() {

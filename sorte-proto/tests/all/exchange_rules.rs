@@ -77,6 +77,42 @@ fn cycles_begin_and_own_frames_leave_at_their_times() {
     assert_eq!(device.counters().master, Tally::default());
 }
 
+/// A frame that is held up is late if its stamp is that of the cycle, give or take the window of 250 ns, and stale beyond.
+#[test]
+fn late_or_stale_by_the_stamp() {
+    let stamped = |off_ns: i32| {
+        let mut device = device();
+        device.hear_exchange(&frame(0), captured(0, 0)).unwrap();
+        let mut bytes = [0; 21];
+        let stamp = (ZERO_NS + 500).wrapping_add_signed(off_ns) as u16;
+        emit_master_frame_into(&[0; 16], stamp, &mut bytes).unwrap();
+        assert!(device.hear_exchange(&bytes, captured(0, 1000)).is_err());
+        (device.counters().master.late, device.counters().master.stale)
+    };
+    assert_eq!([stamped(0), stamped(250), stamped(-250)], [(1, 0); 3]);
+    assert_eq!([stamped(251), stamped(-251)], [(0, 1); 2]);
+}
+
+/// With cycles of 10 ms a device waits for six frames and two more, not for the 20 ms of the start-up.
+#[test]
+fn long_cycles_are_waited_for() {
+    let mut device = Device::new(Config::new().with_cycle_ns(Some(10_000_000)));
+    device.set_links(Link::Up, Link::Down);
+    for mut frame in [
+        Discovery::request(Place::Inner).emit().to_vec(),
+        Discovery::request(Place::Last).emit().to_vec(),
+        sorte_proto::Param::request(Parameters::CNC, Place::Last).emit().to_vec(),
+        sorte_proto::DelayReq::of_master(Place::Last).emit().to_vec(),
+        Sync::of_master(30_500, 76, Place::Last).emit().to_vec(),
+    ] {
+        assert_eq!(device.hear(PortId::A, &mut frame, captured(0, 0)).result, Ok(()));
+    }
+    let now_ns = captured(0, 0).now_ns;
+    let missed = u64::from(Config::new().missed_frames) + 2;
+    assert_ne!(device.poll(ZERO_NS, now_ns + missed * 10_000_000), Action::Restart);
+    assert_eq!(device.poll(ZERO_NS, now_ns + missed * 10_000_000 + 1), Action::Restart);
+}
+
 /// The cycle comes with PARAM: 31.25 us here; or from the settings, for the published master says 10 us and runs at 4.
 #[test]
 fn param_sets_the_cycle() {
@@ -429,6 +465,26 @@ fn a_patient_master_asks_again() {
     assert!(places[8..].iter().all(|place| *place == Place::Last), "{places:?}");
     let (places, end) = run(patient.with_discovery_tries(50), &|_| true);
     assert_eq!((places.len(), end), (50, Err(ErrorClass::NoAnswer)));
+}
+
+/// Two answers have agreed, and the last one tells another line: it is asked again, and the line has to be the one told last.
+#[test]
+fn a_patient_master_refuses_a_line_that_changes() {
+    let mut master = Master::new(master::Config::new().with_patient_discovery(true));
+    master.set_link(Link::Up);
+    let (mut now_ns, mut last) = (0, 0);
+    loop {
+        match master.poll(now_ns) {
+            master::Action::Wait { until_ns } => now_ns = until_ns,
+            master::Action::Send { at_ns, frame: frame @ Outgoing::Discovery { place } } => {
+                last += u8::from(place == Place::Last);
+                let devices = if place == Place::Last { 3 } else { 2 };
+                master.hear(&answer(frame, devices), at_ns + 1072).unwrap();
+            }
+            _ => break,
+        }
+    }
+    assert_eq!((last, master.network().devices()), (2, 3));
 }
 
 /// A device that has had the last DISCOVERY counts itself in its repetition too, until PARAM comes.

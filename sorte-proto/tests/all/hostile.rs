@@ -1,12 +1,13 @@
 //! A master against a network, and a device against a master, that know nothing of this crate: bytes, checks and times are written
 //! here as the sources give them. Frames are lost, come twice, late, damaged, by a clock that drifts.
 //!
-//! `HOSTILE_EVENTS=10000000 cargo test --release -p sorte-proto --test all hostile:: -- --nocapture` runs as many frames.
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p sorte-proto --test all hostile:: -- --nocapture` runs as many frames;
+//! with `SEED=1` other ones.
 
 mod device;
 mod network;
 
-use servowire_world::Draw;
+use servowire_world::{Draw, Seed, first_seed};
 use sorte_proto::Error;
 use sorte_proto::master::Config;
 use sorte_proto::timing::{Limit, Slots, Timing};
@@ -94,6 +95,12 @@ impl Happened {
     }
 }
 
+/// The numbers of this run, and a guard that names their seed in a panic.
+fn seeded() -> (Seed, Draw) {
+    let seed = first_seed();
+    (Seed(seed), Draw::seeded(seed))
+}
+
 /// The share of a test in all frames wanted; each line gets a quarter.
 fn frames_of_a_line() -> u64 {
     servowire_world::wanted_events(400_000) / 8
@@ -101,7 +108,7 @@ fn frames_of_a_line() -> u64 {
 
 #[test]
 fn hostile_a_master_takes_no_stale_value_and_counts_every_loss() {
-    let mut draw = Draw::default();
+    let (_said, mut draw) = seeded();
     for (devices, cycle_ns) in LINES {
         let mut bench = network::Bench::new(&mut draw, devices, cycle_ns);
         while bench.happened.sent < frames_of_a_line() || bench.cycles < 60 {
@@ -114,7 +121,7 @@ fn hostile_a_master_takes_no_stale_value_and_counts_every_loss() {
 
 #[test]
 fn hostile_a_device_takes_no_stale_value_and_counts_every_loss() {
-    let mut draw = Draw::default();
+    let (_said, mut draw) = seeded();
     for (devices, cycle_ns) in LINES {
         for address in [1, devices / 2, devices] {
             let mut bench = device::Bench::new(&mut draw, devices, cycle_ns, address);
@@ -168,7 +175,7 @@ fn misfit(cables: &[u64], published: bool, cycle_ns: u64) -> Option<(u8, Limit)>
 /// Cables by chance: planner and master say the same, and it is what the times of the sources make.
 #[test]
 fn hostile_planner_and_master_refuse_the_same_lines() {
-    let mut draw = Draw::default();
+    let (_said, mut draw) = seeded();
     let mut seen = [0_u32; 5];
     for _ in 0..3_000 {
         let (devices, published) = (1 + draw.below(12) as usize, draw.below(2) == 0);

@@ -22,16 +22,15 @@ fn frames() -> [Vec<u8>; 4] {
     ]
 }
 
-/// What each of them says.
-fn classes(frame: &[u8], devices: &[Device]) -> Vec<Option<ErrorClass>> {
+/// What each of them says, with its numbers.
+fn reasons(frame: &[u8], devices: &[Device]) -> Vec<Option<Error>> {
     let mut all = vec![LongFrame::parse(frame).map(|_| ())];
     let adds = Status::empty();
     for rewriter in [Rewriter::discovery(Entry::STOCK, adds), Rewriter::sync(85, adds), Rewriter::unchanged()] {
         all.push(rewriter.pass(&mut frame.to_vec()).map(|_| ()));
     }
     all.extend(devices.iter().map(|device| device.clone().hear(PortId::A, &mut frame.to_vec(), ARRIVAL).result));
-    let class = |result: Result<(), Error>| result.err().map(Error::class);
-    all.into_iter().map(class).collect()
+    all.into_iter().map(Result::err).collect()
 }
 
 fn devices() -> Vec<Device> {
@@ -48,8 +47,10 @@ fn every_flip_has_one_reason_and_it_is_the_fcs() {
         for bit in bits {
             let mut frame = frame.clone();
             frame[bit / 8] ^= 1 << (bit % 8);
-            let classes = classes(&frame, &devices);
-            assert!(classes.iter().all(|class| *class == Some(ErrorClass::BadFcs)), "bit {bit}: {classes:?}");
+            let (body, trailer) = frame.split_last_chunk().unwrap();
+            let want = Some(Error::BadFcs { got: u32::from_le_bytes(*trailer), want: fcs(body) });
+            let reasons = reasons(&frame, &devices);
+            assert!(reasons.iter().all(|reason| *reason == want), "bit {bit}: {reasons:?}");
         }
     }
 }
@@ -74,13 +75,13 @@ fn a_frame_that_is_wrong_with_a_right_fcs_has_one_reason() {
         for mut frame in wrong {
             let (body, trailer) = frame.split_last_chunk_mut().unwrap();
             *trailer = fcs(body).to_le_bytes();
-            let classes = classes(&frame, &devices);
-            assert!(classes[0].is_some(), "{frame:02x?}");
-            assert!(classes.iter().all(|class| *class == classes[0]), "{frame:02x?}: {classes:?}");
+            let reasons = reasons(&frame, &devices);
+            assert!(reasons[0].is_some(), "{frame:02x?}");
+            assert!(reasons.iter().all(|reason| *reason == reasons[0]), "{frame:02x?}: {reasons:?}");
         }
         for len in 0..good.len().min(40) {
-            let classes = classes(&good[..len], &devices);
-            assert!(classes[0].is_some() && classes.iter().all(|class| *class == classes[0]), "{len}: {classes:?}");
+            let reasons = reasons(&good[..len], &devices);
+            assert!(reasons[0].is_some() && reasons.iter().all(|reason| *reason == reasons[0]), "{len}: {reasons:?}");
         }
     }
 }
