@@ -387,7 +387,13 @@ fn what_somebody_has_to_look_after() {
     assert_eq!(said(&log), ["5 sent a counter echo that stood still"]);
     log.block(&response(2, 0x60)).count();
     log.block(&response(3, 0x40)).count();
-    assert_eq!(said(&log), ["5 reported an alarm", "5 sent a counter echo that stood still"]);
+    let both = ["5 reported an alarm", "5 sent a counter echo that stood still"];
+    assert_eq!(said(&log), both);
+    // The same again does not undo it.
+    log.block(&response(0, 0x60)).count();
+    (0..4).for_each(|_| _ = log.block(&response(1, 0x40)).count());
+    log.block(&response(2, 0x40)).count();
+    assert_eq!(said(&log), both);
     // Two commands may be under way without an answer, three are silence; so is a drive that never answered beside one that does.
     for (commands, silent) in [(2, false), (3, true)] {
         let mut log = LogAnalysis::new(None, Gear::UNITY);
@@ -396,7 +402,11 @@ fn what_somebody_has_to_look_after() {
         log.block(&response(1, 0x40)).count();
         let troubles: Vec<_> = log.troubles().collect();
         let want = DriveTrouble { mac_id: MacId::new(5).unwrap(), trouble: Trouble::Silence };
-        assert_eq!(troubles, [want].into_iter().filter(|_| silent).collect::<Vec<_>>(), "{commands}");
+        let want: Vec<_> = [want].into_iter().filter(|_| silent).collect();
+        assert_eq!(troubles, want, "{commands}");
+        (0..commands).for_each(|k| _ = log.block(&command(k, 0x20, 0)).count());
+        log.block(&response(1, 0x40)).count();
+        assert!(log.troubles().eq(want), "{commands} twice");
     }
     let mut log = LogAnalysis::new(None, Gear::UNITY);
     let mut other = command(0, 0x20, 0);

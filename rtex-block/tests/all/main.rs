@@ -9,6 +9,7 @@
     missing_docs
 )]
 
+mod again;
 mod alarms;
 mod answers;
 mod caller;
@@ -30,4 +31,5 @@ mod runner;
 #[cfg(feature = "serde")]
 mod serde;
 mod setpoints;
+mod steps;
 mod stops;

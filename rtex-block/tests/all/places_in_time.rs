@@ -7,7 +7,7 @@ use rtex_block::master::{
     ActiveCode, Arrival, Axis, AxisConfig, AxisState, Heard, Progress, Ring, StopCategory, StopReason, SwitchOnError,
     Turn,
 };
-use rtex_block::{Arguments, MacId, NonCyclicCommand, Policy, Pr, Response, TypeCode};
+use rtex_block::{Arguments, MacId, NonCyclicCommand, Policy, Pr, Response, TypeCode, UpdateCounter};
 
 /// The pair with responses that come `late` periods after their time, from now on.
 struct Late {
@@ -303,5 +303,37 @@ fn what_lay_in_the_memory_is_not_new() {
         assert_ne!(pair.axis.arrival(), Arrival::OnTime);
         assert!(pair.axis.evidence().at(pair.now_ns(), Policy::new(0)).is_err());
         assert!(pair.axis.switch_on().is_err());
+    }
+}
+
+/// Exchanges that did not take place are told by the clock, from one and a half update periods on. With an echo that is two behind,
+/// the block after one of them may be as much earlier.
+#[test]
+fn missed_exchanges_by_the_clock() {
+    let mut bench = Late::new(Pair::new(ActiveCode::CyclicPosition, Behaviour::new()));
+    (0..40).for_each(|_| bench.update(2));
+    let pair = &bench.pair;
+    assert_eq!(pair.axis.arrival(), Arrival::OnTime);
+    let Turn::Valid(sent) = pair.sent else { panic!() };
+    let response = *pair.received.response().unwrap();
+    assert_eq!(sent.get().wrapping_sub(response.update_counter_echo.get()) & 3, 2);
+    for (gap_ns, missed) in [
+        (500_000, 0),
+        (750_000, 0),
+        (750_001, 1),
+        (1_250_000, 1),
+        (1_250_001, 2),
+        (1_750_000, 2),
+        (1_750_001, 3),
+        (9_000_000, 3),
+    ] {
+        for found in 0..3_u8 {
+            let echo = UpdateCounter::new(sent.get().wrapping_sub(found) & 3).unwrap();
+            let heard = Ok(Response { update_counter_echo: echo, ..response }).into();
+            let mut axis = pair.axis;
+            axis.hear(pair.sent, &heard, pair.now_ns() + gap_ns);
+            let want = found + missed >= 2;
+            assert_eq!(axis.arrival() == Arrival::OnTime, want, "{gap_ns} ns, {found} behind: {}", axis.arrival());
+        }
     }
 }

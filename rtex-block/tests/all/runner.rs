@@ -84,7 +84,9 @@ fn a_day_of_a_ring() {
         calls == 4
     })
     .unwrap();
+    let from = ring.now_ns;
     assert_eq!(ring.until(Some(5), |_| false), Err(Ended::Limit));
+    assert_eq!((ring.now_ns - from) / 500_000, 5);
 }
 
 #[test]

@@ -264,6 +264,37 @@ fn a_profile_motion_is_ended_by_the_drive() {
     assert_eq!(bench.drives[1].position(), from);
 }
 
+/// The reason that came first stays, whatever is asked later.
+#[test]
+fn the_first_reason_of_a_stop_stays() {
+    let mut bench = Bench::new(ActiveCode::CyclicPosition, Some(StopCategory::One), 100);
+    bench.run_at(5_000);
+    bench.drives[0].set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
+    let other = StopReason::OtherAxis { place: 0 };
+    while bench.axis().state() == AxisState::On {
+        let to = bench.axis().setpoint().wrapping_add(5_000);
+        bench.axis().set_position(to).unwrap();
+        bench.update();
+    }
+    assert_eq!(bench.axis().state(), AxisState::Stopping(other));
+    bench.ring.stop(StopCategory::Zero);
+    assert_eq!(bench.axis().state(), AxisState::Stopped(other));
+    assert_eq!(bench.ring.failure(), Some(RingFailure { place: 0, reason: StopReason::Alarm }));
+}
+
+/// Two drives that fall silent in the same period do not make up for each other: nobody slows down, all are off.
+#[test]
+fn two_silent_drives_are_silent() {
+    let mut bench = Bench::new(ActiveCode::CyclicPosition, Some(StopCategory::One), 1);
+    bench.run_at(5_000);
+    bench.cut = [true; 2];
+    for _ in 0..=usize::from(crate::common::LIMIT) {
+        bench.update();
+    }
+    assert!(bench.ring.axes().iter().all(|axis| matches!(axis.state(), AxisState::Stopped(_))));
+    assert!(bench.ring.is_timed_out());
+}
+
 /// The communication is lost at an axis that is stopped already: everybody is switched off at the limit all the same.
 #[test]
 fn silence_of_a_stopped_axis_stops_everybody() {

@@ -103,7 +103,7 @@ fn seeded() -> (Seed, Draw) {
 
 /// The share of a test in all frames wanted; each line gets a quarter.
 fn frames_of_a_line() -> u64 {
-    servowire_world::wanted_events(400_000) / 8
+    servowire_world::wanted_events(1_000_000) / 8
 }
 
 #[test]
