@@ -43,6 +43,15 @@ fn every_finding_is_listed() {
         Error::Reserved { byte: 16, bits: 0x40 },
     ];
     assert!(inspect(&block).errors().eq(want));
+    // A non-cyclic code without a layout, and what is wrong beside it.
+    let mut block = [0; 16];
+    block[..4].copy_from_slice(&[0x05, 0x23, 0x02, 0x10]);
+    let want = [
+        Error::NonCyclicCode { code: 3 },
+        Error::Reserved { byte: 2, bits: 0x02 },
+        Error::Reserved { byte: 3, bits: 0x10 },
+    ];
+    assert_eq!(inspect(&block).errors().collect::<Vec<_>>(), want);
 }
 
 #[test]

@@ -208,6 +208,8 @@ mod tests {
         assert!(!watch.sample(None));
         assert!(!watch.sample(None));
         assert!(!watch.sample(UpdateCounter::new(2)));
+        // None after one that was there is no new one.
+        assert_eq!([None; 3].map(|echo| watch.sample(echo)), [false, false, true]);
     }
 
     /// By hand: the counter sent goes on by one, and the echo is as many behind.

@@ -65,6 +65,8 @@ impl Axis {
     /// One update period of a controlled deceleration, from what was sent last.
     pub(super) fn slow_down(&mut self, reason: StopReason) {
         let moves = match self.mode {
+            // Asked for and not yet sent: the axis stands, and the last block says nothing in this mode.
+            mode if mode != self.wire.mode => false,
             ActiveCode::CyclicPosition => {
                 let step = self.less(self.wire.step);
                 self.setpoint = self.wire.value.wrapping_add(step);
