@@ -27,12 +27,11 @@ pub fn decode(
             let mut foreign: BTreeMap<&'static str, u64> = BTreeMap::new();
             while let Some(mut packet) = packets.packet()? {
                 packet.has_fcs = settings.fcs.unwrap_or(packet.has_fcs);
-                if let Some(traffic) = packet.traffic() {
-                    *foreign.entry(traffic).or_default() += 1;
-                } else {
-                    for event in CODECS.iter().filter_map(|codec| codec.packet(&packet)) {
-                        out.event(&event)?;
-                    }
+                let events: Vec<_> = CODECS.iter().filter_map(|codec| codec.packet(&packet)).collect();
+                // Where an EtherType would stand, a good frame may have any bytes.
+                match packet.traffic().filter(|_| !events.iter().any(|event| event.verdict.is_ok())) {
+                    Some(traffic) => *foreign.entry(traffic).or_default() += 1,
+                    None => events.iter().try_for_each(|event| out.event(event))?,
                 }
                 if packets.is_live() {
                     out.flush()?;
