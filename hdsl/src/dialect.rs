@@ -13,11 +13,11 @@ pub enum RegisterRule {
     /// The SICK manual, p. 31-55.
     ///
     /// * Each safe channel shows its last valid block, regardless of the other; a bad word or a wrong CRC sets SCE. If the
-    /// encoder has no position, VPOS shows FDh five times.
+    ///   encoder has no position, VPOS shows FDh five times.
     /// * An event is raised when its status arises, and again only after that status has gone. MIN alone is raised in every
     ///   frame.
     /// * The application cannot write registers that the receiver writes; ACC_ERR_CNT stops at 31; the error code of a long
-    /// message is in PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
+    ///   message is in PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
     #[default]
     Sick,
     /// The firmware of the Motor Control SDK.

@@ -23,10 +23,10 @@ pub enum PositionRule {
     /// As in the firmware of the Motor Control SDK.
     ///
     /// * The estimate wraps at 16 bits, and is added to the velocity with its sign only if bit 10 is set. While nothing wraps,
-    /// both rules produce the same estimate.
+    ///   both rules produce the same estimate.
     /// * The alignment subtracts positions as 40-bit numbers, whatever their width. If the position passes the end of its range
-    /// in the V-frame of stage 0, the velocity is afterwards wrong by an eighth of the range, and so is the position in seven
-    /// frames out of eight, without any flag.
+    ///   in the V-frame of stage 0, the velocity is afterwards wrong by an eighth of the range, and so is the position in seven
+    ///   frames out of eight, without any flag.
     Ti,
 }
 
