@@ -456,6 +456,18 @@ mod tests {
     }
 
     /// The frames of all devices reach the master one slot after the other, whatever the cables.
+    /// The shortest cycle fits, one of a nanosecond less does not; data may be taken up to either end of a frame, and not at it.
+    #[test]
+    fn exactly_as_long() {
+        let line = cnc(4, &[85]);
+        let budget = line.budget();
+        let least = budget.min_cycle_ns();
+        assert_eq!((budget.fits(least), budget.fits(least - 1)), (true, false));
+        assert_eq!((line.misfit(least), line.misfit(least - 1).is_some()), (None, true));
+        let (first, last) = (budget.master_frame_at_first_ns, budget.master_frame_at_last_ns);
+        assert_eq!([first - 1, first, last, last + 1].map(|ns| budget.same_cycle(ns)), [true, false, false, true]);
+    }
+
     #[test]
     fn device_frames_arrive_back_to_back() {
         let delays = [30, 200, 85, 0, 450, 7];

@@ -81,6 +81,7 @@ fn what_network_cards_do_to_a_frame() {
         assert_eq!(texts(inspect(During::StartUp, &wire)), (Some(Cause::PreambleLeft), want.clone()));
         let inverted: Vec<u8> = bytes.iter().map(|byte| !byte).collect();
         assert_eq!(texts(inspect(During::StartUp, &inverted)), (Some(Cause::Inverted), None));
+        assert_eq!(said(During::StartUp, &bytes[..len - 3]).1, "truncated bad_fcs");
         let cut = inspect(During::StartUp, &bytes[..len - 3]);
         assert_eq!(texts(cut), (Some(Cause::Cut { missing: 3 }), None));
         let mut damaged = bytes.clone();

@@ -370,3 +370,12 @@ fn only_one_port_faces_the_master() {
     assert_eq!(device.assignment().map(|place| place.address.get()), Some(1));
     assert_eq!(device.master_port(), Some(PortId::A));
 }
+
+/// When a request has really begun matters where round trips are measured, and nowhere else.
+#[test]
+fn only_a_delay_request_has_a_begin_of_its_own() {
+    let mut discovering = master(Config::new());
+    let Action::Send { at_ns, frame } = discovering.poll(5_000_000) else { panic!() };
+    discovering.sent(at_ns + 10_000);
+    assert!(discovering.hear(&answer(frame, 2), at_ns + 600).is_ok());
+}
