@@ -65,6 +65,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("step_motion_plan", step_motion::plan),
     ("step_motion_path", step_motion::path),
     ("step_motion_axis", step_motion::axis),
+    ("step_motion_axes", step_motion::axes),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),

@@ -1,6 +1,9 @@
 //! step-motion: plans, paths and an axis in two halves against their laws.
 
-use step_motion::{Axis, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Queue, StepTimer, Work};
+use step_motion::{
+    Axes, AxesQueue, AxesTimer, Axis, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Queue,
+    StepTimer, Work,
+};
 
 use crate::{byte, word};
 
@@ -234,6 +237,138 @@ impl Halves<'_> {
                 return;
             }
             self.until((self.now + 250).min(time));
+        }
+    }
+}
+
+/// Slots for each axis of a path.
+const SLOTS_OF_AN_AXIS: usize = 257;
+
+/// Two axes of a path in two halves, and requests to them while their background is in time, late, or not there: limits in four bytes,
+/// the pause of the first axis, then commands of three.
+///
+/// ```text
+/// 0     speed / 100     1     acceleration / 1000     2     jerk / 100000, 0 for none     3     deviation at corners in um
+/// 4     pause / 40 us
+/// 5..   command, and two values: a line, a new target, an override, hold, resume, stop, quick stop, halt, some slices, time with and
+///       without a background
+/// ```
+pub fn axes(mut data: &[u8]) {
+    let [speed, acceleration, jerk, deviation, pause] = core::array::from_fn(|_| u32::from(byte(&mut data)));
+    let speed = speed * 100 + 100;
+    let limits = Limits::new(speed, acceleration * 1000 + 5000).expect("in range");
+    let limits = if jerk == 0 { limits } else { limits.with_jerk(u64::from(jerk) * 100_000).expect("in range") };
+    let axis = AxisSetup::new(limits, 80_000).with_soft_limits(LOW, HIGH);
+    let axes = [axis.with_reversal_pause(pause * 40), axis];
+    let path = Path::<2, 4>::new(Clock::MICROSECONDS, axes, deviation).expect("a speed below the clock's");
+    let queue = AxesQueue::new();
+    let (axes, timer) = Axes::new(&queue, path);
+    let fastest = 1_000_000 / u64::from(speed);
+    let mut both = Both { axes, timer, now: 0, compare: None, position: [0; 2], last: [None; 2], fastest };
+    while let [command, a, b, rest @ ..] = data {
+        data = rest;
+        let to = [a, b].map(|value| i64::from(i8::from_le_bytes([*value])) * 20);
+        match command & 15 {
+            0..=2 => {
+                let inside = to.iter().all(|to| (LOW..=HIGH).contains(to));
+                let added = both.axes.push(to, 200_000).is_ok();
+                assert!(inside || !added, "{to:?} is beyond the soft limits");
+            }
+            3 => drop(both.axes.move_to(to, 50_000)),
+            4 => both.axes.set_override(u16::from(*a)),
+            5 => both.axes.hold(),
+            6 => both.axes.resume(),
+            7 => both.axes.stop(),
+            8 => both.axes.quick_stop([Limits::new(1, u32::from(*b) * 10_000 + 1).expect("in range"); 2]),
+            9 => both.axes.halt(),
+            10 | 11 => {
+                for _ in 0..*a {
+                    both.slice();
+                }
+            }
+            12 => both.until(both.now + u64::from(*a) * 64),
+            _ => both.run(both.now + (u64::from(*a) << (b & 7))),
+        }
+    }
+    // Afterwards it can be started again.
+    both.axes.stop();
+    both.run(both.now + 100_000_000);
+    both.axes.set_override(100);
+    both.axes.resume();
+    both.axes.push([77, -5], 200_000).expect("it is at rest");
+    both.run(both.now + 100_000_000);
+    assert_eq!((both.position, both.axes.is_at_rest()), ([77, -5], true));
+}
+
+/// A background and a timer of two axes.
+struct Both<'q> {
+    axes: Axes<'q, 2, 4, SLOTS_OF_AN_AXIS>,
+    timer: AxesTimer<'q, 2, SLOTS_OF_AN_AXIS>,
+    now: u64,
+    compare: Option<u64>,
+    position: [i64; 2],
+    /// The last step of each: when and whether backwards.
+    last: [Option<(u64, bool)>; 2],
+    /// Ticks of a step at the greatest speed.
+    fastest: u64,
+}
+
+impl Both<'_> {
+    fn slice(&mut self) -> Work {
+        let work = self.axes.poll();
+        if work == Work::Start && self.compare.is_none() {
+            self.fire();
+        }
+        work
+    }
+
+    fn fire(&mut self) {
+        let fired = self.timer.fire();
+        for axis in 0..2 {
+            let back = fired.reverse() >> axis & 1 != 0;
+            if fired.steps() >> axis & 1 == 0 {
+                continue;
+            }
+            self.position[axis] += if back { -1 } else { 1 };
+            assert!((LOW..=HIGH).contains(&self.position[axis]), "{:?} is beyond the soft limits", self.position);
+            if let Some((last, before)) = self.last[axis].replace((self.now, back)) {
+                let ticks = self.now - last;
+                // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
+                let fast = before == back && ticks + 3 + self.fastest / 8 < self.fastest;
+                assert!(ticks > 0 && !fast, "{ticks} ticks of axis {axis}");
+            }
+        }
+        self.compare = (fired.wait() > 0).then(|| self.now + u64::from(fired.wait()));
+        assert_eq!(self.axes.commanded(), self.position);
+    }
+
+    /// Time goes on, without a background.
+    fn until(&mut self, time: u64) {
+        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
+            self.now = compare;
+            self.fire();
+        }
+        self.now = self.now.max(time);
+    }
+
+    /// With one, every 2 ms; until it is at rest, or until a time.
+    fn run(&mut self, time: u64) {
+        loop {
+            let mut slices = 0;
+            let work = loop {
+                let stands = self.compare.is_none();
+                match self.slice() {
+                    Work::More => slices += 1,
+                    // After a halt the timer may still be running.
+                    Work::Start if stands => slices += 1,
+                    other => break other,
+                }
+                assert!(slices < 20_000, "the background does not end");
+            };
+            if self.now >= time || work == Work::Rest {
+                return;
+            }
+            self.until((self.now + 2000).min(time));
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::axes_timer::{AxesQueue, AxesTimer, TURN, TURNS};
 use crate::axis::{COARSE, COARSEST, Work};
 use crate::cutter::Demand;
 use crate::error::Error;
+use crate::limits::Limits;
 use crate::path::Path;
 use crate::path_mover::PathMover;
 use crate::queue::{IDLE, Joint, Queue, REST, TICKET};
@@ -246,6 +247,16 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.path.stop(self.end);
         self.tell_stops(|stop, end| {
             stop.stop(end);
+            Ok(())
+        });
+    }
+
+    /// As [`PathMover::quick_stop`].
+    pub fn quick_stop(&mut self, limits: [Limits; N]) {
+        self.begin_anew();
+        self.path.quick_stop(limits, self.end);
+        self.tell_stops(|stop, end| {
+            stop.quick_stop(limits, end);
             Ok(())
         });
     }

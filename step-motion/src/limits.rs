@@ -184,6 +184,15 @@ impl Limits {
         self.jerk
     }
 
+    /// The higher of both in each; no limit of jerk is the highest.
+    pub(super) fn or_higher(self, other: Self) -> Self {
+        Self {
+            speed: self.speed.max(other.speed),
+            acceleration: self.acceleration.max(other.acceleration),
+            jerk: self.jerk.zip(other.jerk).map(|(own, other)| own.max(other)),
+        }
+    }
+
     /// In steps and moments.
     pub(super) fn bounds(self, clock: Clock) -> Bounds {
         self.bounds_in(clock.seconds())

@@ -7,7 +7,7 @@ use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::phases::Phases;
-use crate::plan::{Setpoint, checked};
+use crate::plan::{Setpoint, checked, clamp};
 use crate::stepper::Stepper;
 use servowire_core::Direction;
 
@@ -340,8 +340,4 @@ impl Mover {
         let bounds = limits.bounds(self.clock).or_higher(self.wish.quick.as_ref().unwrap_or(&self.bounds));
         self.wish.quick = Some(bounds);
     }
-}
-
-fn clamp(target: i64) -> i32 {
-    i32::try_from(target).unwrap_or(if target < 0 { i32::MIN } else { i32::MAX })
 }

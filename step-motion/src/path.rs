@@ -4,9 +4,10 @@ use crate::curve::Curve;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::line::{Line, LinePulses, Start, Steps};
-use crate::plan::checked;
+use crate::plan::{checked, clamp};
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
+use servowire_core::Direction;
 
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,12 +18,27 @@ pub struct AxisSetup {
     pub limits: Limits,
     /// Steps per metre, at least 1: 80 steps/mm is 80000.
     pub steps_per_m: u32,
+    /// The range that no line may leave, both ends included, in steps; none by default.
+    pub soft_limits: Option<(i64, i64)>,
+    /// Ticks between two steps in different directions, at least; 0 by default.
+    pub reversal_pause: u32,
 }
 
 impl AxisSetup {
-    /// Both fields.
+    /// Without soft limits or a reversal pause.
     pub const fn new(limits: Limits, steps_per_m: u32) -> Self {
-        Self { limits, steps_per_m }
+        Self { limits, steps_per_m, soft_limits: None, reversal_pause: 0 }
+    }
+
+    /// With a range that no line may leave, both ends included, in steps.
+    pub const fn with_soft_limits(self, low: i64, high: i64) -> Self {
+        Self { soft_limits: Some((low, high)), ..self }
+    }
+
+    /// With so many ticks at least between two steps in different directions: what the driver and the mechanics need between a step and
+    /// DIR, and between DIR and the next step. A corner at which the axis turns round is as slow as that takes, or the machine rests there.
+    pub const fn with_reversal_pause(self, ticks: u32) -> Self {
+        Self { reversal_pause: ticks, ..self }
     }
 }
 
@@ -74,8 +90,12 @@ pub struct Path<const N: usize, const M: usize> {
     len: usize,
     /// Direction and length of the line before the next one pushed, in units.
     before: Option<([i32; N], Real)>,
-    /// Where the last line ends.
+    /// Where the last line ends, and which way each axis has gone last until there.
     target: [i64; N],
+    ways: [Option<Direction>; N],
+    /// Which way each axis has gone last on lines that are over, and when they were.
+    gone: [Option<Direction>; N],
+    over: u64,
     /// Speed at which the next line begins, in units a moment.
     speed: Real,
     moment: u64,
@@ -107,6 +127,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
             len: 0,
             before: None,
             target: [0; N],
+            ways: [None; N],
+            gone: [Some(Direction::Forward); N],
+            over: 0,
             speed: Real::ZERO,
             moment: 0,
             offset: Real::ZERO,
@@ -143,11 +166,13 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line of no length adds nothing.
     ///
     /// # Errors
-    /// [`Error::QueueFull`]; [`Error::TooManySteps`] for a line of more than 2^31 - 1 steps.
+    /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more than 2^31
+    /// - 1 steps.
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
+        self.check(&target)?;
         let steps = Self::steps(self.target, target)?;
         let length = self.length(&steps);
         if length.is_zero() {
@@ -155,7 +180,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         let (bounds, feed) = self.bounds(&steps, length, feed.max(1));
         let corner = match self.before {
-            Some((before, long)) => self.corner((&before, long), (&steps, length), bounds.a),
+            Some((before, long)) => self
+                .corner((&before, long), (&steps, length), bounds.a)
+                .min(self.turning((&before, long), (&steps, length))),
             None => Real::ZERO,
         };
         let place = self.first.wrapping_add(self.len).checked_rem(M).and_then(|at| self.lines.get_mut(at));
@@ -164,6 +191,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             self.len = self.len.saturating_add(1);
             self.before = Some((steps, length));
             self.target = target;
+            gone_along(&mut self.ways, &steps);
         }
         Ok(())
     }
@@ -172,10 +200,38 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// earlier than [`not_before`](Self::not_before).
     pub fn next_line(&mut self) -> Option<LinePulses<N>> {
         let line = self.line(0)?;
+        self.not_before_turning();
         let Course { curve, exit, .. } = self.begin(0, self.speed, Some(Real::ONE))?;
         let start = self.start();
         self.finish(&curve, start.moment, start.offset, exit);
         Some(LinePulses::new(self.clock, &curve, &line, start, Steps::Single))
+    }
+
+    /// Refuses a target outside the soft limits of an axis.
+    pub(super) fn check(&self, target: &[i64; N]) -> Result<(), Error> {
+        for (axis, &target) in self.axes.iter().zip(target) {
+            if axis.soft_limits.is_some_and(|(low, high)| target < low || target > high) {
+                return Err(Error::SoftLimit { target: clamp(target) });
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the lines use higher limits, of those there are and these, for a stop that is to be found anew.
+    pub(super) fn hurry(&mut self, limits: &[Limits; N]) {
+        let own = self.axes;
+        for (axis, limits) in self.axes.iter_mut().zip(limits) {
+            axis.limits = axis.limits.or_higher(*limits);
+        }
+        for i in 0..self.len {
+            let Some(line) = self.line(i) else { break };
+            let (bounds, _) = self.bounds(&line.steps, line.whole, 1);
+            let place = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            if let Some(Some(line)) = place {
+                (line.bounds, line.leave) = (bounds.or_higher(&line.bounds), None);
+            }
+        }
+        self.axes = own;
     }
 
     /// Steps of each axis from one position to another.
@@ -225,8 +281,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
             (self.moment, self.offset) = (self.moment.saturating_add(grid), Real::ZERO);
         }
         self.speed = exit;
+        self.over = self.moment;
         if let Some(place) = self.lines.get_mut(self.first) {
-            *place = None;
+            if let Some(line) = place.take() {
+                gone_along(&mut self.gone, &line.steps);
+            }
         }
         self.first = self.first.wrapping_add(1).checked_rem(M).unwrap_or(0);
         self.len = self.len.saturating_sub(1);
@@ -340,12 +399,24 @@ impl<const N: usize, const M: usize> Path<N, M> {
     pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
         (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
         (self.speed, self.moment, self.offset) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO);
+        (self.over, self.gone) = (self.moment, [None; N]);
     }
 
     /// After a rest, the next line begins no earlier than this tick.
     pub fn not_before(&mut self, tick: u64) {
         if self.speed.is_zero() {
             self.moment = self.moment.max(self.clock.moment(tick));
+        }
+    }
+
+    /// After a rest, the next line begins no earlier than the pause of an axis that goes the other way, or did so perhaps.
+    pub(super) fn not_before_turning(&mut self) {
+        let Some(line) = self.line(0).filter(|_| self.speed.is_zero()) else { return };
+        for ((axis, &steps), gone) in self.axes.iter().zip(&line.steps).zip(self.gone) {
+            if steps != 0 && gone != Some(Direction::of(steps.into())) {
+                let pause = self.clock.moment(axis.reversal_pause.into());
+                self.moment = self.moment.max(self.over.saturating_add(pause));
+            }
         }
     }
 
@@ -425,6 +496,26 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (Bounds::new(v, a, j), feed)
     }
 
+    /// The speed at which axes that turn round at a corner have their pause between both steps, whatever they do there within their limits:
+    /// half a step at the axis's speed v takes t if v t + a t² / 2 is half a step.
+    fn turning(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real)) -> Real {
+        let mut most = Real::HUGE;
+        for (((axis, way), &before), &after) in self.axes.iter().zip(self.ways).zip(from).zip(to) {
+            let turns = way.is_some_and(|way| way != Direction::of(after.into()));
+            if after == 0 || axis.reversal_pause == 0 || !turns {
+                continue;
+            }
+            let pause = Real::new(self.clock.moment(axis.reversal_pause.into()));
+            // It has half of it on either side, or all of it behind the corner.
+            let time = if before == 0 { pause } else { pause.half() };
+            let v = Real::ONE.half() / time - (axis.limits.bounds(self.clock).a * time).half();
+            for (steps, length) in [(before, long), (after, length)].into_iter().filter(|(steps, _)| *steps != 0) {
+                most = most.min(v * length / Real::new(steps.unsigned_abs().into()));
+            }
+        }
+        most
+    }
+
     /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
     /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits.
     ///
@@ -463,6 +554,13 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let chord = long.min(length).half() * s / rest.sqrt();
         let bow = if shut < STRAIGHT { Real::HUGE } else { self.deviation * s * (one + s) / rest };
         (most * bow.min(chord)).sqrt()
+    }
+}
+
+/// Which way each axis has gone behind a line.
+fn gone_along<const N: usize>(ways: &mut [Option<Direction>; N], steps: &[i32; N]) {
+    for (way, &steps) in ways.iter_mut().zip(steps).filter(|(_, steps)| **steps != 0) {
+        *way = Some(Direction::of(steps.into()));
     }
 }
 

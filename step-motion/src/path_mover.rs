@@ -2,7 +2,7 @@
 
 use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
-use crate::limits::Clock;
+use crate::limits::{Clock, Limits};
 use crate::line::{AxisPulse, LinePulses, Start, Steps};
 use crate::path::{Course, Path};
 use crate::plan::Setpoint;
@@ -66,6 +66,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     braking: bool,
     /// A stop is under way: what runs has been cut off.
     stopping: bool,
+    /// A quick one: until its last step, lines are refused.
+    quick: bool,
     halted: bool,
 }
 
@@ -90,6 +92,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             held: false,
             braking: false,
             stopping: false,
+            quick: false,
             halted: false,
         }
     }
@@ -176,8 +179,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// as much as the corner requires.
     ///
     /// # Errors
-    /// As [`Path::push`].
+    /// As [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.ready()?;
         self.path.push(target, feed)?;
         self.halted = false;
         self.look_ahead(now);
@@ -212,12 +216,32 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
+    /// Slows down to rest along the path within other limits of the axes, higher ones for a limit switch, and forgets the rest of it. Until
+    /// its last step, lines are refused. Where an axis's own limits are higher, those are used: a quick stop is never longer than a
+    /// [`stop`](Self::stop), also of one that is under way.
+    pub fn quick_stop(&mut self, limits: [Limits; N], now: u64) {
+        if self.line.is_none() {
+            return self.stop(now);
+        }
+        let before = if self.stopping { self.path.end_of_cut() } else { None };
+        (self.stopping, self.quick) = (false, true);
+        self.path.hurry(&limits);
+        match (self.end_of_stop(now), before) {
+            (Some((end, _)), Some(before)) if before < end => self.leave_at((before, self.exit), now),
+            (Some(end), _) => self.leave_at(end, now),
+            (None, _) => self.leave(self.tick(now)),
+        }
+    }
+
     /// A new target: slows down to rest along the path, forgets the rest of it, and goes straight to `target` from there.
     ///
     /// # Errors
-    /// [`Error::QueueFull`] if the way to rest takes all lines of a full queue; [`Error::TooManySteps`] more than 2^31 - 1 steps
-    /// from there. Both leave the path as it was.
+    /// [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::QueueFull`] if the way to rest takes all lines of a full queue;
+    /// [`Error::TooManySteps`] more than 2^31 - 1 steps from there; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop). All leave
+    /// the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.ready()?;
+        self.path.check(&target)?;
         let end = self.end_of_stop(now);
         let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun(), self.made));
         Path::<N, M>::steps(from, target)?;
@@ -233,7 +257,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn halt(&mut self, now: u64) {
         self.halted = !self.is_at_rest(now);
         let free = self.free.iter().copied().max().unwrap_or(0);
-        (self.held, self.stopping) = (false, false);
+        (self.held, self.stopping, self.quick) = (false, false, false);
         self.leave(now.max(free));
     }
 
@@ -286,6 +310,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// As [`push`](Self::push); what runs takes no notice of it before it is told to [look ahead](Self::look_ahead).
     pub(super) fn append(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.ready()?;
         self.path.push(target, feed)?;
         self.halted = false;
         if self.line.is_none() {
@@ -313,6 +338,15 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.halt(now);
         (self.commanded, self.halted) = (commanded, was_moving);
         self.leave(now);
+    }
+
+    /// Refuses lines in a quick stop, which is over when no step is to come.
+    fn ready(&mut self) -> Result<(), Error> {
+        if self.quick && self.due().is_some() {
+            return Err(Error::Moving);
+        }
+        self.quick = false;
+        Ok(())
     }
 
     /// Part of the speeds that were asked for; `None` to brake.
@@ -426,6 +460,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return;
         }
         self.path.not_before_steps(self.free);
+        self.path.not_before_turning();
         if let Some(course) = self.path.begin(0, self.path.speed(), part) {
             self.adopt(&course, self.path.start());
         }

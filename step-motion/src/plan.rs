@@ -211,6 +211,11 @@ pub(super) fn position(steps: u32) -> Result<i64, Error> {
     if steps > limit { Err(Error::TooManySteps { steps, limit }) } else { Ok(i64::from(steps) << 32) }
 }
 
+/// A position for [`Error::SoftLimit`].
+pub(super) fn clamp(target: i64) -> i32 {
+    i32::try_from(target).unwrap_or(if target < 0 { i32::MIN } else { i32::MAX })
+}
+
 pub(super) fn too_short(steps: u32, need: Real) -> Error {
     let whole = (need - Real::fixed(1, 16)).to_fixed(0).saturating_add(1);
     Error::TooShort { steps, needed: whole }

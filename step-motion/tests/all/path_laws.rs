@@ -1,7 +1,7 @@
 //! The laws of a stop over all requests to a path, at any moment, any clock and any limits. What is looked at are the steps.
 
 use proptest::prelude::*;
-use step_motion::{AxisSetup, Clock, Direction, Limits, Path, PathMover};
+use step_motion::{AxisSetup, Clock, Direction, Error, Limits, Path, PathMover};
 
 const N: usize = 2;
 type Machine = PathMover<N, 5>;
@@ -14,11 +14,12 @@ enum Request {
     Hold,
     Resume,
     Stop,
+    Quick([(u32, u64); N]),
     Halt,
 }
 
 fn place() -> impl Strategy<Value = [i64; N]> {
-    prop_oneof![3 => [-900..900_i64, -900..900_i64], 1 => [-6..6_i64, -6..6_i64], 1 => (-900..900_i64).prop_map(|x| [x, 0])]
+    prop_oneof![3 => [-900..900_i64, -900..900_i64], 1 => [-1300..1300_i64, -1300..1300_i64], 1 => [-6..6_i64, -6..6_i64], 1 => (-900..900_i64).prop_map(|x| [x, 0])]
 }
 
 fn request() -> impl Strategy<Value = Request> {
@@ -30,6 +31,7 @@ fn request() -> impl Strategy<Value = Request> {
         3 => Just(Request::Hold),
         3 => Just(Request::Resume),
         2 => Just(Request::Stop),
+        2 => [harder(), harder()].prop_map(Request::Quick),
         1 => Just(Request::Halt),
     ]
 }
@@ -38,6 +40,19 @@ fn request() -> impl Strategy<Value = Request> {
 fn spread(low: f64, high: f64) -> impl Strategy<Value = u64> {
     (low.ln()..high.ln()).prop_map(|x| x.exp() as u64)
 }
+
+/// Acceleration and jerk of a quick stop, maybe less than those of the axis.
+fn harder() -> impl Strategy<Value = (u32, u64)> {
+    (spread(1e3, 1e8).prop_map(|a| a as u32), prop_oneof![1 => Just(0), 1 => spread(1e4, 1e12)])
+}
+
+/// In us.
+fn pause() -> impl Strategy<Value = u64> {
+    prop_oneof![1 => Just(0), 1 => spread(1.0, 3e4)]
+}
+
+/// How far the axes may go.
+const SOFT: i64 = 1100;
 
 fn axis() -> impl Strategy<Value = (u64, u64, u64, u64)> {
     (spread(50.0, 1e5), spread(1e3, 1e7), prop_oneof![2 => Just(0), 5 => spread(1e4, 1e11)], spread(1e3, 1e6))
@@ -59,7 +74,7 @@ fn ending(machine: &Machine, now: u64) -> Ending {
         assert!(steps[0] + steps[1] < 100_000, "the stop does not end");
         last = pulse.tick;
     }
-    let (mut low, mut high) = (last, last.max(1) << 20);
+    let (mut low, mut high) = (last, (last.max(1) << 20).max(1 << 40));
     while low < high {
         let middle = low.midpoint(high);
         if machine.is_at_rest(middle) { high = middle } else { low = middle + 1 }
@@ -87,6 +102,8 @@ struct Watched {
     /// It is held: lines that come do not move it.
     held: bool,
     slowed: bool,
+    /// In a quick stop, which may be within less than half a step of a corner.
+    hurried: bool,
 }
 
 impl Watched {
@@ -96,7 +113,7 @@ impl Watched {
         }
         self.now = self.now.max(time);
         if self.machine.is_at_rest(self.now) {
-            self.stop = None;
+            (self.stop, self.hurried) = (None, false);
         }
         Ok(())
     }
@@ -107,11 +124,18 @@ impl Watched {
         self.position[i] = pulse.direction.advance(self.position[i]);
         prop_assert_eq!(self.machine.commanded(), self.position);
         prop_assert!(pulse.tick >= self.now || self.last.iter().flatten().all(|(last, _)| pulse.tick >= *last));
-        if let Some((last, _)) = self.last[i] {
+        prop_assert!(self.position[i].abs() <= SOFT, "axis {i} at {}", self.position[i]);
+        if let Some((last, before)) = self.last[i] {
             prop_assert!(pulse.tick > last, "two steps in a tick");
             let least = u64::from(self.hz) / u64::from(self.axes[i].limits.speed());
             let gap = pulse.tick - last;
             prop_assert!(gap + 2 >= least, "axis {i}: {gap} ticks, {least} are the fastest");
+            let pause = u64::from(self.axes[i].reversal_pause);
+            // A tick of rounding at either end.
+            prop_assert!(
+                before == pulse.direction || self.hurried || gap + 2 >= pause,
+                "axis {i} turns round within {gap} ticks, {pause} are asked for"
+            );
         }
         self.last[i] = Some((pulse.tick, pulse.direction));
         self.now = self.now.max(pulse.tick);
@@ -168,6 +192,24 @@ impl Watched {
                 prop_assert!(rest || end.is_within(plain, 1, self.rounding), "{end:?} of a stop, {plain:?} of a hold");
                 stops = true;
             }
+            Request::Quick(limits) => {
+                let limits = limits.map(|(a, j)| {
+                    let limits = Limits::new(1, a).unwrap();
+                    if j == 0 { limits } else { limits.with_jerk(j).unwrap() }
+                });
+                self.machine.quick_stop(limits, now);
+                let end = ending(&self.machine, self.now);
+                prop_assert!(
+                    rest || end.is_within(plain, 1, self.rounding),
+                    "{end:?} of a quick stop, {plain:?} of a hold"
+                );
+                prop_assert!(
+                    self.machine.due().is_none() || self.machine.clone().push([0; N], 1000, now).is_err(),
+                    "a line in a quick stop"
+                );
+                stops = true;
+                self.hurried = !self.machine.is_at_rest(now);
+            }
             Request::Halt => {
                 self.machine.halt(now);
                 prop_assert!(self.machine.due().is_none() && self.machine.is_empty());
@@ -203,20 +245,23 @@ proptest! {
 
     #[test]
     fn a_stop_wins_whatever_is_asked(
-        hz in clocks(), axes in [axis(), axis()], deviation in prop_oneof![Just(0), 1..2000_u32],
+        hz in clocks(), axes in [axis(), axis()], pauses in [pause(), pause()], deviation in prop_oneof![Just(0), 1..2000_u32],
         requests in prop::collection::vec(
             (request(), spread(1e-6, 0.3e6), prop_oneof![3 => Just(0_i64), 1 => -20_000..20_000_i64]), 1..16),
-        target in place(),
+        target in [-900..900_i64, -900..900_i64],
     ) {
+        let mut pauses = pauses.into_iter().map(|us| (us * u64::from(hz) / 1_000_000) as u32);
         let axes = axes.map(|(v, a, j, scale)| {
             let limits = Limits::new((v as u32).min(hz / 2), a as u32).unwrap();
             let limits = if j == 0 { limits } else { limits.with_jerk(j).unwrap() };
             AxisSetup::new(limits, scale as u32)
+                .with_soft_limits(-SOFT, SOFT)
+                .with_reversal_pause(pauses.next().unwrap())
         });
         let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, deviation).unwrap());
         let slowest = axes.iter().map(|axis| axis.limits.acceleration()).min().map_or(1.0, f64::from);
         let rounding = 2 + ((2.0 / 65536.0 / slowest).sqrt() * f64::from(hz)) as u64;
-        let mut watched = Watched { machine, hz, axes, rounding, now: 0, last: [None; N], position: [0; N], stop: None, held: false, slowed: false };
+        let mut watched = Watched { machine, hz, axes, rounding, now: 0, last: [None; N], position: [0; N], stop: None, held: false, slowed: false, hurried: false };
         for (request, wait_us, skew) in requests {
             watched.tell(request, skew)?;
             // 20 s at most, else a slow path takes for ever.
@@ -251,4 +296,89 @@ fn a_stop_without_speed_and_with_a_step_that_is_due() {
     assert_eq!((machine.due(), machine.at(358)[0].speed), (Some(358), 0));
     machine.stop(358);
     assert_eq!((machine.due(), machine.is_empty(), machine.target()), (None, true, machine.commanded()));
+}
+
+/// There, back and there with a pause, at a clock of 1 MHz.
+#[test]
+fn an_axis_has_its_pause_where_it_turns_round() {
+    let limits = Limits::new(20_000, 2_000_000).unwrap();
+    let axis = AxisSetup::new(limits, 80_000);
+    for pause in [0, 40, 900, 20_000] {
+        let axis = axis.with_reversal_pause(pause);
+        let mut machine = PathMover::new(Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 2000).unwrap());
+        for to in [[800, 0], [400, 300], [800, 600]] {
+            machine.push(to, 250_000, 0).unwrap();
+        }
+        let (mut last, mut turns) = (None::<(u64, Direction)>, 0);
+        while let Some(pulse) = machine.pulse() {
+            if pulse.axis == 0 {
+                if let Some((tick, _)) = last.filter(|(_, way)| *way != pulse.direction) {
+                    assert!(pulse.tick - tick + 1 >= u64::from(pause), "{} of {pause}", pulse.tick - tick);
+                    turns += 1;
+                }
+                last = Some((pulse.tick, pulse.direction));
+            }
+        }
+        assert_eq!((machine.commanded(), turns), ([800, 600], 2));
+    }
+}
+
+/// A corner is as slow as a pause takes, not slower: one of 40 us costs no rest.
+#[test]
+fn a_short_pause_does_not_stop_at_a_corner() {
+    let limits = Limits::new(20_000, 200_000).unwrap();
+    let over = |pause| {
+        let axis = AxisSetup::new(limits, 80_000).with_reversal_pause(pause);
+        let mut path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        for to in [[40, 800], [0, 1600]] {
+            path.push(to, 100_000).unwrap();
+        }
+        let mut end = 0;
+        while let Some(line) = path.next_line() {
+            end = line.end();
+        }
+        end
+    };
+    let [none, short, long] = [0, 40, 20_000].map(over);
+    assert!(none <= short && short < none + none / 100 && long >= none + 20_000, "{none} {short} {long}");
+}
+
+/// From 8000 steps/s a stop at 20,000 steps/s² takes 1600 steps, a quick one at 400,000 takes 80; also from within the stop.
+#[test]
+fn a_quick_stop_of_a_path_is_quick() {
+    let axis = AxisSetup::new(Limits::new(8000, 20_000).unwrap(), 80_000);
+    let quick = [Limits::new(1, 400_000).unwrap(); 2];
+    for stops_before in [false, true] {
+        let mut machine = PathMover::new(Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 2000).unwrap());
+        machine.push([8000, 0], 100_000, 0).unwrap();
+        machine.push([8000, 4000], 100_000, 0).unwrap();
+        let mut now = 0;
+        while machine.commanded() != [4000, 0] {
+            now = machine.pulse().unwrap().tick;
+        }
+        if stops_before {
+            machine.stop(now);
+        }
+        machine.quick_stop(quick, now);
+        assert_eq!(machine.push([0, 0], 1000, now), Err(Error::Moving));
+        while machine.pulse().is_some() {}
+        let [x, y] = machine.commanded();
+        assert!((4078..=4083).contains(&x) && y == 0, "{x} {y}");
+        machine.push([0, 0], 100_000, now + 10_000_000).unwrap();
+        while machine.pulse().is_some() {}
+        assert_eq!(machine.commanded(), [0, 0]);
+    }
+}
+
+#[test]
+fn soft_limits_of_a_path_refuse_and_change_nothing() {
+    let axis = AxisSetup::new(Limits::new(8000, 20_000).unwrap(), 80_000);
+    let axes = [axis.with_soft_limits(-10, 500), axis];
+    let mut machine = PathMover::new(Path::<2, 8>::new(Clock::MICROSECONDS, axes, 20).unwrap());
+    machine.push([500, 9000], 100_000, 0).unwrap();
+    assert_eq!(machine.push([501, 0], 100_000, 0), Err(Error::SoftLimit { target: 501 }));
+    let due = machine.due();
+    assert_eq!(machine.move_to([-11, 0], 100_000, 0), Err(Error::SoftLimit { target: -11 }));
+    assert_eq!((machine.due(), machine.target(), machine.len()), (due, [500, 9000], 1));
+    machine.push([-10, 0], 100_000, 0).unwrap();
 }

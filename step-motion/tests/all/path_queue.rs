@@ -112,7 +112,7 @@ fn path(hz: u32, axes: [AxisSetup; N], deviation: u32) -> Path<N, LINES> {
 
 fn place() -> impl Strategy<Value = [i64; N]> {
     prop_oneof![
-        3 => [-900..900_i64, -900..900_i64, -300..300_i64],
+        3 => [-900..=900_i64, -900..=900_i64, -300..=300_i64],
         1 => [-6..6_i64, -6..6_i64, -2..2_i64],
         1 => (-900..900_i64).prop_map(|x| [x, 0, 0]),
     ]
@@ -184,18 +184,21 @@ enum Request {
     Hold,
     Resume,
     Stop,
+    Quick(u32),
     Halt,
 }
 
 fn request() -> impl Strategy<Value = Request> {
     let feed = || spread(100.0, 3e5).prop_map(|feed| feed as u32);
     prop_oneof![
+        1 => (-2000..2000_i64, feed()).prop_map(|(x, feed)| Request::Push([0, x, 0], feed)),
         7 => (place(), feed()).prop_map(|(to, feed)| Request::Push(to, feed)),
         2 => (place(), feed()).prop_map(|(to, feed)| Request::MoveTo(to, feed)),
         3 => (0..200_u16).prop_map(Request::Override),
         2 => Just(Request::Hold),
         3 => Just(Request::Resume),
         1 => Just(Request::Stop),
+        1 => (1000..10_000_000_u32).prop_map(Request::Quick),
         1 => Just(Request::Halt),
     ]
 }
@@ -208,6 +211,7 @@ fn ask(axes: &mut Background, request: Request) {
         Request::Hold => axes.hold(),
         Request::Resume => axes.resume(),
         Request::Stop => axes.stop(),
+        Request::Quick(acceleration) => axes.quick_stop([Limits::new(1, acceleration).unwrap(); N]),
         Request::Halt => axes.halt(),
     }
 }
@@ -230,8 +234,13 @@ proptest! {
     fn requests_and_a_background_that_stalls(
         hz in clocks(), from in [setup(), setup(), setup()], deviation in prop_oneof![Just(0), 1..2000_u32],
         requests in prop::collection::vec((request(), 0..300_000_u64, 0..400_u32), 1..16), target in place(),
+        pauses in prop_oneof![Just([0; N]), [0..20_000_u32, 0..300_u32, 0..1_u32]],
     ) {
-        let setups = axes(hz, from);
+        let mut pauses = pauses.into_iter().map(|us| (u64::from(us) * u64::from(hz) / 1_000_000) as u32);
+        let setups = axes(hz, from)
+            .map(|axis| axis.with_soft_limits(-900, 900).with_reversal_pause(pauses.next().unwrap()));
+        // In a quick stop a corner may be within less than half a step.
+        let hurried = requests.iter().any(|(request, ..)| matches!(request, Request::Quick(_)));
         let (mut axes, timer) = Axes::new(queue(), path(hz, setups, deviation));
         let mut machine = Machine::new(timer);
         let reach = u64::from(hz / 200);
@@ -255,6 +264,7 @@ proptest! {
                 prop_assert_eq!(machine.position, position, "a step after a halt");
             }
             prop_assert_eq!(axes.commanded(), machine.position);
+            prop_assert!(machine.position.iter().all(|at| at.abs() <= 900), "{:?}", machine.position);
         }
         axes.stop();
         machine.drain();
@@ -268,8 +278,10 @@ proptest! {
         prop_assert_eq!(run(&mut axes, &mut machine, reach / 2, u64::MAX), Work::Rest);
         prop_assert_eq!((machine.position, axes.commanded()), (target, target));
         let mut last = [None; N];
-        for (tick, axis, _) in machine.steps {
-            if let Some(before) = last[axis].replace(tick) {
+        for (tick, axis, by) in machine.steps {
+            if let Some((before, way)) = last[axis].replace((tick, by)) {
+                let pause = u64::from(setups[axis].reversal_pause);
+                prop_assert!(by == way || hurried || tick - before + 3 >= pause, "{} of {pause} ticks", tick - before);
                 let least = u64::from(hz) / u64::from(setups[axis].limits.speed());
                 prop_assert!(tick - before + 3 + least / 8 >= least, "axis {axis}: {} of {least} ticks", tick - before);
             }
