@@ -2007,7 +2007,7 @@ enum sw_tformat_error_t
      */
     SW_E_TFORMAT_PARITY = -261,
     /**
-     * The data ID is none of the nine documented ones.
+     * The data ID is not one of the nine documented ones.
      */
     SW_E_TFORMAT_UNKNOWN_DATA_ID = -262,
     /**
@@ -4198,7 +4198,7 @@ sw_result_t sw_aformat_bus_sample(sw_aformat_bus_t *bus,
                                   sw_aformat_response_t *response);
 
 /**
- * The line is at its end: SW_OK, or why a response that had begun is none.
+ * Ends the line: SW_OK, or why a response that had begun is incomplete.
  */
 sw_result_t sw_aformat_bus_line_ends(sw_aformat_bus_t *bus, sw_aformat_receiver_t *receiver);
 
@@ -4408,9 +4408,9 @@ sw_result_t sw_aformat_bus_push_abs40(sw_aformat_bus_t *bus,
                                       sw_aformat_abs40_t *data);
 
 /**
- * One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
+ * Takes one response, a 16-bit word for each frame. SW_OK with the response, or why it is refused. A second
  * good one from the same address is SW_E_AFORMAT_TWO_RESPONSES: two encoders have it; one from an address that was not asked is
- * SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for a look.
+ * SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for inspection.
  */
 sw_result_t sw_aformat_bus_push(sw_aformat_bus_t *bus,
                                 const uint16_t *words,
@@ -4572,7 +4572,7 @@ sw_result_t sw_hdsl_equalisation(int8_t *disparity, uint8_t *bits);
 sw_result_t sw_hdsl_build_parameter(uint8_t parameter, int8_t *disparity, uint16_t *word);
 
 /**
- * The parameter byte of a word. SW_E_NO_VALUE for a word that is none.
+ * The parameter byte of a word. SW_E_NO_VALUE if the word is not a parameter word.
  */
 sw_result_t sw_hdsl_parse_parameter(uint16_t word, uint8_t *parameter);
 
@@ -4666,7 +4666,7 @@ sw_result_t sw_hdsl_reset_messages(sw_hdsl_t *m);
 sw_result_t sw_hdsl_finished(const sw_hdsl_t *m, sw_hdsl_finished_t *finished);
 
 /**
- * A free-running receiver at the begin of the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
+ * Prepares a free-running receiver, which begins with the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
  * known. `dialect` is sw_hdsl_dialect_t.
  */
 sw_result_t sw_hdsl_start(sw_hdsl_t *m,
@@ -4674,7 +4674,7 @@ sw_result_t sw_hdsl_start(sw_hdsl_t *m,
                           uint32_t steps_per_turn);
 
 /**
- * What the present H-frame sends.
+ * Tells what is to be sent in the present H-frame.
  */
 sw_result_t sw_hdsl_transmission(const sw_hdsl_t *m, sw_hdsl_transmission_t *to_send);
 
@@ -4912,47 +4912,47 @@ sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
                            sw_motion_fired_t *fired);
 
 /**
- * A slice of planning, in the background: sw_motion_work_t, or a refusal.
+ * Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal.
  */
 sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
 
 /**
- * To a position in steps.
+ * Moves to a position, in steps.
  */
 sw_result_t sw_motion_move_to(sw_motion_axis_t *axis, int64_t target);
 
 /**
- * On and on at this speed, steps/s; `reverse` is 0 or 1.
+ * Runs at this speed, in steps/s, until something else is asked for; `reverse` is 0 or 1.
  */
 sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t speed);
 
 /**
- * To rest within the limits; the target is forgotten.
+ * Slows down to rest within the limits; the target is dropped.
  */
 sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
 
 /**
- * No step any more, at once.
+ * Stops at once: no further step is made.
  */
 sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
 
 /**
- * To rest within the limits; sw_motion_resume() goes on.
+ * Slows down to rest within the limits; sw_motion_resume() continues the motion.
  */
 sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
 
 /**
- * Goes on after sw_motion_hold().
+ * Continues the motion after sw_motion_hold().
  */
 sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
 
 /**
- * Where the axis is commanded to be, in steps.
+ * Tells the commanded position of the axis, in steps.
  */
 sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
 
 /**
- * Whether the axis stands; false for a state that was not started.
+ * Returns whether the axis is at rest; false for a state that was not started.
  */
 bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
 
@@ -4970,8 +4970,8 @@ sw_result_t sw_nrz_run(sw_nrz_t *receiver,
                        sw_nrz_field_t *field);
 
 /**
- * The name of a result in `snake_case`, as logs and test vectors of servowire spell it; "unknown" for a number that is none.
- * Never NULL, valid for ever.
+ * Returns the name of a result in `snake_case`, as the logs and test vectors of servowire spell it; "unknown" for a number that is
+ * not a result. It is never NULL and stays valid.
  */
 const char *sw_text(sw_result_t result);
 
@@ -5130,7 +5130,7 @@ sw_result_t sw_rtex_phases_step(sw_rtex_phases_t *phases, const sw_rtex_inputs_t
 sw_result_t sw_rtex_phases_fault(const sw_rtex_phases_t *phases);
 
 /**
- * What the LED shows `t_ms` after the begin of a lit half period: sw_rtex_led_t, or a refusal.
+ * Returns what the LED shows `t_ms` after the beginning of a lit half period: sw_rtex_led_t, or a refusal.
  */
 sw_result_t sw_rtex_led(uint8_t phase, uint8_t fault, uint64_t t_ms);
 
@@ -5143,7 +5143,7 @@ sw_result_t sw_rtex_periods_a6n(int32_t pr7_20,
                                 sw_rtex_periods_t *periods);
 
 /**
- * How long a frame for so many axes takes, ns (System Design Guide for Master).
+ * Returns how long a frame for this number of axes takes, in ns (System Design Guide for Master).
  */
 uint64_t sw_rtex_frame_ns(uint32_t axes);
 
@@ -5421,9 +5421,10 @@ sw_result_t sw_sorte_build_device_frame(const sw_sorte_device_frame_t *frame,
 sw_result_t sw_sorte_pto_of_step(uint32_t sync_ns, uint8_t direction, uint16_t *word);
 
 /**
- * What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
+ * Decodes a PTO word. A reserved one is refused with SW_E_SORTE_RESERVED_PTO_VALUE, but `pto` is filled in for inspection.
  */
-sw_result_t sw_sorte_parse_pto(uint16_t word, sw_sorte_pto_t *pto);
+sw_result_t sw_sorte_parse_pto(uint16_t word,
+                               sw_sorte_pto_t *pto);
 
 /**
  * The output for four axes, SW_SORTE_PAYLOAD bytes: a PTO word for each, commands 0. `count` is 4.
@@ -5445,7 +5446,7 @@ sw_result_t sw_sorte_build_shared_payload(uint16_t word,
 sw_result_t sw_sorte_parse_payload(const uint8_t *bytes, size_t len, uint16_t (*words)[4]);
 
 /**
- * The CRC-8 of the IO exchange over more bytes, behind those that gave `crc`; 0 at the begin.
+ * Continues the CRC-8 of the IO exchange over more bytes, after those that gave `crc`; it starts from 0.
  */
 sw_result_t sw_sorte_crc8(const uint8_t *bytes, size_t len, uint8_t *crc);
 
@@ -5545,7 +5546,7 @@ sw_result_t sw_step_check(uint32_t speed,
 sw_result_t sw_step_duration_ns(uint32_t speed, uint32_t k, uint32_t init_sync, uint32_t steps, uint64_t *ns);
 
 /**
- * How a move goes, with a ramp of one's own of 32 entries, or with the published one for NULL.
+ * Tells the shape of a move, with your own ramp of 32 entries, or with the published one if `table` is NULL.
  */
 sw_result_t sw_step_shape(const uint32_t *table,
                           size_t len,
@@ -5553,8 +5554,8 @@ sw_result_t sw_step_shape(const uint32_t *table,
                           sw_step_shape_t *shape);
 
 /**
- * The steps of a move from step `first` on, as many as there is room for: `count` is 0 behind the last one. All before `first` are computed
- * once more, so it is SW_STEP_FIRST at most.
+ * Writes the steps of a move from step `first` on, as many as there is room for: `count` is 0 after the last one. All steps before
+ * `first` are computed again, so it may be at most SW_STEP_FIRST.
  */
 sw_result_t sw_step_steps(const uint32_t *table,
                           size_t len,
@@ -5716,7 +5717,7 @@ sw_result_t sw_tformat_init(sw_tformat_t *m,
                             uint8_t abm_bits);
 
 /**
- * Other widths, or turns of another kind (`flags`: sw_tformat_turns_t). The position that was heard last is forgotten.
+ * Sets other widths, or turns of another kind (`flags`: sw_tformat_turns_t). The position that was heard last is dropped.
  */
 sw_result_t sw_tformat_set_resolution(sw_tformat_t *m,
                                       uint8_t abs_bits,
@@ -5724,17 +5725,18 @@ sw_result_t sw_tformat_set_resolution(sw_tformat_t *m,
                                       uint8_t flags);
 
 /**
- * The times of the line as they are.
+ * Reads the present times of the line.
  */
 sw_result_t sw_tformat_get_line(const sw_tformat_t *m, sw_tformat_line_t *line);
 
 /**
- * Other times of the line, from the next request on. `echo` is 0 or 1.
+ * Sets other times of the line, from the next request on. `echo` is 0 or 1.
  */
 sw_result_t sw_tformat_set_line(sw_tformat_t *m, const sw_tformat_line_t *line);
 
 /**
- * Alarms (sw_tformat_almc_t, added) that sw_tformat_angle() and sw_tformat_position() tolerate beside their own, from now on.
+ * Sets the alarms (sum of sw_tformat_almc_t) that sw_tformat_angle() and sw_tformat_position() tolerate from now on, in addition to
+ * their own.
  */
 sw_result_t sw_tformat_tolerate(sw_tformat_t *m,
                                 uint8_t almc);
@@ -5758,8 +5760,8 @@ sw_result_t sw_tformat_start(sw_tformat_t *m,
                              sw_tformat_transmission_t *to_send);
 
 /**
- * Bytes were received one after the other; the last one ended at `end_ns`, or was handed over within the latency of the line after
- * that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
+ * Takes bytes that were received back to back; the last one ended at `end_ns`, or was handed over within the latency of the line
+ * after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
  */
 sw_result_t sw_tformat_hear(sw_tformat_t *m,
                             const uint8_t *bytes,
@@ -5772,7 +5774,7 @@ sw_result_t sw_tformat_hear(sw_tformat_t *m,
 sw_result_t sw_tformat_framing_error(sw_tformat_t *m, uint64_t end_ns);
 
 /**
- * It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+ * Ends an exchange whose time is over at `now_ns`. Hand over what was received before you call it.
  */
 sw_result_t sw_tformat_poll(sw_tformat_t *m, uint64_t now_ns);
 

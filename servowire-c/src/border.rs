@@ -163,7 +163,7 @@ pub(crate) struct Started<T> {
     pub(crate) state: T,
 }
 
-/// Where in the memory of a C type its state stands: at the begin, unless the state wants more than 8 bytes of alignment, which only
+/// Returns where in the memory of a C type its state stands: at the beginning, unless the state wants more than 8 bytes of alignment, which only
 /// hosts ask for.
 #[inline(always)]
 pub(crate) fn place<C, T>(memory: *mut C) -> *mut Started<T> {

@@ -143,7 +143,7 @@ pub extern "C" fn sw_motion_fire(
     })
 }
 
-/// A slice of planning, in the background: sw_motion_work_t, or a refusal.
+/// Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_poll(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {
@@ -157,7 +157,7 @@ pub extern "C" fn sw_motion_poll(axis: Option<&mut sw_motion_axis_t>) -> sw_resu
     })
 }
 
-/// To a position in steps.
+/// Moves to a position, in steps.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_move_to(axis: Option<&mut sw_motion_axis_t>, target: i64) -> sw_result_t {
     border(|| {
@@ -166,7 +166,7 @@ pub extern "C" fn sw_motion_move_to(axis: Option<&mut sw_motion_axis_t>, target:
     })
 }
 
-/// On and on at this speed, steps/s; `reverse` is 0 or 1.
+/// Runs at this speed, in steps/s, until something else is asked for; `reverse` is 0 or 1.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_run(axis: Option<&mut sw_motion_axis_t>, reverse: u8, speed: u32) -> sw_result_t {
     border(|| {
@@ -176,7 +176,7 @@ pub extern "C" fn sw_motion_run(axis: Option<&mut sw_motion_axis_t>, reverse: u8
     })
 }
 
-/// To rest within the limits; the target is forgotten.
+/// Slows down to rest within the limits; the target is dropped.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_stop(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {
@@ -185,7 +185,7 @@ pub extern "C" fn sw_motion_stop(axis: Option<&mut sw_motion_axis_t>) -> sw_resu
     })
 }
 
-/// No step any more, at once.
+/// Stops at once: no further step is made.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_halt(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {
@@ -194,7 +194,7 @@ pub extern "C" fn sw_motion_halt(axis: Option<&mut sw_motion_axis_t>) -> sw_resu
     })
 }
 
-/// To rest within the limits; sw_motion_resume() goes on.
+/// Slows down to rest within the limits; sw_motion_resume() continues the motion.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_hold(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {
@@ -203,7 +203,7 @@ pub extern "C" fn sw_motion_hold(axis: Option<&mut sw_motion_axis_t>) -> sw_resu
     })
 }
 
-/// Goes on after sw_motion_hold().
+/// Continues the motion after sw_motion_hold().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_resume(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {
@@ -212,7 +212,7 @@ pub extern "C" fn sw_motion_resume(axis: Option<&mut sw_motion_axis_t>) -> sw_re
     })
 }
 
-/// Where the axis is commanded to be, in steps.
+/// Tells the commanded position of the axis, in steps.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_commanded(
     axis: Option<&sw_motion_axis_t>,
@@ -225,7 +225,7 @@ pub extern "C" fn sw_motion_commanded(
     })
 }
 
-/// Whether the axis stands; false for a state that was not started.
+/// Returns whether the axis is at rest; false for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_is_at_rest(axis: Option<&sw_motion_axis_t>) -> bool {
     sw_motion_axis_t::look(axis).is_ok_and(Axis::is_at_rest)

@@ -146,8 +146,8 @@ fn text(code: sw_result_t) -> Option<&'static CStr> {
     if number == 0 { None } else { nth(names, number) }
 }
 
-/// The name of a result in `snake_case`, as logs and test vectors of servowire spell it; "unknown" for a number that is none.
-/// Never NULL, valid for ever.
+/// Returns the name of a result in `snake_case`, as the logs and test vectors of servowire spell it; "unknown" for a number that is
+/// not a result. It is never NULL and stays valid.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_text(result: sw_result_t) -> *const c_char {
     text(result).unwrap_or(c"unknown").as_ptr()

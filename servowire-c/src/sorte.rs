@@ -193,7 +193,7 @@ pub extern "C" fn sw_sorte_pto_of_step(
     })
 }
 
-/// What a word says. A reserved one is SW_E_SORTE_RESERVED_PTO_VALUE, and `pto` is filled for a look.
+/// Decodes a PTO word. A reserved one is refused with SW_E_SORTE_RESERVED_PTO_VALUE, but `pto` is filled in for inspection.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_sorte_parse_pto(word: u16, pto: Option<&mut MaybeUninit<sw_sorte_pto_t>>) -> sw_result_t {
     border(|| {

@@ -203,7 +203,7 @@ unsafe fn with_profile(
     })
 }
 
-/// How a move goes, with a ramp of one's own of 32 entries, or with the published one for NULL.
+/// Tells the shape of a move, with your own ramp of 32 entries, or with the published one if `table` is NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_step_shape(
     table: *const u32,
@@ -226,8 +226,8 @@ pub unsafe extern "C" fn sw_step_shape(
     unsafe { with_profile(table, len, it, act) }
 }
 
-/// The steps of a move from step `first` on, as many as there is room for: `count` is 0 behind the last one. All before `first` are computed
-/// once more, so it is SW_STEP_FIRST at most.
+/// Writes the steps of a move from step `first` on, as many as there is room for: `count` is 0 after the last one. All steps before
+/// `first` are computed again, so it may be at most SW_STEP_FIRST.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_step_steps(
     table: *const u32,

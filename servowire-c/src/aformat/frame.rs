@@ -223,7 +223,7 @@ pub extern "C" fn sw_aformat_bus_sample(
     })
 }
 
-/// The line is at its end: SW_OK, or why a response that had begun is none.
+/// Ends the line: SW_OK, or why a response that had begun is incomplete.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_line_ends(
     bus: Option<&mut sw_aformat_bus_t>,

@@ -117,9 +117,9 @@ pub(super) fn judged(verdict: Verdict) -> Result<sw_result_t, Refused> {
     }
 }
 
-/// One response came, a 16-bit word each frame. SW_OK with the response, or why it is none. A second
+/// Takes one response, a 16-bit word for each frame. SW_OK with the response, or why it is refused. A second
 /// good one from the same address is SW_E_AFORMAT_TWO_RESPONSES: two encoders have it; one from an address that was not asked is
-/// SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for a look.
+/// SW_E_AFORMAT_ADDRESS_MISMATCH. Both are filled in for inspection.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_bus_push(
     bus: Option<&mut sw_aformat_bus_t>,

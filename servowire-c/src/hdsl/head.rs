@@ -142,7 +142,7 @@ pub extern "C" fn sw_hdsl_build_parameter(
     })
 }
 
-/// The parameter byte of a word. SW_E_NO_VALUE for a word that is none.
+/// The parameter byte of a word. SW_E_NO_VALUE if the word is not a parameter word.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_parse_parameter(word: u16, parameter: Option<&mut MaybeUninit<u8>>) -> sw_result_t {
     border(|| {

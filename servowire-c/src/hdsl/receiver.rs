@@ -54,7 +54,7 @@ pub struct sw_hdsl_position_t {
     pub angle: u32,
 }
 
-/// A free-running receiver at the begin of the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
+/// Prepares a free-running receiver, which begins with the start-up. `steps_per_turn` is the encoder's resolution, for angles; 0 if it is not
 /// known. `dialect` is sw_hdsl_dialect_t.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_start(
@@ -70,7 +70,7 @@ pub extern "C" fn sw_hdsl_start(
     })
 }
 
-/// What the present H-frame sends.
+/// Tells what is to be sent in the present H-frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_transmission(
     m: Option<&sw_hdsl_t>,

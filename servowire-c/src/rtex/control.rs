@@ -108,7 +108,7 @@ pub extern "C" fn sw_rtex_phases_fault(phases: Option<&sw_rtex_phases_t>) -> sw_
     border(|| Ok(fault(sw_rtex_phases_t::look(phases)?.error()) as sw_result_t))
 }
 
-/// What the LED shows `t_ms` after the begin of a lit half period: sw_rtex_led_t, or a refusal.
+/// Returns what the LED shows `t_ms` after the beginning of a lit half period: sw_rtex_led_t, or a refusal.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_led(phase: u8, fault: u8, t_ms: u64) -> sw_result_t {
     border(|| {
@@ -152,7 +152,7 @@ pub extern "C" fn sw_rtex_periods_a6n(
     })
 }
 
-/// How long a frame for so many axes takes, ns (System Design Guide for Master).
+/// Returns how long a frame for this number of axes takes, in ns (System Design Guide for Master).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_frame_ns(axes: u32) -> u64 {
     FrameTime::GUIDE.estimate_ns(axes)

@@ -111,7 +111,7 @@ pub struct sw_sorte_discovery_t {
     pub status: u8,
 }
 
-/// The CRC-8 of the IO exchange over more bytes, behind those that gave `crc`; 0 at the begin.
+/// Continues the CRC-8 of the IO exchange over more bytes, after those that gave `crc`; it starts from 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_sorte_crc8(bytes: *const u8, len: usize, crc: Option<&mut u8>) -> sw_result_t {
     border(|| {

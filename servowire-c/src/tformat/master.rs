@@ -191,7 +191,7 @@ pub extern "C" fn sw_tformat_init(
     })
 }
 
-/// Other widths, or turns of another kind (`flags`: sw_tformat_turns_t). The position that was heard last is forgotten.
+/// Sets other widths, or turns of another kind (`flags`: sw_tformat_turns_t). The position that was heard last is dropped.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_set_resolution(
     m: Option<&mut sw_tformat_t>,
@@ -215,7 +215,7 @@ pub extern "C" fn sw_tformat_set_resolution(
     })
 }
 
-/// The times of the line as they are.
+/// Reads the present times of the line.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_get_line(
     m: Option<&sw_tformat_t>,
@@ -237,7 +237,7 @@ pub extern "C" fn sw_tformat_get_line(
     })
 }
 
-/// Other times of the line, from the next request on. `echo` is 0 or 1.
+/// Sets other times of the line, from the next request on. `echo` is 0 or 1.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_set_line(m: Option<&mut sw_tformat_t>, line: Option<&sw_tformat_line_t>) -> sw_result_t {
     border(|| {
@@ -255,7 +255,8 @@ pub extern "C" fn sw_tformat_set_line(m: Option<&mut sw_tformat_t>, line: Option
     })
 }
 
-/// Alarms (sw_tformat_almc_t, added) that sw_tformat_angle() and sw_tformat_position() tolerate beside their own, from now on.
+/// Sets the alarms (sum of sw_tformat_almc_t) that sw_tformat_angle() and sw_tformat_position() tolerate from now on, in addition to
+/// their own.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_tolerate(m: Option<&mut sw_tformat_t>, almc: u8) -> sw_result_t {
     border(|| {
@@ -302,8 +303,8 @@ pub extern "C" fn sw_tformat_start(
     })
 }
 
-/// Bytes were received one after the other; the last one ended at `end_ns`, or was handed over within the latency of the line after
-/// that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
+/// Takes bytes that were received back to back; the last one ended at `end_ns`, or was handed over within the latency of the line
+/// after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_hear(
     m: Option<&mut sw_tformat_t>,
@@ -334,7 +335,7 @@ pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns:
     })
 }
 
-/// It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+/// Ends an exchange whose time is over at `now_ns`. Hand over what was received before you call it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> sw_result_t {
     border(|| {

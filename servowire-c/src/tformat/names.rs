@@ -132,7 +132,7 @@ pub enum sw_tformat_error_t {
     SW_E_TFORMAT_SINK_CODE = -0x104,
     /// The parity of the control field is odd.
     SW_E_TFORMAT_PARITY = -0x105,
-    /// The data ID is none of the nine documented ones.
+    /// The data ID is not one of the nine documented ones.
     SW_E_TFORMAT_UNKNOWN_DATA_ID = -0x106,
     /// The response answers another data ID.
     SW_E_TFORMAT_CF_MISMATCH = -0x107,
