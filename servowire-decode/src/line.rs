@@ -36,7 +36,7 @@ fn read(
     changes: &mut Vec<Change>,
     out: &mut Output<'_>,
 ) -> io::Result<Result<bool, Fault>> {
-    let straight = if decoder.takes_samples(out) { line.samples() } else { None };
+    let straight = decoder.takes_samples(out).and_then(|channel| line.samples(channel));
     Ok(match straight {
         Some(Ok(samples)) => {
             decoder.samples(samples, out)?;

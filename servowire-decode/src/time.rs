@@ -38,6 +38,24 @@ impl Time {
         self.0 as f64 / 1e6
     }
 
+    /// The way from `earlier` to here in picoseconds, where it is known to be shorter than 106 days.
+    #[inline]
+    pub(crate) const fn after(self, earlier: Self) -> i64 {
+        (self.0 as i64).wrapping_sub(earlier.0 as i64)
+    }
+
+    /// The last instant on a way that leads beyond it.
+    #[cold]
+    fn far(self, picoseconds: i128) -> Self {
+        Self(self.0.saturating_add(picoseconds))
+    }
+
+    /// The most that can be said of the way from one that is more than 106 days away.
+    #[cold]
+    fn longest(self, before: Self) -> i64 {
+        if self < before { i64::MIN } else { i64::MAX }
+    }
+
     /// The same instant on a clock that is 0 at `origin`.
     #[must_use]
     pub(crate) const fn since(self, origin: Self) -> Self {
@@ -50,7 +68,10 @@ impl Add<i64> for Time {
 
     #[inline]
     fn add(self, picoseconds: i64) -> Self {
-        Self(self.0.saturating_add(picoseconds.into()))
+        match self.0.overflowing_add(picoseconds.into()) {
+            (sum, false) => Self(sum),
+            _ => self.far(picoseconds.into()),
+        }
     }
 }
 
@@ -75,11 +96,9 @@ impl Sub for Time {
 
     #[inline]
     fn sub(self, before: Self) -> i64 {
-        match self.0.checked_sub(before.0).map(i64::try_from) {
-            Some(Ok(way)) => way,
-            _ if self < before => i64::MIN,
-            _ => i64::MAX,
-        }
+        let (way, over) = self.0.overflowing_sub(before.0);
+        let near = way as i64;
+        if !over && i128::from(near) == way { near } else { self.longest(before) }
     }
 }
 
@@ -207,6 +226,18 @@ impl Clock {
             Some(time) => Time((time / self.samples).into()),
             None => self.late(index),
         }
+    }
+
+    /// Samples that take at least so many picoseconds.
+    pub(crate) fn fewest(self, picoseconds: i64) -> u64 {
+        let samples = u128::from(picoseconds.max(0).unsigned_abs()) * u128::from(self.samples);
+        u64::try_from(samples.div_ceil(self.picoseconds.into())).unwrap_or(u64::MAX)
+    }
+
+    /// Samples that take at most so many picoseconds.
+    pub(crate) fn most(self, picoseconds: i64) -> u64 {
+        let samples = u128::from(picoseconds.max(0).unsigned_abs()) * u128::from(self.samples);
+        u64::try_from(samples / u128::from(self.picoseconds)).unwrap_or(u64::MAX)
     }
 
     /// The same where 64 bits do not hold the product.

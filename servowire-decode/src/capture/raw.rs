@@ -27,6 +27,10 @@ pub struct Raw {
     /// The channel of each bit of a sample.
     of_bit: Vec<Option<u16>>,
     block: Vec<u8>,
+    /// How much of it was filled and is not read, in bytes and samples.
+    filled: Option<(usize, u64)>,
+    /// The samples of one channel in it, eight a byte.
+    packed: Vec<u8>,
     /// The last sample, for the changes.
     last: Option<u64>,
     samples: u64,
@@ -66,6 +70,8 @@ impl Raw {
             channels,
             of_bit,
             block: vec![0; BLOCK],
+            filled: None,
+            packed: Vec::new(),
             last: None,
             samples: 0,
             ragged: None,
@@ -80,6 +86,9 @@ impl Raw {
 
     /// Reads a block; gives its length in bytes and in samples, 0 at the end.
     fn fill(&mut self) -> Result<(usize, u64), Fault> {
+        if let Some(filled) = self.filled.take() {
+            return Ok(filled);
+        }
         if let Some(fault) = self.ragged.take() {
             return Err(fault);
         }
@@ -99,11 +108,38 @@ impl Raw {
         Ok((got - rest, (got / n) as u64))
     }
 
+    /// Packs the samples of one channel, a byte each. None where another one moves, or where they do not fill whole bytes.
+    fn pack(&mut self, channel: u16, bytes: usize) -> Option<()> {
+        const ONES: u64 = 0x0101_0101_0101_0101;
+        let last = self.last?;
+        let bit = self.of_bit.iter().position(|own| *own == Some(channel))?;
+        if bytes % 8 != 0 || bit >= 8 {
+            return None;
+        }
+        let others = (self.mask() & 0xff & !(1 << bit)) * ONES;
+        let still = ((last & 0xff) * ONES) & others;
+        self.packed.resize(bytes / 8, 0);
+        for (packed, eight) in self.packed.iter_mut().zip(self.block.get(..bytes)?.chunks_exact(8)) {
+            let samples = little_endian(eight);
+            if samples & others != still {
+                return None;
+            }
+            // The bits of eight bytes come together in the highest byte.
+            *packed = ((samples >> bit & ONES).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8;
+        }
+        self.last = self.block.get(..bytes)?.last().map_or(self.last, |last| Some(u64::from(*last)));
+        Some(())
+    }
+
+    /// The bits that are channels.
+    fn mask(&self) -> u64 {
+        (0..64).filter(|bit| self.of_bit.get(*bit).copied().flatten().is_some()).fold(0, |m, bit| m | 1 << bit)
+    }
+
     /// The changes between the last sample and the next ones, whose bits are the channels.
     fn differences(&mut self, bytes: usize, changes: &mut Vec<Change>) {
+        let mask = self.mask();
         let block = self.block.get(..bytes).unwrap_or_default();
-        let mask =
-            (0..64).filter(|bit| self.of_bit.get(*bit).copied().flatten().is_some()).fold(0, |m, bit| m | 1 << bit);
         let mut last = self.last;
         let (clock, of_bit) = (self.clock, &self.of_bit);
         let mut see = |last: &mut Option<u64>, index: u64, sample: u64| {
@@ -179,15 +215,27 @@ impl Line for Raw {
         Ok(samples != 0 || self.ragged.is_some())
     }
 
-    fn samples(&mut self) -> Option<Result<Samples<'_>, Fault>> {
-        let before = self.last.filter(|_| self.unit == Unit::Bit)? & 1;
+    fn samples(&mut self, channel: u16) -> Option<Result<Samples<'_>, Fault>> {
+        if !matches!(self.unit, Unit::Bit | Unit::Bytes(1)) {
+            return None;
+        }
+        let last = self.last?;
         let (bytes, samples) = match self.fill() {
             Ok(got) => got,
             Err(fault) => return Some(Err(fault)),
         };
-        let block = self.block.get(..bytes).unwrap_or_default();
-        self.last = Some(block.last().map_or(before, |last| u64::from(last >> 7)));
         let first = self.samples;
+        let (block, before) = if self.unit == Unit::Bit {
+            let block = self.block.get(..bytes).unwrap_or_default();
+            self.last = Some(block.last().map_or(last & 1, |last| u64::from(last >> 7)));
+            (block, last & 1)
+        } else if self.pack(channel, bytes).is_some() {
+            let bit = self.of_bit.iter().position(|own| *own == Some(channel))?;
+            (self.packed.as_slice(), last >> bit & 1)
+        } else {
+            self.filled = Some((bytes, samples));
+            return None;
+        };
         self.samples += samples;
         Some(Ok(Samples::new(block, first, before == 1, self.clock)))
     }

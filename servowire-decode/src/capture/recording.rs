@@ -36,9 +36,11 @@ pub trait Line {
     /// appended; nothing more will come.
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
 
-    /// The next samples instead of the next changes, of a recording that is one channel of packed samples; nothing of
-    /// another one, or as long as its first level has not been read.
-    fn samples(&mut self) -> Option<Result<Samples<'_>, Fault>> {
+    /// The next samples of a channel instead of the next changes, of a recording of samples in which no other channel moves
+    /// meanwhile; nothing of another one, or as long as the first levels have not been read. What it does not give is
+    /// [`read`](Self::read).
+    fn samples(&mut self, channel: u16) -> Option<Result<Samples<'_>, Fault>> {
+        let _ = channel;
         None
     }
 

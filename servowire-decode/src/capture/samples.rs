@@ -1,5 +1,7 @@
 //! A block of packed samples, as a decoder takes it that needs no edges one by one.
 
+use std::ops::RangeInclusive;
+
 use crate::time::{Clock, Time};
 
 /// Samples of one channel, eight a byte, the oldest in bit 0.
@@ -39,6 +41,11 @@ impl<'a> Samples<'a> {
     /// The level before the first sample.
     pub fn before(&self) -> bool {
         self.before
+    }
+
+    /// The level of the last sample.
+    pub fn last(&self) -> bool {
+        self.bytes.last().map_or(self.before, |last| (last >> 7 == 1) != self.inverted)
     }
 
     /// Between sample numbers and times.
@@ -87,14 +94,104 @@ impl<'a> Samples<'a> {
     }
 
     /// All changes, by time.
-    #[inline]
     pub fn changes(self) -> impl Iterator<Item = (Time, bool)> + 'a {
-        let (mut at, mut level) = (self.first, self.before);
-        std::iter::from_fn(move || {
-            let next = self.change(at, level)?;
-            (at, level) = (next + 1, !level);
-            Some((self.clock.time(next), level))
+        let mut numbers = Vec::new();
+        self.numbers(&mut numbers);
+        let Self { before, clock, .. } = self;
+        numbers.into_iter().zip([!before, before].into_iter().cycle()).map(move |(at, level)| (clock.time(at), level))
+    }
+
+    /// The same in pieces of so many samples that the numbers of their changes fit into a near memory.
+    pub(crate) fn pieces(self) -> impl Iterator<Item = Self> {
+        let mut before = self.before;
+        let mut first = self.first;
+        self.bytes.chunks(PIECE).map(move |bytes| {
+            let piece = Self { bytes, first, before, ..self };
+            (first, before) = (piece.end(), piece.last());
+            piece
         })
+    }
+
+    /// All changes, by time, with room for their numbers. Runs are even that last between `least` and `most` picoseconds.
+    pub(crate) fn turns(self, room: &mut Vec<u64>, least: i64, most: i64) -> Turns<'_> {
+        room.clear();
+        self.numbers(room);
+        // The times of samples are rounded.
+        let even = self.clock.fewest(least.saturating_add(1))..=self.clock.most(most.saturating_sub(1));
+        Turns { numbers: room, told: 0, level: self.before, clock: self.clock, even }
+    }
+
+    /// Appends the number of each sample before which the level changes.
+    fn numbers(self, out: &mut Vec<u64>) {
+        let flip = if self.inverted { u64::MAX } else { 0 };
+        let mut before = u64::from(self.before);
+        for (at, bytes) in (self.first..).step_by(64).zip(self.bytes.chunks(8)) {
+            let word = little_endian(bytes) ^ flip;
+            let mut edges = word ^ (word << 1 | before);
+            before = word >> 63;
+            if bytes.len() < 8 {
+                edges &= (1 << (8 * bytes.len())) - 1;
+            }
+            while edges != 0 {
+                out.push(at + u64::from(edges.trailing_zeros()));
+                edges &= edges - 1;
+            }
+        }
+    }
+}
+
+/// Bytes of samples that are looked at together.
+const PIECE: usize = 1 << 10;
+
+/// The changes of a piece of a recording.
+#[derive(Debug, Clone)]
+pub(crate) struct Turns<'a> {
+    /// Of the samples before which the level changes.
+    numbers: &'a [u64],
+    /// Changes that are told.
+    told: usize,
+    /// The level after the last of them.
+    level: bool,
+    clock: Clock,
+    even: RangeInclusive<u64>,
+}
+
+impl<'a> Turns<'a> {
+    /// The change that was told last.
+    pub(crate) fn told_at(&self) -> Option<Time> {
+        Some(self.clock.time(*self.numbers.get(self.told.checked_sub(1)?)?))
+    }
+
+    /// Changes from the last one told on, each with an even run behind it, at most so many: all of them are told then, and the one
+    /// behind them.
+    pub(crate) fn even(
+        &mut self,
+        most: usize,
+    ) -> impl DoubleEndedIterator<Item = (Time, bool)> + ExactSizeIterator + use<'a> {
+        let from = self.numbers.get(self.told.wrapping_sub(1)..).unwrap_or_default();
+        let mut before = from.first().copied().unwrap_or(0);
+        let is_even = |number: &&u64| {
+            let run = **number - before;
+            before = **number;
+            self.even.contains(&run)
+        };
+        let count = from.iter().skip(1).take(most).take_while(is_even).count();
+        let (clock, level) = (self.clock, self.level);
+        self.told += count;
+        self.level ^= count % 2 == 1;
+        let even = from.get(..count).unwrap_or_default();
+        even.iter().enumerate().map(move |(at, number)| (clock.time(*number), level ^ (at % 2 == 1)))
+    }
+}
+
+impl Iterator for Turns<'_> {
+    type Item = (Time, bool);
+
+    fn next(&mut self) -> Option<(Time, bool)> {
+        let at = *self.numbers.get(self.told)?;
+        self.told += 1;
+        self.level = !self.level;
+        Some((self.clock.time(at), self.level))
     }
 }
 

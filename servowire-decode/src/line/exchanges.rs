@@ -10,6 +10,7 @@ use super::receive::{EdgeReceiver, Rates};
 use super::start_stop::StartStop;
 use super::trial::is_failed;
 use crate::capture::Hole;
+use crate::capture::samples::Samples;
 use crate::event::{Event, Place, Verdict};
 use crate::sink::Sink;
 use crate::time::Time;
@@ -29,6 +30,8 @@ pub(crate) struct StartStopLine<P> {
     /// Of a line without bias.
     floating: Option<Floating>,
     told: Told<P>,
+    /// For the numbers of samples.
+    room: Vec<u64>,
 }
 
 /// What has been said since the line rested the last time.
@@ -108,7 +111,8 @@ impl<P: StartStop + Clone> StartStopLine<P> {
 
     fn with(receiver: EdgeReceiver, protocol: P, weights: Weights, bit: i64, luck: u32) -> Self {
         let told = Told::new(protocol.clone(), luck);
-        Self { receiver, protocol, weights, bit, begun: false, opening: Vec::new(), tried: 0, floating: None, told }
+        let (opening, room) = (Vec::new(), Vec::new());
+        Self { receiver, protocol, weights, bit, begun: false, opening, tried: 0, floating: None, told, room }
     }
 
     /// Gives the fields that are complete to the protocol.
@@ -317,6 +321,24 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
         for (time, level) in std::mem::take(&mut self.opening) {
             self.take(time, level, out)?;
         }
+        Ok(())
+    }
+
+    fn samples(&mut self, samples: Samples<'_>, out: &mut dyn Sink) -> io::Result<()> {
+        let mut room = std::mem::take(&mut self.room);
+        for piece in samples.pieces() {
+            let [least, most] = self.receiver.runs();
+            let mut turns = piece.turns(&mut room, least, most);
+            while !self.begun || !self.opening.is_empty() || self.floating.is_some() {
+                let Some((time, level)) = turns.next() else { break };
+                self.change(time, level, out)?;
+            }
+            // So it stays, and nothing but the receiver takes changes.
+            while self.receiver.turns(&mut turns) {
+                self.give(out)?;
+            }
+        }
+        self.room = room;
         Ok(())
     }
 

@@ -58,6 +58,12 @@ impl Wires {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
 
+    /// The only wire, as an idle-high line, has come to a level without being told of its changes.
+    pub(crate) fn keep(&mut self, level: bool) {
+        self.levels.fill(Some(level));
+        self.level = Some(level);
+    }
+
     /// Nothing is known of the levels any more.
     pub(crate) fn forget(&mut self) {
         self.levels.fill(None);

@@ -162,18 +162,23 @@ impl PushDecoder {
         self.held.is_none() && !self.lines.is_empty()
     }
 
-    /// Whether all there is is one channel whose line is decoded, so that nobody else needs its changes.
-    pub(super) fn takes_samples(&self, out: &Output<'_>) -> bool {
-        self.held.is_none() && matches!(self.states.as_slice(), [State::Taken(_)]) && !out.wants_changes()
+    /// The only channel that is decoded, where nobody else needs its changes.
+    pub(super) fn takes_samples(&self, out: &Output<'_>) -> Option<u16> {
+        let ([_], [Found { taps, .. }], None) = (self.lines.as_slice(), self.found.as_slice(), &self.held) else {
+            return None;
+        };
+        if let ([tap], false) = (taps.as_slice(), out.wants_changes()) { Some(tap.channel) } else { None }
     }
 
-    /// The next samples of the only channel.
+    /// The next samples of the channel that takes them; no other one moves meanwhile.
     pub(super) fn samples(&mut self, samples: Samples<'_>, out: &mut Output<'_>) -> io::Result<()> {
         let ([running], [Found { taps, .. }]) = (self.lines.as_mut_slice(), self.found.as_slice()) else {
             return Ok(());
         };
+        let [tap] = taps.as_slice() else { return Ok(()) };
         out.lane(0);
-        let samples = if taps.iter().any(|tap| tap.inverted) { samples.inverted() } else { samples };
+        let samples = if tap.inverted { samples.inverted() } else { samples };
+        running.wires.keep(samples.last());
         running.decoder.samples(samples, out)
     }
 

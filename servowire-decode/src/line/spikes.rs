@@ -88,6 +88,24 @@ impl Spikes {
         })
     }
 
+    /// Shorter runs are spikes.
+    pub(super) fn shortest(&self) -> i64 {
+        self.shortest
+    }
+
+    /// When the level changed last, where that is an edge that is not told yet, and no spike is about.
+    pub(super) fn plain(&self) -> Option<Time> {
+        (self.edges == 1 && self.dropped == 0).then_some(self.since)
+    }
+
+    /// All changes of a [plain](Self::plain) line were edges. Those up to `last` are told, not that at `since`.
+    pub(super) fn go_on(&mut self, last: &Edge, since: Time) {
+        if since != self.since {
+            (self.last, self.solid) = (last.time, Some(last.level));
+            (self.level, self.since, self.begun) = (!last.level, since, since);
+        }
+    }
+
     /// The line changes to `level`; the edges before it that are known to last.
     #[inline]
     pub(crate) fn change(&mut self, time: Time, level: bool) -> Edges {

@@ -144,7 +144,10 @@ impl Figures {
                 self.ok += 1;
                 // A request and its answer are one of a kind.
                 if event.direction != Some(Direction::Request) {
-                    *self.kinds.entry(event.kind.to_string()).or_default() += 1;
+                    match self.kinds.get_mut(event.kind.as_ref()) {
+                        Some(count) => *count += 1,
+                        None => drop(self.kinds.insert(event.kind.to_string(), 1)),
+                    }
                 }
             }
             Verdict::Refused(refusal) => *self.refused.entry(refusal.class).or_default() += 1,

@@ -143,9 +143,12 @@ impl Decoder {
 
     /// Whether the open frame is whole as an answer and too long for a request.
     fn is_answer_alone(&self) -> bool {
+        if self.pending.is_some() || self.open.broken.is_some() {
+            return false;
+        }
         let Ok(id) = self.open.data_id() else { return false };
         let (request, answer) = (usize::from(id.request_fields()), usize::from(id.response_fields()));
-        self.pending.is_none() && self.open.broken.is_none() && self.open.len() == answer && answer > request
+        self.open.len() == answer && answer > request
     }
 
     /// The open frame is over.

@@ -1,5 +1,6 @@
 //! T-Format frames as events: names, values, positions, reasons.
 
+use std::cell::Cell;
 use std::sync::LazyLock;
 
 use tformat::{
@@ -211,12 +212,27 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
 
 /// With the places of its fields, which have these `names` on the line: ABS is ABS0 to ABS2.
 fn located(event: Event, frame: &Frame, names: &[&str]) -> Event {
+    // The fields come in the order of the line, but for those that have no place.
+    let next = Cell::new(0);
     event.locate(|name| {
-        let part = |known: &&str| known.strip_prefix(name).is_some_and(|rest| matches!(rest, "" | "0" | "1" | "2"));
-        let first = names.iter().position(part)? as u32;
-        let last = names.iter().rposition(part)? as u32;
-        frame.span(8 * first, 8 * last + 7)
+        let is_part = |known: &&str| is_part(known, name);
+        let (before, behind) = names.split_at_checked(next.get())?;
+        let first = match behind.iter().position(is_part) {
+            Some(at) => before.len() + at,
+            None => before.iter().position(is_part)?,
+        };
+        let parts = names.iter().skip(first).take_while(|known| is_part(known)).count();
+        next.set(first + parts);
+        frame.span(8 * first as u32, 8 * (first + parts) as u32 - 1)
     })
+}
+
+/// Whether a field of the line is this one, or one of several of it.
+fn is_part(known: &str, name: &str) -> bool {
+    let end = name.len().saturating_sub(1);
+    // Nearly all differ there.
+    known.as_bytes().get(end) == name.as_bytes().last()
+        && known.strip_prefix(name).is_some_and(|rest| matches!(rest, "" | "0" | "1" | "2"))
 }
 
 /// The data ID as it displays itself, written once and not for every frame.
