@@ -42,20 +42,20 @@ mod control;
 mod h_frame;
 mod link;
 mod send;
+mod start_up;
 mod state;
 
 pub use h_frame::{Counters, HFrame, SignalQuality};
 pub use send::Transmission;
 pub use state::{RestartReason, State};
 
-use crate::answer::Answer;
 use crate::dialect::Dialect;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
 use crate::frame::{BIT_RATE, Extra, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::message::Requester;
-use crate::parameter::{EncoderByte, MasterSymbol};
+use crate::parameter::MasterSymbol;
 use crate::rssi::Rssi;
 use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
@@ -271,33 +271,6 @@ impl Master {
         }
     }
 
-    /// Handles a frame with the test pattern.
-    fn hear_window(&mut self, samples: &[u8; WINDOW]) -> &HFrame {
-        match self.alignment {
-            Some(alignment) if self.state != State::Start => {
-                self.edges |= alignment.edges(samples);
-                let (bits, rssi) = alignment.read_quarter(samples, self.done & 3);
-                self.end_measured(alignment, bits, rssi)
-            }
-            _ => self.learn(samples),
-        }
-    }
-
-    /// Handles a START frame.
-    fn learn(&mut self, samples: &[u8]) -> &HFrame {
-        self.edges = 0;
-        match Alignment::learn(self.dialect.edge, samples) {
-            Ok(found) => {
-                self.alignment = Some(found);
-                self.end(TEST_PATTERN, None)
-            }
-            Err(error) => {
-                self.h_frame.begin(self.state, None);
-                self.end_with(Err(RestartReason::Learn(error)))
-            }
-        }
-    }
-
     #[inline]
     fn end_measured(&mut self, alignment: Alignment, bits: u64, rssi: Rssi) -> &HFrame {
         self.end(bits, Some(SignalQuality { rssi, delay: alignment.delay, edges: self.edges }))
@@ -467,39 +440,5 @@ impl Master {
             (self.state, self.done) = (self.state.next(), 0);
         }
         Ok(())
-    }
-
-    fn identify(&mut self, bits: u64) -> Result<(), Error> {
-        let answer = Answer::from_bits(self.dialect.rule, bits);
-        let id = EncoderId::from_answer(answer)?;
-        let bits = id.check()?;
-        self.encoder = Some(id);
-        self.link = Link::new(&self.dialect, id, bits);
-        self.h_frame.encoder = Some(id);
-        Ok(())
-    }
-
-    fn wait_for_vsync(&mut self, bits: u64) -> Result<(), RestartReason> {
-        let answer = Answer::from_bits(self.dialect.rule, bits);
-        self.h_frame.encoder = None;
-        self.done = self.done.saturating_add(1);
-        if answer.parameter().is_ok_and(EncoderByte::vsync) {
-            (self.state, self.done) = (State::Running, 0);
-            self.latch();
-        } else if self.dialect.vsync_frames != 0 && self.done >= self.dialect.vsync_frames {
-            return Err(RestartReason::NoVsync);
-        }
-        Ok(())
-    }
-
-    /// Restarts the start-up. Messages under way end.
-    fn begin_again(&mut self) {
-        self.counters.restarts = self.counters.restarts.wrapping_add(1);
-        (self.state, self.done) = (State::Reset, 0);
-        // The link itself begins anew with the next identifier.
-        self.encoder = None;
-        self.h_frame.encoder = None;
-        self.requester.drop_into(&mut self.h_frame.finished);
-        self.h_frame.clear();
     }
 }

@@ -10,6 +10,9 @@ pub struct Chain {
     before: Option<RunningDisparity>,
     after: Option<RunningDisparity>,
     holds: bool,
+    /// The first word that tells and the last one, 0..=5.
+    first: u8,
+    last: u8,
 }
 
 impl Chain {
@@ -19,10 +22,10 @@ impl Chain {
             let [low, high, ..] = (line >> at).to_le_bytes();
             Word::truncate(u16::from_le_bytes([low, high]))
         });
-        let mut chain = Self { before: None, after: None, holds: true };
+        let mut chain = Self { before: None, after: None, holds: true, first: 5, last: 0 };
         // After the last word that told; words that did, and whether one was in no table before them.
         let (mut last, mut told, mut spoilt) = (None, 0_u8, false);
-        for word in words {
+        for (word, at) in words.into_iter().zip(0_u8..) {
             let column = match (word.is_in(RunningDisparity::Minus), word.is_in(RunningDisparity::Plus)) {
                 (true, true) => continue,
                 (true, false) => RunningDisparity::Minus,
@@ -33,6 +36,8 @@ impl Chain {
                 }
             };
             let breaks = last.is_some_and(|last| last != column);
+            chain.first = if told == 0 { at } else { chain.first };
+            chain.last = at;
             // Where two words do not go together either may be the wrong one.
             chain.before = match told {
                 0 => (!spoilt).then_some(column),
@@ -60,6 +65,18 @@ impl Chain {
     /// The running disparity after the last word, if the words determine it; this includes the words after a damaged one.
     pub const fn after(self) -> Option<RunningDisparity> {
         self.after
+    }
+
+    /// The first word that tells, 0..=5. If the answer does not begin where the one before ended and the fault is in it, it is in this
+    /// word or in one before it; the last word where none tells.
+    pub const fn first_told(self) -> u8 {
+        self.first
+    }
+
+    /// The last word that tells, 0..=5. If the next answer does not begin where this ends and the fault is in this, it is in this word
+    /// or in one behind it; the first word where none tells.
+    pub const fn last_told(self) -> u8 {
+        self.last
     }
 
     /// Returns whether `next` begins with the disparity with which this one ends; `None` if either is unknown.
@@ -99,6 +116,9 @@ mod tests {
         assert_eq!((up.before(), up.after(), up.holds()), (Some(Minus), Some(Plus), true));
         let next = chain([NEUTRAL, IDLE_PLUS, DOWN, NEUTRAL, NEUTRAL, NEUTRAL]);
         assert_eq!((next.before(), next.after(), next.holds()), (Some(Plus), Some(Minus), true));
+        assert_eq!((neutral.first_told(), neutral.last_told()), (5, 0));
+        assert_eq!((idle.first_told(), idle.last_told()), (1, 1));
+        assert_eq!((up.first_told(), up.last_told()), (1, 3));
         assert_eq!((up.goes_on_in(next), next.goes_on_in(next)), (Some(true), Some(false)));
         assert_eq!((up.goes_on_in(neutral), neutral.goes_on_in(up)), (None, None));
     }

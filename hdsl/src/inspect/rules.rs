@@ -81,6 +81,29 @@ pub struct HeadRules {
 }
 
 impl HeadRules {
+    /// Heads of a lesson from which a rule is taken; one of so many may break it.
+    const LESSON: usize = 8;
+
+    /// Learns from the first heads of a link, which followed each other, what they do: each with the line that it begins.
+    pub fn learn(&mut self, heads: &[(ParsedHead, Window)]) {
+        let rule = |kept: usize, all: usize| all >= Self::LESSON && all.saturating_sub(kept) <= all / Self::LESSON;
+        let of = |head: &ParsedHead| head.byte.symbol().ok();
+        let answered = heads.windows(2).filter_map(|pair| match pair {
+            [(before, _), next] => of(before).is_some_and(MasterSymbol::is_answered).then_some(*next),
+            _ => None,
+        });
+        let balanced = || answered.clone().filter(|(head, _)| head.extra_bits == 0);
+        let kept = balanced().filter(|(head, line)| is_coded_for_balance(*head, *line)).count();
+        if rule(kept, balanced().count()) {
+            self.balanced = Kept(RULE);
+        }
+        let running = || heads.iter().filter(|(head, _)| of(head).is_some_and(may_be_first));
+        let kept = running().filter(|(head, _)| head.byte.first()).count();
+        if rule(kept, running().count()) {
+            self.first = Kept(RULE);
+        }
+    }
+
     /// Returns what is wrong with the head at the start of `line`; `at` is its place in the V-frame, 0..=7, if known.
     pub fn check(&mut self, head: ParsedHead, line: Window, at: Option<u8>) -> Option<BrokenRule> {
         let symbol = head.byte.symbol().ok();
@@ -107,9 +130,7 @@ impl HeadRules {
     fn is_first(&mut self, head: ParsedHead, symbol: Option<MasterSymbol>) -> bool {
         match symbol {
             None => true,
-            Some(MasterSymbol::Data(_) | MasterSymbol::Idle | MasterSymbol::Init) => {
-                self.first.holds(head.byte.first())
-            }
+            Some(symbol) if may_be_first(symbol) => self.first.holds(head.byte.first()),
             Some(_) => !head.byte.first(),
         }
     }
@@ -127,6 +148,11 @@ impl HeadRules {
         self.msync = Some(if holds { said } else { due });
         holds
     }
+}
+
+/// Whether FIRST may be 1 in a frame with this symbol.
+const fn may_be_first(symbol: MasterSymbol) -> bool {
+    matches!(symbol, MasterSymbol::Data(_) | MasterSymbol::Idle | MasterSymbol::Init)
 }
 
 /// Learns from the line with which running disparity the answers of an encoder begin, because no document says so.
@@ -259,6 +285,34 @@ mod tests {
         for line in strange {
             assert_eq!(rules.check(Head::parse(line).unwrap(), line, Some(3)), Some(BrokenRule::Balance));
         }
+    }
+
+    /// A head with FIRST 0 among others is damage at once if the first heads had it.
+    #[test]
+    fn what_the_first_heads_do_is_learned() {
+        let lesson = |odd: &[usize], count: usize| -> std::vec::Vec<_> {
+            (0..count).map(|at| head(MasterSymbol::Idle, !odd.contains(&at), false)).collect()
+        };
+        let refuses = |heads: &[(ParsedHead, Window)]| {
+            let mut rules = HeadRules::default();
+            rules.learn(heads);
+            let (head, line) = head(MasterSymbol::Idle, false, false);
+            rules.check(head, line, None) == Some(BrokenRule::First)
+        };
+        assert!(refuses(&lesson(&[], 8)) && refuses(&lesson(&[3], 8)));
+        assert!(!refuses(&lesson(&[], 7)) && !refuses(&lesson(&[3, 5], 12)));
+        // Coded as after a line that was not balanced.
+        let byte = ParameterByte::of(MasterSymbol::Idle).with_first();
+        let strange = Head::new(byte, None, LineDisparity::new(6)).bits();
+        let strange = (Head::parse(strange).unwrap(), strange);
+        let balance = |heads: &[(ParsedHead, Window)]| {
+            let mut rules = HeadRules::default();
+            rules.learn(heads);
+            let (head, line) = head(MasterSymbol::Idle, true, false);
+            assert_eq!(rules.check(head, line, None), None);
+            rules.check(strange.0, strange.1, None) == Some(BrokenRule::Balance)
+        };
+        assert!(balance(&lesson(&[], 9)) && !balance(&lesson(&[], 8)) && !balance(&[strange; 12]));
     }
 
     #[test]
