@@ -1,6 +1,7 @@
 //! Truth in every shown value: generated captures, with the truth of all that may be shown of each frame beside them.
 //!
-//! `TRUTH_CAPTURES=1000 cargo test -p servowire-decode --release --test all truth:: -- --nocapture` draws more and prints the tally.
+//! `TRUTH_CAPTURES=1000 cargo test -p servowire-decode --release --test all truth:: -- --nocapture` draws more and prints the tally;
+//! `TRUTH_ONLY` names a part of the condition that is wanted, `TRUTH_SEED` one seed.
 
 mod bus;
 mod buses;
@@ -37,6 +38,8 @@ enum Shown {
     Text(String),
     /// All bits, and the names of those that are set.
     Flags(u64, Vec<&'static str>),
+    /// The truth, or what nobody can tell from it.
+    Either(Box<[Shown; 2]>),
     /// Whatever it is.
     Any,
 }
@@ -54,6 +57,7 @@ impl Shown {
             Self::Within(due, near) => number.is_some_and(|number| (number as f64 - due).abs() <= *near),
             Self::Flags(due, names) => matches!(value, Value::Flags { raw, set, .. } if raw == due && set == names),
             Self::Text(due) => matches!(value, Value::Text(text) if text == due),
+            Self::Either(both) => both.iter().any(|it| it.allows(value)),
             Self::Any => true,
         }
     }
@@ -148,7 +152,9 @@ fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) 
                 note || said[at].fields.iter().any(|(name, due)| *name == field.name && due.allows(&field.value));
             if !allowed {
                 let due = said[at].fields.iter().find(|(name, _)| *name == field.name);
-                outcome.wrong.push(format!("{} {} is {:?}, true is {due:?}", event.kind, field.name, field.value));
+                let at = start / 1e6;
+                let (kind, name, value) = (&event.kind, field.name, &field.value);
+                outcome.wrong.push(format!("{kind} at {at:.2} us: {name} is {value:?}, true is {due:?}"));
             }
         }
         if let Some(delay) = event.delay {
@@ -162,7 +168,8 @@ fn judge(events: &[Event], said: &[Said], near: f64, due: impl Fn(&Said, usize) 
         if let Some(position) = event.position {
             outcome.shown += 1;
             if said[at].position != Some((position.name, position.counts)) {
-                outcome.wrong.push(format!("position {position:?}, true is {:?}", said[at].position));
+                let due = said[at].position;
+                outcome.wrong.push(format!("at {:.2} us: {position:?}, true is {due:?}", start / 1e6));
             }
         }
     }
@@ -184,10 +191,12 @@ fn captures(few: u64, conditions: usize) -> u64 {
 /// Judges some captures of each condition and prints how many came out right; panics where one did not.
 fn hold<C: Copy>(conditions: &[(&str, C)], run: impl Fn(&str, C, u64) -> Outcome) {
     let mut faults = String::new();
-    for (name, condition) in conditions {
+    let only = std::env::var("TRUTH_ONLY").unwrap_or_default();
+    for (name, condition) in conditions.iter().filter(|it| it.0.contains(&only)) {
         let (mut right, mut shown, mut wrong, mut lost) = (0, 0, 0, 0);
         let count = captures(2, conditions.len());
-        for seed in 0..count {
+        let one = std::env::var("TRUTH_SEED").ok().and_then(|seed| seed.parse::<u64>().ok());
+        for seed in one.map_or(0..count, |one| one..one + 1) {
             let outcome = run(name, *condition, seed);
             right += u64::from(outcome.is_right());
             (shown, wrong, lost) = (shown + outcome.shown, wrong + outcome.wrong.len(), lost + outcome.lost.len());

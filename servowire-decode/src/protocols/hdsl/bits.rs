@@ -25,10 +25,15 @@ const OFF: i64 = 6;
 const ELSEWHERE: i64 = 30;
 /// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
 const ON_GRID: i64 = 32;
-/// Heads that are measured, and one of so many after them; the bits from a falling edge in CYCLE RESET to their end.
+/// Heads that are measured, and two of so many after them.
 const MEASURED: u64 = 256;
 const SOME: u64 = 16;
-const FALL: u64 = 15;
+/// The distance of two heads, in parts of a bit, is known to be whole bits if it is so far from them at most.
+const WHOLE: f64 = 0.3;
+/// Edges whose mean distance from the grid is more than this part of a bit may be on the wrong side of it now and then.
+const JITTERY: i64 = 13;
+/// Edges over which this is a mean, as a power of two.
+const JITTER_EDGES: u32 = 6;
 /// Edges after longer runs than this tell nothing of the bit length.
 pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
 /// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
@@ -51,6 +56,8 @@ pub(super) struct Bits {
     bit: i64,
     inverse: i64,
     inverse_of: i64,
+    /// The mean distance of edges from the grid in picoseconds, by the power of two of `JITTER_EDGES`.
+    jitter: i64,
     /// Where the grid has the last edge, and the level since.
     last: Option<(Time, bool)>,
     /// 64 bits each, the first in bit 0.
@@ -87,12 +94,14 @@ pub(super) struct Grid {
     pub(super) clock: Clock,
 }
 
-/// What was heard of the line: edges, spikes, and heads with their length in picoseconds and bits.
+/// What was heard of the line: edges, spikes, and heads with the time and the bits from one to the next.
 #[derive(Debug, Clone, Copy, Default)]
 struct Heard {
     edges: u64,
     spikes: u64,
     heads: u64,
+    /// The last head that was measured.
+    last: Option<(u64, Time)>,
     time: i64,
     bits: i64,
 }
@@ -106,6 +115,7 @@ impl Bits {
             bit: (bit * f64::from(1 << FINE)) as i64,
             inverse: 0,
             inverse_of: 0,
+            jitter: 0,
             last: None,
             words: Vec::new(),
             first: 0,
@@ -150,17 +160,35 @@ impl Bits {
         if bits > 0 { time as f64 / bits as f64 } else { self.nominal as f64 }
     }
 
-    /// A head of this many bits begins at bit `at`: the first ones are all measured, later only some.
-    pub(super) fn heard_head(&mut self, at: u64, len: u64) {
+    /// The heads at two bits are so many bits of the same clock apart.
+    pub(super) fn learn(&mut self, heads: Range<u64>, bits: u64) {
+        self.measure(self.time(heads.end) - self.time(heads.start), bits as i64);
+    }
+
+    fn measure(&mut self, time: i64, bits: i64) {
+        (self.heard.time, self.heard.bits) = (self.heard.time.saturating_add(time), self.heard.bits + bits);
+    }
+
+    /// A head begins at bit `at`: the first ones are all measured, later only some. All frames are whole bits.
+    pub(super) fn heard_head(&mut self, at: u64) {
         self.heard.heads += 1;
-        if self.heard.heads > MEASURED && self.heard.heads % SOME != 0 {
+        if self.heard.heads > MEASURED && self.heard.heads % SOME > 1 {
             return;
         }
-        // Falling edges, so that what delays rising ones does not matter: of SYNC, and in CYCLE RESET.
-        let to = len.saturating_sub(FALL);
-        let time = self.time(at + to) - self.time(at);
-        let bits = (time as f64 / self.mean()).round() as i64;
-        (self.heard.time, self.heard.bits) = (self.heard.time.saturating_add(time), self.heard.bits + bits);
+        let time = self.time(at);
+        let Some((before, since)) = self.heard.last.replace((at, time)) else { return };
+        let apart = (time - since) as f64 / self.mean();
+        let near = (apart - apart.round()).abs() <= WHOLE && apart <= PAUSE as f64;
+        if self.heard.bits == 0 {
+            self.measure(time - since, (at - before) as i64);
+        } else if near {
+            self.measure(time - since, apart.round() as i64);
+        }
+    }
+
+    /// Whether edges are so far from the grid that bits which hold may be wrong all the same.
+    pub(super) fn is_jittery(&self) -> bool {
+        (self.jitter >> JITTER_EDGES) * JITTERY > self.nominal
     }
 
     #[inline]
@@ -209,9 +237,11 @@ impl Bits {
         // Half a bit, where another speaker begins, always goes the same way.
         let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
         let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
+        self.jitter -= self.jitter >> JITTER_EDGES;
         let place = match usize::try_from(count).ok().and_then(|count| ADAPT.get(count)) {
             Some(_) if off.abs() * ON_GRID <= self.nominal => time,
             Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
+                self.jitter += off.abs();
                 self.adapt(off * part);
                 // The grid follows half-way.
                 time - (off >> 1)

@@ -36,6 +36,8 @@ const GOOD: usize = 10;
 /// Answers from which the delay is learned, and bits in which they are.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
+/// So many answers that hold in another place say that the delay has changed.
+const MOVED: u8 = 3;
 /// Of an encoder whose identifier was not seen: 11 bits of acceleration, 40 of position.
 const WIDEST: EncoderId = EncoderId::truncate(0x001d3);
 
@@ -45,8 +47,22 @@ struct Break {
     /// Their numbers.
     ends: u64,
     begins: u64,
+    /// Whether all words of either that may be the wrong one are under a check: of the secondary channel or the acceleration, and of the
+    /// vertical channel.
+    tail_is_checked: bool,
+    front_is_checked: bool,
     /// Whether the V-frame of the first has a bad check in channel 2, if it was another one.
     first_failed: Option<bool>,
+}
+
+/// Where an answer is: the delay of the link and its own in bits, how well it holds there, and whether another one holds
+/// where none was so far.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    usual: u32,
+    delay: u32,
+    score: usize,
+    elsewhere: bool,
 }
 
 /// An answer beside another: what its words say of the running disparity, its number, and whether it is good by itself.
@@ -69,11 +85,15 @@ pub(super) struct Decoder {
     before: Option<u64>,
     after: u64,
     again: Option<u64>,
+    /// Up to here all edges lie on the grid of that head, those of later answers too, which have grids of their own.
+    laid: u64,
     /// So many frames are looked at again whether they fail or not: it helped not long ago.
     shaky: u8,
     delay: Option<u32>,
     /// Time from the end of a head to its answer, in picoseconds.
     lag: Option<i64>,
+    /// So many answers in a row hold elsewhere.
+    elsewhere: u8,
     /// `None` only if there were encoders that it cannot follow.
     fast: Option<FastPosition>,
     /// The identifier, or how far safe positions reached as long as it is not known.
@@ -88,6 +108,8 @@ pub(super) struct Decoder {
     /// The last frame carried a nibble; the number of its head, if the one before did not.
     talks: bool,
     lone: Option<u64>,
+    /// Frames since the last head without a nibble.
+    since_quiet: u8,
     beginnings: Beginnings,
     /// The answer before, if no frame lies between.
     chain: Option<Neighbour>,
@@ -111,9 +133,11 @@ impl Decoder {
             before: None,
             after: 0,
             again: None,
+            laid: 0,
             shaky: 0,
             delay: None,
             lag: None,
+            elsewhere: 0,
             fast: FastPosition::new(WIDEST).ok(),
             id: None,
             reach: Reach::default(),
@@ -124,6 +148,7 @@ impl Decoder {
             heads: HeadRules::default(),
             talks: false,
             lone: None,
+            since_quiet: 0,
             beginnings: Beginnings::default(),
             chain: None,
             breaks: Vec::new(),
@@ -159,6 +184,10 @@ impl Decoder {
     /// Takes what is left.
     pub(super) fn finish(&mut self, bits: &mut Bits, out: &mut dyn Sink) -> io::Result<()> {
         self.take_from(bits, u64::from(Head::BITS), out)?;
+        // No later head says that one is missing: the last edges are looked at again for it.
+        while self.looks_behind_the_last(bits) {
+            self.take_from(bits, u64::from(Head::BITS), out)?;
+        }
         self.settle(None);
         self.said.give(u64::MAX, out)
     }
@@ -171,12 +200,24 @@ impl Decoder {
                 self.next += 1;
                 continue;
             };
+            if self.head.is_none() {
+                if need == NEED && at + LESSON > bits.end() {
+                    break;
+                }
+                let first = heads_from(bits, at, u64::from(found.len));
+                heads::learn(bits, &first);
+                self.heads.learn(&heads::parsed(bits, &first));
+            }
             let (mut heads, due) = (self.heads, self.at);
             let mut broken = heads.check(found.head, bits.window(at), due);
             if self.looks_again(bits, at, broken.is_some()) {
                 continue;
             }
-            bits.heard_head(at, found.len.into());
+            if broken.is_some() && self.is_stray(bits, at) {
+                self.next += 1;
+                continue;
+            }
+            bits.heard_head(at);
             self.missed(bits, at);
             if self.at != due {
                 // It is not the frame that it seemed to be.
@@ -196,7 +237,7 @@ impl Decoder {
                 }
                 // In a link that runs, no frame asks for a pattern or the identifier.
                 let start_up = symbol.ok().filter(|symbol| symbol.is_start_up() && !found.head.byte.first());
-                self.next = self.answer(start_up, bits, at, len);
+                self.next = self.answer(start_up, bits, at, len, running);
                 self.after = self.next;
             } else {
                 self.after = self.next;
@@ -218,8 +259,9 @@ impl Decoder {
     fn lose(&mut self, frames: u8) {
         for _ in 0..frames {
             self.step(None);
+            self.since_quiet = self.since_quiet.saturating_add(1);
         }
-        (self.lone, self.chain) = (None, None);
+        self.chain = None;
         self.lose_v_frame();
     }
 
@@ -232,44 +274,60 @@ impl Decoder {
         self.settle(None);
     }
 
-    /// Where the answer after the head of `len` bits at bit `at` begins at the earliest, the delay with which it does, and how well
-    /// it stands there.
-    fn place_of_answer(&self, start_up: bool, bits: &Bits, from: u64) -> (u32, u32, usize) {
+    /// Where the answer behind bit `from` is.
+    fn place_of_answer(&self, start_up: bool, bits: &Bits, from: u64) -> Placed {
         let line = |delay: u32| bits.window(from + u64::from(delay));
         let usual = match self.delay {
             Some(delay) => delay,
             None => usual_delay(bits, from),
         };
         // The delay of a cable does not change, but it need not be whole bits. What is perfect is where it is; of a
-        // damaged answer some words may hold a bit beside it by chance, so there the time decides.
+        // damaged answer some words, or all, may hold a bit beside it by chance, so there the time decides.
         let since = |delay: u32| bits.time_by_next(from + u64::from(delay)) - released(bits, from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
-        let rank = |(delay, score): (u32, usize)| (score >= PERFECT, -off(delay), score);
-        let mut best = (usual, score(line(usual)));
         let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !start_up;
+        let is_far = |delay: u32| !start_up && !bits.is_jittery() && 2 * off(delay) > 3 * bits.half();
+        let holds = |(delay, score): (u32, usize)| score >= PERFECT && (self.elsewhere >= MOVED || !is_far(delay));
+        let rank = |it: (u32, usize)| (holds(it), -off(it.0), it.1);
+        let mut best = (usual, score(line(usual)));
+        let mut elsewhere = best.1 >= PERFECT && is_far(usual);
         if !running || best.1 < PERFECT {
             for delay in [usual + 1, usual.saturating_sub(1)] {
                 let next = (delay, score(line(delay)));
+                elsewhere |= next.1 >= PERFECT && is_far(delay);
                 best = if rank(next) > rank(best) { next } else { best };
             }
         }
-        (usual, best.0, best.1)
+        Placed { usual, delay: best.0, score: best.1, elsewhere }
     }
 
-    /// The answer to the head of `len` bits at bit `at`; where to go on.
-    fn answer(&mut self, start_up: Option<MasterSymbol>, bits: &mut Bits, at: u64, len: u64) -> u64 {
+    /// The answer to the head of `len` bits at bit `at`, which may be damaged; where to go on.
+    fn answer(
+        &mut self,
+        start_up: Option<MasterSymbol>,
+        bits: &mut Bits,
+        at: u64,
+        len: u64,
+        is_head_damaged: bool,
+    ) -> u64 {
         let mut from = at + len + 1;
-        let (mut usual, mut delay, mut score) = self.place_of_answer(start_up.is_some(), bits, from);
+        let mut placed = self.place_of_answer(start_up.is_some(), bits, from);
         self.shaky = self.shaky.saturating_sub(1);
-        let before = score;
-        if before < PERFECT || self.shaky > 0 {
+        let before = placed.score;
+        if before < PERFECT || self.shaky > 0 || at < self.laid || bits.is_jittery() {
             let beat = bits.beat(at, len, self.before(at));
             bits.lay(at, beat, Again::Answer);
             from = at + find_head(bits.window(at)).map_or(len, |found| found.len.into()) + 1;
-            (usual, delay, score) = self.place_of_answer(start_up.is_some(), bits, from);
-            if before < PERFECT && score >= PERFECT {
+            placed = self.place_of_answer(start_up.is_some(), bits, from);
+            if before < PERFECT && placed.score >= PERFECT {
                 self.shaky = SHAKY;
             }
+        }
+        let Placed { usual, delay, score, elsewhere } = placed;
+        self.elsewhere = if elsewhere { self.elsewhere.saturating_add(1) } else { 0 };
+        if is_head_damaged && score < PERFECT {
+            // The receiver knew where to look for it.
+            self.quality.forget();
         }
         let bits = &*bits;
         let line = |delay: u32| bits.window(from + u64::from(delay));
@@ -354,30 +412,31 @@ fn released(bits: &Bits, from: u64) -> Time {
     bits.time(from.saturating_sub(RESET + 1)) + ((RESET + 1) as f64 * bits.mean()) as i64
 }
 
-/// The delay at which most of the answers after the next heads hold.
+/// The delay at which most of the answers after the heads of `LEARNED` frames hold, the first of them before bit `from`.
 fn usual_delay(bits: &Bits, from: u64) -> u32 {
     let delays = 0..=u32::from(Delay::MAX.get()) + 1;
     let mut sums = vec![0; delays.clone().count()];
-    let (mut at, mut heard) = (from, 0);
-    while heard < LEARNED && at + u64::from(ANSWER_BITS) < bits.end() {
+    let answers = std::iter::successors(Some(from), |at| {
+        let (at, len) = next_head(bits, at + u64::from(ANSWER_BITS))?;
+        Some(at + len + 1)
+    });
+    for at in answers.take(LEARNED).take_while(|at| at + u64::from(ANSWER_BITS) < bits.end()) {
         for (delay, sum) in delays.clone().zip(&mut sums) {
             *sum += score(bits.window(at + u64::from(delay)));
-        }
-        heard += 1;
-        at += u64::from(ANSWER_BITS);
-        // The answer after the next head.
-        loop {
-            if at + u64::from(Head::BITS) > bits.end() {
-                at = bits.end();
-                break;
-            }
-            if let Some(found) = find_head(bits.window(at)) {
-                at += u64::from(found.len) + 1;
-                break;
-            }
-            at += 1;
         }
     }
     let best = delays.zip(sums).reduce(|best, next| if next.1 > best.1 { next } else { best });
     best.map_or(0, |(delay, _)| delay)
+}
+
+/// The heads in the first bits of a link, from that of `len` bits at bit `at` on.
+fn heads_from(bits: &Bits, at: u64, len: u64) -> Vec<(u64, u64)> {
+    let next = |(at, len): &(u64, u64)| next_head(bits, at + len);
+    std::iter::successors(Some((at, len)), next).take_while(|(head, _)| head - at <= LESSON).collect()
+}
+
+/// Where the next head begins, at bit `from` or later, and its bits.
+fn next_head(bits: &Bits, from: u64) -> Option<(u64, u64)> {
+    (from..(bits.end() + 1).saturating_sub(Head::BITS.into()))
+        .find_map(|at| find_head(bits.window(at)).map(|found| (at, u64::from(found.len))))
 }

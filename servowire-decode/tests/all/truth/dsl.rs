@@ -247,7 +247,7 @@ pub(crate) fn build(link: &Link, seed: u64) -> Built {
         ];
         let line = b.six(words);
         let answer = b.answer(end, &line);
-        b.sent.push(Sent { said: b.said.len(), v_frame, at, flip: answer.1 });
+        b.sent.push(Sent { said: b.said.len(), v_frame, at, flip: answer.1, words, line });
         let raw = link.forty(position);
         let fields = vec![
             b.delay(),
@@ -278,6 +278,7 @@ pub(crate) fn build(link: &Link, seed: u64) -> Built {
         b.tail(end, true);
     }
     doubt::mark(&mut b.said, &b.sent);
+    doubt::leave_to_chance(&mut b.said, &b.sent);
     let end = b.now + 30.0 * bit;
     Built { wire: b.wire, said: b.said, end }
 }

@@ -8,6 +8,8 @@ use crate::time::Time;
 
 /// Bits from the end of a head to TRAILER, of which the first two are not driven.
 const TO_TRAILER: f64 = (1 + ANSWER_BITS + DELAY_RESERVE_BITS) as f64;
+/// So far, in bits, a head may lie from where the mean length of a bit has it, by jitter alone.
+const SAME_CLOCK: f64 = 0.25;
 /// Edges in SYNC, where they lie, and bits from CYCLE RESET on, before which an EXTRA window may end anywhere.
 const SYNC: [u64; 4] = [0, 2, 3, 4];
 pub(in super::super) const RESET: u64 = 17;
@@ -36,7 +38,9 @@ impl Bits {
         let start = self.head_start(at, len, mean);
         let bit = before.map_or(mean, |before| {
             let time = (start - self.head_start(before, len.min(at - before), mean)) as f64;
-            time / (time / mean).round().max(1.0)
+            let bits = (time / mean).round().max(1.0);
+            // The mean of many heads is nearer than two of them, unless the clock has moved.
+            if (time - bits * mean).abs() < SAME_CLOCK * mean { mean } else { time / bits }
         });
         let end = self.time(at + len);
         Beat { start, len: ((end - start) as f64 / bit).round().max(0.0) as u64, bit }
@@ -91,6 +95,8 @@ impl Bits {
         let phase = phase(&edges.iter().map(|(time, _)| place(*time)).filter(|place| of_answer(*place)));
         let olds: Vec<u64> = edges.iter().map(|(time, _)| self.nearest_mark(*time)).collect();
         let Some(first) = self.marks.iter().rposition(|mark| mark.bit <= at) else { return };
+        // At the end of a capture the level after the last edge was bits already.
+        let held = olds.last().filter(|_| self.last.is_none()).map(|last| self.end.saturating_sub(*last));
         // A stretch on a grid goes on to the next mark.
         let begins = self.marks.get(first).is_some_and(|mark| mark.bit == at);
         self.marks.truncate(first + usize::from(!begins));
@@ -112,6 +118,10 @@ impl Bits {
             let place = start + ((whole + off) * bit) as i64;
             self.last = Some((if now >= to && what == Again::Answer { time } else { place }, level));
             before = Some((level, (now >= to).then_some(old)));
+        }
+        if let (Some(held), Some((level, _))) = (held, before) {
+            self.push(level, held);
+            self.last = None;
         }
     }
 

@@ -4,7 +4,7 @@
 //! all lie at the same one of them. As long as that holds, the edges lie on the grid, nothing follows them, and 64 samples
 //! are eight bits.
 
-use super::{Bits, FINE, Grid, LONGEST_RUN, Mark, ON_GRID, PAUSE, SAMPLES};
+use super::{Bits, FINE, Grid, JITTER_EDGES, LONGEST_RUN, Mark, ON_GRID, PAUSE, SAMPLES};
 use crate::capture::samples::Samples;
 
 /// The first sample of each bit.
@@ -105,6 +105,7 @@ impl Bits {
             self.spikes.settle(time, level);
             self.last = Some((time, level));
             self.heard.edges += u64::from(edges);
+            self.jitter -= (self.jitter >> JITTER_EDGES) * i64::from(edges).min(1 << JITTER_EDGES);
         }
         Some(Taken { next, since, level })
     }

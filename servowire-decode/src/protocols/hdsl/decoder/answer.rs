@@ -20,6 +20,8 @@ const BETWEEN: &str =
     "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
 const STRAY: &str = "VSYNC is expected in every eighth answer, and only there";
 const SWITCH: &str = "the switch bit is not the inverse of the bit before it";
+/// The first of the words that the check of the acceleration covers; the one behind them is of the secondary channel.
+const ACCELERATION: u8 = 3;
 /// The answer at hand is the last of a V-frame of which the others are not known.
 const LAST: u8 = 8;
 
@@ -128,7 +130,9 @@ impl Decoder {
         }
         if !goes_on && self.beginnings.are_carried() {
             let first_failed = if self.at == Some(0) { self.failed.map(|[_, second]| second) } else { None };
-            self.breaks.push(Break { ends, begins, first_failed });
+            let (tail_is_checked, front_is_checked) =
+                (before.chain.last_told() >= ACCELERATION, next.chain.first_told() == 0);
+            self.breaks.push(Break { ends, begins, tail_is_checked, front_is_checked, first_failed });
             let told = match self.at {
                 Some(0) => first_failed.is_some(),
                 Some(at) => at < LAST,
@@ -141,14 +145,18 @@ impl Decoder {
         self.beginnings.note(before.chain, next.chain);
     }
 
-    /// With the checks of the V-frame it is known on which side of a break a bit was flipped: the last word of an answer
-    /// is of channel 2, the first of the next of channel 1.
+    /// With the checks of the V-frame it is known on which side of a break a bit was flipped, if the words there that may be the wrong
+    /// one are under them: the last word of an answer is of channel 2, the first of the next of channel 1.
     pub(super) fn settle(&mut self, failed: Option<[bool; 2]>) {
-        for Break { ends, begins, first_failed } in std::mem::take(&mut self.breaks) {
-            let sides = (first_failed.or(failed.map(|[_, second]| second)), failed.map(|[first, _]| first));
-            let (tail, front, what) = match sides {
-                (Some(false), _) => (false, true, FRONT),
-                (_, Some(false)) => (true, false, TAIL),
+        for Break { ends, begins, tail_is_checked, front_is_checked, first_failed } in std::mem::take(&mut self.breaks)
+        {
+            let second = first_failed.or(failed.map(|[_, second]| second));
+            let first = failed.map(|[first, _]| first);
+            let (tail_holds, front_holds) =
+                (tail_is_checked && second == Some(false), front_is_checked && first == Some(false));
+            let (tail, front, what) = match (tail_holds, front_holds) {
+                (true, false) => (false, true, FRONT),
+                (false, true) => (true, false, TAIL),
                 _ => (true, true, BETWEEN),
             };
             for (_, number) in [(tail, ends), (front, begins)].into_iter().filter(|side| side.0) {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use hdsl::frame::{H_FRAME_BITS, Head, ParsedHead, STUFFING_BITS, Stuffing};
-use hdsl::inspect::{BrokenRule, FRONT_BITS, FoundHead, ends_with_stuffing, ends_with_trailer, head_damage};
+use hdsl::inspect::{BrokenRule, FRONT_BITS, FoundHead, ends_with_stuffing, ends_with_trailer, find_head, head_damage};
 use hdsl::{Error, MasterSymbol, Window};
 
 use super::super::bits::{Again, Bits, RESET};
@@ -14,12 +14,16 @@ use crate::event::{Direction, Field, Span};
 const LONE: &str = "a lone nibble between two frames that have none is not a message: a bit was flipped";
 const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
 const PAUSED: &str = "the line is idle here, although frames should follow each other without end";
+/// Nibbles of the shortest message: a byte and its check.
+const SHORTEST_MESSAGE: u8 = 6;
 /// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of that, and how far a
 /// length may be off where other speakers were in between.
 const SHORTEST: u64 = H_FRAME_BITS as u64;
 const LONGEST: u64 = 273 + 4;
 const STUFFING: u64 = STUFFING_BITS as u64;
 const SLACK: u64 = 8;
+/// Bits behind an answer in which there may be another head.
+const BEHIND: u64 = Head::BITS as u64 + 8;
 
 impl Decoder {
     /// A head with its request, and what is `wrong` with it; whether it is one of a running link that was damaged.
@@ -29,11 +33,13 @@ impl Decoder {
         let place = bits.place(at.clone());
         let damaged = wrong.is_some() && self.delay.is_some();
         let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
-        if let Some(number) = self.lone.take().filter(|_| !talks) {
+        // Heads that were not heard may have gone on with it.
+        if let Some(number) = self.lone.take().filter(|_| !talks && self.since_quiet < SHORTEST_MESSAGE) {
             self.said.refuse(number, ("lone", LONE.to_owned()));
         }
         self.lone = (talks && !self.talks).then(|| self.said.next());
         self.talks = talks;
+        self.since_quiet = if talks { self.since_quiet.saturating_add(1) } else { 0 };
         let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
         let extra = if found.head.extra_bits > 0 { window_bits(bits, &at) } else { 0 };
         let event = event(place, Direction::Request, "H-frame", master(found.head, symbol, extra), wrong);
@@ -58,13 +64,27 @@ impl Decoder {
     pub(super) fn looks_again(&mut self, bits: &mut Bits, at: u64, broken: bool) -> bool {
         let Some(last) = self.head.filter(|last| self.is_running() && self.again != Some(*last)) else { return false };
         let fails = broken || !self.is_one_frame(bits, at - last, at) || !ends_with_trailer(front(bits, at));
-        if bits.paused.is_some() || !fails && self.shaky == 0 {
+        if bits.paused.is_some() || !fails && self.shaky == 0 && !bits.is_jittery() {
             return false;
         }
+        self.look_again(bits, last);
+        true
+    }
+
+    /// Whether the edges behind the last head, which no other one followed, are looked at again.
+    pub(super) fn looks_behind_the_last(&mut self, bits: &mut Bits) -> bool {
+        let last = self.head.filter(|last| self.is_running() && self.again != Some(*last));
+        let Some(last) = last.filter(|_| bits.paused.is_none() && self.after + BEHIND <= bits.end()) else {
+            return false;
+        };
+        self.look_again(bits, last);
+        true
+    }
+
+    fn look_again(&mut self, bits: &mut Bits, last: u64) {
         let beat = bits.beat(last, self.head_len, self.before(last));
         bits.lay(last, beat, Again::Rest);
-        (self.again, self.next) = (Some(last), self.after);
-        true
+        (self.again, self.next, self.laid) = (Some(last), self.after, bits.end());
     }
 
     /// Frames follow each other for ever: says where one should have been before the head at `at`.
@@ -100,20 +120,50 @@ impl Decoder {
         }
     }
 
+    /// Whether what looks like a head at `at`, but breaks a rule, lies where none is due: bits of an answer or of a damaged head.
+    pub(super) fn is_stray(&self, bits: &Bits, at: u64) -> bool {
+        let (Some(last), Some(usual)) = (self.head.filter(|_| self.is_running()), self.apart) else { return false };
+        let apart = at - last;
+        let is_due = |frames: u64| (frames * usual).abs_diff(apart) <= 2 * SLACK;
+        !(1..=4).any(is_due) && filled(bits, self.head_len, at).abs_diff(apart) > SLACK / 2
+    }
+
     /// Whether nothing is missing between the last head and that at `at`: frames may have any length, but two of them do not
     /// fit, or it is that of the frame before, or stuffing fills it.
     fn is_one_frame(&self, bits: &Bits, apart: u64, at: u64) -> bool {
-        let blocks = (1..=u64::from(Stuffing::MAX.get())).take_while(|k| {
-            let from = at.saturating_sub(STUFFING * k);
-            Window::from_bits(bits.load(from), STUFFING as u32).is_some_and(ends_with_stuffing)
-        });
-        // Without stuffing a frame has so many bits more than its head.
-        let filled = self.head_len + SHORTEST - u64::from(Head::BITS) + STUFFING * blocks.count() as u64;
         apart <= LONGEST
             && (apart + SLACK < 2 * SHORTEST
                 || self.apart.is_some_and(|usual| usual.abs_diff(apart) <= 2 * SLACK)
-                || filled.abs_diff(apart) <= SLACK / 2)
+                || filled(bits, self.head_len, at).abs_diff(apart) <= SLACK / 2)
     }
+}
+
+/// The bits of a frame with a head of so many, by the stuffing in front of the next one at bit `at`: without any it has so many
+/// bits more than its head.
+fn filled(bits: &Bits, head: u64, at: u64) -> u64 {
+    let blocks = (1..=u64::from(Stuffing::MAX.get())).take_while(|k| {
+        let from = at.saturating_sub(STUFFING * k);
+        Window::from_bits(bits.load(from), STUFFING as u32).is_some_and(ends_with_stuffing)
+    });
+    head + SHORTEST - u64::from(Head::BITS) + STUFFING * blocks.count() as u64
+}
+
+/// Learns the length of a bit from the first frames of a link: `heads` has the bits at which they begin, and those of the heads.
+/// Where an encoder speaks in between, a frame may be read a bit too long or too short.
+pub(super) fn learn(bits: &mut Bits, heads: &[(u64, u64)]) {
+    for pair in heads.windows(2) {
+        let [(at, len), (next, _)] = *pair else { continue };
+        let filled = filled(bits, len, next);
+        if filled.abs_diff(next - at) <= SLACK / 2 {
+            bits.learn(at..next, filled);
+        }
+    }
+}
+
+/// The heads at these bits, and the line that each begins.
+pub(super) fn parsed(bits: &Bits, heads: &[(u64, u64)]) -> Vec<(ParsedHead, Window)> {
+    let head = |at: u64| find_head(bits.window(at)).map(|found| (found.head, bits.window(at)));
+    heads.iter().filter_map(|(at, _)| head(*at)).collect()
 }
 
 /// What is in front of a head.

@@ -67,6 +67,11 @@ impl Quality {
         self.monitor.count_answer(at, answer);
     }
 
+    /// The receiver may have heard more than the capture shows.
+    pub(super) fn forget(&mut self) {
+        (self.known, self.clean) = (false, 0);
+    }
+
     /// The V-frame is over.
     pub(super) fn count_v_frame(&mut self, frame: &VFrame) {
         self.monitor.count_v_frame(frame);

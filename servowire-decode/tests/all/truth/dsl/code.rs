@@ -81,6 +81,19 @@ pub(super) fn parameter(byte: u8, disparity: i64) -> Vec<bool> {
     [bits(equal), six, four].concat()
 }
 
+/// The byte of ten bits, and whether it is a special character, if they are in a table.
+pub(super) fn decoded(line: &[bool]) -> Option<(u8, bool)> {
+    let all = (0..=255).map(|byte| (byte, false));
+    let special = [0x1c, 0x3c, 0x5c, 0x7c, 0x9c, 0xbc, 0xdc, 0xfc, 0xf7, 0xfb, 0xfd, 0xfe].map(|byte| (byte, true));
+    all.chain(special)
+        .find(|(byte, control)| [false, true].iter().any(|plus| coded(*byte, *control, &mut plus.clone()) == line))
+}
+
+/// Whether a word is another one in each column, so that it tells the running disparity.
+pub(super) fn tells(byte: u8, control: bool) -> bool {
+    coded(byte, control, &mut false) != coded(byte, control, &mut true)
+}
+
 /// x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, inverted in its low byte, behind the bytes.
 pub(super) fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut crc = 0_u32;
