@@ -25,6 +25,9 @@ pub trait RegisterBus {
     fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Self::Error>;
 }
 
+/// The end of a long message in EVENT_L.
+const END_OF_LONG: u8 = (Event::FREL.bits() | Event::ANS.bits()).to_le_bytes()[0];
+
 /// Why an access to a receiver failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -118,12 +121,14 @@ pub struct RemoteReceiver<B> {
     dialect: Dialect,
     /// The short and the long message that were started here.
     under_way: [bool; 2],
+    /// Their ends, if they were taken along with other events: FRES; FREL and ANS.
+    ended: [u8; 2],
 }
 
 impl<B: RegisterBus> RemoteReceiver<B> {
     /// Creates the access over a bus; the dialect determines the order of error codes.
     pub const fn new(dialect: Dialect, bus: B) -> Self {
-        Self { bus, dialect, under_way: [false; 2] }
+        Self { bus, dialect, under_way: [false; 2], ended: [0; 2] }
     }
 
     /// The bus.
@@ -177,13 +182,22 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         self.put(register, &written)
     }
 
-    /// Takes the events that happened: reads them and clears those that were read.
+    /// Takes the events that happened: reads them and clears those that were read. The end of a message is among them, and it is still
+    /// found by `poll_...`.
     ///
     /// # Errors
     /// The errors of the bus.
     pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
+        let [short, long] = self.under_way;
+        let [short_ended, long_ended] = &mut self.ended;
+        if short {
+            *short_ended |= safe & EventS::FRES.bits();
+        }
+        if long {
+            *long_ended |= low & END_OF_LONG;
+        }
         self.clear(Register::EventH, [high, low], [high, low])?;
         self.clear(Register::EventS, [safe], [safe])?;
         let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
@@ -201,6 +215,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         }
         let events = self.get(Register::EventS)?;
         self.clear(Register::EventS, events, [EventS::FRES.bits()])?;
+        self.ended[0] = 0;
         match (request, self.is_core()) {
             // What this reading returns means nothing.
             (ShortRequest::Read(register), true) => {
@@ -226,10 +241,11 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// The errors of the bus.
     pub fn poll_short(&mut self) -> Result<Option<u8>, BusError<B::Error>> {
         let [events] = self.get(Register::EventS)?;
-        if events & EventS::FRES.bits() == 0 {
+        if (events | self.ended[0]) & EventS::FRES.bits() == 0 {
             return Ok(None);
         }
         self.clear(Register::EventS, [events], [EventS::FRES.bits()])?;
+        self.ended[0] = 0;
         let [data] = self.get(if self.is_core() { Register::PcData } else { Register::SPcData })?;
         self.under_way[0] = false;
         Ok(Some(data))
@@ -245,7 +261,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
             return Err(BusError::Link(Error::Busy));
         }
         let events = self.get(Register::EventL)?;
-        self.clear(Register::EventL, events, [(Event::FREL | Event::ANS).bits().to_le_bytes()[0]])?;
+        self.clear(Register::EventL, events, [END_OF_LONG])?;
+        self.ended[1] = 0;
         if let Access::Write(data) = &request.access {
             self.put(Register::PcBuffer, data.as_bytes())?;
         }
@@ -264,13 +281,13 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// [`Error::NotAccepted`] if the answer failed (ANS), [`Error::Resource`] if the encoder refused; the errors of the bus.
     pub fn poll_long(&mut self) -> Result<Option<Data>, BusError<B::Error>> {
         let [events] = self.get(Register::EventL)?;
-        let [frel, ans] = [Event::FREL, Event::ANS].map(|event| event.bits().to_le_bytes()[0]);
-        if events & frel == 0 {
+        let ended = Event::from_bits_retain((events | self.ended[1]).into());
+        if !ended.contains(Event::FREL) {
             return Ok(None);
         }
-        self.clear(Register::EventL, [events], [frel | ans])?;
-        self.under_way[1] = false;
-        if events & ans != 0 {
+        self.clear(Register::EventL, [events], [END_OF_LONG])?;
+        (self.under_way[1], self.ended[1]) = (false, 0);
+        if ended.contains(Event::ANS) {
             return Err(BusError::Link(Error::NotAccepted { tries: 1 }));
         }
         let [header, _] = self.get(Register::PcAdd)?;

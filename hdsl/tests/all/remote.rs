@@ -209,3 +209,42 @@ fn what_only_the_manual_has() {
         assert_eq!(map.byte(0x06), Some(0));
     }
 }
+
+/// Events are taken while messages are under way: their ends are seen, and the messages end all the same.
+#[test]
+fn taking_events_does_not_take_the_end_of_a_message_away() {
+    fn ends<B: RegisterBus<Error = Infallible>>(mut remote: RemoteReceiver<B>, frame: fn(&mut B), value: u8) {
+        for _ in 0..3 {
+            remote.start_short(ShortRequest::Read(RemoteRegister::SRSSI)).unwrap();
+            remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+            assert_eq!((remote.poll_short(), remote.poll_long()), (Ok(None), Ok(None)));
+            frame(remote.bus());
+            let events = remote.take_events().unwrap();
+            assert_eq!(events, Events { drive: Event::FREL, safe: EventS::FRES });
+            assert_eq!(remote.take_events(), Ok(NONE));
+            assert_eq!(remote.poll_short(), Ok(Some(value)));
+            let name = remote.poll_long().unwrap().unwrap();
+            assert_eq!(name.as_bytes(), b"RESOLUTN");
+            assert_eq!((remote.poll_short(), remote.poll_long()), (Ok(None), Ok(None)));
+        }
+    }
+    ends(RemoteReceiver::new(Dialect::TI, Firmware::new()), Firmware::frame, 0x5a);
+    ends(RemoteReceiver::new(Dialect::SICK, Core::new()), Core::frame, 0x3c);
+}
+
+/// An answer that failed is told by ANS, which may have been taken too.
+#[test]
+fn a_failed_answer_is_known_after_its_event_was_taken() {
+    let mut remote = RemoteReceiver::new(Dialect::TI, Firmware::new());
+    remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+    let failed = Event::FREL | Event::ANS;
+    remote.bus().memory[0x05] |= failed.bits() as u8;
+    assert_eq!(remote.take_events().map(|events| events.drive), Ok(failed));
+    assert_eq!(remote.poll_long(), Err(BusError::Link(Error::NotAccepted { tries: 1 })));
+    // Nothing of it is left for the next one.
+    remote.bus().memory[0x2c] = 0;
+    remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+    assert_eq!(remote.poll_long(), Ok(None));
+    remote.bus().frame();
+    assert!(remote.poll_long().unwrap().is_some());
+}
