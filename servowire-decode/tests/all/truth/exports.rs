@@ -57,13 +57,23 @@ fn is_true(value: &Value, due: &Shown) -> bool {
         Shown::Flags(raw, names) => {
             number == i64::try_from(*raw).ok() && value.get("set").is_none_or(|set| *set == Value::from(names.clone()))
         }
+        Shown::Either(both) => both.iter().any(|due| is_true(value, due)),
         Shown::Any => true,
+    }
+}
+
+/// Whether it is shown as a text.
+fn is_text(due: &Shown) -> bool {
+    match due {
+        Shown::Text(_) => true,
+        Shown::Either(both) => both.iter().any(is_text),
+        _ => false,
     }
 }
 
 /// A cell as what it says, where a text or a number is due.
 fn cell(text: &str, due: Option<&Shown>) -> Value {
-    let number = text.parse::<i64>().ok().filter(|_| !matches!(due, Some(Shown::Text(_))));
+    let number = text.parse::<i64>().ok().filter(|_| !due.is_some_and(is_text));
     number.map_or_else(|| Value::from(text), Value::from)
 }
 
