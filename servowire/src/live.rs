@@ -129,7 +129,9 @@ impl<W: Write> Printer for Live<W> {
         figures.erase()?;
         let empty = Gathered::new(figures.limit);
         let whole = std::mem::replace(&mut figures.whole, empty);
-        let in_json = figures.shown == Shown::Json;
-        whole.write(origin, in_json, &mut figures.out)
+        match figures.shown {
+            Shown::Json => whole.write_json(origin, &mut figures.out),
+            _ => whole.write(origin, &mut figures.out),
+        }
     }
 }

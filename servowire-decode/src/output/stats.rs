@@ -318,18 +318,9 @@ impl Gathered {
         self.by.iter().map(one).collect()
     }
 
-    /// Writes a table for each speaker, or an object a line; one without figures where nobody spoke.
-    pub fn write(mut self, origin: &Origin, in_json: bool, out: &mut impl Write) -> io::Result<()> {
-        if self.by.is_empty() {
-            self.by.insert(Speaker { lane: 0, address: None }, Figures::default());
-        }
-        if in_json {
-            for object in self.json(origin) {
-                serde_json::to_writer(&mut *out, &object)?;
-                out.write_all(b"\n")?;
-            }
-            return out.flush();
-        }
+    /// Writes a table for each speaker, and one without figures if nobody spoke.
+    pub fn write(mut self, origin: &Origin, out: &mut impl Write) -> io::Result<()> {
+        self.at_least_one();
         writeln!(out, "{}", origin.file)?;
         for Table { speaker, rows } in self.tables(origin) {
             if !speaker.is_empty() {
@@ -343,6 +334,22 @@ impl Gathered {
             }
         }
         out.flush()
+    }
+
+    /// Writes an object on a line for each speaker, and one without figures if nobody spoke.
+    pub fn write_json(mut self, origin: &Origin, out: &mut impl Write) -> io::Result<()> {
+        self.at_least_one();
+        for object in self.json(origin) {
+            serde_json::to_writer(&mut *out, &object)?;
+            out.write_all(b"\n")?;
+        }
+        out.flush()
+    }
+
+    fn at_least_one(&mut self) {
+        if self.by.is_empty() {
+            self.by.insert(Speaker { lane: 0, address: None }, Figures::default());
+        }
     }
 
     /// A line for each speaker of `all` with what it did in these figures: frames, errors, cycle, delay and position.
@@ -410,6 +417,7 @@ impl<W: Write> Printer for Stats<W> {
 
     fn end(&mut self, origin: &Origin) -> io::Result<()> {
         let empty = Gathered::new(self.gathered.limit);
-        std::mem::replace(&mut self.gathered, empty).write(origin, self.json, &mut self.out)
+        let gathered = std::mem::replace(&mut self.gathered, empty);
+        if self.json { gathered.write_json(origin, &mut self.out) } else { gathered.write(origin, &mut self.out) }
     }
 }

@@ -33,6 +33,8 @@ struct World {
     /// The call that fails, by its number.
     fails: Option<usize>,
     on: bool,
+    /// Whether it was on after each request.
+    left_on: Vec<bool>,
     /// When the bits that were written have left.
     left_ns: u64,
     /// The driver went off before that.
@@ -53,6 +55,13 @@ impl Bench {
         let (number, now_ns) = (world.calls.len(), world.now_ns);
         world.calls.push((call, now_ns));
         world.fails != Some(number)
+    }
+
+    /// A request is over.
+    fn over(&self) {
+        let mut world = self.0.borrow_mut();
+        let on = world.on;
+        world.left_on.push(on);
     }
 }
 
@@ -148,7 +157,11 @@ fn transact(bench: &Bench) -> [Failure; 2] {
     let mut buffers = ([0; 48], [0; 160]);
     let uart = uart(bench, &mut buffers);
     let mut encoder = Driver::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5)).unwrap();
-    std::array::from_fn(|_| encoder.transact(Request::ReadSingleTurn).unwrap_err())
+    std::array::from_fn(|_| {
+        let error = encoder.transact(Request::ReadSingleTurn).unwrap_err();
+        bench.over();
+        error
+    })
 }
 
 /// Blocking, and as futures.
@@ -209,7 +222,8 @@ fn faults_are_told(transact: Transact) {
         }
         assert!(matches!(next, Error::Protocol(tformat::Error::NoResponse { .. })), "{what}, {next:?}");
         let world = bench.0.borrow();
-        assert!(!world.on && !world.cut, "{what}");
+        assert_eq!(world.left_on, [false; 2], "{what}");
+        assert!(!world.cut, "{what}");
     }
 }
 
@@ -323,7 +337,11 @@ mod asynch {
         let mut buffers = ([0; 48], [0; 160]);
         let uart = uart(bench, &mut buffers);
         let mut encoder = Driver::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5)).unwrap();
-        std::array::from_fn(|_| run(encoder.transact(Request::ReadSingleTurn)).unwrap_err())
+        std::array::from_fn(|_| {
+            let error = run(encoder.transact(Request::ReadSingleTurn)).unwrap_err();
+            bench.over();
+            error
+        })
     }
 
     #[test]
