@@ -10,15 +10,15 @@ pub struct DeviceAddress(u8);
 impl DeviceAddress {
     /// The device next to the master.
     pub const FIRST: Self = Self(1);
-    /// The last that can exist.
+    /// The highest possible address.
     pub const MAX: Self = Self(254);
 
-    /// `address`: 1..=254.
+    /// Returns the address, or `None` outside 1..=254.
     pub const fn new(address: u8) -> Option<Self> {
         if address == 0 || address > Self::MAX.0 { None } else { Some(Self(address)) }
     }
 
-    /// The nearest address: 1 for 0, 254 for 255.
+    /// Returns the nearest address: 1 for 0, 254 for 255.
     pub const fn truncate(address: u8) -> Self {
         match address {
             0 => Self::FIRST,

@@ -1,6 +1,6 @@
-/// From reading the counter to the moment the new value takes effect in the published device: 27 instructions, 135 ns.
+/// Time from reading the counter until the new value takes effect in the published device: 27 instructions, 135 ns.
 pub(crate) const WRITE_DELAY_NS: u32 = 135;
-/// Frames that one correction is made from.
+/// Frames averaged for one correction.
 pub(crate) const AVERAGE: u8 = 16;
 
 /// What the device does to its counter. The IEP counter adds 5 per 5 ns tick, so it counts nanoseconds.
@@ -47,20 +47,20 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// Not yet set.
+    /// Creates a clock that is not set yet.
     pub const fn new() -> Self {
         Self::averaging(AVERAGE)
     }
 
-    /// Not yet set; a correction is made from this many frames, 16 in the published device. The clock runs free between two
-    /// corrections: at 50 ppm 3 ns in 16 cycles of 4 us, and 180 ns in 16 of 224 us, which no gap between two device
-    /// frames bears. 0 counts as 1.
+    /// Creates a clock that is not set yet and makes each correction from this many frames, 16 in the published device. The
+    /// clock runs free between two corrections: at 50 ppm 3 ns in 16 cycles of 4 us, and 180 ns in 16 of 224 us, more than
+    /// any gap between two device frames allows. 0 counts as 1.
     pub(crate) const fn averaging(frames: u8) -> Self {
         Self { set: false, average: frames, count: 0, sum: 0 }
     }
 
-    /// A frame that was expected at `time_stamp_ns` of the master's time has begun at `rx_sof_ns` of the own counter,
-    /// which now reads `counter_now_ns`. In SYNC the time stamp comes with the frame; in the IO exchange it is the
+    /// Takes a frame that was expected at `time_stamp_ns` of the master's time and began at `rx_sof_ns` of the device's own
+    /// counter, which now reads `counter_now_ns`. In SYNC the time stamp comes with the frame; in the IO exchange it is the
     /// accumulated delay plus 500 in each cycle.
     pub const fn frame(&mut self, time_stamp_ns: u32, rx_sof_ns: u32, counter_now_ns: u32) -> Correction {
         if !self.set {

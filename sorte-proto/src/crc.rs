@@ -5,7 +5,7 @@ use crc::{CRC_8_SMBUS, CRC_32_ISO_HDLC, Crc, Table};
 static CRC8: Crc<u8, Table<1>> = Crc::<u8, Table<1>>::new(&CRC_8_SMBUS);
 static CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// CRC-8 of `bytes`: polynomial 0x07, start value 0, nothing reflected, nothing inverted.
+/// Returns the CRC-8 of `bytes`: polynomial 0x07, start value 0, nothing reflected, nothing inverted.
 ///
 /// The start value 0 makes leading zero bytes invisible. Within 127 bits every single and double bit error is found;
 /// of the 19 protected bytes of the stock master frame, the 25 bit pairs at a distance of 127 pass.
@@ -17,22 +17,22 @@ pub fn crc8(bytes: &[u8]) -> u8 {
     CRC8.checksum(bytes)
 }
 
-/// CRC-8 of more bytes: `crc8_update(crc8(a), b)` is the CRC-8 of `a` followed by `b`.
+/// Continues a CRC-8 over more bytes: `crc8_update(crc8(a), b)` is the CRC-8 of `a` followed by `b`.
 pub fn crc8_update(crc: u8, bytes: &[u8]) -> u8 {
     let mut digest = CRC8.digest_with_initial(crc);
     digest.update(bytes);
     digest.finalize()
 }
 
-/// CRC-8 of one more byte, for loops that do something else beside.
+/// Continues a CRC-8 over one more byte, for loops that also do something else.
 #[inline]
 pub(crate) fn crc8_step(crc: u8, byte: u8) -> u8 {
     let [table] = CRC8.table();
     table.get(usize::from(crc ^ byte)).copied().unwrap_or(0)
 }
 
-/// The Ethernet frame check sequence over DA to the last payload byte: CRC-32, polynomial 0x04C11DB7, start value all
-/// ones, reflected, inverted. Sent least significant byte first.
+/// Returns the Ethernet frame check sequence over DA to the last payload byte: CRC-32, polynomial 0x04C11DB7, start value
+/// all ones, reflected, inverted. Sent least significant byte first.
 ///
 /// ```
 /// assert_eq!(sorte_proto::fcs(b"123456789"), 0xcbf4_3926);
@@ -61,9 +61,10 @@ impl RunningFcs {
         !self.0
     }
 
-    /// The FCS of all bytes but the last four, which were `trailer`. All of them went through [`push`](Self::push).
+    /// Returns the FCS of all bytes but the last four, which were `trailer`. All of them have gone through
+    /// [`push`](Self::push).
     ///
-    /// Nothing is held back on the way: the four steps are undone here.
+    /// No byte is held back; the last four steps are undone here.
     pub(crate) fn before(self, trailer: u32) -> u32 {
         const POLYNOMIAL: u32 = 0xedb8_8320;
         let undone = (0..32).fold(self.0, |register, _| {
@@ -73,7 +74,7 @@ impl RunningFcs {
         !(undone ^ trailer)
     }
 
-    /// Whether the bytes end with the FCS of those before it: the register then always holds the same.
+    /// Whether the bytes end with the FCS of the bytes before it: the register then always holds the same value.
     pub(crate) const fn is_whole(self) -> bool {
         self.0 == 0xdebb_20e3
     }

@@ -1,10 +1,10 @@
-//! Start-up frames on their way through a device, byte by byte: some bytes of state, no frame buffer.
+//! Rewrites start-up frames on their way through a device, byte by byte: a few bytes of state, no frame buffer.
 //!
 //! A device sends each byte on as soon as the next one has come, so it must know what to write before it has seen the
-//! rest of the frame. The rewriter takes the frame from DA to FCS, gives one byte for each byte, and computes a new
-//! FCS on the way.
+//! rest of the frame. The rewriter takes the frame from DA to FCS, returns one byte for each byte, and computes a new FCS
+//! as it goes.
 //!
-//! If the incoming FCS turns out wrong, the last byte is sent inverted: the new FCS must not heal the error. (The
+//! If the incoming FCS turns out wrong, the last byte is sent inverted: the new FCS must not hide the error. (The
 //! vendor's hardware does.) A frame of another TYPE or with another DA passes unchanged.
 
 mod transit;
@@ -19,7 +19,7 @@ use crate::sync::{Sync, hop_ns};
 
 pub(crate) use transit::Transit;
 
-/// A frame that has passed a device, and what it has told.
+/// A frame that has passed a device, and what the device learnt from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,14 +28,14 @@ pub enum Passed {
     Discovery {
         /// STATUS as it was received.
         status: Status,
-        /// What the device has learnt of itself.
+        /// What the device has learnt about itself.
         assignment: Assignment,
     },
-    /// SYNC as it was received; rewritten.
+    /// SYNC, rewritten; the content is as received.
     Sync(Sync),
     /// PARAM: its parameters.
     Param([u8; Parameters::LEN]),
-    /// Another one, which has passed unchanged.
+    /// Any other frame, which has passed unchanged.
     Unchanged(FrameType),
 }
 
@@ -54,10 +54,10 @@ pub struct Rewriter {
     addends: [u8; 6],
     width: u16,
     carry: bool,
-    /// The own entry of DISCOVERY, and where it begins; `u16::MAX` for none.
+    /// The device's own entry in DISCOVERY, and where it begins; `u16::MAX` for none.
     entry: [u8; 4],
     entry_at: u16,
-    /// The bytes after STATUS as they came: the numbers of DISCOVERY and SYNC, or the parameters.
+    /// The bytes after STATUS as received: the numbers of DISCOVERY and SYNC, or the parameters.
     came: [u8; Parameters::LEN],
 }
 
@@ -70,7 +70,7 @@ const HEAD: u16 = 4;
 const _: () = assert!(DISCOVERY_FCS as usize + 4 == Discovery::LEN && SYNC_FCS as usize + 4 == Sync::LEN);
 
 impl Rewriter {
-    /// For a frame that passes as it is.
+    /// Creates the state for a frame that passes unchanged.
     pub const fn unchanged() -> Self {
         Self {
             transit: Transit::START,
@@ -120,7 +120,7 @@ impl Rewriter {
         }
     }
 
-    /// The byte to send for the byte received.
+    /// Takes the byte received and returns the byte to send.
     #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
         // Most bytes are entries of other devices.
@@ -132,7 +132,7 @@ impl Rewriter {
         }
     }
 
-    /// A whole frame in a buffer.
+    /// Rewrites a whole frame in a buffer.
     ///
     /// # Errors
     /// As [`finish`](Self::finish).
@@ -143,7 +143,7 @@ impl Rewriter {
         self.finish()
     }
 
-    /// Whether DA and TYPE are those of the frame that is rewritten. Known with the third byte.
+    /// Whether DA and TYPE are those of the frame that is rewritten. Known once the third byte has come.
     const fn rewrites(&self) -> bool {
         match self.frame_type {
             Some(frame_type) => self.transit.is_for_all(frame_type),
@@ -180,7 +180,7 @@ impl Rewriter {
         out
     }
 
-    /// STATUS, the numbers, the own entry, the FCS, and what comes after the frame.
+    /// Rewrites STATUS, the numbers, the device's own entry, the FCS, and anything after the frame.
     fn rewritten(&mut self, at: u16, byte: u8) -> u8 {
         match at {
             3 => byte | self.add.bits(),
@@ -191,7 +191,7 @@ impl Rewriter {
         }
     }
 
-    /// The count of DISCOVERY, low byte first. A device that has no address adds nothing.
+    /// Rewrites the count of DISCOVERY, low byte first. A device that has no address adds nothing.
     fn count(&mut self, at: u16, byte: u8) -> u8 {
         if at == HEAD {
             let [low, _] = count_after(byte.into()).to_le_bytes();
@@ -205,7 +205,7 @@ impl Rewriter {
         byte
     }
 
-    /// A byte of a number that something is added to.
+    /// Rewrites a byte of a number that is increased.
     fn sum(&mut self, at: u16, byte: u8) -> u8 {
         let add = self.addends.get(usize::from(at.wrapping_sub(HEAD))).copied().unwrap_or(0);
         let begins = at & self.width.wrapping_sub(1) == 0;
@@ -215,7 +215,7 @@ impl Rewriter {
         sum
     }
 
-    /// Byte `at` of the FCS, and what comes after it.
+    /// Returns byte `at` of the FCS, or of anything after it.
     #[inline(never)]
     fn trailer(&self, at: u16, byte: u8) -> u8 {
         let [out, ..] = (self.sent.value() >> (u32::from(at & 3) << 3)).to_le_bytes();
@@ -226,13 +226,13 @@ impl Rewriter {
         }
     }
 
-    /// Two bytes after STATUS as they came.
+    /// Returns two bytes after STATUS as received.
     fn number(&self, at: usize) -> u16 {
         let bytes = self.came.get(at..).and_then(|rest| rest.first_chunk().copied());
         bytes.map_or(0, u16::from_le_bytes)
     }
 
-    /// What the frame was and what it has told.
+    /// Returns what the frame was and what the device learnt from it.
     ///
     /// # Errors
     /// As [`LongFrame::parse`](crate::LongFrame::parse); [`Error::TooManyDevices`].
@@ -259,7 +259,7 @@ impl Rewriter {
         &self.transit
     }
 
-    /// Whether bits of the device's own went out with STATUS.
+    /// Whether STATUS was sent with bits that the device added.
     pub(crate) const fn has_written_status(&self) -> bool {
         self.transit.len() > 3 && self.rewrites()
     }

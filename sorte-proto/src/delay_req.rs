@@ -11,7 +11,7 @@ use crate::status::Status;
 ///       255  SA  3   STATUS  FCS
 /// ```
 ///
-/// The frame is its header, so this is view and value in one.
+/// The frame is only a header, so this type is both view and value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -26,12 +26,12 @@ impl DelayReq {
     /// Bytes from DA to FCS.
     pub const LEN: usize = LongFrame::OVERHEAD;
 
-    /// As the master sends it to the first device.
+    /// Creates the request that the master sends to the first device.
     pub const fn of_master(place: Place) -> Self {
         Self { source: 0, status: place.choose(Status::FINAL, Status::DELAY_REQ) }
     }
 
-    /// As a device sends it to the next one.
+    /// Creates the request that a device sends to the next one.
     pub const fn of_device(place: Place) -> Self {
         Self { source: 0, status: place.choose(Status::FINAL_DEVICE_DELAY_REQ, Status::DELAY_REQ) }
     }
@@ -44,7 +44,7 @@ impl DelayReq {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 3.
+    /// Takes the frame if its TYPE is 3.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]

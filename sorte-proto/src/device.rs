@@ -2,11 +2,12 @@
 //!
 //! Sans-IO: frames and the time go in, and what to do comes out. The caller moves bytes between the ports as [`Reaction::path`]
 //! says, sends the delay requests that are asked for, and writes the corrections into its counter. A frame in a buffer goes
-//! through [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`]. In the IO exchange [`Device::poll`] says when a
-//! cycle begins, when the own frame leaves and which cycle has brought nothing, and [`Device::hear_exchange`] gives the data of
-//! a frame that is of the present cycle. The device is silent until the first master frame of the exchange.
+//! through [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`]. In the IO exchange [`Device::poll`]
+//! says when a cycle begins, when the device must send its own frame and in which cycle no frame arrived;
+//! [`Device::hear_exchange`] returns the data of a frame that belongs to the present cycle. The device is silent until the
+//! first master frame of the exchange.
 //!
-//! Data are used only after their checksum was found right. (The published device uses them in any case.)
+//! Data are used only if their checksum is right. (The published device uses them in any case.)
 
 mod config;
 mod exchange;

@@ -43,7 +43,7 @@ impl Entry {
 ///                            u16    u16          u16           input u16, output u16
 /// ```
 ///
-/// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
+/// Only the first `count` entries are valid. The rest is whatever the master filled in: the published master
 /// sends a debug pattern there.
 ///
 /// A device takes the next address and the present totals as its offsets, adds its lengths, and LAST and ERROR to STATUS: see
@@ -63,7 +63,7 @@ impl<'a> DiscoveryView<'a> {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 1.
+    /// Takes the frame if its TYPE is 1.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]
@@ -104,7 +104,7 @@ impl<'a> DiscoveryView<'a> {
         self.table().take(usize::from(self.count()))
     }
 
-    /// Entry of one of the devices counted.
+    /// Returns the entry of one of the devices counted.
     pub fn entry(self, address: DeviceAddress) -> Option<Entry> {
         self.entries().nth(usize::from(address.hops_before()))
     }
@@ -181,7 +181,7 @@ impl Discovery {
     /// Bytes from DA to FCS.
     pub const LEN: usize = PAYLOAD + LongFrame::OVERHEAD;
 
-    /// As a master sends it, with zeros where the devices will write.
+    /// Creates the frame that a master sends, with zeros where the devices will write.
     pub const fn request(place: Place) -> Self {
         Self {
             source: 0,
@@ -193,7 +193,7 @@ impl Discovery {
         }
     }
 
-    /// [`request`](Self::request) written into a buffer, without a frame of its own on the stack; gives its length.
+    /// Writes [`request`](Self::request) into a buffer without a copy on the stack and returns its length.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
@@ -208,8 +208,8 @@ impl Discovery {
         Ok(Self::LEN)
     }
 
-    /// As the published master sends it: its table is filled with a debug pattern, 31 blocks of 32 bytes holding the
-    /// words 16, 48, 80, ... and then 0xBEEF.
+    /// Creates the frame that the published master sends: its table is filled with a debug pattern, 31 blocks of 32 bytes
+    /// holding the words 16, 48, 80, ... and then 0xBEEF.
     pub fn published_request(place: Place) -> Self {
         let mut frame = Self::request(place);
         for (index, entry) in (0u16..).zip(&mut frame.entries) {
@@ -264,8 +264,8 @@ pub struct Member {
     pub lengths: Entry,
 }
 
-/// The device count after one more device. A passing frame shows its low byte first, so a carry cannot reach the high
-/// one: 254 and 255 both become 255.
+/// Returns the device count after one more device. A passing frame shows its low byte first, so a carry cannot reach the
+/// high one: 254 and 255 both become 255.
 pub(crate) fn count_after(before: u16) -> u16 {
     let [low, high] = before.to_le_bytes();
     u16::from_le_bytes([low.saturating_add(1), high])
@@ -287,7 +287,7 @@ pub struct Network {
     entries: [Entry; MAX_DEVICES],
 }
 
-/// A network as a file has it.
+/// A network as it is stored in a file.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked {
@@ -325,7 +325,7 @@ impl Network {
         Ok(network)
     }
 
-    /// The same in place: a kilobyte that is not copied. A refusal leaves the network as it was.
+    /// Does the same in place, which saves copying a kilobyte. A refusal leaves the network as it was.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -359,7 +359,7 @@ impl Network {
         Ok(())
     }
 
-    /// Whether an answer tells this line.
+    /// Returns whether an answer describes this line.
     pub(crate) fn is_told_by(&self, answer: DiscoveryView<'_>) -> bool {
         let mut told = answer.entries();
         answer.count() == u16::from(self.devices) && self.entries().iter().all(|entry| told.next() == Some(*entry))

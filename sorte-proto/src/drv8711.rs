@@ -1,5 +1,5 @@
-//! What the wire and the pins need of the stepper driver DRV8711: its STATUS byte in the device frame, and its limits. The chip
-//! itself is set up by the feature `drv8711` of `servowire-drivers`.
+//! What the wire and the pins need to know about the stepper driver DRV8711: its STATUS byte in the device frame, and its
+//! limits. The chip itself is set up by the feature `drv8711` of `servowire-drivers`.
 //!
 //! From the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
 //! section 2.1.
@@ -57,7 +57,7 @@ impl Status {
     /// The value that clears all bits.
     pub const CLEAR_ALL: u16 = 0;
 
-    /// From the register's value; its upper four bits are reserved and left out.
+    /// Creates the status from the register's value; its upper four bits are reserved and dropped.
     pub const fn of_register(value: u16) -> Self {
         let [_, low] = value.to_be_bytes();
         Self(low)
@@ -68,7 +68,7 @@ impl Status {
         self.intersects(Self::FAULTS)
     }
 
-    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF tells a dead bus.
+    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF reveals a dead bus.
     pub const fn looks_unpowered(self) -> bool {
         self.is_all()
     }

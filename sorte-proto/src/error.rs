@@ -11,10 +11,10 @@ servowire_core::errors! {
         Truncated = 1 {
             /// Bytes given.
             got: u16,
-            /// Bytes of a frame of this kind; 8 where the kind is not known.
+            /// Bytes of a frame of this kind; 8 if the kind is not known.
             want: u16,
         },
-        /// The frame check sequence does not fit the bytes before it.
+        /// The frame check sequence does not match the bytes before it.
         #[error("FCS is {got:#010x}, the bytes before it give {want:#010x}")]
         BadFcs = 2 {
             /// FCS in the frame.
@@ -50,7 +50,7 @@ servowire_core::errors! {
             /// Bytes of this kind.
             want: u16,
         },
-        /// The CRC-8 of an IO-exchange frame does not fit.
+        /// The CRC-8 of an IO-exchange frame does not match.
         #[error("CRC-8 is {got:#04x}, the bytes before it give {want:#04x}")]
         BadCrc8 = 7 {
             /// CRC-8 in the frame.
@@ -92,7 +92,7 @@ servowire_core::errors! {
             /// Its length.
             len: u16,
         },
-        /// The output bytes handed over for a master frame are not as many as the line has.
+        /// The number of output bytes handed over for a master frame is not that of the line.
         #[error("{got} output bytes were given, the line has {want}")]
         OutputLength = 13 {
             /// Bytes given.
@@ -139,28 +139,28 @@ servowire_core::errors! {
         /// A start-up frame began before the request that it would answer: it is an answer to an earlier one.
         #[error("the frame began {early_ns} ns before the request")]
         BeforeRequest = 21 {
-            /// So much earlier.
+            /// How much earlier, in ns.
             early_ns: u32,
         },
-        /// DISCOVERY found fewer devices than asked for.
+        /// DISCOVERY found fewer devices than required.
         #[error("{got} devices answered, {want} are needed")]
         TooFewDevices = 22 {
             /// Devices in the line.
             got: u8,
-            /// Devices asked for.
+            /// Devices required.
             want: u8,
         },
-        /// Device frames were missing in too many cycles one after the other.
+        /// Device frames were missing in too many consecutive cycles.
         #[error("no frame of device {first} for {cycles} cycles, {count} missing in all")]
         DevicesMissing = 23 {
             /// Address of the first that is missing.
             first: u8,
-            /// How many are.
+            /// How many are missing.
             count: u8,
             /// For this many cycles.
             cycles: u8,
         },
-        /// Device frames were damaged in too many cycles one after the other.
+        /// Device frames were damaged in too many consecutive cycles.
         #[error("damaged device frames in {cycles} consecutive cycles")]
         TooManyCrcErrors = 24 {
             /// For this many cycles.
@@ -169,10 +169,10 @@ servowire_core::errors! {
         /// A device frame comes from beyond the line, or LAST is set or missing where it was not before.
         #[error("the line has changed: device {address} does not fit what DISCOVERY found")]
         TopologyChanged = 25 {
-            /// Who sent the frame.
+            /// Address of the sender.
             address: u8,
         },
-        /// The last device is further away than the 16 bits of the delay in SYNC can say.
+        /// The last device is further away than the 16-bit delay in SYNC can express.
         #[error("the last device is {delay_ns} ns away, the delay field of SYNC ends at 65535 ns")]
         LineTooLong = 26 {
             /// Its delay from the master.
@@ -195,14 +195,14 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 30,
-        /// The frame of a device comes too close to the one before it, for the jitter of the ports that both pass.
+        /// The frame of a device comes too close to the one before it, given the jitter of the ports that both pass.
         #[error("the frame of device {device} comes {gap_ns} ns after the one before it, {needs_ns} ns are needed")]
         GapTooShort = 31 {
             /// Whose frame.
             device: u8,
             /// From the end of the one before, at the master; negative: they overlap.
             gap_ns: i32,
-            /// What six sigma of jitter need.
+            /// Gap needed for six sigma of jitter.
             needs_ns: u32,
         },
         /// A device would have to send before its cycle begins: its cable is longer than a slot.
@@ -210,22 +210,22 @@ servowire_core::errors! {
         SendBeforeCycle = 32 {
             /// Which.
             device: u8,
-            /// So much before.
+            /// How long before, in ns.
             early_ns: u32,
         },
         /// A frame of the IO exchange began at a time that does not belong to its sender.
         #[error("the frame began {off_ns} ns away from its time")]
         OutsideWindow = 33 {
-            /// From the nearest time at which it was expected.
+            /// Distance from the nearest time at which it was expected, in ns.
             off_ns: i32,
         },
-        /// A frame of this sender has come in this cycle already.
+        /// A frame from this sender has already come in this cycle.
         #[error("a second frame of {address} in one cycle")]
         Doubled = 34 {
             /// Who sent it; 0: the master.
             address: u8,
         },
-        /// A frame of the IO exchange belongs to a cycle that is over.
+        /// A frame of the IO exchange belongs to a cycle that has ended.
         #[error("the frame belongs to a cycle that is over")]
         CycleOver = 35,
     }

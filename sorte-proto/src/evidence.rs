@@ -1,4 +1,4 @@
-//! What control may use of a device's frame.
+//! The part of a device's frame that a control loop may use.
 
 use servowire_core::{Feedback, Tolerance, Words};
 
@@ -9,7 +9,7 @@ use crate::payload::InputSlice;
 use crate::status::Status;
 
 /// The devices of a line send positions, as [`follow`](crate::follow) says: an extension of this crate. The reference design
-/// sends 0 in their place, and nothing in a frame tells one from the other, so the caller has to know.
+/// sends 0 in their place, and nothing in a frame tells the two apart, so the caller has to know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -18,15 +18,15 @@ pub struct Positions {
 }
 
 impl Positions {
-    /// `taken_before_ns`: how long before the start of its frame at the master a device has taken the position, at most, in ns:
-    /// its own firmware, and the way of the frame. A device that takes it at the start of its cycle, with the published send
-    /// times: one cycle.
+    /// `taken_before_ns`: the longest time between the moment a device takes the position and the start of its frame at the
+    /// master, in ns: delays of its own firmware, and the way of the frame. A device that takes it at the start of its
+    /// cycle, with the published send times: one cycle.
     pub const fn taken_before_ns(taken_before_ns: u32) -> Self {
         Self { taken_before_ns }
     }
 }
 
-/// Despite what a position may be used.
+/// The faults despite which a position may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -51,10 +51,10 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// Up to what age, and despite what, a position may be used.
+/// Up to what age, and despite which faults, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
-/// What a device has reported about its axis, with the instant: judged where it is used, by [`at`](Self::at).
+/// What a device has reported about its axis, and when. It is judged at the moment of use, by [`at`](Self::at).
 ///
 /// ```
 /// use sorte_proto::{DeviceFrameView, Doubt, Evidence, Policy, Positions};
@@ -84,14 +84,15 @@ impl Evidence {
     /// Before the first frame: a doubt under every policy.
     pub const NEVER: Self = Self { sampled_ns: 0, from: None, status: Status::empty(), told: None };
 
-    /// Of a device's frame that began at `sof_ns` at the master.
+    /// Creates the evidence of a device's frame that began at `sof_ns` at the master.
     pub fn of(frame: DeviceFrameView<'_>, positions: Positions, sof_ns: u64) -> Self {
         let told = frame.payload().first_chunk().map(|bytes| InputSlice::parse(*bytes));
         let sampled_ns = sof_ns.saturating_sub(positions.taken_before_ns.into());
         Self { sampled_ns, from: Some(frame.address()), status: frame.status(), told }
     }
 
-    /// The position, if it may be used at this time. The doubts are looked for in the order in which [`Doubt`] declares them.
+    /// Returns the position, if it may be used at this time. The doubts are checked in the order in which [`Doubt`]
+    /// declares them.
     ///
     /// # Errors
     /// Why it must not be used.
@@ -168,8 +169,8 @@ pub struct Sample {
 
 impl Sample {
     /// Steps that the device has ordered from its pulse generator, modulo 2^16, backward ones negative.
-    /// [`Asked::position`](crate::follow::Asked::position) gives them in all their bits. A motor that has lost steps is elsewhere,
-    /// and nobody on this wire knows.
+    /// [`Asked::position`](crate::follow::Asked::position) gives them in all their bits. A motor that has lost steps is
+    /// elsewhere, and nothing on this wire shows it.
     pub const fn position(self) -> u16 {
         self.told.ordered
     }
@@ -179,7 +180,7 @@ impl Sample {
         self.address
     }
 
-    /// The motor driver's STATUS: what the policy tolerates.
+    /// The motor driver's STATUS: only bits that the policy tolerates.
     pub const fn alarms(self) -> drv8711::Status {
         self.told.driver
     }
@@ -209,14 +210,14 @@ pub enum Doubt {
         /// Who sent it.
         address: DeviceAddress,
     },
-    /// The device sets ERROR: it has seen a wrong checksum since its frame before, or does not know where its axis is.
+    /// The device sets ERROR: it has seen a wrong checksum since its previous frame, or does not know where its axis is.
     Error {
         /// Who sets it.
         address: DeviceAddress,
     },
     /// The motor driver reports what the policy does not tolerate: the motor need not be where the steps are.
     Alarms {
-        /// Whose driver.
+        /// Address of the device.
         address: DeviceAddress,
         /// Bits that are not tolerated; all eight if the driver has no supply.
         alarms: drv8711::Status,

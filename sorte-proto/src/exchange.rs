@@ -21,8 +21,8 @@ pub(crate) const STOCK_INPUT: usize = 3;
 ///                                  before time at the start of this frame
 /// ```
 ///
-/// Device `a` owns the bytes `2 + offset ..` as DISCOVERY told it. The time stamp is inserted while the frame is on
-/// its way and no check covers it: see [`check_time_stamp`](Self::check_time_stamp).
+/// Device `a` owns the bytes `2 + offset ..` as DISCOVERY told it. The time stamp is inserted while the frame is being
+/// sent, and no check covers it: see [`check_time_stamp`](Self::check_time_stamp).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MasterFrameView<'a> {
@@ -32,10 +32,11 @@ pub struct MasterFrameView<'a> {
 }
 
 impl<'a> MasterFrameView<'a> {
-    /// Bytes beside the output bytes.
+    /// Bytes in addition to the output bytes.
     pub const OVERHEAD: usize = 5;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes are the whole frame and nothing after it.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be the whole frame and nothing after
+    /// it.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
@@ -65,7 +66,7 @@ impl<'a> MasterFrameView<'a> {
         self.output
     }
 
-    /// The output bytes of one device.
+    /// Returns the output bytes of one device.
     ///
     /// # Errors
     /// [`Error::OutsideOutput`]
@@ -80,7 +81,7 @@ impl<'a> MasterFrameView<'a> {
         self.time_stamp
     }
 
-    /// The master's time at the start of the frame as the device at a distance of `delay_ns` sees it.
+    /// Returns the master's time at the start of the frame as seen by a device at a distance of `delay_ns`.
     pub const fn reference_ns(self, delay_ns: u32) -> u32 {
         (self.time_stamp as u32).saturating_add(delay_ns)
     }
@@ -166,7 +167,7 @@ impl<const S: usize> MasterFrame<S> {
 /// ```
 ///
 /// The published firmware contradicts itself here: its comment and its send times describe this frame with p = 3,
-/// its code sends another one, see [`PublishedDeviceFrame`]. This crate takes the designed frame.
+/// its code sends a different one, see [`PublishedDeviceFrame`]. This crate uses the designed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DeviceFrameView<'a> {
@@ -176,10 +177,11 @@ pub struct DeviceFrameView<'a> {
 }
 
 impl<'a> DeviceFrameView<'a> {
-    /// Bytes beside the payload.
+    /// Bytes in addition to the payload.
     pub const OVERHEAD: usize = 3;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes are the whole frame and nothing after it.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be the whole frame and nothing after
+    /// it.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
@@ -216,7 +218,7 @@ impl<'a> DeviceFrameView<'a> {
 /// The values of a device frame with `P` payload bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DeviceFrame<const P: usize = STOCK_INPUT> {
-    /// Who sends it.
+    /// Address of the sender.
     pub address: DeviceAddress,
     /// STATUS: LAST and ERROR.
     pub status: Status,
@@ -255,8 +257,8 @@ impl<const P: usize> DeviceFrame<P> {
 }
 
 /// The device frame as the published image builds it: two payload bytes and a CRC byte that covers registers which
-/// were never set, so nothing can be checked. That routine's call is commented out; no such frame is on any wire of
-/// the published firmware.
+/// were never set, so nothing can be checked. The call of that routine is commented out; the published firmware never sends
+/// such a frame.
 ///
 /// ```text
 ///  byte 0        1             2               3  4
@@ -265,7 +267,7 @@ impl<const P: usize> DeviceFrame<P> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PublishedDeviceFrame {
-    /// Who sends it.
+    /// Address of the sender.
     pub address: DeviceAddress,
     /// STATUS: LAST and ERROR.
     pub status: Status,
@@ -277,7 +279,7 @@ impl PublishedDeviceFrame {
     /// Bytes from SA to the CRC byte.
     pub const LEN: usize = 5;
 
-    /// Checks length and SA; there is no check over the contents.
+    /// Checks length and SA; nothing covers the contents.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::WrongSource`]
@@ -325,7 +327,7 @@ servowire_core::one_line!(PublishedDeviceFrame {
     Self { address, status, drv8711_status } => "device {}, DRV8711 {:02X}h, STATUS {}", address, drv8711_status, status;
 });
 
-/// What there is for the views there is for values of any length too.
+/// Everything that the views offer also exists for values of any length.
 macro_rules! as_view {
     ($frame:ident) => {
         impl<const N: usize> core::fmt::Display for $frame<N> {

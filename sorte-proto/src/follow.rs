@@ -1,6 +1,6 @@
 //! Motion that survives lost frames. **An extension of this crate, not TI's.**
 //!
-//! The published device does the previous cycle's step again when a frame is lost, and nobody ever knows. Here the command
+//! If a frame is lost, the published device repeats the step of the previous cycle, and nothing reveals it. Here the command
 //! word of each [`Slice`], which the reference design leaves free, carries the position that the axis has after the step
 //! of this word, modulo 2^16. A device that missed a frame sees how far it is behind and catches up in cycles that have no
 //! step of their own; if it is too far behind it stops. The reserved bytes of its device frame tell the master how many
@@ -11,8 +11,8 @@
 //!  device frame  byte 0     DRV8711 STATUS  byte 1..3  steps ordered, LSB first
 //! ```
 //!
-//! Both count up with DIR 0 and down with DIR 1, modulo 2^16. A device whose follower does not know yet where the axis is has to
-//! say so with ERROR, see [`Device::flag_error`](crate::device::Device::flag_error).
+//! Both count up with DIR 0 and down with DIR 1, modulo 2^16. A device whose follower does not yet know where the axis is
+//! must say so with ERROR, see [`Device::flag_error`](crate::device::Device::flag_error).
 //!
 //! ```
 //! use sorte_proto::follow::{Asked, Follower};
@@ -33,7 +33,7 @@ pub use crate::payload::InputSlice;
 use crate::payload::Slice;
 use crate::pto::{Direction, Pto, StartTime};
 
-/// Steps of a word: 1, -1 or 0.
+/// Returns the steps of a word: 1, -1 or 0.
 const fn step(word: Pto) -> i16 {
     match word {
         Pto::Pulse { direction: Direction::Low, .. } => 1,
@@ -42,7 +42,7 @@ const fn step(word: Pto) -> i16 {
     }
 }
 
-/// The master's end: what one axis was asked for.
+/// The master's end: the steps asked of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -56,7 +56,7 @@ impl Asked {
         Self { steps: 0 }
     }
 
-    /// The word with the steps asked for after it.
+    /// Returns the slice with this word and the steps asked for after it.
     pub const fn slice(&mut self, word: Pto) -> Slice {
         self.steps = self.steps.saturating_add(step(word) as i64);
         Slice { pto: word, command: self.low() }
@@ -72,19 +72,19 @@ impl Asked {
         u16::from_le_bytes([low, high])
     }
 
-    /// How many steps a device that has ordered this many, modulo 2^16, still has to make. Words that are on their way count too:
-    /// two cycles with the published timing.
+    /// Returns how many steps a device still has to make if it has ordered this many, modulo 2^16. Words still on their way
+    /// count too: two cycles with the published timing.
     pub const fn lag(&self, ordered: u16) -> i16 {
         difference(self.low(), ordered)
     }
 
-    /// The position of a sample in all its bits, in steps: the one nearest to what was asked for.
+    /// Returns the full position of a sample, in steps: the one nearest to what was asked for.
     pub const fn position(&self, sample: Sample) -> i64 {
         self.steps.saturating_sub(self.lag(sample.position()) as i64)
     }
 }
 
-/// The shorter distance from `from` to `to`, modulo 2^16.
+/// Returns the shorter distance from `from` to `to`, modulo 2^16.
 const fn difference(to: u16, from: u16) -> i16 {
     i16::from_le_bytes(to.wrapping_sub(from).to_le_bytes())
 }
@@ -126,8 +126,8 @@ impl Follower {
         Self { ordered: None, asked: 0, direction: Direction::Low, quiet: false, stopped: false, max_lag }
     }
 
-    /// What the axis does in the next cycle. `slice`: the device's bytes of a good frame; `None` if none came. The first
-    /// one only tells where the axis is.
+    /// Returns what the axis does in the next cycle. `slice`: the device's bytes of a good frame; `None` if none came. The
+    /// first one only tells where the axis is.
     pub fn next(&mut self, slice: Option<Slice>) -> Pto {
         let word = self.word(slice);
         self.quiet = word.start().is_none();
@@ -159,14 +159,14 @@ impl Follower {
         }
     }
 
-    /// Steps ordered from the pulse generator, modulo 2^16: what the device tells the master. `None` before the first word and
-    /// after [`resume`](Self::resume): nobody knows where the axis is, and the device's frame has to carry ERROR, see
-    /// [`Device::flag_error`](crate::device::Device::flag_error).
+    /// Steps ordered from the pulse generator, modulo 2^16, as the device reports them to the master. `None` before the
+    /// first word and after [`resume`](Self::resume): it is not known where the axis is, and the device's frame must carry
+    /// ERROR, see [`Device::flag_error`](crate::device::Device::flag_error).
     pub const fn ordered(&self) -> Option<u16> {
         self.ordered
     }
 
-    /// Steps that are missing, as far as the last good frame told.
+    /// Steps that are missing, according to the last good frame.
     pub const fn lag(&self) -> i16 {
         match self.ordered {
             Some(ordered) => difference(self.asked, ordered),
@@ -179,7 +179,7 @@ impl Follower {
         self.stopped
     }
 
-    /// The host has dealt with the loss: the next word tells anew where the axis is.
+    /// Resumes after the host has dealt with the loss: the next word says again where the axis is.
     pub const fn resume(&mut self) {
         (self.stopped, self.ordered) = (false, None);
     }

@@ -8,7 +8,7 @@ use crate::status::Status;
 /// DA of every start-up frame.
 pub(crate) const MULTICAST: u8 = 255;
 
-/// A long-header frame whose FCS and length are right: from DA to FCS, without preamble.
+/// A long-header frame with the right FCS and length: from DA to FCS, without preamble.
 ///
 /// ```text
 ///  byte 0    1    2     3       4 ...........  last four
@@ -31,7 +31,8 @@ impl<'a> LongFrame<'a> {
     /// Bytes of header and FCS.
     pub const OVERHEAD: usize = 8;
 
-    /// Checks, in this order: at least 8 bytes, FCS, DA, TYPE, length. The bytes are the whole frame and nothing after it.
+    /// Checks, in this order: at least 8 bytes, FCS, DA, TYPE, length. The bytes must be the whole frame and nothing after
+    /// it.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::BadFcs`], [`Error::WrongDestination`], [`Error::UnknownType`],
@@ -46,7 +47,7 @@ impl<'a> LongFrame<'a> {
         Ok(Self { source, frame_type, status: Status::from_bits_retain(status), payload, fcs: got })
     }
 
-    /// A frame whose FCS was taken off, with the one that belongs there; for tools.
+    /// Rebuilds a frame whose FCS was removed; for tools.
     pub(crate) fn without_fcs(body: &'a [u8]) -> Option<Self> {
         let &[_, source, code, status, ref payload @ ..] = body else { return None };
         let frame_type = FrameType::from_code(code)?;
@@ -78,7 +79,7 @@ impl<'a> LongFrame<'a> {
         self.fcs
     }
 
-    /// The payload, if the frame is of this type; `N` is the type's payload length.
+    /// Returns the payload, if the frame is of this type; `N` is the type's payload length.
     pub(crate) fn of_type<const N: usize>(self, want: FrameType) -> Result<&'a [u8; N], Error> {
         match self.payload.first_chunk() {
             Some(payload) if self.frame_type == want => Ok(payload),
@@ -87,7 +88,7 @@ impl<'a> LongFrame<'a> {
     }
 }
 
-/// The checks of a long-header frame in their order: for a frame in a buffer, and for one that has passed byte by byte.
+/// Makes the checks of a long-header frame in their order, for a frame in a buffer and for one that has passed byte by byte.
 /// `got`, `want`: the FCS in the frame and the one of the bytes before it.
 pub(crate) fn check(len: usize, [da, _, code, _]: [u8; 4], got: u32, want: u32) -> Result<FrameType, Error> {
     if len < LongFrame::OVERHEAD {
@@ -111,14 +112,14 @@ fn truncated(len: usize) -> Error {
     Error::Truncated { got: count(len), want: count(LongFrame::OVERHEAD) }
 }
 
-/// `got` bytes, and the frame has `want`.
+/// Returns the error for `got` bytes of a frame that has `want`.
 #[cold]
 pub(crate) fn wrong_length(got: usize, want: usize) -> Error {
     let (got, want) = (count(got), count(want));
     if got < want { Error::Truncated { got, want } } else { Error::TooLong { got, want } }
 }
 
-/// Header, payload and FCS as one array; `N` = payload + 8, written by the frames of known length.
+/// Returns header, payload and FCS as one array; `N` = payload + 8, written by the frames of known length.
 pub(crate) fn emit<const N: usize>(source: u8, frame_type: FrameType, status: Status, payload: &[u8]) -> [u8; N] {
     let mut bytes = [0; N];
     if let [da, sa, code, flags, rest @ ..] = bytes.as_mut_slice() {
@@ -136,7 +137,7 @@ pub(crate) fn refresh_fcs(frame: &mut [u8]) {
     }
 }
 
-/// A length as the errors carry it.
+/// Converts a length to the type that the errors carry.
 pub(crate) fn count(len: usize) -> u16 {
     u16::try_from(len).unwrap_or(u16::MAX)
 }

@@ -1,11 +1,11 @@
 //! An ideal IEP timer with its SYNC0 output and a [`Sync0`] handler, for test benches and simulators.
 //!
 //! The counter runs in ticks of 5 ns: 0, 5, .. 3995, 0. A compare fires in the tick in which the counter reaches or
-//! passes its value, if it is enabled then. The handler runs a fixed time after the first event that is not yet
-//! served, after the compares of that tick, and serves all that has fired by then. Its register writes take effect at
-//! once, or one after the other, see [`Channel::with_write_time`].
+//! passes its value, if it is enabled then. The handler runs a fixed time after the first event not yet served, after the
+//! compares of that tick, and serves every event that has fired by then. Its register writes take effect at once, or one
+//! after the other, see [`Channel::with_write_time`].
 //!
-//! Nothing is simulated between the events, so a cycle costs a handful of steps and not 800.
+//! Nothing is simulated between events, so a cycle costs a handful of steps instead of 800.
 //!
 //! ```
 //! use sorte_proto::StartTime;
@@ -52,7 +52,7 @@ servowire_core::one_line!(Edge {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Events {
-    /// The pulse is over.
+    /// The pulse has ended.
     pub cmp6: bool,
     /// The counter has wrapped.
     pub cmp0: bool,
@@ -92,7 +92,7 @@ pub struct Channel {
     pins: Pins,
     word: Pto,
     latency: u64,
-    /// The last tick that has been dealt with.
+    /// The last tick that has been simulated.
     now: u64,
     /// Ticks of the next events.
     cmp0: u64,
@@ -118,7 +118,7 @@ pub struct Channel {
     busy_until: u64,
 }
 
-/// What nearly always tells two channels apart.
+/// The fields that nearly always tell two channels apart.
 impl Hash for Channel {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.sync0, self.word, self.cmp6_ns).hash(state);
@@ -127,8 +127,8 @@ impl Hash for Channel {
 }
 
 impl Channel {
-    /// A timer at 0. `cmp7_ns`: when new data are taken, 2000 in the reference design; `latency_ns`: from an event to
-    /// its handler, rounded up to ticks.
+    /// Creates a timer at 0. `cmp7_ns`: when new data are taken, 2000 in the reference design; `latency_ns`: from an event
+    /// to its handler, rounded up to ticks.
     pub const fn new(variant: Variant, cmp7_ns: u16, latency_ns: u16) -> Self {
         Self {
             sync0: Sync0::new(variant),
@@ -157,14 +157,14 @@ impl Channel {
         }
     }
 
-    /// Each register write takes `write_ns`, rounded up to ticks: the first takes effect so long after the handler's start,
-    /// and so on. New events wait until the last is made.
+    /// Makes each register write take `write_ns`, rounded up to ticks: the first takes effect this long after the handler's
+    /// start, the second twice as long, and so on. New events wait until the last write is made.
     pub const fn with_write_time(mut self, write_ns: u16) -> Self {
         self.write_ticks = (write_ns as u64).div_ceil(TICK_NS);
         self
     }
 
-    /// The word in the output buffer: what CMP7 will find.
+    /// Puts a word into the output buffer, where CMP7 will find it.
     pub const fn set_word(&mut self, word: Pto) {
         self.word = word;
     }
@@ -174,7 +174,7 @@ impl Channel {
         self.word
     }
 
-    /// A word with this start and the DIR level that is there.
+    /// Sets a word with this start and the present DIR level.
     pub const fn set_start(&mut self, start: Option<StartTime>) {
         let direction = self.pins.levels().direction;
         self.word = match start {
@@ -193,7 +193,7 @@ impl Channel {
         &self.sync0
     }
 
-    /// A register as it was written last.
+    /// Returns the value last written to a register.
     pub const fn register(&self, register: Register) -> u16 {
         match register {
             Register::CmpCfg => self.cfg,
@@ -210,11 +210,11 @@ impl Channel {
         }
     }
 
-    /// The same channel on a counter of cycles that begins `cycles` later: later events have times that are smaller by that many
+    /// Returns the same channel with time zero moved `cycles` later: the times of later events are smaller by that many
     /// cycles. Run it up to there first, with [`next`](Self::next).
     ///
-    /// Channels that will do the same are equal then, whatever they did before, so a bench need not work out again what it
-    /// has seen once.
+    /// Channels that will behave alike then compare equal, whatever they did before, so a bench need not compute the same
+    /// behaviour twice.
     ///
     /// ```
     /// use sorte_proto::iep::Channel;
@@ -240,7 +240,7 @@ impl Channel {
         self
     }
 
-    /// The next edge before `until_ns`.
+    /// Returns the next edge before `until_ns`.
     pub fn next_edge(&mut self, until_ns: u64) -> Option<Edge> {
         loop {
             if let Activity::Edge(edge) = self.next(until_ns)? {
@@ -249,7 +249,7 @@ impl Channel {
         }
     }
 
-    /// The next edge or run of the handler before `until_ns`.
+    /// Returns the next edge or run of the handler before `until_ns`.
     pub fn next(&mut self, until_ns: u64) -> Option<Activity> {
         loop {
             let compare = self.cmp0.min(self.cmp1).min(self.cmp6).min(self.cmp7);
@@ -335,7 +335,8 @@ impl Channel {
         Activity::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes, levels })
     }
 
-    /// At once, or one after the other. The handler never runs while writes of the run before are still to be made.
+    /// Makes the writes at once, or one after the other. The handler never runs while writes of its previous run are
+    /// pending.
     fn write_all(&mut self, writes: [Writes; 3]) {
         let all = writes.into_iter().flatten();
         if self.write_ticks == 0 {
@@ -348,7 +349,7 @@ impl Channel {
         }
     }
 
-    /// The oldest write takes effect.
+    /// Makes the oldest write take effect.
     fn write_queued(&mut self) {
         let mut left = self.queue.into_iter().flatten().skip(self.made.into());
         let next = left.next();
@@ -387,7 +388,7 @@ impl Channel {
         }
     }
 
-    /// The next tick after this one in which the counter reaches `value_ns`, if bit `enable` of CMP_CFG is set.
+    /// Returns the next tick after this one in which the counter reaches `value_ns`, if bit `enable` of CMP_CFG is set.
     fn next_match(&self, enable: u8, value_ns: u16) -> u64 {
         let tick = u64::from(value_ns).div_ceil(TICK_NS);
         if self.cfg >> enable & 1 == 0 || tick > WRAP {

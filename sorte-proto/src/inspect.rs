@@ -1,8 +1,9 @@
 //! For tools: looks at a frame that was refused, lists every fault and guesses the cause.
 //!
-//! Decoders stop at the first fault and give no value; that is right for a master and unhelpful at a bench. Here all that can
-//! be looked at is looked at, and the usual mistakes (the network card has taken the FCS, padded the frame, cut it, the bytes
-//! are inverted, the preamble is still there) are undone one by one: the one that makes the frame sound is the cause.
+//! Decoders stop at the first fault and give no value; that is right for a master and unhelpful at a bench. This module
+//! examines everything it can, and the usual mistakes (the network card has taken the FCS, padded the frame, cut it, the
+//! bytes are inverted, the preamble is still there) are undone one by one; the one whose removal makes the frame sound is
+//! the cause.
 //!
 //! Frames of the IO exchange have no type and no addresses, so the caller has to know what the line was doing: [`During`].
 //!
@@ -57,8 +58,8 @@ impl<'a> Report<'a> {
         self.error
     }
 
-    /// Every kind of fault in the frame as it was given, those of its contents too, which a decoder does not look at: totals of
-    /// DISCOVERY that are not the sums of the entries, more devices than there can be, PTO words without a meaning.
+    /// Every kind of fault in the frame as given, including faults of its contents, which a decoder does not check: totals
+    /// of DISCOVERY that are not the sums of the entries, more devices than there can be, undefined PTO words.
     pub const fn findings(&self) -> Findings {
         self.findings
     }
@@ -68,7 +69,8 @@ impl<'a> Report<'a> {
         self.cause
     }
 
-    /// The values, as they are if it is not refused, or as they would be without the cause. For showing to a person only.
+    /// The values: as they are if the frame is not refused, or as they would be without the cause. Only for display to a
+    /// person.
     pub const fn frame(&self) -> Option<Frame<'a>> {
         self.frame
     }
@@ -82,7 +84,7 @@ servowire_core::one_line!(Report<'_> {
     Self { kind, .. } => "{}", kind;
 });
 
-/// Looks at a frame without its preamble.
+/// Examines a frame without its preamble.
 pub fn inspect(during: During, bytes: &[u8]) -> Report<'_> {
     let decoded = Frame::parse(during, bytes);
     let (cause, frame) = match decoded {

@@ -1,9 +1,9 @@
 use crate::error::Error;
 
-/// Round trips that make one measurement.
+/// Round trips in one measurement.
 pub(crate) const SAMPLES: u8 = 16;
 
-/// How round trips become a line delay. The vendor's master and device do it differently; so does this crate.
+/// How round trips become a line delay. The vendor's master and device do it differently, and so do those of this crate.
 ///
 /// | | sum | line delay |
 /// |---|---|---|
@@ -15,18 +15,18 @@ pub(crate) const SAMPLES: u8 = 16;
 pub struct DelayModel {
     /// Time between the reception of the request and its reflection, in ns.
     pub forward_ns: u16,
-    /// Whether every round trip is divided by 16 before it is added, and not only the sum.
+    /// Whether every round trip is divided by 16 before it is added, instead of dividing the sum.
     pub shift_samples: bool,
 }
 
 impl DelayModel {
-    /// The published master's.
+    /// The model of the published master.
     pub const MASTER: Self = Self { forward_ns: 320, shift_samples: false };
-    /// The published device's, for the line to the next device.
+    /// The model of the published device, for the line to the next device.
     pub const DEVICE: Self = Self { forward_ns: 360, shift_samples: true };
 }
 
-/// How far round trips lie apart.
+/// The spread of the round trips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -50,13 +50,13 @@ pub struct LineDelay {
 }
 
 impl LineDelay {
-    /// No round trip yet.
+    /// Creates a measurement without round trips.
     pub const fn new(model: DelayModel) -> Self {
         Self { model, count: 0, sum: 0, min: u32::MAX, max: 0 }
     }
 
-    /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips
-    /// beyond the sixteenth are left out.
+    /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips beyond the
+    /// sixteenth are ignored.
     #[inline]
     pub const fn add(&mut self, rtt_ns: u32) {
         if self.is_complete() {
@@ -97,7 +97,8 @@ impl LineDelay {
     }
 
     /// The line delay in ns as the published firmware computes it: everything wraps, and round trips shorter than the
-    /// forwarding time give a huge delay. The master halves 16 bits, the device 32 of which it then keeps 16.
+    /// forwarding time give a huge delay. The master halves a 16-bit value; the device halves a 32-bit one and then keeps
+    /// 16 bits.
     pub const fn published(&self) -> u16 {
         if !self.model.shift_samples {
             return self.published_mean().wrapping_sub(self.model.forward_ns) >> 1;

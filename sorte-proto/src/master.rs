@@ -2,7 +2,7 @@
 //!
 //! Sans-IO. [`Master::poll`] says what to send and when; [`Master::hear`] takes what comes back. Every wait ends:
 //! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
-//! [`Action::Restart`] that says why, and after a pause it starts again. (The published master waits for ever.)
+//! [`Action::Restart`] that says why; after a pause it restarts. (The published master waits for ever.)
 //!
 //! ```text
 //!  IDLE -> DISCOVERY -> PARAM -> LINE_DELAY -> SYNC -> IO_EXCHANGE

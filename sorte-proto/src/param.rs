@@ -45,7 +45,7 @@ impl CrcMode {
     /// CRC-8 both ways.
     pub const CRC8: Self = Self(0x33);
 
-    /// From the byte of PARAM; every byte is a mode.
+    /// Creates the mode from the byte of PARAM; every byte is a mode.
     pub const fn from_byte(byte: u8) -> Self {
         Self(byte)
     }
@@ -55,18 +55,18 @@ impl CrcMode {
         self.0
     }
 
-    /// Check of master frames; `None` for a code without a meaning.
+    /// Check of master frames; `None` for an undefined code.
     pub const fn out(self) -> Option<CrcKind> {
         CrcKind::from_code(self.0 & 15)
     }
 
-    /// Check of device frames; `None` for a code without a meaning.
+    /// Check of device frames; `None` for an undefined code.
     pub const fn input(self) -> Option<CrcKind> {
         CrcKind::from_code(self.0 >> 4)
     }
 }
 
-/// What PARAM tells the devices. The published device stores the 32 bytes and acts on none of them.
+/// The parameters that PARAM carries to the devices. The published device stores the 32 bytes and acts on none of them.
 ///
 /// ```text
 ///  byte 0 ...  4           8           12            14           15         16
@@ -137,9 +137,9 @@ impl Parameters {
     /// [`STOCK`](Self::STOCK) with the cycle time of the CNC machine, 4 us.
     pub const CNC: Self = Self { cycle_time_ns: 4000, ..Self::STOCK };
 
-    /// Cycle times that the vendor's header names, in ns: 1 ms, 100, 62.5, 31.25, 10 and 4 us.
+    /// Cycle times listed in the vendor's header, in ns: 1 ms, 100, 62.5, 31.25, 10 and 4 us.
     pub const CYCLE_TIMES_NS: [u32; 6] = [1_000_000, 100_000, 62_500, 31_250, 10_000, 4000];
-    /// Inter-packet gaps that the vendor's header names, in ns. The IO exchange is laid out for 240 ns, see
+    /// Inter-packet gaps listed in the vendor's header, in ns. The IO exchange is laid out for 240 ns, see
     /// [`GAP_NS`](crate::timing::GAP_NS).
     pub const GAPS_NS: [u32; 5] = [200, 260, 500, 640, 960];
 
@@ -148,7 +148,7 @@ impl Parameters {
         self.ipg_5ns.saturating_mul(5)
     }
 
-    /// Any 32 bytes are parameters.
+    /// Reads the parameters; any 32 bytes are valid.
     #[rustfmt::skip]
     pub fn parse(bytes: &[u8; Self::LEN]) -> Self {
         let [
@@ -206,7 +206,7 @@ impl<'a> ParamView<'a> {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 2.
+    /// Takes the frame if its TYPE is 2.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]
@@ -255,7 +255,7 @@ pub struct Param {
     pub source: u8,
     /// STATUS.
     pub status: Status,
-    /// What the devices are told.
+    /// Parameters sent to the devices.
     pub parameters: Parameters,
 }
 
@@ -263,7 +263,7 @@ impl Param {
     /// Bytes from DA to FCS.
     pub const LEN: usize = Parameters::LEN + LongFrame::OVERHEAD;
 
-    /// As a master sends it.
+    /// Creates the frame that a master sends.
     pub const fn request(parameters: Parameters, place: Place) -> Self {
         Self { source: 0, status: place.choose(Status::FINAL_PARAM, Status::PARAM), parameters }
     }
@@ -276,7 +276,7 @@ impl Param {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 2.
+    /// Takes the frame if its TYPE is 2.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]

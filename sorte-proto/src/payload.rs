@@ -23,7 +23,7 @@ impl Slice {
     /// Length in bytes.
     pub const LEN: usize = 4;
 
-    /// Any four bytes are a slice.
+    /// Reads the slice; any four bytes are valid.
     pub const fn parse([p0, p1, c0, c1]: [u8; Self::LEN]) -> Self {
         Self { pto: Pto::from_word(u16::from_le_bytes([p0, p1])), command: u16::from_le_bytes([c0, c1]) }
     }
@@ -94,7 +94,7 @@ impl Payload {
     /// Length in bytes.
     pub const LEN: usize = 16;
 
-    /// Four axes with a word each, commands 0.
+    /// Creates the payload of four axes with a word each and commands 0.
     pub const fn independent(words: [Pto; 4]) -> Self {
         let [a, b, c, d] = words;
         Self([
@@ -105,8 +105,8 @@ impl Payload {
         ])
     }
 
-    /// The same word for every motor of `motors`. The others get a no-pulse word with the same DIR level, so that
-    /// their drivers stay on; without any motor, all four get driver off (TIDEP-0061 section 2.3.3).
+    /// Creates the payload with the same word for every motor of `motors`. The others get a no-pulse word with the same DIR
+    /// level, so that their drivers stay on; without any motor, all four get driver off (TIDEP-0061 section 2.3.3).
     pub const fn shared(pto: Pto, motors: MotorMask) -> Self {
         let rest = match pto.direction() {
             _ if !motors.intersects(MotorMask::all()) => Pto::DriverOff,
@@ -121,7 +121,7 @@ impl Payload {
         ])
     }
 
-    /// Any 16 bytes are a payload.
+    /// Reads the payload; any 16 bytes are valid.
     pub const fn parse(bytes: [u8; Self::LEN]) -> Self {
         let [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3] = bytes;
         Self([
@@ -154,7 +154,8 @@ servowire_core::one_line!(Payload { Self([a, b, c, d]) => "{}, {}, {}, {}", a, b
 pub struct InputSlice {
     /// The driver's STATUS.
     pub driver: drv8711::Status,
-    /// [`Follower::ordered`](crate::follow::Follower::ordered). The reference design sends 0, and nothing in the frame says which of the two it is.
+    /// [`Follower::ordered`](crate::follow::Follower::ordered). The reference design sends 0, and nothing in the frame
+    /// tells the two apart.
     pub ordered: u16,
 }
 
@@ -162,7 +163,7 @@ impl InputSlice {
     /// Length in bytes.
     pub const LEN: usize = 3;
 
-    /// Any three bytes are a payload.
+    /// Reads the payload; any three bytes are valid.
     pub const fn parse([driver, low, high]: [u8; Self::LEN]) -> Self {
         Self { driver: drv8711::Status::from_bits_retain(driver), ordered: u16::from_le_bytes([low, high]) }
     }

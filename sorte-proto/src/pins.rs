@@ -31,11 +31,11 @@ pub mod ice {
     pub const N_FAULT: Gpio = Gpio { module: 0, bit: 13 };
 }
 
-/// STEP edge to a change of DIR, and a change of DIR to the next STEP edge, at least: set-up and hold time of the DRV8711
-/// in ns.
+/// Shortest time from a STEP edge to a change of DIR, and from a change of DIR to the next STEP edge: set-up and hold time
+/// of the DRV8711 in ns.
 pub const DIR_SETUP_HOLD_NS: u64 = crate::drv8711::DIR_SETUP_HOLD_NS as u64;
 
-/// What the pins carry.
+/// The levels of the pins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Levels {
@@ -47,7 +47,7 @@ pub struct Levels {
 
 /// DIR and enable of an axis, beside its [`Sync0`](crate::sync0::Sync0).
 ///
-/// A word is about the next cycle, and so are its DIR and its enable. If a pulse is still programmed when CMP7 takes the
+/// A word applies to the next cycle, and so do its DIR and enable. If a pulse is still programmed when CMP7 takes the
 /// word, the pins follow at the end of that pulse, in the CMP6 handler: 2000 ns and more after its rise, and with steps
 /// 4000 ns apart 1380 ns and more before the next one. Otherwise they follow at once, before the earliest pulse of the
 /// next cycle by 1380 ns and more. Both are far beyond the 200 ns of set-up and hold time that the driver asks for, at
@@ -61,19 +61,19 @@ pub struct Pins {
 }
 
 impl Pins {
-    /// DIR low, driver on.
+    /// Creates the state with DIR low and the driver on.
     pub const fn new() -> Self {
         let levels = Levels { direction: Direction::Low, enabled: true };
         Self { now: levels, next: levels }
     }
 
-    /// What the pins carry now.
+    /// The present levels of the pins.
     pub const fn levels(&self) -> Levels {
         self.now
     }
 
-    /// CMP7 has taken a word. `before`: the flags of its [`Sync0`](crate::sync0::Sync0) before this
-    /// event. Gives the levels to write, if they change.
+    /// Takes a word at CMP7. `before`: the flags of its [`Sync0`](crate::sync0::Sync0) before this
+    /// event. Returns the levels to write, if they change.
     pub fn cmp7(&mut self, word: Pto, before: Flags) -> Option<Levels> {
         // A driver-off word holds DIR.
         let direction = word.direction().unwrap_or(self.next.direction);
@@ -81,7 +81,7 @@ impl Pins {
         if before.contains(Flags::PENDING_PULSE) { None } else { self.follow() }
     }
 
-    /// The pulse is over. Gives the levels to write, if they change.
+    /// Ends the pulse. Returns the levels to write, if they change.
     pub fn cmp6(&mut self) -> Option<Levels> {
         self.follow()
     }

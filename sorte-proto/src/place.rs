@@ -1,6 +1,6 @@
 use crate::status::Status;
 
-/// Place of a frame among those of its phase of the start-up. Only the last carries STATE_CHANGE, with which the devices go on
+/// Place of a frame among those of its phase of the start-up. Only the last carries STATE_CHANGE, which takes the devices
 /// to the next phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -15,12 +15,12 @@ pub enum Place {
 }
 
 impl Place {
-    /// Of frame `frame`, counted from 0, among this many.
+    /// Returns the place of frame `frame`, counted from 0, among this many.
     pub(crate) const fn of(frame: u16, frames: u16) -> Self {
         if frame.saturating_add(1) >= frames { Self::Last } else { Self::Inner }
     }
 
-    /// The last one's STATUS, or that of all others.
+    /// Returns the STATUS of the last frame or of all others.
     pub(crate) const fn choose(self, last: Status, inner: Status) -> Status {
         match self {
             Self::Last => last,

@@ -33,9 +33,9 @@ impl Preamble {
         }
     }
 
-    /// From the first bit of the preamble, which is the trigger of the frame, to the capture of its start as the published ports
-    /// have it, half a byte before the end of 0xD5: 600, 280 and 120 ns. All `sof_ns` of this crate are such captures. A port that
-    /// gives another point adds the difference.
+    /// From the first bit of the preamble, which is the trigger of the frame, to the capture of its start by the published
+    /// ports, half a byte before the end of 0xD5: 600, 280 and 120 ns. All `sof_ns` of this crate are such captures. A port
+    /// that captures at another point adds the difference.
     pub const fn capture_ns(self) -> u32 {
         match self {
             Self::Long => 600,
@@ -45,11 +45,11 @@ impl Preamble {
     }
 }
 
-/// The bytes after preamble and start delimiter. PHYs may swallow part of a preamble, so any 1 to 7 bytes 0x55
+/// Returns the bytes after preamble and start delimiter. PHYs may swallow part of a preamble, so any 1 to 7 bytes 0x55
 /// followed by 0xD5 are accepted, whatever the frame.
 ///
 /// # Errors
-/// [`Error::BadPreamble`] with the first byte that does not fit, or with the length if the bytes end before 0xD5.
+/// [`Error::BadPreamble`] with the index of the first wrong byte, or with the length if the bytes end before 0xD5.
 pub fn strip_preamble(wire: &[u8]) -> Result<&[u8], Error> {
     match scan(wire) {
         Scan::Frame(frame) => Ok(frame),

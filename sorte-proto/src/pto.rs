@@ -48,12 +48,12 @@ impl StartTime {
     /// The latest start the wire can carry.
     pub const MAX: Self = Self(3990);
 
-    /// `ns`: 1..=3990.
+    /// Returns the start time, or `None` if `ns` is outside 1..=3990.
     pub const fn new(ns: u16) -> Option<Self> {
         if ns >= Self::MIN.0 && ns <= Self::MAX.0 { Some(Self(ns)) } else { None }
     }
 
-    /// The nearest that the wire can carry: 1 for 0, 3990 above it.
+    /// Returns the nearest that the wire can carry: 1 for 0, 3990 for anything above it.
     pub const fn truncate(ns: u16) -> Self {
         match Self::new(ns) {
             Some(start) => start,
@@ -88,14 +88,14 @@ impl From<StartTime> for u16 {
     }
 }
 
-/// A PTO word without a meaning: 3991..=0x7FFE, the same with bit 15, or 0xFFFF.
+/// An undefined PTO word: 3991..=0x7FFE, the same with bit 15, or 0xFFFF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Pto", into = "Pto"))]
 pub struct Reserved(u16);
 
 impl Reserved {
-    /// `word`: one without a meaning.
+    /// Returns the word if it is undefined.
     pub const fn new(word: u16) -> Option<Self> {
         match Pto::from_word(word) {
             Pto::Reserved(reserved) => Some(reserved),
@@ -135,11 +135,11 @@ const DRIVER_OFF: u16 = 0x7fff;
 ///           3991..=0x7FFE, and 0xFFFF      reserved: driver on, no pulse
 /// ```
 ///
-/// Every 16-bit word is a `Pto` and gives itself back. From the design guide of the 4-axis CNC router with 250-kHz
+/// Every 16-bit word is a `Pto` and converts back to itself. From the design guide of the 4-axis CNC router with 250-kHz
 /// control loop (TIDEP-0061), section 2.4.2. A device holds its DIR level through a driver-off word.
 ///
-/// All of the word is about the next cycle, DIR too: a device that sets DIR as soon as it takes the word turns the
-/// direction of a pulse that is still to come. It belongs to the wrap at the start of that cycle.
+/// The whole word applies to the next cycle, including DIR: a device that sets DIR as soon as it takes the word reverses
+/// the direction of a pulse that is still to come. DIR has to change at the wrap at the start of that cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "u16", into = "u16"))]
@@ -158,7 +158,7 @@ pub enum Pto {
     },
     /// The motor driver is switched off to save power.
     DriverOff,
-    /// A word without a meaning.
+    /// An undefined word.
     Reserved(Reserved),
 }
 
@@ -169,7 +169,7 @@ impl Default for Pto {
 }
 
 impl Pto {
-    /// Any word is one of the four.
+    /// Creates the value from a word; any word is one of the four.
     pub const fn from_word(word: u16) -> Self {
         let direction = Direction::of(word);
         match StartTime::new(word & TIME) {
@@ -190,9 +190,9 @@ impl Pto {
         }
     }
 
-    /// A step at `sync_ns` of a cycle (0..=3999) as the wire can carry it: 0 becomes 1 because 0 means no pulse, and
-    /// 3991..=3999 become 3990. The shift is +1 ns or at most -9 ns and does not accumulate, as long as the caller
-    /// keeps the exact time for its next step.
+    /// Creates the word for a step at `sync_ns` of a cycle (0..=3999), as closely as the wire can carry it: 0 becomes 1
+    /// because 0 means no pulse, and 3991..=3999 become 3990. The shift is +1 ns or at most -9 ns and does not accumulate,
+    /// as long as the caller keeps the exact time for its next step.
     ///
     /// # Errors
     /// [`OutOfRange`] above 3999.
@@ -204,7 +204,7 @@ impl Pto {
         Ok(Self::Pulse { start: StartTime::truncate(sync_ns as u16), direction })
     }
 
-    /// The word, unless it is reserved.
+    /// Returns the word, unless it is reserved.
     ///
     /// # Errors
     /// [`Error::ReservedPtoValue`]
@@ -215,7 +215,7 @@ impl Pto {
         }
     }
 
-    /// Start of the pulse, if the word asks for one.
+    /// Returns the start of the pulse, if the word asks for one.
     pub const fn start(self) -> Option<StartTime> {
         match self {
             Self::Pulse { start, .. } => Some(start),

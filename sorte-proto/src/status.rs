@@ -7,7 +7,7 @@
 /// ```
 ///
 /// The nibble is sent as the published firmware sends it, which is not what its header file lists; no receiver looks
-/// at it, and neither does this crate. Every byte is a `Status` and gives itself back.
+/// at it, and neither does this crate. Every byte is a `Status` and converts back to itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -30,15 +30,15 @@ bitflags::bitflags! {
 servowire_core::show_flags!(Status);
 
 impl Status {
-    /// DISCOVERY frames of the master but the last, and device frames of the IO exchange.
+    /// All DISCOVERY frames of the master but the last, and device frames of the IO exchange.
     pub const DISCOVERY: Self = Self(0x00);
-    /// PARAM frames of the master but the last.
+    /// All PARAM frames of the master but the last.
     pub const PARAM: Self = Self(0x10);
-    /// DELAY_REQ frames but the last.
+    /// All DELAY_REQ frames but the last.
     pub const DELAY_REQ: Self = Self(0x20);
     /// DELAY_RESP frames; defined by the vendor, never sent.
     pub const DELAY_RESP: Self = Self(0x30);
-    /// SYNC frames of the master but the last.
+    /// All SYNC frames of the master but the last.
     pub const SYNC: Self = Self(0x40);
     /// Master frames of the IO exchange.
     pub const EXCHANGE: Self = Self(0x30);
@@ -50,12 +50,12 @@ impl Status {
     /// The last DELAY_REQ frame of a device: the type nibble is kept.
     pub const FINAL_DEVICE_DELAY_REQ: Self = Self(0x28);
 
-    /// Bits 7 to 4 as they came.
+    /// Bits 7 to 4 as received.
     pub const fn type_nibble(self) -> u8 {
         self.0 >> 4
     }
 
-    /// What a device adds to the STATUS byte that it writes or passes on.
+    /// Returns what a device adds to the STATUS byte that it writes or passes on.
     pub(crate) const fn of_device(last: bool, error: bool) -> Self {
         Self(last as u8 | (error as u8) << 2)
     }

@@ -1,6 +1,6 @@
 //! The decoders as `nom` streaming parsers, for frames that arrive as a stream of bytes.
 //!
-//! Missing bytes give `Incomplete` with the number that is wanted; every other fault is an `Error`. With
+//! If bytes are missing, they return `Incomplete` with the number needed; every other fault is an `Error`. With
 //! [`sorte_proto::Error`](crate::error::Error) as the error type the reason is kept; any other type that implements
 //! `FromExternalError` works too.
 
@@ -14,7 +14,7 @@ use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::preamble::{Scan, scan};
 
-/// Takes preamble and start delimiter off the front, as [`strip_preamble`](crate::strip_preamble).
+/// Removes preamble and start delimiter from the front, as [`strip_preamble`](crate::strip_preamble).
 ///
 /// # Errors
 /// [`Error::BadPreamble`]; `Incomplete` while only preamble bytes have come.
@@ -29,7 +29,7 @@ where
     }
 }
 
-/// Takes a long-header frame off the front, as [`LongFrame::parse`]. The length follows from TYPE.
+/// Reads a long-header frame from the front, as [`LongFrame::parse`]. The length follows from TYPE.
 ///
 /// ```
 /// use nom::Parser;
@@ -43,7 +43,7 @@ where
 ///
 /// # Errors
 /// As [`LongFrame::parse`], with `Incomplete` in place of [`Error::Truncated`]; [`Error::UnknownType`] also for the types
-/// without a published layout, whose end nobody knows.
+/// without a published layout, whose length is unknown.
 pub fn long_frame<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], LongFrame<'a>, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
@@ -54,7 +54,7 @@ where
     unit(input, len, LongFrame::parse)
 }
 
-/// Takes a master frame of the IO exchange with `output_len` output bytes off the front.
+/// Reads a master frame of the IO exchange with `output_len` output bytes from the front.
 ///
 /// # Errors
 /// As [`MasterFrameView::parse`], with `Incomplete` in place of [`Error::Truncated`].
@@ -66,7 +66,7 @@ where
     move |input: &'a [u8]| unit(input, len, |frame| MasterFrameView::parse(output_len, frame))
 }
 
-/// Takes a device frame of the IO exchange with `payload_len` payload bytes off the front.
+/// Reads a device frame of the IO exchange with `payload_len` payload bytes from the front.
 ///
 /// # Errors
 /// As [`DeviceFrameView::parse`], with `Incomplete` in place of [`Error::Truncated`].

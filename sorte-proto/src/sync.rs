@@ -4,14 +4,14 @@ use crate::frame_type::FrameType;
 use crate::place::Place;
 use crate::status::Status;
 
-/// From the trigger of a SYNC frame to the capture of its start at the receiver without the cable: 280 ns, which is
+/// From the trigger of a SYNC frame to the capture of its start at the receiver, without the cable: 280 ns, which is
 /// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
 pub(crate) const TRIGGER_TO_CAPTURE_NS: u32 = 280;
 
 /// Trigger of the master frame in its cycle, of the first device's frame, and of the first SYNC frame, in ns.
 pub const TRIGGER_NS: u32 = 500;
 
-/// What one device adds to the way of a SYNC frame beside the cable: 320 ns until its port starts to send, and 35 ns
+/// The delay that one device adds to a SYNC frame besides the cable: 320 ns until its port starts to send, and 35 ns
 /// of hardware latency.
 pub const TRANSIT_NS: u16 = 355;
 
@@ -37,7 +37,7 @@ impl<'a> SyncView<'a> {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 5.
+    /// Takes the frame if its TYPE is 5.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]
@@ -104,7 +104,8 @@ impl Sync {
     /// Bytes from DA to FCS.
     pub const LEN: usize = 6 + LongFrame::OVERHEAD;
 
-    /// As the master sends it: triggered at `trigger_ns` of its time, over a line of `line_delay_ns` to the first device.
+    /// Creates the frame that the master sends: triggered at `trigger_ns` of its time, over a line of `line_delay_ns` to
+    /// the first device.
     pub const fn of_master(trigger_ns: u32, line_delay_ns: u16, place: Place) -> Self {
         Self {
             source: 0,
@@ -122,7 +123,7 @@ impl Sync {
         Self::of(LongFrame::parse(bytes)?)
     }
 
-    /// Checks that TYPE is 5.
+    /// Takes the frame if its TYPE is 5.
     ///
     /// # Errors
     /// [`Error::UnexpectedType`]
@@ -142,15 +143,15 @@ impl Sync {
         emit(self.source, FrameType::Sync, self.status, &[t0, t1, t2, t3, d0, d1])
     }
 
-    /// When the master triggered the frame, in its time, as a device sees it that is `delay_ns` away.
+    /// Returns when the master triggered the frame, in its time, as seen by a device that is `delay_ns` away.
     pub(crate) const fn trigger_ns(self, delay_ns: u32) -> u32 {
         self.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns)
     }
 
-    /// The delay from the master in all its bits, for lines longer than 65,535 ns. **An extension of this crate, not TI's.**
+    /// Returns the full delay from the master, for lines longer than 65,535 ns. **An extension of this crate, not TI's.**
     ///
     /// The master sends SYNC at 500 ns of each period of `period_ns`, and both times of the frame grow by the same hops, so
-    /// the time stamp tells what the delay field lost when it wrapped. `None` if no delay below 600 us fits, or if the
+    /// the time stamp reveals what the delay field lost when it wrapped. `None` if no delay below 600 us fits, or if the
     /// period is such that several could.
     pub fn long_delay_ns(&self, period_ns: u32) -> Option<u32> {
         let since_sof = self.time_stamp_ns.checked_sub(TRIGGER_NS.saturating_add(TRIGGER_TO_CAPTURE_NS))?;
@@ -160,7 +161,7 @@ impl Sync {
     }
 }
 
-/// Way from one device's receiver to the next one's in ns.
+/// Time from one device's receiver to the next one's in ns.
 pub(crate) const fn hop_ns(line_delay_next_ns: u16) -> u32 {
     // Two 16-bit numbers: the sum cannot pass u32.
     (line_delay_next_ns as u32).saturating_add(TRANSIT_NS as u32)

@@ -1,7 +1,7 @@
 //! Step pulses from PTO words: the interrupt handler that programs the SYNC0 output of the IEP timer.
 //!
 //! The IEP counts 0, 5, .. 3995 ns and starts again. A compare event CMP1 starts the SYNC0 unit: `START + 1` ticks of
-//! 5 ns later the output rises and stays high for 2000 ns. It does so once; then it must be armed again by writing
+//! 5 ns later the output rises and stays high for 2000 ns. It does so once. Then it must be armed again by writing
 //! SYNC_CTRL, which also cuts a pulse that is still high. Three events call the handler:
 //!
 //! ```text
@@ -16,13 +16,13 @@
 //!          |             |             |CMP6
 //! ```
 //!
-//! A pulse is normally programmed *late* in the cycle before it. If the pulse before is still running, it has to be
-//! programmed in its own cycle, by CMP0 or CMP6 (*now*: CMP1 = PTO).
+//! A pulse is normally programmed *late* in the cycle before it. If the previous pulse is still running, the new one has to
+//! be programmed in its own cycle, by CMP0 or CMP6 (*now*: CMP1 = PTO).
 //!
 //! [`Variant::Published`] does what the published device does, register write for register write; with steps 4 us
-//! apart and random phases some 5 to 7 % of them come a cycle late or not at all. [`Variant::Lossless`] keeps every
-//! step, as long as the last register write of an event is made within less than 600 ns and steps are at least 4000 ns
-//! apart. The CMP6 handler with a deferred pulse has the most, seven: with `w` ns for each, latency + 7 w < 600.
+//! apart and random phases some 5 to 7 % of the pulses come a cycle late or not at all. [`Variant::Lossless`] keeps every
+//! step, as long as the last register write for an event is made less than 600 ns after it and steps are at least 4000 ns
+//! apart. The CMP6 handler with a deferred pulse makes the most writes, seven: with `w` ns for each, latency + 7 w < 600.
 //!
 //! Events that are pending together are served in the order CMP6, CMP0, CMP7.
 //!
@@ -43,15 +43,16 @@ use crate::pto::StartTime;
 
 /// Width of the pulse in ns: PWIDTH = 399.
 pub const PULSE_NS: u16 = 2000;
-/// CMP7: when the handler takes new data, in ns.
+/// CMP7: when the handler takes new data, in ns of the cycle.
 pub const CMP7_NS: u16 = 2000;
 /// CMP1 of a pulse programmed late, in ns: two ticks before the next cycle.
 pub const LATE_CMP1_NS: u16 = 3990;
-/// The longest time from an event to the last of its register writes for which [`Variant::Lossless`] is proved, in ns.
+/// The longest time from an event to the last of its register writes for which [`Variant::Lossless`] is proved to lose no
+/// step, in ns.
 ///
 /// The proof is a walk over all phases of a step at every latency in ticks of 5 ns, over pairs of phases, and over writes
 /// of 0 to 60 ns as events of their own, against the timer of [`iep`](crate::iep). At 600 ns the same walk loses steps: a
-/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the one deferred after it.
+/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the pulse deferred after it.
 pub const MAX_LATENCY_NS: u16 = 590;
 
 /// CMP_CFG of an idle output: CMP0 resets the counter, CMP0 and CMP7 are enabled. Bit n+1 enables CMPn.
@@ -64,15 +65,15 @@ const OVERLAP_NS: u16 = 3390;
 /// The lossless machine does not place CMP6 before this time: CMP0's handler must have enabled it.
 const EARLIEST_CMP6_NS: u16 = 600;
 
-/// Which machine.
+/// Which handler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Variant {
-    /// The published device's, with its losses.
+    /// That of the published device, with its losses.
     Published,
-    /// This crate's.
+    /// That of this crate.
     #[default]
     Lossless,
 }
@@ -85,7 +86,7 @@ pub struct Flags(u16);
 
 bitflags::bitflags! {
     impl Flags: u16 {
-        /// A pulse is programmed and not yet over.
+        /// A pulse is programmed and has not ended.
         const PENDING_PULSE = 1 << 0;
         /// A pulse has been ordered and is not yet programmed.
         const ACTIVE_PULSE = 1 << 1;
@@ -101,7 +102,7 @@ bitflags::bitflags! {
 servowire_core::show_flags!(Flags);
 
 impl Flags {
-    /// With `flag` set or cleared.
+    /// Returns the flags with `flag` set or cleared.
     const fn with(self, flag: Self, on: bool) -> Self {
         if on { self.union(flag) } else { self.difference(flag) }
     }
@@ -143,7 +144,7 @@ servowire_core::one_line!(Register {
 
 servowire_core::one_line!(Write { Self { register, value } => "{} = {}", register, value; });
 
-/// What comes first.
+/// The writes that come first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Prelude {
@@ -228,7 +229,7 @@ impl Iterator for WriteIter {
     }
 }
 
-/// The SYNC0 generator: flags, the pulse on order, and CMP_CFG as it was written last.
+/// The SYNC0 generator: flags, the pulse on order, and the last value written to CMP_CFG.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(align(4))] // copied in words
@@ -249,7 +250,7 @@ impl Default for Sync0 {
 }
 
 impl Sync0 {
-    /// An idle output: CMP_CFG holds [`CMP_CFG_IDLE`], SYNC0 is armed.
+    /// Creates a generator with an idle output: CMP_CFG holds [`CMP_CFG_IDLE`], SYNC0 is armed.
     pub const fn new(variant: Variant) -> Self {
         Self { variant, flags: Flags::empty(), pto: 0, ticks: 0, new6: 0, cfg: CMP_CFG_IDLE }
     }
@@ -264,7 +265,7 @@ impl Sync0 {
         self.flags
     }
 
-    /// The pulse is over.
+    /// Handles CMP6: the pulse has ended.
     pub const fn cmp6(&mut self) -> Writes {
         self.cfg &= !(CMP1_ENABLED | CMP6_ENABLED);
         self.flags = self.flags.with(Flags::PENDING_PULSE, false);
@@ -279,7 +280,7 @@ impl Sync0 {
         writes
     }
 
-    /// The counter wraps.
+    /// Handles CMP0: the counter wraps.
     pub const fn cmp0(&mut self) -> Writes {
         let mut writes = Writes::NONE;
         if self.flags.contains(Flags::DELAYED_CMP6_ACTIVATED) {
@@ -296,7 +297,8 @@ impl Sync0 {
         writes
     }
 
-    /// New data: the start of the pulse in the next cycle, [`Pto::start`](crate::pto::Pto::start) of the device's word.
+    /// Handles CMP7, new data: `start` is the start of the pulse in the next cycle, [`Pto::start`](crate::pto::Pto::start)
+    /// of the device's word.
     pub const fn cmp7(&mut self, start: Option<StartTime>) -> Writes {
         let mut writes = Writes::NONE;
         let Some(start) = start else {
@@ -325,7 +327,7 @@ impl Sync0 {
         writes
     }
 
-    /// A pulse for the next cycle.
+    /// Programs a pulse for the next cycle.
     const fn program_late(&mut self, writes: &mut Writes) {
         let overlap = self.flags.contains(Flags::SYNC_PULSE_OVERLAP);
         self.flags = self.flags.with(Flags::PREV_SYNC_PULSE_OVERLAP, overlap);
@@ -336,7 +338,7 @@ impl Sync0 {
         self.programmed(writes, Program::Late, self.ticks, LATE_CMP1_NS);
     }
 
-    /// A pulse for the running cycle.
+    /// Programs a pulse for the running cycle.
     const fn program_now(&mut self, writes: &mut Writes) {
         let overlap = self.flags.contains(Flags::SYNC_PULSE_OVERLAP);
         self.flags = self.flags.with(Flags::PREV_SYNC_PULSE_OVERLAP, overlap);

@@ -1,4 +1,4 @@
-//! The 254 entries of DISCOVERY in a file: without the empty ones at the end.
+//! Stores the 254 entries of DISCOVERY in a file without the empty ones at the end.
 
 use core::fmt;
 

@@ -1,5 +1,4 @@
-/// What became of the frames of one sender in the IO exchange, beside the good ones and those with a wrong checksum. All counts stay
-/// at their end.
+/// Faults in the frames of one sender in the IO exchange, other than a wrong checksum. All counts saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tally {
@@ -7,13 +6,13 @@ pub struct Tally {
     pub missed: u32,
     /// Frames that came a second time in their cycle.
     pub doubled: u32,
-    /// Frames that came at another time than theirs.
+    /// Frames that came at the wrong time.
     pub late: u32,
-    /// Frames of a cycle that is over.
+    /// Frames of a cycle that has ended.
     pub stale: u32,
 }
 
-/// What may be wrong with a frame of the exchange whose checks are right, or that is not there.
+/// What may be wrong with a frame of the exchange whose checks are right, or which is missing.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Fault {
     Missed,

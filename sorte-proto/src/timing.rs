@@ -13,7 +13,7 @@ pub const GAP_NS: u32 = 240;
 pub const CNC_CYCLE_NS: u32 = 4000;
 
 /// Rms jitter that a port adds to a frame, in ps: one that samples at 200 MHz, as the published hardware does, is off by 0 to 5 ns
-/// (uniform: 5 ns / sqrt(12)). One that re-times to the 25-MHz clock of its PHY has 11,547.
+/// (uniform: 5 ns / sqrt(12)). A port that re-times to the 25-MHz clock of its PHY has 11,547.
 pub(crate) const JITTER_PS: u32 = 1443;
 
 /// Send times of the published device in ns of the common time, for addresses 1, 2, 3, and 4 or more. They are tuned
@@ -32,18 +32,19 @@ pub const fn published_send_time_ns(address: DeviceAddress) -> u32 {
     }
 }
 
-/// When the devices send: the one rule for the planner, the master and the devices, which must all have the same.
+/// When the devices send. The planner, the master and the devices must all use the same rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Slots {
-    /// [`published_send_time_ns`], by the address alone: for four devices, with up to 123 ns of cable in front of each at 4 us.
+    /// [`published_send_time_ns`], by the address alone: for four devices, with up to 123 ns of cable before each at 4 us.
     #[default]
     Published,
     /// Back to back at the master, whatever the cables: device `a` sends at `first_ns + (a - 1) x slot_ns` less its delay from the
     /// master, which SYNC tells it.
     Raster {
         /// When the first device's frame begins at the master, in ns of the cycle. With 500 and the first line delay that device
-        /// sends at 500 ns: the comment in the published source leaves the line delay out, and all frames come so much earlier.
+        /// sends at 500 ns: the comment in the published source omits the line delay, which would make all frames that much
+        /// earlier.
         first_ns: u32,
         /// From the start of one device's frame to the next one's, in ns: 880 for 3 payload bytes and a gap of 240 ns.
         slot_ns: u32,
@@ -56,8 +57,8 @@ impl Slots {
         Self::Raster { first_ns: TRIGGER_NS.saturating_add(first_line_delay_ns as u32), slot_ns: 8 * BYTE_NS + GAP_NS }
     }
 
-    /// When the device `address`, which is `delay_ns` away from the master, starts to send, in ns of its cycle. Below 0 it would
-    /// have to send before the cycle begins: no device does, and [`Timing::misfit`] names it.
+    /// When the device `address`, which is `delay_ns` away from the master, starts to send, in ns of its cycle. Below 0 it
+    /// would have to send before the cycle begins, which no device does; [`Timing::misfit`] names it.
     pub(crate) const fn send_ns(self, address: DeviceAddress, delay_ns: u32) -> i64 {
         match self {
             Self::Published => published_send_time_ns(address) as i64,
@@ -74,7 +75,7 @@ servowire_core::one_line!(Slots {
     Self::Raster { first_ns, slot_ns } => "at the master from {} ns on, every {} ns", first_ns, slot_ns;
 });
 
-/// A line to be timed: how many devices, how far from each other, how many bytes, and who sends when.
+/// A line to plan: how many devices, how far apart, how many bytes, and who sends when.
 ///
 /// ```
 /// use sorte_proto::timing::Timing;
@@ -88,7 +89,8 @@ servowire_core::one_line!(Slots {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Timing<'a> {
-    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last one stands for all after it. Empty: no delay.
+    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last value applies to all devices after it. Empty: no
+    /// delay.
     pub line_delays_ns: &'a [u16],
     /// Devices, 0..=254.
     pub devices: u8,
@@ -143,7 +145,7 @@ impl Budget {
         }
     }
 
-    /// What keeps the cycle from being shorter.
+    /// What prevents a shorter cycle.
     pub const fn limit(self) -> Limit {
         if self.master_frame_at_last_ns > self.device_frames_at_master_ns {
             Limit::MasterFrame
@@ -157,8 +159,8 @@ impl Budget {
         self.min_cycle_ns() <= cycle_ns
     }
 
-    /// Whether all devices act on the data of the same frame: their new-data event CMP7 comes before the first of them
-    /// has the whole frame, or after the last has. Two devices with 8 output bytes and CMP7 at 2000 ns act one cycle
+    /// Returns whether all devices act on the data of the same frame: their new-data event CMP7 comes before the first of
+    /// them has the whole frame, or after the last has. Two devices with 8 output bytes and CMP7 at 2000 ns act one cycle
     /// apart; with 16 output bytes that cannot happen.
     pub const fn same_cycle(self, cmp7_ns: u32) -> bool {
         cmp7_ns < self.master_frame_at_first_ns || self.master_frame_at_last_ns < cmp7_ns
@@ -166,7 +168,8 @@ impl Budget {
 }
 
 impl<'a> Timing<'a> {
-    /// Four output bytes and three payload bytes for each device, send times by the rule, and ports as the published ones.
+    /// Creates a line with four output bytes and three payload bytes for each device, send times by the rule, and ports
+    /// like the published ones.
     pub const fn new(line_delays_ns: &'a [u16], devices: u8) -> Self {
         let output_len = (devices as u16).saturating_mul(4);
         Self { line_delays_ns, devices, output_len, payload_len: 3, slots: None, jitter_ps: JITTER_PS }
@@ -189,14 +192,14 @@ impl Timing<'_> {
         })
     }
 
-    /// Line delay in front of device `address`, in ns.
+    /// Line delay before device `address`, in ns.
     fn line_delay_ns(&self, address: u8) -> u32 {
         let index = usize::from(address.saturating_sub(1));
         let delays = self.line_delays_ns;
         delays.get(index).or(delays.last()).copied().map_or(0, u32::from)
     }
 
-    /// The devices and the way of a frame from the master to each, in ns: the cables and the devices between.
+    /// The devices and the time of a frame from the master to each, in ns: the cables and the devices between.
     fn ways(&self) -> impl Iterator<Item = (DeviceAddress, u32)> + '_ {
         let addresses = (1..=self.devices.min(DeviceAddress::MAX.get())).filter_map(DeviceAddress::new);
         addresses.scan(0_u32, |way, address| {
@@ -216,7 +219,7 @@ impl Timing<'_> {
         (self.payload_len as u32).saturating_add(5).saturating_mul(BYTE_NS)
     }
 
-    /// When device `address` starts to send, in ns of the cycle. `None` if the line has no such device.
+    /// Returns when device `address` starts to send, in ns of the cycle. `None` if the line has no such device.
     pub fn send_time_ns(&self, address: DeviceAddress) -> Option<i64> {
         let (_, way) = self.ways().find(|(device, _)| *device == address)?;
         Some(self.slots().send_ns(address, way))
@@ -231,7 +234,7 @@ impl Timing<'_> {
         TRIGGER_NS.saturating_add(self.master_frame_bytes().saturating_mul(BYTE_NS))
     }
 
-    /// When a frame that leaves a device at `send_ns` has ended at the master.
+    /// Returns when a frame that a device sends at `send_ns` has ended at the master.
     const fn end_ns(&self, send_ns: i64, way_ns: u32) -> i64 {
         send_ns.saturating_add(way_ns as i64).saturating_add(self.device_frame_ns() as i64)
     }
@@ -253,8 +256,9 @@ impl Timing<'_> {
         }
     }
 
-    /// The least gap between two device frames, in ns, so that those of device `address` and the one before it do not meet on their
-    /// way: each of the ports between adds its jitter to each of them, and six sigma of the difference must fit in.
+    /// Returns the smallest gap between two device frames, in ns, at which the frames of device `address` and the one
+    /// before it do not meet on their way. Each of the ports they pass adds its jitter to each frame, and six sigma of the
+    /// difference must fit into the gap.
     pub(crate) fn least_gap_ns(&self, address: DeviceAddress) -> u32 {
         let jitter = u64::from(self.jitter_ps);
         let square = jitter.saturating_mul(jitter).saturating_mul(u64::from(address.hops_before())).saturating_mul(72);
@@ -262,7 +266,7 @@ impl Timing<'_> {
     }
 }
 
-/// What does not fit, and for whom: the line must not be started.
+/// What does not fit, and for which device: the line must not be started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Misfit {
@@ -270,15 +274,15 @@ pub struct Misfit {
     pub device: u8,
     /// What does not fit.
     pub limit: Limit,
-    /// What this device needs, in ns: of the cycle; of the gap in front of its frame; of the time before the cycle begins.
+    /// What this device needs, in ns: of the cycle; of the gap before its frame; of the time before the cycle begins.
     pub needs_ns: u32,
-    /// What is there, in ns. A gap below 0: the frame begins before the one in front of it has ended.
+    /// What is available, in ns. A gap below 0: the frame begins before the previous one has ended.
     pub has_ns: i32,
 }
 
 impl Timing<'_> {
-    /// The first device for which a cycle of `cycle_ns` is too short, whose frame comes too close to the one before, or which would
-    /// have to send before its cycle; in the order of the addresses.
+    /// Returns the first device for which a cycle of `cycle_ns` is too short, whose frame comes too close to the one
+    /// before, or which would have to send before its cycle; in the order of the addresses.
     pub fn misfit(&self, cycle_ns: u32) -> Option<Misfit> {
         let (slots, sent_ns) = (self.slots(), self.master_sent_ns());
         let mut line_free = None;
@@ -307,8 +311,9 @@ impl Timing<'_> {
         })
     }
 
-    /// The shortest cycle in whole periods of the step pulse generator, 4 us, in ns. A step word is about the second period
-    /// after the cycle that brought it, so longer cycles mean fewer steps a second and not longer pulses.
+    /// Returns the shortest cycle that is a whole number of periods of the step pulse generator (4 us), in ns. A step word
+    /// applies to the second period after the cycle that brought it, so a longer cycle means fewer steps a second, not
+    /// longer pulses.
     pub fn cnc_cycle_ns(&self) -> u32 {
         self.budget().min_cycle_ns().max(1).div_ceil(CNC_CYCLE_NS).saturating_mul(CNC_CYCLE_NS)
     }

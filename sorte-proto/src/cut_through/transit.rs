@@ -4,15 +4,15 @@ use crate::frame::{MULTICAST, check};
 use crate::frame_type::FrameType;
 use crate::status::Status;
 
-/// A frame that passes byte by byte: how far it is, its head, and its check. Sixteen bytes of state.
+/// A frame that passes byte by byte: its progress, its head and its check. Sixteen bytes of state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Transit {
     /// Bytes so far.
     at: u16,
-    /// Bytes before this one pass as they are, and nobody has to look at them.
+    /// Bytes before this one pass unchanged and need no inspection.
     quiet: u16,
-    /// DA, SA, TYPE and STATUS as they came.
+    /// DA, SA, TYPE and STATUS as received.
     head: [u8; 4],
     /// Over all bytes, the FCS too.
     received: RunningFcs,
@@ -23,7 +23,7 @@ pub(crate) struct Transit {
 impl Transit {
     pub(crate) const START: Self = Self { at: 0, quiet: 0, head: [0; 4], received: RunningFcs::START, trailer: 0 };
 
-    /// Takes a byte of a quiet stretch; any other is left, and the answer is no.
+    /// Takes a byte of a quiet stretch; returns `false` and takes nothing outside of one.
     #[inline]
     pub(crate) fn passes(&mut self, byte: u8) -> bool {
         let quiet = self.at < self.quiet;
@@ -35,7 +35,7 @@ impl Transit {
         quiet
     }
 
-    /// Nobody has to look at the bytes from the next one to before `end`.
+    /// Marks the bytes from the next one up to `end` (exclusive) as needing no inspection.
     pub(crate) const fn quiet_until(&mut self, end: u16) {
         self.quiet = end;
     }
@@ -46,7 +46,7 @@ impl Transit {
         self.trailer = self.trailer >> 8 | u32::from(byte) << 24;
     }
 
-    /// Takes a byte and gives its place in the frame.
+    /// Takes a byte and returns its place in the frame.
     pub(crate) fn take(&mut self, byte: u8) -> u16 {
         let at = self.at;
         self.at = at.saturating_add(1);
@@ -62,7 +62,7 @@ impl Transit {
         self.at
     }
 
-    /// DA, SA, TYPE and STATUS as they came, once four bytes are there.
+    /// DA, SA, TYPE and STATUS as received, once four bytes are there.
     pub(crate) const fn head(&self) -> [u8; 4] {
         self.head
     }
@@ -77,13 +77,13 @@ impl Transit {
         Status::from_bits_retain(status)
     }
 
-    /// Whether DA and TYPE are such that a device rewrites the frame. Known with the third byte.
+    /// Whether DA and TYPE are such that a device rewrites the frame. Known once the third byte has come.
     pub(crate) const fn is_for_all(&self, frame_type: FrameType) -> bool {
         let [da, _, code, _] = self.head;
         da == MULTICAST && code == frame_type.code()
     }
 
-    /// Whether the last four bytes are the FCS of those before.
+    /// Whether the last four bytes are the FCS of the bytes before them.
     #[inline]
     pub(crate) const fn is_whole(&self) -> bool {
         self.received.is_whole()

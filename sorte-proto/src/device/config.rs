@@ -16,34 +16,37 @@ use crate::timing::Slots;
 pub struct Config {
     /// Its process data.
     pub lengths: Entry,
-    /// Output bytes of the master frame; `None`: as many as DISCOVERY counted.
+    /// Output bytes of the master frame; `None`: the number that DISCOVERY counted.
     pub output_len: Option<u16>,
-    /// Cycle of the IO exchange in ns; `None`: what PARAM says. The published device runs at 4000 whatever PARAM says, and its
+    /// Cycle of the IO exchange in ns; `None`: as PARAM says. The published device runs at 4000 whatever PARAM says, and its
     /// master says 10,000.
     pub cycle_ns: Option<u32>,
-    /// When it sends its own frame: the same as the master's, and every device's.
+    /// When it sends its own frame: must be the same at the master and at every device.
     pub slots: Slots,
-    /// How long before its time [`Action::Send`](super::Action::Send) is given out, in ns: what the port needs to take the frame.
+    /// How long before its time [`Action::Send`](super::Action::Send) is returned, in ns: the time that the port needs to
+    /// take the frame.
     pub lead_ns: u32,
-    /// From the end of a frame of the exchange until it is handed over, at most, in ns. After that it is lost.
+    /// Longest time from the end of a frame of the exchange until it is handed over, in ns. After that the frame counts as
+    /// lost.
     pub hand_over_ns: u32,
     /// How far from its time a master frame of the exchange may begin, and how far its time stamp may be off, in ns.
     pub window_ns: u16,
-    /// DISCOVERY frames are taken until the first PARAM: for a master that repeats the last one, see
+    /// Accepts DISCOVERY frames until the first PARAM, for a master that repeats the last DISCOVERY, see
     /// [`master::Config::patient_discovery`](crate::master::Config::patient_discovery). An extension of this crate.
     pub patient_discovery: bool,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
-    /// Frames that a correction of the clock is made from: a longer average is steadier and follows a drift later.
+    /// Frames averaged for a correction of the clock: a longer average is steadier but follows a drift more slowly.
     pub clock_average: u8,
     /// Cycle starts without a frame that a device in IO exchange tolerates.
     pub missed_frames: u8,
-    /// How long a start-up state waits for its frame, in ns.
+    /// Longest time that a start-up state waits for its frame, in ns.
     pub start_up_timeout_ns: u64,
 }
 
 impl Config {
-    /// The reference design's. Time-outs, windows and `lead_ns` are this crate's; the published device has none.
+    /// Creates the settings of the reference design. Time-outs, windows and `lead_ns` are this crate's; the published
+    /// device has none.
     pub const fn new() -> Self {
         Self {
             lengths: Entry::STOCK,
@@ -87,7 +90,7 @@ impl Default for Config {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
-    /// Frames that were good.
+    /// Good frames.
     pub good_frames: u64,
     /// Frames with a wrong checksum.
     pub crc_errors: u64,
@@ -95,7 +98,7 @@ pub struct Counters {
     pub format_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
-    /// Master frames of the exchange that were missing, doubled, or not at their time.
+    /// Master frames of the exchange that were missing, came twice, or came at the wrong time.
     pub master: Tally,
     /// Of these, at [`PortId::A`].
     pub a: PortCounters,
@@ -109,13 +112,13 @@ servowire_core::one_line!(Counters {
         good_frames, crc_errors, format_errors, retrains, master;
 });
 
-/// What a device counts at one of its ports. A port that forwards by hardware sees no frames.
+/// What a device counts at one of its ports. A port that forwards in hardware counts no frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct PortCounters {
-    /// Frames that were good.
+    /// Good frames.
     pub good_frames: u64,
     /// Frames with a wrong checksum.
     pub crc_errors: u64,
@@ -129,7 +132,7 @@ impl Counters {
         Self { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0, master: Tally::ZERO, a: PORT, b: PORT }
     };
 
-    /// A frame at `port` was good, or refused for a reason.
+    /// Counts a frame at `port`, good or refused.
     pub(super) fn count(&mut self, port: PortId, result: Result<(), Error>) {
         let at = match port {
             PortId::A => &mut self.a,

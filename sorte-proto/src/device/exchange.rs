@@ -1,4 +1,4 @@
-//! The IO exchange: which master frames count, when the own frame leaves, and when the device gives up.
+//! The IO exchange: which master frames count, when the device sends its own frame, and when it gives up.
 
 use super::heard::{Action, FrameTimes, Output};
 use super::machine::Device;
@@ -11,23 +11,23 @@ use crate::status::Status;
 use crate::tally::Fault;
 use crate::timing::{BYTE_NS, TRIGGER_NS};
 
-/// Bytes of a master frame on the wire beside its output bytes: preamble 2, header 2, CRC 1, time stamp 2.
+/// Bytes of a master frame on the wire in addition to its output bytes: preamble 2, header 2, CRC 1, time stamp 2.
 const WIRE_BYTES: u32 = 7;
-/// How often a device in the start-up wants to be asked, in ns.
+/// How often a device in the start-up must be polled, in ns.
 const START_UP_POLL_NS: u32 = 1_000_000;
-/// Cycles that are closed in one call at most.
+/// Maximum number of cycles closed in one call.
 const AT_ONCE: u8 = 64;
-/// Master's address in an error.
+/// Address that stands for the master in an error.
 const MASTER: u8 = 0;
 
-/// A cycle that is over; `lost`: its data are missing, and the device was running.
+/// A cycle that has ended; `lost`: its data are missing although the device was running.
 struct Closed {
     cycle: u64,
     lost: bool,
 }
 
 impl Device {
-    /// The last SYNC frame was heard: the first cycle begins 10 us after it was sent.
+    /// Enters the exchange after the last SYNC frame: the first cycle begins 10 us after that frame was sent.
     pub(super) fn enter_exchange(&mut self) {
         let (Some(first_ns), Some(delay_ns)) = (self.first_cycle_ns(), self.way_ns) else { return };
         let told = self.parameters().map(|parameters| parameters.cycle_time_ns);
@@ -47,9 +47,9 @@ impl Device {
         self.config.output_len.or(self.output_total).unwrap_or_default()
     }
 
-    /// What to do now. Call it again at once after anything but [`Action::Wait`], and when a frame has been heard.
+    /// Returns what to do now. Call it again at once after any action but [`Action::Wait`], and after each frame heard.
     ///
-    /// `counter_ns`: the device's counter; `now_ns`: the clock for the time-outs that nobody sets.
+    /// `counter_ns`: the device's counter; `now_ns`: a free-running clock for the time-outs.
     pub fn poll(&mut self, counter_ns: u32, now_ns: u64) -> Action {
         let state = self.state();
         if matches!(state, State::Idle | State::Diag | State::Error) {
@@ -87,7 +87,7 @@ impl Device {
         Action::Wait { until_ns: counter_ns }
     }
 
-    /// The awaited cycle is over. `None`: the device has waited for too many frames and starts again.
+    /// Closes the awaited cycle. `None`: the device has waited for too many frames and starts again.
     fn close_cycle(&mut self) -> Option<Closed> {
         let raster = self.raster.as_mut()?;
         let (cycle, received, good, running) = (raster.awaited().number, raster.received, raster.good, raster.running);
@@ -106,14 +106,14 @@ impl Device {
         Some(Closed { cycle, lost: running && !good })
     }
 
-    /// A frame of the IO exchange at the port that faces the master; frames of the other port just pass. It is taken if its checks
-    /// are right, if it began at its time, and if its time stamp is that of its cycle: only then is it of this cycle. Each cycle has
-    /// one.
+    /// Takes a frame of the IO exchange from the port that faces the master; frames at the other port just pass through. A
+    /// frame belongs to this cycle, and is accepted, only if its checks are right, it began at the expected time, and its
+    /// time stamp is the one of this cycle. Each cycle has one.
     ///
     /// # Errors
     /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::OutsideWindow`], [`Error::CycleOver`],
-    /// [`Error::ImplausibleTimeStamp`] and [`Error::Doubled`], which [`Counters::master`](super::Counters::master) counts and
-    /// the next own frame reports with ERROR; [`Error::WrongState`] if the device is not in IO exchange.
+    /// [`Error::ImplausibleTimeStamp`] and [`Error::Doubled`], which [`Counters::master`](super::Counters::master) counts
+    /// and the device's next frame reports with ERROR; [`Error::WrongState`] if the device is not in IO exchange.
     pub fn hear_exchange<'a>(&mut self, frame: &'a [u8], times: FrameTimes) -> Result<Output<'a>, Error> {
         let (State::Exchange, Some(place), Some(delay_ns), Some(_)) =
             (self.state(), self.assignment, self.way_ns, self.raster)
@@ -138,8 +138,8 @@ impl Device {
         Ok(Output { data, cycle, trigger_ns, reference_ns: view.reference_ns(delay_ns), correction })
     }
 
-    /// Finds the cycle of a frame by its time, and by its time stamp, which nothing else checks. `view`: `None` for a damaged one,
-    /// which is in time or not, nothing else.
+    /// Finds the cycle of a frame by its time, and by its time stamp, which nothing else checks. `view`: `None` for a
+    /// damaged frame, of which only the time can be judged.
     fn arrive(&mut self, times: FrameTimes, view: Option<MasterFrameView<'_>>) -> Result<(), Error> {
         let Some(raster) = &mut self.raster else { return Err(Error::WrongState) };
         let (ahead, off_ns) = raster.place(times.sof_ns);
@@ -188,19 +188,19 @@ impl Device {
         }
     }
 
-    /// Cycles without a frame since the last frame.
+    /// Cycles since the last frame.
     pub const fn missed_frames(&self) -> u8 {
         self.missed
     }
 
-    /// The next STATUS byte that the device writes carries ERROR, as after a wrong checksum: for firmware that does not know where
-    /// its axis is, see [`follow`](crate::follow).
+    /// Makes the next STATUS byte that the device writes carry ERROR, as after a wrong checksum: for firmware that does not
+    /// know where its axis is, see [`follow`](crate::follow).
     pub const fn flag_error(&mut self) {
         self.error = true;
     }
 
-    /// The own frame of the IO exchange for an [`Action::Send`]; reports an error once. `None` before the first master frame of the
-    /// exchange: on a long line the answer to the last SYNC is still on its way.
+    /// Returns the device's frame of the IO exchange for an [`Action::Send`]; an error is reported once. `None` before the
+    /// first master frame of the exchange: on a long line the answer to the last SYNC is still on its way.
     pub fn answer<const P: usize>(&mut self, payload: [u8; P]) -> Option<DeviceFrame<P>> {
         let (State::Exchange, Some(place)) = (self.state(), self.assignment) else { return None };
         if !self.raster?.running {
@@ -210,23 +210,23 @@ impl Device {
         Some(DeviceFrame { address: place.address, status, payload })
     }
 
-    /// When to send the own frame, in ns of its cycle, as [`Config::slots`](super::Config::slots) says; `None` without an address, or
-    /// if that would be before the cycle.
+    /// When to send the device's own frame, in ns of its cycle, as [`Config::slots`](super::Config::slots) says; `None`
+    /// without an address, or if that would be before the cycle.
     pub fn send_time_ns(&self) -> Option<u32> {
         let address: DeviceAddress = self.assignment?.address;
         let at_ns = self.config.slots.send_ns(address, self.delay_ns().unwrap_or_default());
         u32::try_from(at_ns).ok()
     }
 
-    /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master begins it 10 us after the
-    /// trigger of its last SYNC frame, and triggers the first frame 500 ns later.
+    /// The device's counter at the start of the first cycle of the IO exchange, in the common time: the master begins it 10
+    /// us after the trigger of its last SYNC frame, and triggers the first frame 500 ns later.
     pub fn first_cycle_ns(&self) -> Option<u32> {
         let (sync, delay_ns) = (self.last_sync?.sync, self.way_ns?);
         Some(sync.trigger_ns(delay_ns).wrapping_add(10_000))
     }
 }
 
-/// The low half of a time, as the stamps of the exchange have it.
+/// Returns the low half of a time, as time stamps of the exchange carry it.
 const fn low(ns: u32) -> u16 {
     let [low, high, ..] = ns.to_le_bytes();
     u16::from_le_bytes([low, high])

@@ -1,4 +1,4 @@
-//! What a device hears, and what it makes of it.
+//! What a device hears and how it reacts.
 
 use super::port::Trigger;
 use crate::clock::Correction;
@@ -17,7 +17,7 @@ pub enum PortId {
 }
 
 impl PortId {
-    /// The other one.
+    /// Returns the other port.
     pub const fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -30,9 +30,9 @@ impl PortId {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Path {
-    /// Out of the other port.
+    /// It leaves through the other port.
     Forward,
-    /// Out of the port it came in.
+    /// It leaves through the port at which it came in.
     Reflect,
     /// Nowhere.
     Absorb,
@@ -61,13 +61,13 @@ pub struct Reaction {
     pub path: Path,
     /// Whether it was good, and if not, why it was not used.
     pub result: Result<(), Error>,
-    /// Delay request to send on the reverse port; a last device sends none.
+    /// Delay request to send on the reverse port; the last device sends none.
     pub trigger: Trigger,
     /// What to do to the counter.
     pub correction: Correction,
 }
 
-/// What the IO exchange gave a device, always of this cycle.
+/// The data that the IO exchange brought to a device, always from this cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Output<'a> {
@@ -77,14 +77,14 @@ pub struct Output<'a> {
     pub cycle: u64,
     /// The common time at which the master began to send them, in ns modulo 2^32.
     pub trigger_ns: u32,
-    /// The frame's time stamp and the delay from the master, as the published device adds them up, in ns.
+    /// The sum of the frame's time stamp and the delay from the master, as the published device adds them, in ns.
     pub reference_ns: u32,
     /// What to do to the counter.
     pub correction: Correction,
 }
 
 impl Output<'_> {
-    /// How old the data are when the device's counter shows `counter_ns`, in ns.
+    /// Returns how old the data are when the device's counter shows `counter_ns`, in ns.
     pub const fn age_ns(&self, counter_ns: u32) -> u32 {
         counter_ns.wrapping_sub(self.trigger_ns)
     }
@@ -95,23 +95,23 @@ impl Output<'_> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Action {
-    /// Nothing before `until_ns`, unless a frame comes.
+    /// Nothing to do before `until_ns`, unless a frame comes.
     Wait {
-        /// When to ask again.
+        /// When to poll again.
         until_ns: u32,
     },
     /// A cycle of the exchange begins.
     CycleStart {
         /// Its number, from 0.
         cycle: u64,
-        /// When; it has passed by less than a cycle.
+        /// When it began; less than a cycle ago.
         start_ns: u32,
     },
-    /// The own frame leaves, see [`Device::answer`](super::Device::answer).
+    /// Send the device's own frame, see [`Device::answer`](super::Device::answer).
     Send {
-        /// In this cycle.
+        /// The cycle in which it is sent.
         cycle: u64,
-        /// At this time, which has not passed.
+        /// When it is sent; this time has not passed.
         at_ns: u32,
     },
     /// No good master frame has come in this cycle, and none will.

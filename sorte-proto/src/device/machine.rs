@@ -1,4 +1,4 @@
-//! The machine: what a device learns from the frames that pass.
+//! The state machine: what a device learns from the frames that pass.
 
 use super::config::{Config, Counters};
 use super::heard::{FrameTimes, HeardSync, Path, PortId, Reaction};
@@ -26,7 +26,7 @@ pub struct Device {
     pub(super) a: Port,
     pub(super) b: Port,
     pub(super) counters: Counters,
-    /// Goes into the next STATUS byte the device writes.
+    /// Bits for the next STATUS byte that the device writes.
     pub(super) error: bool,
     pub(super) assignment: Option<Assignment>,
     pub(super) output_total: Option<u16>,
@@ -36,15 +36,15 @@ pub struct Device {
     pub(super) last_sync: Option<HeardSync>,
     /// Delay from the master in ns.
     pub(super) way_ns: Option<u32>,
-    /// The cycles of the IO exchange, while it is in there.
+    /// The cycles of the IO exchange, while the device is in it.
     pub(super) raster: Option<Raster>,
     pub(super) missed: u8,
-    /// When a frame of the present state came last.
+    /// When the last frame of the present state came.
     pub(super) alive_ns: u64,
 }
 
 impl Device {
-    /// A device without links.
+    /// Creates a device without links.
     pub const fn new(config: Config) -> Self {
         const PORT: Port = Port { state: State::Idle, flags: PortFlags::empty() };
         Self {
@@ -71,7 +71,7 @@ impl Device {
         self.counters
     }
 
-    /// A port's handler.
+    /// Returns the handler of a port.
     pub const fn port(&self, port: PortId) -> &Port {
         match port {
             PortId::A => &self.a,
@@ -97,7 +97,7 @@ impl Device {
         }
     }
 
-    /// The port that does not face the master; B while none is known to.
+    /// The port that does not face the master; B while it is not known which one does.
     pub(super) fn reverse_port(&self) -> PortId {
         self.master_port().map_or(PortId::B, PortId::other)
     }
@@ -112,7 +112,7 @@ impl Device {
         self.a.flags.contains(PortFlags::LAST_DEVICE) || self.b.flags.contains(PortFlags::LAST_DEVICE)
     }
 
-    /// Whether the host has taken it out of the line's work.
+    /// Whether the host has taken it out of service.
     fn is_out(&self) -> bool {
         self.a.state == State::Error
     }
@@ -143,8 +143,8 @@ impl Device {
         self.last_sync
     }
 
-    /// Own counter at the start of the first cycle of the IO exchange as the published device sets it: 10 us after the
-    /// last SYNC frame.
+    /// The device's counter at the start of the first cycle of the IO exchange, as the published device sets it: 10 us
+    /// after the last SYNC frame.
     pub fn cycle_zero_ns(&self) -> Option<u32> {
         self.last_sync.map(|last| last.sof_ns.wrapping_add(10_000))
     }
@@ -159,8 +159,8 @@ impl Device {
         Some(long.unwrap_or(sync.delay_ns.into()))
     }
 
-    /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
-    /// loses the link to the master starts again.
+    /// Takes the new state of both links. With one link the device is the last one, and that port faces the master. A
+    /// device that loses the link to the master starts again.
     pub fn set_links(&mut self, a: Link, b: Link) {
         let master_lost = match self.master_port() {
             Some(PortId::A) => a == Link::Down,
@@ -186,7 +186,7 @@ impl Device {
         }
     }
 
-    /// Back to IDLE: address, clock and line delay are forgotten.
+    /// Goes back to IDLE: address, clock and line delay are forgotten.
     pub(super) fn restart(&mut self) {
         let last_device = |port: Port| {
             let last = port.flags.contains(PortFlags::LAST_DEVICE);
@@ -199,7 +199,8 @@ impl Device {
         (self.a.flags, self.b.flags) = (a, b);
     }
 
-    /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`hear_passed`](Self::hear_passed).
+    /// Begins a start-up frame at `port`. Pass its bytes through the [`Passage`], then hand that to
+    /// [`hear_passed`](Self::hear_passed).
     pub fn passage(&self, port: PortId) -> Passage {
         let handler = self.port(port);
         let master = handler.flags.contains(PortFlags::MASTER_PORT);
@@ -215,7 +216,7 @@ impl Device {
         Passage::new(rewriter, self.path(port), handler.state, idle_last)
     }
 
-    /// What it sets in a STATUS byte that it writes now.
+    /// Bits that it sets in a STATUS byte written now.
     const fn adds(&self) -> Status {
         Status::of_device(self.is_last(), self.error)
     }
@@ -229,7 +230,7 @@ impl Device {
         Rewriter::discovery(self.config.lengths, self.adds())
     }
 
-    /// A start-up frame whose bytes went through a [`passage`](Self::passage) has ended at `port`.
+    /// Takes a start-up frame whose bytes went through a [`passage`](Self::passage) and which has ended at `port`.
     pub fn hear_passed(&mut self, port: PortId, passage: Passage, times: FrameTimes) -> Reaction {
         let state = self.port(port).state;
         let (path, rewriter) = (passage.path().unwrap_or(Path::Absorb), passage.rewriter);
@@ -288,7 +289,7 @@ impl Device {
         reaction
     }
 
-    /// A whole start-up frame was heard at `port`. It is rewritten as it will be sent on.
+    /// Takes a whole start-up frame heard at `port` and rewrites it as it has to be sent on.
     pub fn hear(&mut self, port: PortId, frame: &mut [u8], times: FrameTimes) -> Reaction {
         let mut passage = self.passage(port);
         for byte in frame.iter_mut() {
@@ -314,7 +315,7 @@ impl Device {
         }
     }
 
-    /// The delay request to send for a trigger.
+    /// Returns the delay request to send for a trigger.
     pub const fn delay_request(trigger: Trigger) -> Option<DelayReq> {
         match trigger {
             Trigger::None => None,
@@ -323,7 +324,7 @@ impl Device {
         }
     }
 
-    /// Tells that our own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
+    /// Takes the device's own request, started by `trigger`, which has come back to the reverse port after `rtt_ns`.
     ///
     /// # Errors
     /// As [`LongFrame::parse`] and [`DelayReq::of`]; the round trip is then not used.

@@ -8,20 +8,20 @@ use super::port::{PortFlags, State};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Forwarding {
-    /// Auto-forward: the hardware sends them on by itself, 320 ns after they begin.
+    /// Auto-forward: the hardware forwards them by itself, 320 ns after they begin.
     Auto,
     /// Cut-through: byte by byte through a [`Passage`](super::Passage), which rewrites.
     Rewrite,
-    /// The hardware sends them back out of the port that they came in.
+    /// The hardware sends them back through the port at which they came in.
     Reflect,
-    /// Nothing passes; the host sends its delay requests out of this port.
+    /// Nothing passes; the host sends its delay requests through this port.
     HostSend,
-    /// The own frame leaves at its time, [`Device::send_time_ns`]; then auto-forward until the cycle is over.
+    /// The device sends its own frame at its time, [`Device::send_time_ns`]; then auto-forward until the cycle is over.
     TimeTriggered,
 }
 
 impl Device {
-    /// What happens to the frames that come in at `port`, as the published device configures its hardware.
+    /// Returns what happens to the frames that come in at `port`, as the published device configures its hardware.
     ///
     /// | state | at the master port | at the other port | at the port of a last device |
     /// |---|---|---|---|
@@ -56,7 +56,7 @@ impl Device {
         }
     }
 
-    /// Back to IDLE from any state; counts as a retrain.
+    /// Goes back to IDLE from any state; counts as a retrain.
     pub fn reset(&mut self) {
         self.restart();
     }

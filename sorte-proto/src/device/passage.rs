@@ -22,15 +22,15 @@ impl Passage {
         Self { rewriter, path, began_in, only_discovery }
     }
 
-    /// The byte to send for the byte received.
+    /// Takes the byte received and returns the byte to send.
     #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
         self.rewriter.byte(byte)
     }
 
     /// Where the frame goes. It is known before the first byte, but for a last device in IDLE, which sends back
-    /// DISCOVERY only: `None` there until the third byte has come. The published device begins to send four bytes after
-    /// it begins to receive, so its FIFO bears that.
+    /// DISCOVERY only: `None` there until the third byte has come. The published device begins to send four bytes after it
+    /// begins to receive, so its FIFO allows for that.
     pub const fn path(&self) -> Option<Path> {
         if !self.only_discovery {
             return Some(self.path);

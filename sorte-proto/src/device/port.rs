@@ -12,9 +12,9 @@ servowire_core::codes! {
         /// Waits for DISCOVERY.
         #[default]
         Idle = 0 => "IDLE",
-        /// Gets address and offsets.
+        /// Waits for its address and offsets.
         Discovery = 1 => "DISCOVERY",
-        /// Gets the parameters.
+        /// Waits for the parameters.
         Param = 2 => "PARAM",
         /// Measures the line to the next device.
         LineDelay = 3 => "LINE_DELAY",
@@ -24,13 +24,13 @@ servowire_core::codes! {
         Exchange = 5 => "IOEX",
         /// Diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
         Diag = 6 => "DIAG",
-        /// Out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
+        /// Out of service until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
         Error = 7 => "ERROR",
     }
 }
 
 impl State {
-    /// Whether this is the head of a frame the state acts on.
+    /// Whether this is the head of a frame that the state acts on.
     pub(super) fn waits_for(self, [da, _, code, _]: [u8; 4]) -> bool {
         da == MULTICAST && self.frame_type().is_some_and(|t| t.code() == code)
     }
@@ -82,7 +82,7 @@ servowire_core::codes! {
     }
 }
 
-/// What a handler found out from the head of a frame.
+/// What a handler learnt from the head of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -152,7 +152,7 @@ impl Port {
         seen
     }
 
-    /// The first DISCOVERY tells which way the master is. A last device handles even this one.
+    /// Learns from the first DISCOVERY which way the master is. The last device handles even this one.
     fn first(&mut self, status: Status) -> Seen {
         if !status.contains(Status::LAST) {
             self.flags |= PortFlags::MASTER_PORT;
@@ -166,7 +166,7 @@ impl Port {
         self.flags |= PortFlags::SWITCH_PORT_CONFIG;
     }
 
-    /// The frame has ended: the next one is looked at again.
+    /// Ends the frame: the next one is examined again.
     pub(super) fn end_of_frame(&mut self) {
         self.flags.remove(PortFlags::IGNORE_TO_EOF | PortFlags::SWITCH_PORT_CONFIG | PortFlags::NEW_SYNC_FRAME);
     }

@@ -1,5 +1,5 @@
-//! Where a device is in the cycles of the IO exchange: which one a frame belongs to, when the own frame leaves, and when a frame
-//! that has not come is lost.
+//! Where a device is in the cycles of the IO exchange: which cycle a frame belongs to, when the device sends its own frame,
+//! and when a frame that has not come is lost.
 
 use crate::sync::TRIGGER_NS;
 
@@ -43,19 +43,20 @@ pub(super) struct Raster {
     cycle_ns: u32,
     /// From the start of a cycle to the capture of its master frame here.
     arrives_ns: u32,
-    /// From the start of a cycle until nobody hands over its master frame any more.
+    /// From the start of a cycle until its master frame can no longer be handed over.
     closes_ns: u32,
-    /// From the start of a cycle to the own frame, and how long before that it is handed out.
+    /// From the start of a cycle to the device's own frame, and how long before that the frame is handed out.
     sends_ns: Option<u32>,
     lead_ns: u32,
-    /// The cycle that begins next, the one whose master frame is awaited, and the one in which the own frame leaves next.
+    /// The cycle that begins next, the one whose master frame is awaited, and the one in which the device next sends its
+    /// own frame.
     begins: Start,
     awaited: Start,
     sends: Start,
     /// What the awaited cycle has brought.
     pub(super) received: bool,
     pub(super) good: bool,
-    /// A master frame of this exchange has come, so the device may speak.
+    /// A master frame of this exchange has come, so the device may send.
     pub(super) running: bool,
 }
 
@@ -74,7 +75,7 @@ pub(super) struct Plan {
     pub(super) lead_ns: u32,
 }
 
-/// How far `at` is after `from`, both modulo 2^32.
+/// Returns how far `at` is after `from`, both modulo 2^32.
 const fn since(at: u32, from: u32) -> i32 {
     i32::from_le_bytes(at.wrapping_sub(from).to_le_bytes())
 }
@@ -136,13 +137,13 @@ impl Raster {
         (cycles, off.saturating_sub(cycles.saturating_mul(cycle)))
     }
 
-    /// The awaited cycle is over; the next one's frame is awaited.
+    /// Ends the awaited cycle and waits for the next one's frame.
     pub(super) const fn close(&mut self) {
         self.awaited = self.awaited.after(1, self.cycle_ns);
         (self.received, self.good) = (false, false);
     }
 
-    /// The first good frame: the own one leaves from the next cycle on.
+    /// Takes the first good frame: the device sends its own frame from the next cycle onwards.
     pub(super) const fn run(&mut self) {
         if !self.running {
             self.running = true;
@@ -150,8 +151,8 @@ impl Raster {
         }
     }
 
-    /// What comes next. What is taken from here is done: the next call gives what comes after it. No cycle and no own frame is given
-    /// out after its time.
+    /// What comes next. Takes the next event: the following call returns the one after it. No cycle and no frame of the
+    /// device is handed out after its time.
     pub(super) fn next(&mut self, now_ns: u32) -> Due {
         let closes = self.awaited.ns.wrapping_add(self.closes_ns);
         // What has passed is left out.
@@ -186,7 +187,7 @@ impl Raster {
         Due::Send(sent)
     }
 
-    /// How many times of a raster from `at_ns` on are not after now.
+    /// Returns how many times of a raster that starts at `at_ns` are not after now.
     fn passed(&self, now_ns: u32, at_ns: u32) -> u32 {
         match u32::try_from(since(now_ns, at_ns)) {
             Ok(late) => late.checked_div(self.cycle_ns).unwrap_or_default().saturating_add(1),

@@ -15,9 +15,9 @@ const CARD_LEN: usize = 60;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// Preamble and start delimiter are still in front of the frame.
+    /// Preamble and start delimiter still precede the frame.
     PreambleLeft,
-    /// The FCS is missing: most network cards check it and take it off.
+    /// The FCS is missing: most network cards check it and remove it.
     FcsMissing,
     /// Zeros follow the frame: a network card or a switch has padded it.
     Padded {
@@ -39,7 +39,7 @@ pub enum Cause {
     ExchangeFrame,
     /// This is no frame of SORTE: an ordinary Ethernet frame, for example.
     NotSorte,
-    /// Everything is right but the check: single bits were disturbed.
+    /// Everything is right but the check: single bits are wrong.
     Disturbed,
 }
 
@@ -89,7 +89,7 @@ fn of_start_up(bytes: &[u8], error: Error) -> Diagnosis<'_> {
     (matches!(error, Error::BadFcs { .. }).then_some(Cause::Disturbed), None)
 }
 
-/// What the length of a frame tells whose type has `len` bytes.
+/// Diagnoses the length of a frame whose type has `len` bytes.
 fn of_length(bytes: &[u8], len: usize) -> Option<Diagnosis<'_>> {
     let (got, body) = (bytes.len(), len.saturating_sub(4));
     if got == body {
@@ -108,12 +108,12 @@ fn of_length(bytes: &[u8], len: usize) -> Option<Diagnosis<'_>> {
     (got == CARD_LEN && zeros(rest)).then(|| (Some(Cause::FcsMissingAndPadded), without_fcs(frame)))
 }
 
-/// The values of a frame whose FCS was taken off.
+/// Returns the values of a frame whose FCS was removed.
 fn without_fcs(body: &[u8]) -> Option<Frame<'_>> {
     LongFrame::without_fcs(body).and_then(|frame| Frame::of_long(frame).ok())
 }
 
-/// Whether the inverted bytes end with the FCS of those before, and begin as a frame does.
+/// Whether the inverted bytes end with the FCS of the bytes before it, and begin as a frame does.
 fn is_inverted(bytes: &[u8]) -> bool {
     let mut running = RunningFcs::START;
     for byte in bytes {

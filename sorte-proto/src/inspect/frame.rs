@@ -8,7 +8,7 @@ use crate::param::Param;
 use crate::payload::Slice;
 use crate::sync::Sync;
 
-/// What the line was doing when the frame was taken: it alone says which kinds of frames there are.
+/// What the line was doing when the frame was captured. Only this says which kinds of frames are possible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,7 +34,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// By TYPE in the start-up, by SA in the exchange: what a frame says of itself, whether its check is right or not.
+    /// Identifies a frame by TYPE in the start-up and by SA in the exchange, whether its check is right or not.
     pub(super) fn of(during: During, bytes: &[u8]) -> Self {
         match (during, bytes) {
             (During::StartUp, [_, _, code, ..]) => FrameType::from_code(*code).map_or(Self::Unknown, Self::Long),
@@ -69,7 +69,7 @@ pub enum Frame<'a> {
     DelayReq(DelayReq),
     /// SYNC
     Sync(Sync),
-    /// A type whose layout is not published, or that has no payload.
+    /// A type without a payload, or whose layout is not published.
     Other(LongFrame<'a>),
     /// The master frame of the exchange.
     Master(MasterFrameView<'a>),
@@ -78,7 +78,7 @@ pub enum Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// A frame of the exchange may have any length; SA says whose it is.
+    /// A frame of the exchange may have any length; SA says who sent it.
     pub(super) fn parse(during: During, bytes: &'a [u8]) -> Result<Self, Error> {
         match (during, bytes) {
             (During::StartUp, _) => Self::of_long(LongFrame::parse(bytes)?),

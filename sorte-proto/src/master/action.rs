@@ -27,7 +27,7 @@ pub enum Outgoing {
 }
 
 impl Outgoing {
-    /// What goes before it.
+    /// The preamble before it.
     pub const fn preamble(&self) -> Preamble {
         match self {
             Self::Sync(_) => Preamble::Middle,
@@ -35,7 +35,7 @@ impl Outgoing {
         }
     }
 
-    /// Writes the frame from DA to FCS and gives its length.
+    /// Writes the frame from DA to FCS and returns its length.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Discovery::LEN`] is always enough.
@@ -59,27 +59,27 @@ fn put(into: &mut [u8], frame: &[u8]) -> Result<usize, Error> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Action {
-    /// Nothing before `until_ns`, unless something comes.
+    /// Nothing to do before `until_ns`, unless something comes.
     Wait {
-        /// `u64::MAX`: until link and enable are there.
+        /// `u64::MAX`: until link and enable are present.
         until_ns: u64,
     },
     /// Send a start-up frame.
     Send {
-        /// When it is triggered; not before the time of the poll.
+        /// When to trigger it; not before the time of the poll.
         at_ns: u64,
         /// Which.
         frame: Outgoing,
     },
     /// Send the master frame of a cycle, see [`Master::emit_into`](super::Master::emit_into).
     Exchange {
-        /// When it is triggered; not before the time of the poll.
+        /// When to trigger it; not before the time of the poll.
         at_ns: u64,
         /// Low 16 bits of the master's time then.
         time_stamp: u16,
         /// Number of the cycle, from 0.
         cycle: u64,
-        /// The master is about to start again, so the axes have to come to rest: see
+        /// The master is about to restart, so the axes must come to rest: see
         /// [`Config::stop_cycles`](super::Config::stop_cycles). Then call [`Master::halted`](super::Master::halted).
         stop: bool,
     },

@@ -20,19 +20,19 @@ use crate::timing::{Limit, Misfit, TRIGGER_NS, Timing};
 
 /// From the first bit of a device frame to the capture of its start.
 const CAPTURE_NS: u32 = Preamble::Short.capture_ns();
-/// What the published measurement of a line delay loses, in a hop and back, in ns at most.
+/// The most that the published measurement of a line delay loses in a hop and back, in ns.
 const LOST_NS: u64 = 16;
 
 impl Master {
-    /// A frame was heard whose start was captured at `sof_ns`, see [`Preamble::capture_ns`]: a start-up frame that has come back, or a
-    /// device's frame of the IO exchange. Its payload may be used only if this accepts it: if its checks are right, if it began at
-    /// the time of its device in a cycle that is open, and if it is the first in that cycle.
+    /// Takes a frame whose start was captured at `sof_ns`, see [`Preamble::capture_ns`]: a start-up frame that has come
+    /// back, or a device's frame of the IO exchange. Use its payload only if this function accepts it: its checks must be
+    /// right, it must have begun at the time of its device in a cycle that is open, and it must be the first in that cycle.
     ///
     /// # Errors
-    /// What the frame is refused for: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
+    /// The reason for the refusal: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
     /// began before the frame that it would answer; [`Error::OutsideWindow`], [`Error::CycleOver`] and [`Error::Doubled`], which
     /// [`tally`](Master::tally) counts for each device; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer and
-    /// [`Error::TopologyChanged`] take the master back to IDLE, everything else just does not count.
+    /// [`Error::TopologyChanged`] take the master back to IDLE; any other refused frame is ignored.
     pub fn hear<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<Heard<'a>, Error> {
         let result = match self.state {
             State::Idle | State::Error => return Err(Error::WrongState),
@@ -79,8 +79,8 @@ impl Master {
         Ok((view, cycle))
     }
 
-    /// The cycle that a frame belongs to by its time, whichever is open now; `None` for one that the host has left out. Each cycle has
-    /// one frame of each device.
+    /// Returns the cycle that a frame belongs to by its time, whichever is open now; `None` for one that the host has
+    /// skipped. Each cycle has one frame of each device.
     fn cycle_of(&mut self, address: DeviceAddress, sof_ns: u64) -> Result<Option<u64>, Error> {
         let Cycles { present, before, hop_ns, .. } = &mut self.cycles;
         let Some(present) = present else { return Err(Error::WrongState) };
@@ -118,7 +118,7 @@ impl Master {
         Err(error)
     }
 
-    /// What began before the request is not its answer.
+    /// Refuses a frame that began before the request: it is not its answer.
     fn is_fresh(&self, sof_ns: u64) -> Result<(), Error> {
         match self.sent_ns.checked_sub(sof_ns) {
             None | Some(0) => Ok(()),

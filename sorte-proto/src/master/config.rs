@@ -7,16 +7,16 @@ use crate::timing::{JITTER_PS, Slots};
 
 servowire_core::codes! {
     /// State of the master, by the codes that the published one shows to its host: the low three bits of its status register,
-    /// where 7 has no meaning.
+    /// in which 7 is undefined.
     #[derive(Default)]
     #[non_exhaustive]
     pub enum State: u8 {
-        /// Waits for link and enable, or until the pause after a failure is over.
+        /// Waits for link and enable, or until the pause after a failure has passed.
         #[default]
         Idle = 0 => "IDLE",
         /// Counts the devices.
         Discovery = 1 => "DISCOVERY",
-        /// Tells them the parameters.
+        /// Sends them the parameters.
         Param = 2 => "PARAM",
         /// Measures the line to the first device.
         LineDelay = 3 => "LINE_DELAY",
@@ -24,7 +24,7 @@ servowire_core::codes! {
         Sync = 4 => "SYNC",
         /// Exchanges data.
         Exchange = 5 => "IOEX",
-        /// Has failed too often and waits for the host to take the enable bit away and give it again.
+        /// Has failed too often and waits until the host clears the enable bit and sets it again.
         Error = 6 => "ERROR",
     }
 }
@@ -35,14 +35,15 @@ servowire_core::codes! {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Config {
-    /// DISCOVERY frames, 2 at least: devices take part from the second on.
+    /// DISCOVERY frames, at least 2: devices take part from the second onwards.
     pub discovery_frames: u16,
-    /// A damaged answer to DISCOVERY does not end the phase: frames are sent until two answers in a row tell the same line, then
-    /// the last one until it comes back whole. The devices need
-    /// [`device::Config::patient_discovery`](crate::device::Config::patient_discovery) too: a published one that has had the last
-    /// frame lets its repetitions pass without being counted. An extension of this crate; the published master starts again.
+    /// A damaged answer to DISCOVERY does not end the phase: frames are sent until two answers in a row report the same
+    /// line, then the last one is sent until it comes back whole. The devices need
+    /// [`device::Config::patient_discovery`](crate::device::Config::patient_discovery) too: a published device that has
+    /// received the last frame lets its repetitions pass without being counted. An extension of this crate; the published
+    /// master starts again.
     pub patient_discovery: bool,
-    /// DISCOVERY frames at most, if it is patient.
+    /// Maximum number of DISCOVERY frames, if the master is patient.
     pub discovery_tries: u16,
     /// PARAM frames that must be answered.
     pub param_frames: u16,
@@ -54,24 +55,24 @@ pub struct Config {
     pub sync_period_ns: u32,
     /// Period of the IO exchange in ns.
     pub cycle_ns: u32,
-    /// How long a delay request and the last SYNC frame may take to come back, in ns.
+    /// Longest time that a delay request or the last SYNC frame may take to come back, in ns.
     pub answer_timeout_ns: u64,
-    /// PARAM frames in a row that may stay without an answer.
+    /// PARAM frames in a row that may remain unanswered.
     pub param_tries: u16,
     /// Pause after a failure in ns, so that the devices' start-up states time out.
     pub restart_pause_ns: u64,
-    /// How long before its time a frame is handed out, in ns: what the port needs to take it, if it sends at a time by
-    /// itself. With 0 a frame is to be sent when it is handed out.
+    /// How long before its time a frame is handed out, in ns: the time that the port needs to take it, if it sends at a set
+    /// time by itself. With 0 a frame is to be sent when it is handed out.
     pub lead_ns: u32,
     /// Devices that DISCOVERY must find.
     pub min_devices: u8,
-    /// Output bytes of the master frame at least; 16 keeps all axes in the same cycle whatever their number.
+    /// Minimum number of output bytes of the master frame; 16 keeps all axes in the same cycle whatever their number.
     pub min_output_len: u16,
     /// Payload bytes of a device frame.
     pub payload_len: u8,
-    /// What the devices are told. The published master says 10 us and exchanges every 4 us; here both are the cycle.
+    /// Parameters sent to the devices. The published master says 10 us and exchanges every 4 us; here both are the cycle.
     pub parameters: Parameters,
-    /// When the devices send: the same as theirs.
+    /// When the devices send: must be the same as at the devices.
     pub slots: Slots,
     /// Rms jitter of each port of the line, in ps.
     pub jitter_ps: u32,
@@ -80,23 +81,23 @@ pub struct Config {
     pub window_ns: u16,
     /// How the line to the first device is measured.
     pub delay_model: DelayModel,
-    /// Cycles in a row with a damaged device frame that make the master start again; 0: never.
+    /// Cycles in a row with a damaged device frame that make the master restart; 0: never.
     pub retrain_crc_errors: u8,
-    /// Cycles in a row with a device frame missing that make the master start again; 0: never.
+    /// Cycles in a row with a missing device frame that make the master restart; 0: never.
     pub retrain_timing_errors: u8,
-    /// Cycles of the IO exchange that are left for the axes to come to rest before the master starts again; 0: it starts
-    /// at once, and motors that run stop dead.
+    /// Cycles of the IO exchange in which the axes can come to rest before the master restarts; 0: it restarts at once, and
+    /// running motors stop dead.
     pub stop_cycles: u32,
     /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in
-    /// [`State::Error`]; 0: it tries for ever.
+    /// [`State::Error`]; 0: it retries for ever.
     pub max_failures: u16,
-    /// The line may be longer than the delay field of SYNC can say: an extension of this crate, see
-    /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master tells its SYNC period in PARAM then.
+    /// The line may be longer than the delay field of SYNC can express: an extension of this crate, see
+    /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master then sends its SYNC period in PARAM.
     pub long_line: bool,
 }
 
 impl Config {
-    /// The published master's counts and times, and this crate's time-outs.
+    /// Creates the settings with the published master's counts and times, and this crate's time-outs.
     pub const fn new() -> Self {
         Self {
             discovery_frames: 10,
@@ -127,7 +128,7 @@ impl Config {
         }
     }
 
-    /// The same with this period of the IO exchange in ns, which the devices are told too.
+    /// Sets the period of the IO exchange in ns, which is also sent to the devices.
     #[must_use]
     pub const fn with_cycle_ns(self, cycle_ns: u32) -> Self {
         Self { cycle_ns, parameters: Parameters { cycle_time_ns: cycle_ns, ..self.parameters }, ..self }
@@ -185,9 +186,11 @@ pub struct Counters {
     pub device_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
-    /// Cycles of the IO exchange that were left out because [`Master::poll`](super::Master::poll) was called after their time.
+    /// Cycles of the IO exchange that were skipped because [`Master::poll`](super::Master::poll) was called after their
+    /// time.
     pub skipped_cycles: u64,
-    /// Device frames that were not there, not once, or not at their time; of each device in [`Master::tally`](super::Master::tally).
+    /// Device frames that were missing, came twice, or came at the wrong time; for each device in
+    /// [`Master::tally`](super::Master::tally).
     pub frames: Tally,
 }
 

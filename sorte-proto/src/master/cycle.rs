@@ -14,7 +14,7 @@ pub(super) struct Cycle {
     seen: [u64; 4],
     /// A device frame was damaged.
     pub(super) damaged: bool,
-    /// Something was late, doubled or of another cycle.
+    /// A frame was late, came twice, or belonged to another cycle.
     pub(super) disorderly: bool,
 }
 
@@ -23,7 +23,7 @@ impl Cycle {
         Self { number, trigger_ns, seen: [0; 4], damaged: false, disorderly: false }
     }
 
-    /// The device has answered; gives whether it had not before.
+    /// Marks the device as having answered; returns whether it had not before.
     pub(super) fn mark(&mut self, address: u8) -> bool {
         let new = !self.has(address);
         if let Some(word) = self.seen.get_mut(usize::from(address >> 6)) {
@@ -36,7 +36,7 @@ impl Cycle {
         self.seen.get(usize::from(address >> 6)).is_some_and(|word| word >> (address & 63) & 1 == 1)
     }
 
-    /// Devices seen; a fast way to tell that none is missing.
+    /// Devices seen: a fast check that none is missing.
     pub(super) const fn count(&self) -> u32 {
         let [a, b, c, d] = self.seen;
         // At most 256.
@@ -48,12 +48,12 @@ impl Cycle {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Cycles {
-    /// The one handed out last, and the one before it as long as its frames may still come.
+    /// The cycle handed out last, and the one before it while its frames may still come.
     pub(super) present: Option<Cycle>,
     pub(super) before: Option<Cycle>,
-    /// The first one of this exchange: the devices are silent in it.
+    /// The first cycle of this exchange, in which the devices are silent.
     pub(super) first: Option<u64>,
-    /// The cycle closed last had a fault: the next master frame says so.
+    /// The last closed cycle had a fault: the next master frame says so.
     pub(super) fault: bool,
     pub(super) damaged_in_a_row: u8,
     pub(super) silent_in_a_row: u8,
@@ -79,7 +79,7 @@ impl Cycles {
 /// What became of the frames of each device.
 pub(super) type Tallies = [Tally; MAX_DEVICES];
 
-/// The nearest whole number of periods from `from_ns` to `at_ns`, and how far `at_ns` is from there.
+/// Returns the nearest whole number of periods from `from_ns` to `at_ns`, and how far `at_ns` is from there.
 pub(super) fn nearest(at_ns: u64, from_ns: u64, period_ns: u32) -> (i64, i64) {
     let off = i64::from_le_bytes(at_ns.wrapping_sub(from_ns).to_le_bytes());
     let period = i64::from(period_ns.max(1));

@@ -1,4 +1,4 @@
-//! The machine: what it sends, and when.
+//! The state machine: what the master sends, and when.
 
 use super::action::{Action, Outgoing};
 use super::config::{Config, Counters, State};
@@ -18,11 +18,12 @@ use crate::sync::Sync;
 use crate::tally::{Fault, Tally};
 use crate::timing::TRIGGER_NS;
 
-/// From the last SYNC frame to the first of the exchange, as the published master has it: 10 us to its cycle zero, and 500 ns.
+/// From the last SYNC frame to the first of the exchange, as in the published master: 10 us to its cycle zero, and 500 ns.
 const SYNC_TO_EXCHANGE_NS: u64 = 10_500;
-/// Answers to DISCOVERY that must tell the same line before the last one is sent: devices take part from the second on.
+/// Answers to DISCOVERY that must report the same line before the last one is sent: devices take part from the second
+/// onwards.
 pub(super) const AGREED: u8 = 2;
-/// When the answer to the last SYNC frame is looked at first.
+/// When the answer to the last SYNC frame is first checked.
 const LOOK_NS: u64 = 5000;
 
 /// A master with one port.
@@ -39,7 +40,7 @@ pub struct Master {
     /// Number of the next frame of this phase, and its time.
     pub(super) frame: u16,
     pub(super) next_ns: u64,
-    /// PARAM: answers still needed, frames without one.
+    /// PARAM: answers still needed, and frames without an answer.
     pub(super) remaining: u16,
     pub(super) unanswered: u16,
     /// Capture of the start of the start-up frame sent last.
@@ -48,7 +49,7 @@ pub struct Master {
     pub(super) asking: bool,
     /// DISCOVERY, SYNC: the answer that is needed has come.
     pub(super) answered: bool,
-    /// Patient DISCOVERY: answers in a row that told the same line.
+    /// Patient DISCOVERY: answers in a row that reported the same line.
     pub(super) agreed: u8,
     /// SYNC: time stamp of the frame sent last.
     pub(super) sync_stamp_ns: u32,
@@ -64,7 +65,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// A master in IDLE, without link, enabled.
+    /// Creates an enabled master in IDLE, without a link.
     pub const fn new(config: Config) -> Self {
         Self {
             config,
@@ -107,12 +108,12 @@ impl Master {
         self.state
     }
 
-    /// The counters.
+    /// Returns the counters.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// The line as the last DISCOVERY answer told it.
+    /// The line as reported by the last DISCOVERY answer.
     pub const fn network(&self) -> &Network {
         &self.network
     }
@@ -127,7 +128,7 @@ impl Master {
         self.epoch_ns
     }
 
-    /// What became of the frames of the device `address` since the master was made; `None` for 0 and 255.
+    /// Returns what became of the frames of the device `address` since the master was created; `None` for 0 and 255.
     pub fn tally(&self, address: u8) -> Option<Tally> {
         self.tallies.get(usize::from(address).checked_sub(1)?).copied()
     }
@@ -137,7 +138,7 @@ impl Master {
         self.network.output_total().max(self.config.min_output_len)
     }
 
-    /// The link has come or gone. Losing it ends whatever is going on.
+    /// Takes the new state of the link. Losing it ends any start-up or exchange.
     pub fn set_link(&mut self, link: Link) {
         if link == Link::Down && !matches!(self.state, State::Idle | State::Error) {
             self.fail(Error::LinkDown);
@@ -145,17 +146,17 @@ impl Master {
         self.link = link;
     }
 
-    /// The host sets the enable bit, which is set from the beginning.
+    /// Sets the enable bit, which is set initially.
     pub const fn enable(&mut self) {
         self.enabled = true;
     }
 
-    /// The host takes the enable bit away: whatever is going on ends.
+    /// Clears the enable bit: any start-up or exchange ends.
     pub const fn disable(&mut self) {
         (self.state, self.failures, self.stopping, self.enabled) = (State::Idle, 0, None, false);
     }
 
-    /// Back to IDLE; [`poll`](Self::poll) reports why.
+    /// Goes back to IDLE; [`poll`](Self::poll) reports why.
     pub(super) fn fail(&mut self, error: Error) {
         self.failures = self.failures.saturating_add(1);
         let most = self.config.max_failures;
@@ -164,7 +165,7 @@ impl Master {
         (self.pending, self.stopping, self.good_cycles) = (Some(error), None, 0);
     }
 
-    /// The IO exchange must end; the axes may come to rest first.
+    /// Ends the IO exchange; the axes may come to rest first.
     pub(super) fn give_up(&mut self, error: Error) {
         match (self.config.stop_cycles, self.stopping) {
             (0, _) => self.fail(error),
@@ -173,16 +174,16 @@ impl Master {
         }
     }
 
-    /// All axes stand still after an [`Action::Exchange`] with `stop`: the master starts again now.
+    /// Reports that all axes are at rest after an [`Action::Exchange`] with `stop`: the master now restarts.
     pub fn halted(&mut self) {
         if let Some((error, _)) = self.stopping {
             self.fail(error);
         }
     }
 
-    /// What to do now. Call it again at once after anything but [`Action::Wait`], and when something has come.
+    /// Returns what to do now. Call it again at once after any action but [`Action::Wait`], and when something has come.
     ///
-    /// No time in an action has passed: a master that is asked too late leaves cycles out and stays in their raster. A
+    /// No time in an action has passed: a master that is polled too late skips cycles and stays in their raster. A
     /// frame is handed out [`Config::lead_ns`] before its time.
     pub fn poll(&mut self, now_ns: u64) -> Action {
         let lead_ns = u64::from(self.config.lead_ns);
@@ -194,7 +195,7 @@ impl Master {
         }
     }
 
-    /// What there is to do for a frame that can leave at `now_ns` or later.
+    /// Returns what to do for a frame that can be sent at `now_ns` or later.
     fn plan(&mut self, now_ns: u64) -> Action {
         if let Some(error) = self.pending.take() {
             self.next_ns = now_ns.saturating_add(self.config.restart_pause_ns);
@@ -225,8 +226,9 @@ impl Master {
         }
     }
 
-    /// The request handed out last has begun at `sof_ns`, as the port has captured it. Round trips count from there; where
-    /// a port does not tell, they count from where the capture of a request triggered at its time would be.
+    /// Reports that the request handed out last began at `sof_ns`, as captured by the port. Round trips count from there.
+    /// If a port does not report it, they count from the point at which a request triggered on time would have been
+    /// captured.
     pub const fn sent(&mut self, sof_ns: u64) {
         if matches!(self.state, State::LineDelay) && self.asking {
             self.sent_ns = sof_ns;
@@ -255,7 +257,7 @@ impl Master {
         }
     }
 
-    /// One start-up frame at `next_ns`, or now if that has passed, and the time of the one after it.
+    /// Sends one start-up frame at `next_ns`, or now if that has passed, and sets the time of the next one.
     fn send(&mut self, now_ns: u64, frame: Outgoing, period_ns: u64) -> Action {
         let at_ns = self.next_ns.max(now_ns);
         self.frame = self.frame.saturating_add(1);
@@ -325,7 +327,7 @@ impl Master {
         self.plan(now_ns)
     }
 
-    /// The frame sent last has so long for its answer.
+    /// Waits for the answer to the frame sent last.
     fn await_answer(&mut self, now_ns: u64, sent: FrameType) -> Action {
         let until_ns = self.sent_ns.saturating_add(self.config.answer_timeout_ns);
         if now_ns < until_ns {
@@ -335,7 +337,7 @@ impl Master {
         self.plan(now_ns)
     }
 
-    /// The first time of the raster of `period_ns` that has not passed; gives how many have.
+    /// Advances to the first time of the raster of `period_ns` that has not passed; returns how many have.
     fn catch_up(&mut self, now_ns: u64, period_ns: u32) -> u64 {
         let period = u64::from(period_ns.max(1));
         let late = now_ns.saturating_sub(self.next_ns).div_ceil(period);
@@ -414,7 +416,7 @@ impl Master {
         }
     }
 
-    /// The cycle is over: who has not answered?
+    /// Closes a cycle and counts the devices that have not answered.
     fn close(&mut self, cycle: &Cycle) -> Result<(), Error> {
         let devices = self.network.devices();
         let first = self.cycles.first == Some(cycle.number);
@@ -449,11 +451,12 @@ impl Master {
         Ok(())
     }
 
-    /// Writes the master frame for an [`Action::Exchange`] and gives its length. Its STATUS has ERROR if the cycle closed last had a
-    /// device frame that was damaged, missing, doubled or not at its time: an addition of this crate, published devices do not look.
+    /// Writes the master frame for an [`Action::Exchange`] and returns its length. Its STATUS has ERROR if the last closed
+    /// cycle had a device frame that was damaged or missing, or that came twice or at the wrong time. This is an addition
+    /// of this crate; published devices ignore it.
     ///
     /// # Errors
-    /// [`Error::OutputLength`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
+    /// [`Error::OutputLength`] if `output` does not have [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
     pub fn emit_into(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
         let (got, want) = (u16::try_from(output.len()).unwrap_or(u16::MAX), self.output_len());
         if got != want {
