@@ -32,7 +32,7 @@ impl BlockSize {
 /// TMG_CNT in a command, CMD_Error in a response.
 pub(crate) const CODE_BIT7: u8 = 0x80;
 
-/// A slice of exactly 16 bytes as a block.
+/// Takes a slice of exactly 16 bytes as a block.
 pub(crate) const fn exact(bytes: &[u8]) -> Result<&[u8; LEN], Error> {
     match bytes.split_first_chunk::<LEN>() {
         Some((block, [])) => Ok(block),
@@ -40,7 +40,7 @@ pub(crate) const fn exact(bytes: &[u8]) -> Result<&[u8; LEN], Error> {
     }
 }
 
-/// Two four-byte halves.
+/// Splits eight bytes into two four-byte halves.
 pub(crate) const fn join([b8, b9, b10, b11]: [u8; 4], data: i32) -> [u8; 8] {
     let [b12, b13, b14, b15] = data.to_le_bytes();
     [b8, b9, b10, b11, b12, b13, b14, b15]

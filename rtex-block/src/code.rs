@@ -81,7 +81,7 @@ impl Code {
     /// 20h, cyclic position.
     pub const CYCLIC_POSITION: Self = Self::truncate(0x20);
 
-    /// The code of a pair.
+    /// Creates the code of a pair.
     pub const fn of(cyclic: CyclicCode, noncyclic: NonCyclicCode) -> Self {
         Self::truncate((cyclic as u8) << 4 | noncyclic as u8)
     }
@@ -118,14 +118,14 @@ impl Code {
         Ok(Codes { cyclic, noncyclic })
     }
 
-    /// The names of both codes with the number, `CP monitor (2Ah)`.
+    /// Shows the names of both codes with the number, `CP monitor (2Ah)`.
     pub(crate) fn write(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let cyclic = self.cyclic().map_or("undefined", CyclicCode::name);
         let noncyclic = self.noncyclic().map_or("undefined", NonCyclicCode::name);
         write!(f, "{cyclic} {noncyclic} ({:02X}h)", self.get())
     }
 
-    /// What a drive reports for an undefined code: 0021h before 0022h; `None` if both are defined.
+    /// Returns what a drive reports for an undefined code: 0021h before 0022h; `None` if both are defined.
     pub const fn error_code(self) -> Option<ErrorCode> {
         match self.codes() {
             Err(Error::CyclicCode { .. }) => Some(ErrorCode::CYCLIC_CODE),
@@ -136,8 +136,8 @@ impl Code {
 
     /// Returns whether both codes are defined and may be combined.
     ///
-    /// Certain: alarm not with NOP, profile with PP only. A working rule for the rest, whose marks in the
-    /// vendor's mode tables could not be read: with NOP only 00h, otherwise every defined code.
+    /// It is certain that alarm does not go with NOP, and that profile goes with PP only. For the rest, the marks in the
+    /// vendor's mode tables could not be read, so this is a working rule: with NOP only 00h, otherwise every defined code.
     pub const fn is_allowed(self) -> bool {
         match self.codes() {
             Ok(Codes { cyclic: CyclicCode::Nop, noncyclic }) => matches!(noncyclic, NonCyclicCode::Normal),

@@ -7,14 +7,14 @@ use crate::error::{Error, wrong_direction};
 use crate::header::{Header, MacId, UpdateCounter};
 use crate::noncyclic_command::NonCyclicCommand;
 
-/// A command block, borrowed: what a drive reads out of its reception memory.
+/// A command block, borrowed, as a drive reads it from its reception memory.
 ///
 /// ```text
 /// byte 0        1                 2   3         4 .. 7          8 .. 15
 ///      header   TMG_CNT | code    Control_Bits  Command_Data1   by the non-cyclic code: [`NonCyclicCommand`]
 /// ```
-/// The constructor checks length and direction, after that no getter can fail; codes are given as they are,
-/// defined or not. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command data block".
+/// The constructor checks length and direction; after that no getter can fail. Codes are returned as they are, defined or
+/// not. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command data block".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CommandBlock<'a>(&'a [u8; LEN]);
 
@@ -92,7 +92,7 @@ impl<'a> CommandBlock<'a> {
         self.code().is_allowed() && self.code().get() != Code::NOP.get()
     }
 
-    /// Everything at once.
+    /// Decodes everything at once.
     ///
     /// # Errors
     /// [`Error::CyclicCode`] or [`Error::NonCyclicCode`] for a code that is not defined.
@@ -111,7 +111,7 @@ impl<'a> CommandBlock<'a> {
         }
     }
 
-    /// What strict decoding checks beyond [`to_owned`](Self::to_owned).
+    /// Makes the checks of strict decoding that [`to_owned`](Self::to_owned) does not make.
     ///
     /// # Errors
     /// [`Error::CyclicCode`], [`Error::NonCyclicCode`], [`Error::CodePair`] or the first [`Error::Reserved`].
@@ -132,7 +132,7 @@ impl<'a> CommandBlock<'a> {
     }
 }
 
-/// A command as values. Any value of this type can be emitted, and reserved bits go out as 0.
+/// A command as values. Any value of this type can be emitted; reserved bits are sent as 0.
 ///
 /// ```
 /// use rtex_block::*;
@@ -154,9 +154,9 @@ pub struct Command {
     pub update_counter: UpdateCounter,
     /// TMG_CNT: `false` outside the inter-axis full-synchronous mode.
     pub tmg_cnt: bool,
-    /// What Command_Data1 is.
+    /// The meaning of Command_Data1.
     pub cyclic: CyclicCode,
-    /// Servo_On and its neighbours.
+    /// Servo_On and the other control bits.
     pub control: ControlBits,
     /// Position, speed or torque by [`cyclic`](Self::cyclic).
     pub command_data1: i32,
@@ -165,7 +165,7 @@ pub struct Command {
 }
 
 impl Command {
-    /// 20h with Servo_On = 0 and all data 0: what a master sends to a drive it does not move.
+    /// Creates the command that a master sends to a drive that it does not move: 20h with Servo_On = 0 and all data 0.
     pub const fn idle(mac_id: MacId, update_counter: UpdateCounter) -> Self {
         Self {
             mac_id,
@@ -178,7 +178,7 @@ impl Command {
         }
     }
 
-    /// 00h, the invalid data that go out with counter 0 before the first valid command.
+    /// Creates 00h, the invalid data that are sent with counter 0 before the first valid command.
     pub const fn nop(mac_id: MacId) -> Self {
         Self { cyclic: CyclicCode::Nop, ..Self::idle(mac_id, UpdateCounter::ZERO) }
     }
@@ -199,7 +199,7 @@ impl Command {
         }
     }
 
-    /// Decodes a slice that is exactly one block and refuses what an encoder must not write.
+    /// Decodes a slice that is exactly one block and refuses anything that an encoder must not write.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CodePair`] and [`Error::Reserved`].

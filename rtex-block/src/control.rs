@@ -8,15 +8,15 @@ flag_set! {
     /// byte 2  Servo_On     0          0    Gain_SW  TL_SW  Homing_Ctrl    0       0
     /// byte 3  Hard_Stop Smooth_Stop Pause    0      SL_SW      0      EX-OUT2  EX-OUT1
     /// ```
-    /// Only the ten named bits are ever written; the other six go out as 0. A drive does not check them, so lenient
-    /// decoding drops them and strict decoding refuses them. System Design Guide for Master, "Cyclic position
-    /// command" and "Profile position command"; SX-DSV02310, "Control bits".
+    /// Only the ten named bits are ever written; the other six are sent as 0. A drive does not check these six, so lenient
+    /// decoding drops them and strict decoding refuses them. System Design Guide for Master, "Cyclic position command" and
+    /// "Profile position command"; SX-DSV02310, "Control bits".
     pub struct ControlBits(u16) {
         /// Hard_Stop: stops profile motion at once.
         HARD_STOP = 1 << 15;
         /// Smooth_Stop: stops profile motion with its deceleration.
         SMOOTH_STOP = 1 << 14;
-        /// Pause: holds profile motion; the axis stands, In_Progress stays 1.
+        /// Pause: holds profile motion; the axis is at rest, In_Progress stays 1.
         PAUSE = 1 << 13;
         /// SL_SW: choice of the speed limit in torque control.
         SL_SW = 1 << 11;
@@ -24,7 +24,7 @@ flag_set! {
         EX_OUT2 = 1 << 9;
         /// Drive output EX-OUT1.
         EX_OUT1 = 1 << 8;
-        /// Servo_On: requests that the motor is energised. Has no effect in a NOP (00h).
+        /// Servo_On: requests that the motor is energised. It has no effect in a NOP (00h).
         SERVO_ON = 1 << 7;
         /// Gain_SW: first or second gain.
         GAIN_SW = 1 << 4;
@@ -36,7 +36,7 @@ flag_set! {
 }
 
 impl ControlBits {
-    /// Takes bytes 2 and 3; reserved bits are dropped.
+    /// Reads bytes 2 and 3; reserved bits are dropped.
     pub const fn from_bytes(bytes: [u8; 2]) -> Self {
         Self::from_bits_truncate(u16::from_le_bytes(bytes))
     }
@@ -46,7 +46,7 @@ impl ControlBits {
         (self.bits() & Self::all().bits()).to_le_bytes()
     }
 
-    /// The reserved bits that are set in bytes 2 and 3.
+    /// Returns the reserved bits that are set in bytes 2 and 3.
     pub const fn reserved(bytes: [u8; 2]) -> [u8; 2] {
         (u16::from_le_bytes(bytes) & !Self::all().bits()).to_le_bytes()
     }

@@ -13,14 +13,14 @@ pub enum Doubt {
     Never,
     /// No block has come on time for longer than the policy allows.
     Old {
-        /// From the last block that came on time until now, ns.
+        /// Time since the last block that came on time, ns.
         age_ns: u64,
     },
-    /// The position is too old, for the last block was refused.
+    /// The position is too old because the last block was refused.
     Refused {
         /// Why it was.
         class: ErrorClass,
-        /// From the last block that came on time until now, ns.
+        /// Time since the last block that came on time, ns.
         age_ns: u64,
     },
     /// The drive reports an alarm: it may have lost its encoder.

@@ -1,13 +1,13 @@
 servowire_core::errors! {
     /// Why a block was refused.
     ///
-    /// Checks are made in the order of the variants; the first that fails is reported, and nothing is decoded then.
+    /// Checks are made in the order of the variants; the first that fails is reported, and nothing is decoded.
     /// `strict` decoding goes through all of them, lenient decoding stops before [`CodePair`](Self::CodePair).
     pub enum Error {
         /// The slice is shorter than a block.
         #[error("{got} bytes, a block has {want}")]
         Truncated = 1 {
-            /// Bytes that were there.
+            /// Bytes received.
             got: u16,
             /// Bytes that a block has: 16 or 32.
             want: u16,
@@ -15,12 +15,12 @@ servowire_core::errors! {
         /// The slice is longer than a block, which must fill it exactly.
         #[error("{got} bytes, a block has {want}")]
         TooLong = 2 {
-            /// Bytes that were there; 65535 for more.
+            /// Bytes received; 65535 for more.
             got: u16,
             /// Bytes that a block has: 16 or 32.
             want: u16,
         },
-        /// C/R (bit 7 of byte 0) says command where a response was due, or the other way round.
+        /// C/R (bit 7 of byte 0) says command where a response was expected, or the other way round.
         #[error("byte 0 is {byte0:#04x}: the C/R bit tells the wrong direction")]
         Direction = 3 {
             /// Byte 0 as received.
@@ -58,7 +58,7 @@ servowire_core::errors! {
             /// The code, 0..=15.
             code: u8,
         },
-        /// Both codes are defined but not for use together (strict decoding only).
+        /// Both codes are defined but must not be used together (strict decoding only).
         #[error("cyclic and non-cyclic code of {code:02x}h cannot be combined")]
         CodePair = 9 {
             /// Bits 6-0 of byte 1.
@@ -67,7 +67,7 @@ servowire_core::errors! {
         /// A bit is 1 that the layout defines as 0 (strict decoding only).
         #[error("byte {byte} has reserved bits {bits:#04x} set")]
         Reserved = 10 {
-            /// Number of the byte in the block, 0..=31; the first one at fault.
+            /// Index of the first faulty byte in the block, 0..=31.
             byte: u8,
             /// Those of its reserved bits that are 1.
             bits: u8,
@@ -80,14 +80,14 @@ servowire_core::errors! {
 
 servowire_core::nom_error!(Error);
 
-/// Out of the way of the good path: otherwise its stores are executed, without effect, for every good block.
+/// Kept out of the good path: otherwise its stores would be executed, without effect, for every good block.
 #[cold]
 #[inline(never)]
 pub(crate) const fn wrong_direction(byte0: u8) -> Error {
     Error::Direction { byte0 }
 }
 
-/// `got` bytes where a block of `want` must be.
+/// Returns the error for `got` bytes in place of a block of `want`.
 #[cold]
 #[expect(clippy::cast_possible_truncation, reason = "compared before")]
 pub(crate) const fn wrong_length(got: usize, want: u16) -> Error {

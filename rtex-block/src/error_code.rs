@@ -2,8 +2,8 @@ use core::fmt;
 
 /// Error_Code of an error answer (bytes 8-9), or Sub_Error_Code (bytes 18-19).
 ///
-/// The vendor's complete list (section 6-10-2) could not be read, so any number is carried; the constants are
-/// those whose meaning is confirmed by SX-DSV02310, "Command error".
+/// The vendor's complete list (section 6-10-2) could not be read, so any number is accepted; the constants are the codes
+/// whose meaning is confirmed by SX-DSV02310, "Command error".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
@@ -28,13 +28,13 @@ impl ErrorCode {
     /// 0034h: feed-forward value out of range; the drive keeps the old one.
     pub const FEED_FORWARD: Self = Self(0x0034);
 
-    /// Returns whether the drive has discarded the whole block and continues with the one before: 0011h, 0012h, 0021h. No
+    /// Returns whether the drive has discarded the whole block and continues with the previous one: 0011h, 0012h, 0021h. No
     /// request in the block was refused for its content. SX-DSV02310, "Command error".
     pub const fn discards_block(self) -> bool {
         matches!(self, Self::MAC_ID | Self::DIRECTION | Self::CYCLIC_CODE)
     }
 
-    /// What the number means; `None` if that is not confirmed.
+    /// Returns what the number means; `None` if that is not confirmed.
     const fn meaning(self) -> Option<&'static str> {
         Some(match self {
             Self::MAC_ID => "MAC-ID is not the drive's",
@@ -79,7 +79,7 @@ impl Alarm {
     pub const CYCLIC_DATA: Self = Self { main: 86, sub: 0 };
     /// Err86.1: the cyclic code stays undefined.
     pub const CYCLIC_CODE: Self = Self { main: 86, sub: 1 };
-    /// Err86.2: the Update_Counter does not count as it must.
+    /// Err86.2: the Update_Counter does not count correctly.
     pub const UPDATE_COUNTER: Self = Self { main: 86, sub: 2 };
     /// Err91.1: cyclic command error other than an undefined code.
     pub const COMMAND: Self = Self { main: 91, sub: 1 };

@@ -1,4 +1,4 @@
-//! What a control loop may use of a drive's answers, judged where it is used.
+//! The part of a drive's answers that a control loop may use, judged at the moment of use.
 
 use servowire_core::{Feedback, Tolerance, Words};
 
@@ -7,7 +7,7 @@ use crate::error::ErrorClass;
 use crate::response::Response;
 use crate::status::StatusFlags;
 
-/// Up to what age, and despite what, a position may be used.
+/// Up to what age, and despite which Status_Flags, a position may be used.
 pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// Despite which Status_Flags a position may be used. Only [`ALARM`](StatusFlags::ALARM) causes a doubt.
@@ -19,12 +19,12 @@ pub struct Tolerated {
 }
 
 impl Tolerated {
-    /// Nothing: an alarm is a doubt.
+    /// No flags: an alarm is a doubt.
     pub const NOTHING: Self = Self { status: StatusFlags::empty() };
     /// An alarm: for displaying where a stopped axis stands.
     pub const ALARM: Self = Self::NOTHING.status(StatusFlags::ALARM);
 
-    /// These flags, in place of those before.
+    /// Tolerates these flags, replacing those set before.
     #[must_use]
     pub const fn status(mut self, status: StatusFlags) -> Self {
         self.status = status;
@@ -78,7 +78,8 @@ impl Sample {
         }
     }
 
-    /// When the block was heard, in ns. How long before it the drive measured is not documented. SX-DSV02310, "Update timing".
+    /// When the block was heard, in ns. It is not documented how long before that the drive measured. SX-DSV02310, "Update
+    /// timing".
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns
     }
@@ -90,7 +91,7 @@ servowire_core::one_line!(Sample {
     Self { position, rates: None, sampled_ns } => "position {} at {} ns", position, sampled_ns;
 });
 
-/// What is known of the actual position of a drive. It is judged where it is used, because it ages in between.
+/// What is known about the actual position of a drive. It is judged at the moment of use, because it ages until then.
 ///
 /// ```
 /// use rtex_block::{Doubt, Evidence, Policy, Response};
@@ -116,7 +117,7 @@ impl Evidence {
     /// Before the first good block.
     pub const NEVER: Self = Self { sample: None, status: StatusFlags::empty(), refused: None };
 
-    /// Of a response whose counter echo was first heard at `sampled_ns`. A master has it from
+    /// Creates the evidence of a response whose counter echo was first heard at `sampled_ns`. A master gets it from
     /// [`Axis::evidence`](crate::master::Axis::evidence); this is for tools.
     pub const fn of(response: &Response, sampled_ns: u64) -> Self {
         let rates = if response.code.noncyclic_bits() == 0 && !response.cmd_error {
@@ -141,17 +142,17 @@ impl Evidence {
         }
     }
 
-    /// With the alarm of a block that was not on time, if it reports one.
+    /// Adds the alarm of a block that was not on time, if it reports one.
     pub(crate) const fn alarmed(self, status: StatusFlags) -> Self {
         Self { status: self.status.union(status.intersection(StatusFlags::ALARM)), ..self }
     }
 
-    /// With the reason why the last block was refused.
+    /// Adds the reason why the last block was refused.
     pub(crate) const fn refused(self, refused: Option<ErrorClass>) -> Self {
         Self { refused, ..self }
     }
 
-    /// The actual position, if it may be used at this time.
+    /// Returns the actual position, if it may be used at this time.
     ///
     /// # Errors
     /// [`Doubt::Never`], then [`Doubt::Refused`] or [`Doubt::Old`], then [`Doubt::Alarm`].

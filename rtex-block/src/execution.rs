@@ -7,7 +7,7 @@ flag_set! {
     ///
     /// SX-DSV02310, "Response of non-cyclic commands".
     pub struct Execution(u8) {
-        /// The command was accepted and failed while it was executed.
+        /// The command was accepted but failed during execution.
         ERR = 1 << 7;
         /// Executed with a restriction.
         WNG = 1 << 6;
@@ -43,31 +43,31 @@ flag_set! {
 }
 
 impl Execution {
-    /// The bits in their places in byte 9, without those that have no name.
+    /// Returns the bits in their places in byte 9, without those that have no name.
     pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }
 
-    /// From byte 16 of a response, where ERR and WNG are one place lower.
+    /// Reads byte 16 of a response, where ERR and WNG are one place lower.
     pub(crate) const fn from_sub(byte16: u8) -> Self {
         Self::from_bits_truncate((byte16 & 0x60) << 1 | byte16 & 0x10)
     }
 
-    /// Their places in byte 16 of a response.
+    /// Returns the bits in their places in byte 16 of a response.
     pub(crate) const fn to_sub(self) -> u8 {
         (self.bits() & 0xc0) >> 1 | self.bits() & 0x10
     }
 }
 
 impl LatchFlags {
-    /// The bits in their places in byte 9, without those that have no name.
+    /// Returns the bits in their places in byte 9, without those that have no name.
     pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }
 }
 
 impl ProfileFlags {
-    /// The bits in their places in byte 9, without those that have no name.
+    /// Returns the bits in their places in byte 9, without those that have no name.
     pub(crate) const fn to_byte(self) -> u8 {
         self.bits() & Self::all().bits()
     }

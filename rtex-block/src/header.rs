@@ -3,12 +3,12 @@ use core::fmt;
 servowire_core::number! {
     /// Address of a drive on the ring, 0..=31 (MAC-ID).
     ///
-    /// A drive takes it from its rotary switches when it powers up. SX-DSV02310, "Command header".
+    /// A drive reads it from its rotary switches when it powers up. SX-DSV02310, "Command header".
     pub struct MacId(u8, 5);
 }
 
 impl MacId {
-    /// How many addresses there are, and so the largest number of drives on a ring.
+    /// Number of addresses, and so the largest number of drives on a ring.
     pub const COUNT: usize = 32;
 }
 
@@ -18,10 +18,10 @@ servowire_core::number! {
 }
 
 impl UpdateCounter {
-    /// Goes out with the invalid data (00h) before the first valid block.
+    /// The counter sent with the invalid data (00h) before the first valid block.
     pub const ZERO: Self = Self::truncate(0);
 
-    /// The counter of the next update period; after 3 comes 0.
+    /// Returns the counter of the next update period; 0 follows 3.
     #[must_use]
     pub const fn next(self) -> Self {
         Self::truncate(self.get().wrapping_add(1))
@@ -53,7 +53,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Takes byte 0 apart; every value is a header.
+    /// Decodes byte 0; every value is a header.
     pub const fn parse(byte0: u8) -> Self {
         Self {
             response: byte0 & 0x80 != 0,

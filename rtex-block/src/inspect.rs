@@ -1,7 +1,7 @@
-//! For tools: decodes all that can be decoded, lists every finding and guesses the cause.
+//! For tools: decodes everything that can be decoded, lists every finding and guesses the cause.
 //!
-//! A block has no check sum, so nothing here proves that it came over unharmed. What can be said is whether it is
-//! one that an encoder may write: length, C/R, defined codes, a pair that goes together, reserved bits 0.
+//! A block has no check sum, so nothing here proves that it arrived undamaged. This module can only tell whether an encoder
+//! may write such a block: length, C/R, defined codes, a permitted pair of codes, reserved bits 0.
 //!
 //! ```
 //! use rtex_block::inspect::{Cause, inspect};
@@ -38,13 +38,13 @@ use crate::sub::{Command32, Response32, SubCommand, SubResponse};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// All bytes are 0: memory that nothing was written to. As a command it is a NOP, not a servo-off.
+    /// All bytes are 0: memory that was never written. As a command it is a NOP, not a servo-off.
     AllZero,
     /// All bytes are FFh: a bus without a device behind it.
     AllOnes,
     /// The two bytes of each 16-bit word are exchanged.
     SwappedWords16,
-    /// The four bytes of each 32-bit word are in the other order.
+    /// The four bytes of each 32-bit word are in reverse order.
     SwappedWords32,
     /// A 32-byte block in a log of 16-byte blocks, or the other way round.
     OtherSize,
@@ -63,13 +63,13 @@ servowire_core::one_line!(Cause {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Note {
-    /// Servo_On is 1 in a NOP: the drive does not look at it.
+    /// Servo_On is 1 in a NOP: the drive ignores it.
     ServoOnIgnored,
     /// Servo_On is 0 in a NOP: this does not switch the servo off.
     NopIsNotServoOff,
     /// CMD_Error or Sub_CMD_Err: a command was not accepted.
     NotAccepted,
-    /// ERR or Sub_ERR: a command failed while it was executed.
+    /// ERR or Sub_ERR: a command failed during execution.
     FailedToExecute,
     /// Alarm is 1.
     Alarm,
@@ -83,7 +83,7 @@ servowire_core::one_line!(Note {
     Self::Alarm => "alarm";
 });
 
-/// A block that lenient decoding takes.
+/// A block that lenient decoding accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -108,7 +108,7 @@ impl fmt::Display for Message {
 /// The kinds of faults found, as a set.
 pub type Findings = servowire_core::Findings<ErrorClass>;
 
-/// What an inspection found out about a block.
+/// The result of inspecting a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -130,14 +130,14 @@ fn each<T: serde::Serialize, S: serde::Serializer>(list: &[Option<T>], serialize
     serializer.collect_seq(list.iter().flatten())
 }
 
-/// A field with another value than in the block before.
+/// A field whose value differs from that in the previous block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Change {
     /// The field as it is.
     pub field: Field,
-    /// The value that it had; `None` if the block before did not have the field.
+    /// Its previous value; `None` if the previous block did not have the field.
     pub before: Option<Value>,
 }
 
@@ -151,7 +151,7 @@ impl Report {
         self.is_response
     }
 
-    /// Returns whether lenient decoding, and so a drive, takes the block.
+    /// Returns whether lenient decoding, and so a drive, accepts the block.
     pub const fn is_usable(&self) -> bool {
         self.message.is_some()
     }
@@ -161,7 +161,7 @@ impl Report {
         self.error
     }
 
-    /// Every fault of the block, in the order of the checks: each as if the ones before it were corrected.
+    /// Every fault of the block, in the order of the checks: each as if the previous ones were corrected.
     pub fn errors(&self) -> impl Iterator<Item = Error> {
         self.errors.into_iter().flatten()
     }
@@ -176,7 +176,7 @@ impl Report {
         self.cause
     }
 
-    /// The command, or the main half of it, if lenient decoding takes the block.
+    /// The command, or the main half of it, if lenient decoding accepts the block.
     pub const fn command(&self) -> Option<Command> {
         match self.message {
             Some(Message::Command(main) | Message::Command32(Command32 { main, .. })) => Some(main),
@@ -184,7 +184,7 @@ impl Report {
         }
     }
 
-    /// The sub half of a command, if lenient decoding takes the block.
+    /// The sub half of a command, if lenient decoding accepts the block.
     pub const fn sub_command(&self) -> Option<SubCommand> {
         match self.message {
             Some(Message::Command32(Command32 { sub, .. })) => Some(sub),
@@ -192,7 +192,7 @@ impl Report {
         }
     }
 
-    /// The response, or the main half of it, if lenient decoding takes the block.
+    /// The response, or the main half of it, if lenient decoding accepts the block.
     pub const fn response(&self) -> Option<Response> {
         match self.message {
             Some(Message::Response(main) | Message::Response32(Response32 { main, .. })) => Some(main),
@@ -200,7 +200,7 @@ impl Report {
         }
     }
 
-    /// The sub half of a response, if lenient decoding takes the block.
+    /// The sub half of a response, if lenient decoding accepts the block.
     pub const fn sub_response(&self) -> Option<SubResponse> {
         match self.message {
             Some(Message::Response32(Response32 { sub, .. })) => Some(sub),
@@ -208,19 +208,19 @@ impl Report {
         }
     }
 
-    /// Every field, in the order of the block; as far as the bytes go.
+    /// Returns every field that the bytes contain, in the order of the block.
     pub fn fields(&self) -> impl Iterator<Item = Field> {
         self.fields.iter()
     }
 
-    /// What the reader should know.
+    /// Returns what the reader should know.
     pub fn notes(&self) -> impl Iterator<Item = Note> {
         self.notes.into_iter().flatten()
     }
 
-    /// The fields that are new or have another value than in `before`, each with the value it had.
+    /// Returns the fields that are new or whose value differs from that in `before`, each with its previous value.
     ///
-    /// Blocks of opposite direction have no field in common but those of bytes 0 and 1.
+    /// Blocks of opposite directions have only the fields of bytes 0 and 1 in common.
     pub fn changes(&self, before: &Self) -> impl Iterator<Item = Change> {
         self.fields.iter().filter_map(move |field| {
             let old = before.fields.iter().find(|old| old.name == field.name).map(|old| old.value);
@@ -283,7 +283,7 @@ fn lenient(bytes: &[u8]) -> Option<Message> {
     .ok()
 }
 
-/// Decodes strictly, mends what is reported, and decodes again.
+/// Decodes strictly, repairs what is reported, and decodes again.
 fn errors(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
     let mut copy = [0; LEN32];
     let mut found = [None; MOST_FINDINGS];
@@ -302,7 +302,7 @@ fn errors(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
     found
 }
 
-/// Changes the bits that an error names, so that the check passes and no other layout applies than must.
+/// Changes the bits that an error names, so that the check passes, and changes the layout only if necessary.
 fn mend(block: &mut [u8], error: Error) -> bool {
     let (byte, clear, set) = match error {
         Error::Reserved { byte, bits } => (byte, bits, 0),

@@ -17,9 +17,9 @@ use crate::type_code::{Nibble, TypeCode, homing, parameter};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Arguments {
-    /// What the command is about.
+    /// The object of the command.
     pub type_code: TypeCode,
-    /// Which one of it.
+    /// The index within the object.
     pub index: u16,
     /// Setting_Data of a parameter command, otherwise Command_Data3 (feed-forward by Pr7.35, else 0).
     pub data: i32,
@@ -33,7 +33,7 @@ pub struct Arguments {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum NonCyclicCommand {
-    /// 0h: nothing is asked.
+    /// 0h: no request.
     Normal {
         /// Bytes 8-11, free.
         command_data2: i32,
@@ -80,7 +80,7 @@ impl NonCyclicCommand {
     /// No request and no feed-forward.
     pub const IDLE: Self = Self::Normal { command_data2: 0, command_data3: 0 };
 
-    /// The code that goes into bits 3-0 of byte 1.
+    /// Returns the code for bits 3-0 of byte 1.
     pub const fn code(&self) -> NonCyclicCode {
         match self {
             Self::Normal { .. } => NonCyclicCode::Normal,
@@ -94,8 +94,8 @@ impl NonCyclicCommand {
         }
     }
 
-    /// Whether bytes 12-15 belong to the command itself, so that no feed-forward can be sent: homing types 21h and 22h,
-    /// parameter write (011h), profile. SX-DSV02310, "Feed-forward".
+    /// Returns whether bytes 12-15 belong to the command itself, so that no feed-forward can be sent: homing types 21h and
+    /// 22h, parameter write (011h), profile. SX-DSV02310, "Feed-forward".
     pub(crate) const fn needs_data3(&self) -> bool {
         match self {
             Self::Homing { type_code: homing::SET_ACTUAL_POSITION | homing::SET_COMMAND_POSITION, .. }
@@ -105,7 +105,7 @@ impl NonCyclicCommand {
         }
     }
 
-    /// With a feed-forward in bytes 12-15, unless it is 0 or the command needs them itself.
+    /// Puts a feed-forward into bytes 12-15, unless it is 0 or the command needs them itself.
     #[must_use]
     pub fn with_feed_forward(self, value: i32) -> Self {
         if value == 0 || self.needs_data3() {
@@ -145,7 +145,7 @@ impl NonCyclicCommand {
         }
     }
 
-    /// Reads bytes 8-15 by the code; reserved bits are not looked at.
+    /// Reads bytes 8-15 by the code; reserved bits are ignored.
     pub const fn parse(code: NonCyclicCode, bytes: [u8; 8]) -> Self {
         let [b8, b9, b10, b11, d @ ..] = bytes;
         let data = i32::from_le_bytes(d);

@@ -25,7 +25,7 @@ pub struct Results {
     pub type_code: TypeCode,
     /// Index_Echo.
     pub index: u16,
-    /// Monitor_Data; of a system ID see [`Results::characters`].
+    /// Monitor_Data; for a system ID see [`Results::characters`].
     pub data: i32,
 }
 
@@ -42,7 +42,7 @@ impl Results {
         AlarmAndWarning { alarm: Alarm { main, sub }, warning: u16::from_le_bytes([low, high]) }
     }
 
-    /// The data of an alarm answer: what [`alarm`](Self::alarm) reads.
+    /// Returns the data of an alarm answer, which [`alarm`](Self::alarm) reads.
     ///
     /// ```
     /// use rtex_block::{Alarm, Results};
@@ -54,7 +54,7 @@ impl Results {
     }
 }
 
-/// What an alarm answer says in bytes 12-15.
+/// The content of bytes 12-15 of an alarm answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -137,7 +137,7 @@ pub enum NonCyclicResponse {
 }
 
 impl NonCyclicResponse {
-    /// Reads bytes 8-15 by CMD_Error and the echoed code; reserved bits are not looked at.
+    /// Reads bytes 8-15 by CMD_Error and the echoed code; reserved bits are ignored.
     pub(crate) const fn parse(cmd_error: bool, noncyclic_bits: u8, bytes: [u8; 8]) -> Self {
         let [b8, b9, b10, b11, d @ ..] = bytes;
         if cmd_error {
@@ -287,7 +287,7 @@ impl fmt::Display for NonCyclicResponse {
     }
 }
 
-/// Flags after a blank, if any is set.
+/// Writes the flags after a blank, if any is set.
 fn suffix(f: &mut fmt::Formatter<'_>, flags: &(impl fmt::Display + bitflags::Flags)) -> fmt::Result {
     if flags.is_empty() { Ok(()) } else { write!(f, " {flags}") }
 }

@@ -1,21 +1,21 @@
 //! Blocks on a 16- or 32-bit bus.
 //!
-//! The words are numbers: the byte that goes out first is in bits 7-0 of the first word, on every host. Only the
-//! picture of a word in the host's memory depends on its byte order, so packing is done with shifts and never by
-//! looking at the same memory as bytes and as words. System Design Guide for Master, figure of the byte order.
+//! The words are numbers: the byte that goes out first is in bits 7-0 of the first word, on every host. Only the layout of
+//! a word in the host's memory depends on its byte order, so packing uses shifts and never reads the same memory both as
+//! bytes and as words. System Design Guide for Master, figure of the byte order.
 //!
 //! ```text
 //! 32-bit word k   byte 4k+3 | byte 4k+2 | byte 4k+1 | byte 4k
 //! 16-bit word k                           byte 2k+1 | byte 2k
 //! ```
 //!
-//! Three things that a host has to see to itself: the memory of the ASIC must not be cached, and a write buffer must be
-//! emptied before the ASIC is told to go on; on a host whose addresses count 16-bit units (TMS320F28388) every address of the
-//! ASIC, which the vendor gives in bytes, is halved. System Design Guide for Master, notes on the host.
+//! A host has to ensure three things itself. The memory of the ASIC must not be cached; a write buffer must be emptied
+//! before the ASIC is told to continue; and on a host whose addresses count 16-bit units (TMS320F28388), every address of
+//! the ASIC, which the vendor gives in bytes, is halved. System Design Guide for Master, notes on the host.
 //!
-//! The words are written to where the caller wants them, for one block or for the memory of a whole ring.
+//! The words are written to memory of the caller, for one block or for a whole ring.
 
-/// The two sides do not have the same size.
+/// The words and the bytes do not have the same size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -38,10 +38,10 @@ mod sealed {
 pub trait Word: Copy + Default + sealed::Sealed {
     /// Bytes of a word.
     const BYTES: usize;
-    /// A word of as many bytes; 0 for any other number of them.
+    /// Creates a word from exactly that many bytes; 0 for any other number of bytes.
     #[doc(hidden)]
     fn load(bytes: &[u8]) -> Self;
-    /// Into as many bytes; nothing happens with any other number of them.
+    /// Writes the word into exactly that many bytes; does nothing for any other number of bytes.
     #[doc(hidden)]
     fn store(self, bytes: &mut [u8]);
 }
@@ -78,7 +78,7 @@ words!(u8, u16, u32);
 /// ```
 ///
 /// # Errors
-/// [`SizeMismatch`] unless the words hold just these bytes; nothing is written then.
+/// [`SizeMismatch`] unless the words hold exactly these bytes; nothing is written.
 pub fn to_words<W: Word>(bytes: &[u8], words: &mut [W]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), W::BYTES)?;
     for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(W::BYTES)) {
@@ -90,7 +90,7 @@ pub fn to_words<W: Word>(bytes: &[u8], words: &mut [W]) -> Result<(), SizeMismat
 /// Unpacks words into bytes.
 ///
 /// # Errors
-/// [`SizeMismatch`] unless the words hold just these bytes; nothing is written then.
+/// [`SizeMismatch`] unless the words hold exactly these bytes; nothing is written.
 pub fn from_words<W: Word>(words: &[W], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), W::BYTES)?;
     for (chunk, word) in bytes.chunks_exact_mut(W::BYTES).zip(words) {

@@ -2,14 +2,14 @@
 
 use servowire_core::OutOfRange;
 
-/// Step from one position to the next, the short way round: 7FFFFFFFh to 80000000h is a step of +1.
+/// Returns the step from one position to the next, the short way round: 7FFFFFFFh to 80000000h is a step of +1.
 ///
 /// SX-DSV02310, "Command error protection".
 pub const fn step(old: i32, new: i32) -> i32 {
     new.wrapping_sub(old)
 }
 
-/// Electronic gear: encoder pulses a command unit.
+/// Electronic gear: encoder pulses per command unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(
@@ -26,7 +26,7 @@ impl Gear {
     /// 1/1.
     pub const UNITY: Self = Self { numerator: 1, denominator: 1 };
 
-    /// `None` if either is 0.
+    /// Creates the gear; `None` if either number is 0.
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         if numerator == 0 || denominator == 0 { None } else { Some(Self { numerator, denominator }) }
     }
@@ -50,9 +50,9 @@ impl From<Gear> for (u32, u32) {
 /// Largest rate of command pulses after the electronic gear, pulses per second.
 pub const MAX_PULSES_PER_S: u32 = 400_000_000;
 
-/// Largest step of the command position in an update period, command units, rounded down.
+/// Returns the largest step of the command position in an update period, command units, rounded down.
 ///
-/// A larger one is alarm Err27.4; so is one above the over-speed level of the drive, which is lower as a rule.
+/// A larger step raises alarm Err27.4. So does a step above the over-speed level of the drive, which is usually lower.
 /// At gear 1/1 and 0.5 ms it is 200 000. SX-DSV02310, "Command error protection".
 pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
     let (pulses, per_unit) = limit(update_ns, gear);
@@ -92,11 +92,11 @@ pub(crate) const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
     quotient((units_per_s as u128).wrapping_mul(update_ns as u128), 1_000_000_000)
 }
 
-/// Largest torque command in 0.1 % of rated, rounded down, from the parameters of a linear drive: `peak` is Pr9.07 (peak
-/// current) and `rated` Pr9.06 (rated current, r.m.s.), both in 0.1 A. `None` if `rated` is 0.
+/// Returns the largest torque command in 0.1 % of rated, rounded down, from the parameters of a linear drive: `peak` is
+/// Pr9.07 (peak current) and `rated` Pr9.06 (rated current, r.m.s.), both in 0.1 A. `None` if `rated` is 0.
 ///
-/// 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is lost in the text at hand and follows
-/// from a peak over an r.m.s. value.
+/// 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is lost in the available text; it
+/// follows from the ratio of a peak to an r.m.s. value.
 pub fn max_torque(peak: u16, rated: u16) -> Option<u32> {
     let thousandfold = u128::from(peak).saturating_mul(1_000);
     let squared = thousandfold.saturating_mul(thousandfold);

@@ -13,7 +13,7 @@ use crate::status::StatusFlags;
 /// byte 0        1                   2   3         4 .. 7           8 .. 15
 ///      header   CMD_Error | code    Status_Flags  Response_Data1   by CMD_Error, then the code: [`NonCyclicResponse`]
 /// ```
-/// The constructor checks length and direction, after that no getter can fail. System Design Guide for Master,
+/// The constructor checks length and direction; after that no getter can fail. System Design Guide for Master,
 /// "Data structure"; SX-DSV02310, "Response data block".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResponseBlock<'a>(&'a [u8; LEN]);
@@ -46,7 +46,7 @@ impl<'a> ResponseBlock<'a> {
         Header::parse(self.0[0]).mac_id
     }
 
-    /// Update_Counter_Echo; it is back with the next reception, one command earlier than the echo of the code.
+    /// Update_Counter_Echo; it comes back with the next reception, one command earlier than the echo of the code.
     pub const fn update_counter_echo(self) -> UpdateCounter {
         Header::parse(self.0[0]).update_counter
     }
@@ -78,12 +78,12 @@ impl<'a> ResponseBlock<'a> {
         tail
     }
 
-    /// What bytes 8-15 say.
+    /// Bytes 8-15, decoded.
     pub const fn noncyclic(self) -> NonCyclicResponse {
         NonCyclicResponse::parse(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
     }
 
-    /// Everything at once.
+    /// Decodes everything at once.
     pub const fn to_owned(self) -> Response {
         let [_, _, _, _, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15] = *self.0;
         Response {
@@ -112,7 +112,7 @@ impl<'a> ResponseBlock<'a> {
 
 /// A response as values, one for one with the 128 bits: `emit` after `parse` gives back the same bytes.
 ///
-/// Bytes 8-15 stay two words, which is what they are in the cyclic case; [`noncyclic`](Self::noncyclic) reads them by
+/// Bytes 8-15 stay two words, as in the cyclic case; [`noncyclic`](Self::noncyclic) reads them by
 /// CMD_Error and code.
 ///
 /// ```
@@ -149,13 +149,13 @@ pub struct Response {
 }
 
 impl Response {
-    /// What bytes 8-15 say.
+    /// Bytes 8-15, decoded.
     pub const fn noncyclic(&self) -> NonCyclicResponse {
         NonCyclicResponse::parse(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
     }
 
-    /// With other bytes 8-15, for a simulated drive. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by every
-    /// other value, whose layout must be the one of [`code`](Self::code).
+    /// Replaces bytes 8-15, for a simulated drive. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by
+    /// every other value, whose layout must be the one of [`code`](Self::code).
     ///
     /// ```
     /// use rtex_block::{ErrorCode, NonCyclicResponse, Response};
@@ -193,7 +193,7 @@ impl Response {
         }
     }
 
-    /// Decodes a slice that is exactly one block and refuses what no drive should send.
+    /// Decodes a slice that is exactly one block and refuses anything that no drive should send.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CyclicCode`] or [`Error::NonCyclicCode`] (without CMD_Error) and

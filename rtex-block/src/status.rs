@@ -50,7 +50,7 @@ flag_set! {
 }
 
 impl StatusFlags {
-    /// Takes bytes 2 and 3; every bit has a meaning.
+    /// Reads bytes 2 and 3; every bit has a meaning.
     pub const fn from_bytes(bytes: [u8; 2]) -> Self {
         Self::from_bits_retain(u16::from_le_bytes(bytes))
     }

@@ -1,6 +1,6 @@
 //! `nom` streaming parsers for logs in which blocks follow each other without anything between them.
 //!
-//! Each takes one block from the front and leaves the rest; `Incomplete` tells how many bytes are missing. They
+//! Each takes one block from the front and leaves the rest; `Incomplete` says how many bytes are missing. They
 //! decode leniently, like the `parse` functions they call.
 
 use nom::error::{FromExternalError, ParseError};
@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::response::Response;
 use crate::sub::{Command32, Response32};
 
-/// A 16-byte command block.
+/// Reads a 16-byte command block.
 pub fn command<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Command, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
@@ -21,7 +21,7 @@ where
     unit(input, LEN, Command::parse)
 }
 
-/// A 16-byte response block.
+/// Reads a 16-byte response block.
 pub fn response<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Response, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
@@ -29,7 +29,7 @@ where
     unit(input, LEN, Response::parse)
 }
 
-/// A 32-byte command block.
+/// Reads a 32-byte command block.
 pub fn command32<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Command32, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
@@ -37,7 +37,7 @@ where
     unit(input, LEN32, Command32::parse)
 }
 
-/// A 32-byte response block.
+/// Reads a 32-byte response block.
 ///
 /// ```
 /// use rtex_block::stream;
@@ -55,7 +55,7 @@ where
     unit(input, LEN32, Response32::parse)
 }
 
-/// What a log holds of one exchange with one drive.
+/// What a log contains for one exchange with one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pair {
@@ -67,7 +67,7 @@ pub struct Pair {
 
 servowire_core::one_line!(Pair { Self { command, response } => "{}; {}", command, response; });
 
-/// The command and response of one exchange with one drive, in this order.
+/// Reads the command and response of one exchange with one drive, in this order.
 pub fn pair<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Pair, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,

@@ -28,14 +28,14 @@ servowire_core::codes! {
 /// byte 16               17              18 19      20 .. 23            24 .. 27            28 .. 31
 ///  Sub_Chk = 1 | code   Sub_Type_Code   Sub_Index  Sub_Command_Data1   Sub_Command_Data2   Sub_Command_Data3
 /// ```
-/// SX-DSV02310, "Command data block, 32-byte mode". There is no view of it: with all fields in fixed places,
-/// decoding it takes only the loads.
+/// SX-DSV02310, "Command data block, 32-byte mode". There is no view of it: all fields are at fixed places, so decoding
+/// costs only the loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SubCommand {
-    /// What is asked.
+    /// The request.
     pub code: SubCode,
     /// Sub_Type_Code: new codes only.
     pub type_code: u8,
@@ -50,7 +50,7 @@ pub struct SubCommand {
 }
 
 impl SubCommand {
-    /// Nothing is asked.
+    /// No request.
     pub const IDLE: Self = Self { code: SubCode::Normal, type_code: 0, index: 0, data1: 0, data2: 0, data3: 0 };
 
     /// Reads bytes 16-31.
@@ -131,7 +131,7 @@ impl SubResponse {
         bytes(flags | self.code.get(), self.type_code, self.index, [self.data1, self.data2, self.data3])
     }
 
-    /// Sub_Error_Code, if there is one.
+    /// Returns the Sub_Error_Code, if there is one.
     pub const fn error_code(&self) -> Option<ErrorCode> {
         if self.cmd_error { Some(ErrorCode(self.index)) } else { None }
     }
@@ -206,7 +206,7 @@ impl Command32 {
         }
     }
 
-    /// Decodes a slice that is exactly one block and refuses what an encoder must not write.
+    /// Decodes a slice that is exactly one block and refuses anything that an encoder must not write.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CodePair`] and [`Error::Reserved`].
@@ -254,11 +254,11 @@ impl Response32 {
         }
     }
 
-    /// Decodes a slice that is exactly one block and refuses what no drive should send.
+    /// Decodes a slice that is exactly one block and refuses anything that no drive should send.
     ///
     /// # Errors
-    /// As [`parse`](Self::parse), then those of [`Response::parse_strict`], then [`Error::Reserved`] for the bytes
-    /// that Sub_CMD_Err makes 0 and [`Error::SubCommandCode`] for an undefined code without Sub_CMD_Err.
+    /// As [`parse`](Self::parse), then those of [`Response::parse_strict`], then [`Error::Reserved`] for bytes that must be
+    /// 0 with Sub_CMD_Err and [`Error::SubCommandCode`] for an undefined code without Sub_CMD_Err.
     pub fn parse_strict(bytes: &[u8]) -> Result<Self, Error> {
         let response = Self::parse(bytes)?;
         let (main, sub) = split32(bytes)?;

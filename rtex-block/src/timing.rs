@@ -17,7 +17,7 @@ pub struct Periods {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct A6nParameters {
-    /// Pr7.20: -1 makes Pr7.91 count.
+    /// Pr7.20: -1 makes Pr7.91 effective.
     pub pr7_20: i32,
     /// Pr7.21: communication periods in an update period.
     pub pr7_21: u32,
@@ -47,12 +47,12 @@ impl Periods {
         A6nParameters { pr7_20: -1, pr7_21: self.communications(), pr7_91: self.com_ns }
     }
 
-    /// Communication periods by which new commands go out late, if the exchange that writes them ends `end_ns` after the
-    /// start of the frame that began its update period (the falling edge of XSYNC).
+    /// Returns by how many communication periods new commands are sent late, if the exchange that writes them ends `end_ns`
+    /// after the start of the frame that began its update period (the falling edge of XSYNC).
     ///
-    /// 0 as long as the exchange is over before the next frame starts. At the falling edge of XSYNC a frame that is under way
-    /// puts off the switch of the memory banks, so anything later waits for one more frame. System Design Guide for Master,
-    /// "2 communications per calculation".
+    /// 0 as long as the exchange ends before the next frame starts. A frame in progress at the falling edge of XSYNC delays
+    /// the switch of the memory banks, so anything later waits for one more frame. System Design Guide for Master, "2
+    /// communications per calculation".
     pub const fn frames_late(&self, end_ns: u32) -> u32 {
         match end_ns.checked_div(self.com_ns) {
             Some(late) => late,
@@ -60,16 +60,16 @@ impl Periods {
         }
     }
 
-    /// The pair that an A5NL drive uses with these parameters; `None` if SX-DSV02310 does not show it.
+    /// Returns the pair that an A5NL drive uses with these parameters; `None` if SX-DSV02310 does not show it.
     ///
     /// Pr7.20 = 3 is 0.5 ms, 0 is 1/12 ms; that 1/6 ms is Pr7.20 = 1 is inferred.
     pub fn from_a5nl(pr7_20: i32, pr7_21: i32) -> Option<Self> {
         A5NL.into_iter().find(|(a, b, _)| (*a, *b) == (pr7_20, pr7_21)).map(|(_, _, periods)| periods)
     }
 
-    /// The pair that an A6N drive uses with these parameters; `None` if the guide's table does not list it.
+    /// Returns the pair that an A6N drive uses with these parameters; `None` if the guide's table does not list it.
     ///
-    /// Not listed does not mean known to be bad. Pr7.91 is looked at only if Pr7.20 is -1 (inferred; the table
+    /// Not listed does not mean known to be bad. Pr7.91 is evaluated only if Pr7.20 is -1 (inferred; the table
     /// gives Pr7.20 = 3 and 6 without it).
     pub fn from_a6n(pr7_20: i32, pr7_21: i32, pr7_91: Option<i64>) -> Option<Self> {
         let com_ns = match (pr7_20, pr7_21) {
@@ -99,8 +99,8 @@ pub const A6N: [Periods; 11] = [
     Periods::of(62_500, 2, false),
 ];
 
-/// The pairs that SX-DSV02310 shows for the A5NL family, with Pr7.20 and Pr7.21; periods in whole ns, rounded down. It does not
-/// say whether they work with the internal-timer system: here those with one communication per update do.
+/// The pairs that SX-DSV02310 shows for the A5NL family, with Pr7.20 and Pr7.21; periods in whole ns, rounded down. It does
+/// not say whether they work with the internal-timer system; here, the pairs with one communication per update do.
 pub const A5NL: [(i32, i32, Periods); 4] = [
     (3, 2, Periods::of(500_000, 2, false)),
     (3, 1, Periods::of(500_000, 1, true)),
@@ -130,13 +130,13 @@ impl TimerSystem {
         }
     }
 
-    /// Returns whether the receive interrupt goes before the NC interrupt.
+    /// Returns whether the receive interrupt has priority over the NC interrupt.
     pub(crate) const fn reception_first(self) -> bool {
         matches!(self, Self::External)
     }
 }
 
-/// Reload value of a timer that counts `timer_hz` and starts again after `period_ns`: ticks less one.
+/// Returns the reload value of a timer that counts at `timer_hz` and restarts after `period_ns`: ticks less one.
 ///
 /// `None` if the period is not a whole number of ticks, or the value exceeds 32 bits. 50 MHz and 0.5 ms give
 /// 24999, the guide's own example.
@@ -152,8 +152,8 @@ pub fn timer_reload(timer_hz: u32, period_ns: u32) -> Option<u32> {
 /// An estimate of how long a frame takes, as a straight line through two points.
 ///
 /// The guide publishes about 11 us with one axis and about 300 us with 32; everything between is an assumption,
-/// the vendor's own limits of axes per period are not known, and blocks of 32 bytes take longer. Put in measured
-/// times where there are any.
+/// the vendor's own limits of axes per period are not known, and blocks of 32 bytes take longer. Use measured times if you
+/// have any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -172,14 +172,14 @@ impl FrameTime {
     /// Steps from one axis to a full ring.
     const STEPS: u64 = 31;
 
-    /// Estimated time with `axes` axes, ns, rounded; axes count from 1 to 32 and are held at the ends.
+    /// Returns the estimated time with `axes` axes, ns, rounded; `axes` is limited to 1 to 32.
     pub fn estimate_ns(self, axes: u32) -> u64 {
         let more = u64::from(axes.clamp(1, Self::FULL).saturating_sub(1));
         let rise = more.saturating_mul(self.rise()).saturating_mul(2).saturating_add(Self::STEPS);
         u64::from(self.one_ns).saturating_add(rise.checked_div(2 * Self::STEPS).unwrap_or(0))
     }
 
-    /// Axes that fit a communication period by this line, at most 32; 0 if not even one does.
+    /// Returns how many axes fit a communication period by this line, at most 32; 0 if not even one does.
     pub fn axes_within(self, com_ns: u32) -> u32 {
         let Some(room) = com_ns.checked_sub(self.one_ns) else { return 0 };
         let steps = u64::from(room).saturating_mul(Self::STEPS).checked_div(self.rise()).unwrap_or(u64::MAX);

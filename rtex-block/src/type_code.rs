@@ -1,6 +1,6 @@
 //! Type codes, parameter numbers and system ID texts.
 //!
-//! A type code says what a non-cyclic command is about. Every number can be sent and received; constants exist
+//! A type code names the object of a non-cyclic command. Every number can be sent and received; constants exist
 //! for those that SX-DSV02310 confirms. The A5N and A6N families have more of them.
 
 use core::fmt;
@@ -14,7 +14,7 @@ servowire_core::number! {
 }
 
 impl TypeCode {
-    /// A code of 8 bits.
+    /// Creates a code of 8 bits.
     pub const fn short(value: u8) -> Self {
         Self::truncate(value as u16)
     }
@@ -42,7 +42,7 @@ impl Nibble {
 pub mod reset {
     use super::TypeCode;
 
-    /// Software reset of the drive. Switch the servo off first.
+    /// Software reset of the drive. Switch the servo off beforehand.
     pub const SOFTWARE: TypeCode = TypeCode::truncate(0x001);
     /// Makes parameters of attribute C valid without a reset.
     pub const ATTRIBUTE_C: TypeCode = TypeCode::truncate(0x011);
@@ -69,7 +69,7 @@ pub mod system_id {
     /// Model of the external scale.
     pub const SCALE_MODEL_ID: TypeCode = TypeCode::truncate(0x32);
 
-    /// The conventional code for the same text: 10h times the new one. Only for the codes above.
+    /// Returns the conventional code for the same text: 10h times the new one. Only for the codes above.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
         match code.get() {
             0x01 | 0x05 | 0x12..=0x15 | 0x31 | 0x32 => Some(TypeCode::truncate(code.get() << 4)),
@@ -77,7 +77,7 @@ pub mod system_id {
         }
     }
 
-    /// Group `index` of a text: four ASCII characters, filled with NUL after the end.
+    /// Returns group `index` of a text: four ASCII characters, filled with NUL after the end.
     ///
     /// ```
     /// use rtex_block::type_code::system_id::group;
@@ -92,13 +92,13 @@ pub mod system_id {
         group
     }
 
-    /// The characters of a group up to the first NUL; a group that is not full is the last of its text.
+    /// Returns the characters of a group up to the first NUL; a group that is not full is the last of its text.
     pub fn text(group: &[u8; 4]) -> &[u8] {
         let end = group.iter().position(|&c| c == 0).unwrap_or(4);
         group.get(..end).unwrap_or(&[])
     }
 
-    /// What a device-type text means; `None` for what the table calls reserved or does not list.
+    /// Returns the meaning of a device-type text; `None` if the table calls it reserved or does not list it.
     pub fn device_type(text: &[u8]) -> Option<&'static str> {
         Some(match text {
             b"1" => "servo",
@@ -165,7 +165,7 @@ pub mod monitor {
     /// Overload ratio, 0.1 %.
     pub const OVERLOAD: TypeCode = TypeCode::truncate(0x12);
 
-    /// The conventional code for the same value: 100h more. The codes 07h to 0Ch have none.
+    /// Returns the conventional code for the same value: 100h more. The codes 07h to 0Ch have none.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
         match code.get() {
             0x01 | 0x02 | 0x04..=0x06 | 0x11 | 0x12 => Some(TypeCode::truncate(code.get() | 0x100)),
@@ -173,7 +173,7 @@ pub mod monitor {
         }
     }
 
-    /// The abbreviation of a code; `None` if it is not confirmed.
+    /// Returns the abbreviation of a code; `None` if it is not confirmed.
     pub const fn name(code: TypeCode) -> Option<&'static str> {
         Some(match code {
             PERR => "PERR",
@@ -213,7 +213,7 @@ impl fmt::Display for Pr {
 }
 
 impl Pr {
-    /// The parameter of an Index.
+    /// Returns the parameter of an Index.
     pub(crate) const fn from_index(index: u16) -> Self {
         let [number, class] = index.to_le_bytes();
         Self { class, number }

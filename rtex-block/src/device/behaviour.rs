@@ -1,15 +1,15 @@
 use crate::flags::flag_set;
 
 flag_set! {
-    /// What a modelled drive does where the available documents allow it or leave it open.
+    /// What a modelled drive does if the available documents allow it or leave it open.
     pub struct Quirks(u16) {
-        /// Every request is busy for as long as a parameter write.
+        /// Every request is busy for as long as a parameter write would be.
         ALWAYS_BUSY = 1 << 0;
-        /// A request that fails says ERR while it is still busy.
+        /// A request that fails shows ERR while it is still busy.
         ERR_WHILE_BUSY = 1 << 1;
         /// A position can be set with the servo on; otherwise that fails with ERR.
         SETS_POSITION_WHILE_ON = 1 << 2;
-        /// Most parameters count only after a reset of type 011h or 001h.
+        /// Most parameters take effect only after a reset of type 011h or 001h.
         PARAMETERS_AFTER_RESET = 1 << 3;
         /// Homing_Complete is 1 from power-up on, if this is set before the first exchange.
         HOMED_AT_START = 1 << 4;
@@ -19,21 +19,20 @@ flag_set! {
         WARNS = 1 << 6;
         /// An alarm is not cleared by command: that fails with ERR.
         REFUSES_TO_CLEAR = 1 << 7;
-        /// The command that clears an alarm is executed, and the alarm is there all the same.
+        /// The command that clears an alarm is executed, but the alarm stays.
         ALARM_STAYS = 1 << 8;
         /// A homing that starts leaves Homing_Complete as it is; otherwise it is 0 until the end.
         HOMED_THROUGH_HOMING = 1 << 9;
-        /// Homing_Complete goes to 0 with the servo.
+        /// Homing_Complete goes to 0 when the servo is switched off.
         UNHOMED_BY_SERVO_OFF = 1 << 10;
-        /// Homing_Complete goes to 0 with an alarm.
+        /// Homing_Complete goes to 0 when an alarm occurs.
         UNHOMED_BY_ALARM = 1 << 11;
     }
 }
 
-/// How impolite a modelled drive is. A new one is polite: it does everything as soon as it can.
+/// How impolite a modelled drive is. A new behaviour is polite: it does everything as soon as it can.
 ///
-/// Each of them is allowed by what the documents at hand say, or left open by them; a master has to live with any
-/// combination.
+/// Each setting is allowed by the available documents or left open by them, so a master must cope with any combination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -42,7 +41,7 @@ flag_set! {
 pub struct Behaviour {
     /// Exchanges by which everything but the counter echo is later than necessary, 0..=3.
     pub echo_lag: u8,
-    /// Update periods from the start of a profile motion to In_Progress = 1; the axis stands as long.
+    /// Update periods from the start of a profile motion to In_Progress = 1; the axis is at rest until then.
     pub in_progress_late: u16,
     /// Update periods for which Servo_Active stays 1 after Servo_On went to 0.
     pub servo_off_late: u16,
@@ -54,12 +53,12 @@ pub struct Behaviour {
     pub status_late: [u8; 8],
     /// Exchanges by which Latch_Comp1 and 2 are shown later than they become true, 0..=15.
     pub latch_late: u8,
-    /// What else it does.
+    /// Its other quirks.
     pub quirks: Quirks,
 }
 
 impl Behaviour {
-    /// Acts as soon as it can, and without quirks.
+    /// Creates the behaviour of a drive that acts as soon as it can, without quirks.
     pub const fn new() -> Self {
         Self {
             echo_lag: 0,
@@ -82,7 +81,7 @@ impl Behaviour {
         with_quirks: quirks, Quirks;
     }
 
-    /// Whether it does this.
+    /// Returns whether it has this quirk.
     pub(super) const fn does(&self, quirk: Quirks) -> bool {
         self.quirks.contains(quirk)
     }

@@ -5,7 +5,7 @@ use crate::block::BlockSize;
 use crate::error_code::{Alarm, ErrorCode};
 use crate::header::MacId;
 
-/// What a drive finds wrong with the header, the codes and the sub block of a command.
+/// The faults that a drive finds in the header, the codes and the sub block of a command.
 ///
 /// Type code, index, data and the pairing of the codes come later, when the command is executed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -16,12 +16,12 @@ pub struct Verdict {
     pub error: Option<ErrorCode>,
     /// Sub_Error_Code.
     pub sub_error: Option<ErrorCode>,
-    /// The alarm that comes if the fault lasts.
+    /// The alarm raised if the fault lasts.
     pub alarm: Option<Alarm>,
 }
 
 impl Verdict {
-    /// Returns whether the block is discarded and the one before it stays in force.
+    /// Returns whether the block is discarded and the previous one stays in force.
     ///
     /// ```
     /// use rtex_block::{BlockSize, MacId, device::check};
@@ -37,12 +37,11 @@ impl Verdict {
     }
 }
 
-/// The checks of a drive with address `mac_id`, in this order: C/R (0012h), MAC-ID (0011h), cyclic code (0021h),
+/// Makes the checks of a drive with address `mac_id`, in this order: C/R (0012h), MAC-ID (0011h), cyclic code (0021h),
 /// non-cyclic code (0022h); in 32-byte mode also Sub_Chk (0012h) and the sub-command code (0022h).
 ///
-/// Errors and alarms are those of SX-DSV02310, "Command error"; the order between several faults is not documented
-/// and is this crate's. A block of the wrong size cannot happen on the ring; it counts as not addressed to
-/// this drive.
+/// Errors and alarms are those of SX-DSV02310, "Command error"; the order of several faults is not documented; this crate
+/// has chosen it. A block of the wrong size cannot happen on the ring; it counts as not addressed to this drive.
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
     let &[byte0, byte1, ..] = bytes else { return Verdict::discard(WRONG_MAC_ID, ERR86_0) };
     let len = match size {

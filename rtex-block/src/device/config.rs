@@ -3,7 +3,7 @@ use crate::header::MacId;
 use crate::position::Gear;
 use crate::type_code::TypeCode;
 
-/// Numbers of a drive that no available document confirms; the author of a drive model has to choose them.
+/// Codes of a drive that no available document confirms; the author of a drive model has to choose them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -14,13 +14,13 @@ pub struct OpenCodes {
     pub parameter_read: TypeCode,
     /// Parameter: write to the EEPROM.
     pub parameter_store: TypeCode,
-    /// Alarm: the one that is active, and the warning.
+    /// Alarm: read the active alarm and the warning.
     pub alarm_active: TypeCode,
-    /// Alarm: history, the index is 1 (latest) to 14.
+    /// Alarm: read the history; the index is 1 (latest) to 14.
     pub alarm_history: TypeCode,
-    /// Alarm: clear.
+    /// Alarm: clear it.
     pub alarm_clear: TypeCode,
-    /// Alarm: attributes of the one that is being issued, with Index 0.
+    /// Alarm: read the attributes of the present alarm, with Index 0.
     pub alarm_attributes: TypeCode,
     /// Parameter: read the initial value.
     pub parameter_initial: TypeCode,
@@ -28,14 +28,14 @@ pub struct OpenCodes {
     pub parameter_count: TypeCode,
     /// Homing: arm both latches.
     pub latch_arm: u8,
-    /// Homing: a motion of the drive to its origin.
+    /// Homing: move the drive to its origin.
     pub homing: u8,
-    /// The alarm when no frame arrives any longer.
+    /// The alarm raised when frames stop arriving.
     pub communication_lost: Alarm,
 }
 
 impl OpenCodes {
-    /// Invented numbers, for examples and tests in which both ends are this crate's: a real drive has others.
+    /// Invented codes, for examples and tests in which both ends belong to this crate; a real drive has different ones.
     pub const INVENTED: Self = Self {
         profile_absolute: 0x10,
         parameter_read: TypeCode::short(0x10),
@@ -52,7 +52,7 @@ impl OpenCodes {
     };
 }
 
-/// How a modelled drive is set up.
+/// The configuration of a modelled drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -64,7 +64,7 @@ pub struct DriveConfig {
     pub update_ns: u32,
     /// Communication periods in an update period, 1 or 2.
     pub communications: u8,
-    /// Exchanges until it is synchronised to the communication.
+    /// Exchanges until the drive is synchronised to the communication.
     pub sync_exchanges: u16,
     /// Update periods from Servo_On to Servo_Active.
     pub servo_on_updates: u16,
@@ -76,26 +76,26 @@ pub struct DriveConfig {
     pub counter_limit: u16,
     /// Consecutive communication periods without a frame that raise [`OpenCodes::communication_lost`].
     pub lost_limit: u16,
-    /// The motor makes up 1/2^follow of the deviation in each update period, 0..=15.
+    /// The motor makes up 1/2^`follow` of the deviation in each update period; 0..=15.
     pub follow: u8,
     /// Electronic gear, for the limit of the position step.
     pub gear: Gear,
-    /// Command units in a revolution, for speeds in r/min.
+    /// Command units per revolution, for speeds in r/min.
     pub units_per_rev: u32,
     /// In_Position window, command units.
     pub in_position: u32,
     /// Near window of profile motion, command units.
     pub near: u32,
-    /// Attributes that it gives for every alarm.
+    /// Attributes that it reports for every alarm.
     pub alarm_attributes: i32,
-    /// How far the origin is from where homing starts, command units.
+    /// Distance of the origin from the point where homing starts, command units.
     pub homing_distance: i32,
-    /// The numbers that are not confirmed.
+    /// The codes that are not confirmed.
     pub codes: OpenCodes,
 }
 
 impl DriveConfig {
-    /// A polite drive at 0.5 ms, one communication per update, gear 1/1 and 2^20 units per revolution.
+    /// Creates a polite drive at 0.5 ms, one communication per update, gear 1/1 and 2^20 units per revolution.
     pub const fn new(mac_id: MacId, codes: OpenCodes) -> Self {
         Self {
             mac_id,

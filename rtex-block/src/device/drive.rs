@@ -25,14 +25,15 @@ use crate::response::Response;
 /// Command units per second.
 const HOMING_SPEED: i64 = 1_000_000;
 
-/// A model of a drive: in every communication period it hears a command block and returns a response block.
+/// A model of a drive: in every communication period it receives a command block and returns a response block.
 ///
 /// The response to command N carries the counter of command N and everything else as it was after command N - 1,
-/// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
-/// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
+/// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or cyclic code
+/// are discarded and the previous command stays in force; if that lasts, the drive raises Err86.
 ///
-/// It shares neither numbers nor code with the master: blocks are read and written by byte. It is as late, forgetful and
-/// literal as its [`Behaviour`] says, and what goes wrong is its [`Fault`]. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// It shares neither constants nor code with the master: blocks are read and written byte by byte. Its [`Behaviour`] says
+/// how late, forgetful and literal it is, and its [`Fault`] what goes wrong. The motor follows its command position as a
+/// first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
@@ -55,7 +56,7 @@ pub struct Drive {
     /// Byte 2 of the responses, and Latch_Comp, as they would have been without lateness; the latest first.
     shown: [u8; 16],
     comp: [u8; 16],
-    /// Latch_Comp as the next response shows it.
+    /// Latch_Comp as the next response will show it.
     latched: u8,
     /// The command in force: cyclic code, Control_Bits, Command_Data1.
     cyclic: u8,
@@ -64,7 +65,7 @@ pub struct Drive {
     target_speed: i32,
     /// What the next response echoes.
     echo: u8,
-    /// Byte 1 of the block taken last; one that was thrown away does not count.
+    /// Byte 1 of the last block taken; a discarded block does not count.
     taken: u8,
     error: Option<u16>,
     job: Option<Job>,
@@ -73,7 +74,7 @@ pub struct Drive {
     sub: Sub,
     /// The response sent last.
     last: [u8; LEN32],
-    /// Responses that are not out yet.
+    /// Responses not sent yet.
     pending: [Block; 3],
     /// Supervision.
     exchanges: u16,
@@ -86,7 +87,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive that has just got control power; main power is on, and nothing has been received.
+    /// Creates a drive whose control power has just come on; main power is on, and nothing has been received.
     pub const fn new(config: DriveConfig) -> Self {
         let silent = Block::new(config.mac_id.get(), NOP, [0; 2], 0, [0; 8]);
         Self {
@@ -130,8 +131,8 @@ impl Drive {
         }
     }
 
-    /// One exchange: a command block of 16 or 32 bytes comes in, and the response goes out; `None` if the drive is silent. A
-    /// block of any other size does not compile.
+    /// Makes one exchange: takes a command block of 16 or 32 bytes and returns the response; `None` if the drive is silent.
+    /// A block of any other size does not compile.
     ///
     /// ```compile_fail,E0080
     /// # use rtex_block::{MacId, device::{Drive, DriveConfig, OpenCodes}};
@@ -173,7 +174,7 @@ impl Drive {
         Response::parse(&self.hear(&command.emit())?).ok()
     }
 
-    /// A communication period in which no frame came, or a damaged one.
+    /// Passes a communication period in which no frame came, or a damaged one.
     pub fn framing_error(&mut self) {
         self.lost = self.lost.saturating_add(1);
         if self.lost == self.config.lost_limit {
@@ -209,7 +210,7 @@ impl Drive {
         self.alarm
     }
 
-    /// How it was set up.
+    /// Returns its configuration.
     pub const fn config(&self) -> &DriveConfig {
         &self.config
     }
@@ -222,7 +223,7 @@ impl Drive {
         }
     }
 
-    /// Sets its fault from now on, replacing the one before.
+    /// Sets its fault from now on, replacing the previous one.
     pub fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
         match fault {
@@ -232,7 +233,7 @@ impl Drive {
         }
     }
 
-    /// Raises an alarm: the motor is released at once. An alarm that is already there stays.
+    /// Raises an alarm: the motor is released at once. An alarm that is already active stays.
     fn raise(&mut self, alarm: Alarm) {
         if self.alarm.is_none() {
             self.alarm = Some(alarm);
@@ -243,7 +244,7 @@ impl Drive {
         self.motion.release(0);
     }
 
-    /// Clears the active alarm and the counts that lead to the next.
+    /// Clears the active alarm and the counts that lead to the next one.
     pub fn clear_alarm(&mut self) {
         self.alarm = None;
         self.faults = 0;
@@ -260,7 +261,7 @@ impl Drive {
         self.inputs = byte3;
     }
 
-    /// The trigger of latch 1 or 2: catches the actual position, if the latch is armed.
+    /// Triggers latch 1 or 2: catches the actual position, if the latch is armed.
     pub fn trigger(&mut self, latch: usize) {
         let actual = self.motion.actual;
         let places = self.armed.iter_mut().zip(&mut self.latches);
@@ -294,7 +295,7 @@ impl Drive {
         set.into_iter().fold(0, |all, (flag, on)| if on { all | flag } else { all })
     }
 
-    /// Byte 2 as this response shows it: each bit from as many exchanges ago as it is late.
+    /// Byte 2 as this response shows it: each bit is delayed by its own number of exchanges.
     fn shown(&mut self) -> u8 {
         let (now, comp) = (self.status(), self.latch_flags());
         for (past, new) in [(&mut self.shown, now), (&mut self.comp, comp)] {
@@ -307,7 +308,8 @@ impl Drive {
         bits.fold(0, |all, (late, bit)| all | ago(&self.shown, late) & 1_u8.wrapping_shl(bit))
     }
 
-    /// The response while the block with this byte 0 comes in: its counter, everything else as it was before.
+    /// Returns the response sent while the block with this byte 0 comes in: it has the block's counter, and everything else
+    /// as it was before.
     fn response(&mut self, byte0: u8) -> [u8; LEN] {
         let shown = self.shown();
         let [response_data1, ..] = self.response_data();
@@ -343,7 +345,7 @@ impl Drive {
         }
     }
 
-    /// A step per update period as a speed in the unit of Pr7.25.
+    /// Converts a step per update period to a speed in the unit of Pr7.25.
     fn speed(&self, step: i32) -> i32 {
         let scale = if self.parameters.value(SPEED_UNIT) == 0 { 60_000_000_000 } else { 1_000_000_000 };
         let per = if self.parameters.value(SPEED_UNIT) == 0 { self.config.units_per_rev } else { 1 };
@@ -352,7 +354,7 @@ impl Drive {
         saturated(speed)
     }
 
-    /// A speed in the unit of Pr7.25 as command units per second.
+    /// Converts a speed in the unit of Pr7.25 to command units per second.
     fn units_per_second(&self, speed: i32) -> i64 {
         let speed = i64::from(speed);
         if self.parameters.value(SPEED_UNIT) == 0 {
@@ -377,7 +379,7 @@ impl Drive {
         self.tick();
     }
 
-    /// The block is thrown away; an undefined code is echoed as it came.
+    /// Discards the block; an undefined code is echoed as received.
     fn discard(&mut self, main: &[u8; LEN], sub: Option<[u8; LEN]>, verdict: Verdict, alarm: Alarm) {
         if let Some(code) = verdict.error {
             self.echo = main[1];
@@ -446,7 +448,7 @@ impl Drive {
         }
     }
 
-    /// The end of a communication period; at the end of an update period the axis moves.
+    /// Ends a communication period; at the end of an update period the axis moves.
     fn tick(&mut self) {
         self.communication = self.communication.saturating_add(1);
         if self.communication < self.config.communications {

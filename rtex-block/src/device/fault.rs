@@ -1,7 +1,7 @@
 use crate::error_code::Alarm;
 use crate::header::MacId;
 
-/// What a modelled drive is made to do wrong, one thing at a time.
+/// The fault that a modelled drive is made to show, one at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -10,19 +10,19 @@ pub enum Fault {
     /// Nothing. An alarm that was raised stays until it is cleared.
     #[default]
     None,
-    /// It is off the ring: it hears no frame and sends none.
+    /// It is off the ring: it receives no frame and sends none.
     Silent,
-    /// Its processing stands still: it sends its last block again and again, and hears nothing.
+    /// Its processing has stopped: it sends its last block again and again, and receives nothing.
     StaleEcho,
-    /// It sends another Actual_MAC-ID than the address that it hears.
+    /// It sends an Actual_MAC-ID different from the address to which it responds.
     WrongMacId(MacId),
-    /// The main power is gone: the motor is released, and the drive is not ready.
+    /// The main power has failed: the motor is released, and the drive is not ready.
     NoMainPower,
     /// Emergency stop: the motor is released without an alarm, the drive is not ready, and E-STOP is 1.
     EmergencyStop,
     /// The motor is released once, without an alarm; Servo_Ready stays 1.
     ServoDrop,
-    /// It raises this alarm once, and releases the motor. An alarm that is already there stays.
+    /// It raises this alarm once, and releases the motor. An alarm that is already active stays.
     Alarm(Alarm),
 }
 

@@ -1,4 +1,4 @@
-//! Numbers of the wire, once more: the drive shares none with the master.
+//! The numbers on the wire, written a second time: the drive shares none with the master.
 
 /// Cyclic codes, bits 6-4 of byte 1.
 pub(super) const NOP: u8 = 0;
@@ -74,7 +74,7 @@ pub(super) const TEXTS: [(u16, u16, &[u8]); 8] = [
     (0x32, 0x320, b"SCALE MODEL"),
 ];
 
-/// Control bits that the drive looks at, byte 2 in bits 7-0.
+/// Control bits that the drive evaluates, byte 2 in bits 7-0.
 pub(super) const SERVO_ON: u16 = 0x0080;
 pub(super) const PAUSE: u16 = 0x2000;
 pub(super) const SMOOTH_STOP: u16 = 0x4000;
@@ -93,7 +93,7 @@ pub(super) const SHOWN_HOMED: u8 = 0x04;
 pub(super) const SHOWN_IN_PROGRESS: u8 = 0x02;
 pub(super) const SHOWN_IN_POSITION: u8 = 0x01;
 
-/// Byte 9 of an answer: how far it is, and by the layout the latches and the near window.
+/// Byte 9 of an answer: its progress and, depending on the layout, the latches and the near window.
 pub(super) const ERR: u8 = 0x80;
 pub(super) const WNG: u8 = 0x40;
 pub(super) const BUSY: u8 = 0x10;

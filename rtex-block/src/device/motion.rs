@@ -10,17 +10,17 @@ const TORQUE_PER_STEP: i32 = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Power {
-    /// Not energised, standing.
+    /// Not energised, at rest.
     Off,
     /// Servo_On was seen.
     SwitchingOn { left: u16 },
     /// Energised.
     On,
-    /// Not energised, slowing down on the dynamic brake. Servo_Active may still say otherwise.
+    /// Not energised, slowing down on the dynamic brake. Servo_Active may still be 1.
     Braking,
 }
 
-/// What the motor shall do in an update period.
+/// What the motor has to do in an update period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Drivemode {
     /// Follow this command position.
@@ -90,7 +90,7 @@ impl Motion {
         self.start_in = late;
     }
 
-    /// A motion of the drive's own: an instant one will do.
+    /// Moves by the drive itself; the model does so in an instant.
     pub(super) const fn home(&mut self, distance: i32) {
         self.start(Generator::new(distance), 0);
     }
@@ -100,7 +100,7 @@ impl Motion {
         self.command.wrapping_sub(self.actual)
     }
 
-    /// Takes the current off the motor; Servo_Active stays 1 for `late` update periods.
+    /// De-energises the motor; Servo_Active stays 1 for `late` update periods.
     pub(super) fn release(&mut self, late: u16) {
         if self.is_active() {
             self.power = Power::Braking;
@@ -111,7 +111,7 @@ impl Motion {
         self.profile = None;
     }
 
-    /// Servo_On as the drive sees it.
+    /// Takes Servo_On as the drive sees it.
     pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig, off_late: u16) {
         match (servo_on, self.power) {
             (false, _) => self.release(off_late),
@@ -120,13 +120,13 @@ impl Motion {
         }
     }
 
-    /// Puts the coordinates.
+    /// Sets the coordinates.
     pub(super) const fn shift(&mut self, by: i32) {
         self.command = self.command.wrapping_add(by);
         self.actual = self.actual.wrapping_add(by);
     }
 
-    /// One update period; `false` if the position command makes too large a step.
+    /// Runs one update period; returns `false` if the position command makes too large a step.
     pub(super) fn update(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, config: &DriveConfig) -> bool {
         self.says_active = self.says_active.saturating_sub(1);
         match self.power {
@@ -195,7 +195,7 @@ impl Motion {
         true
     }
 
-    /// One update period of a profile motion that is being stopped.
+    /// Runs one update period of a profile motion that is being stopped.
     pub(super) fn stop_profile(&mut self, smooth: bool, ramp: Ramp, config: &DriveConfig) {
         let advance = match &mut self.profile {
             Some(generator) if smooth => generator.brake(ramp, config.update_ns),

@@ -13,7 +13,7 @@ pub(super) const SUB_FEED_FORWARD: [u16; 2] = [0x0724, 0x0725];
 pub(super) const ACCELERATION: u16 = 0x0801;
 pub(super) const DECELERATION: u16 = 0x0804;
 
-/// A parameter: the value that counts, and the one that was written.
+/// A parameter: the value in effect, and the value written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Parameter {
@@ -26,7 +26,7 @@ const fn of(pr: u16, value: i32) -> Parameter {
     Parameter { pr, value, written: value }
 }
 
-/// The parameters that the model looks at.
+/// The parameters that the model uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Parameters([Parameter; 12]);
@@ -47,12 +47,12 @@ impl Parameters {
         of(DECELERATION, 1_000),
     ]);
 
-    /// What was written to it, whether it counts or not; `None` if there is no such parameter.
+    /// Returns the value written, whether it is in effect or not; `None` if there is no such parameter.
     pub(super) fn written(&self, pr: u16) -> Option<i32> {
         self.0.iter().find(|parameter| parameter.pr == pr).map(|parameter| parameter.written)
     }
 
-    /// What counts, of a parameter that is in the table.
+    /// Returns the value in effect of a parameter that is in the table.
     pub(super) fn value(&self, pr: u16) -> i32 {
         self.0.iter().find(|parameter| parameter.pr == pr).map_or(0, |parameter| parameter.value)
     }
@@ -64,7 +64,7 @@ impl Parameters {
         i32::try_from(all).ok().filter(|all| *all > 0)
     }
 
-    /// Whether there is such a parameter.
+    /// Whether the parameter exists.
     pub(super) fn set(&mut self, pr: u16, value: i32, at_once: bool) -> bool {
         let Some(parameter) = self.0.iter_mut().find(|parameter| parameter.pr == pr) else { return false };
         parameter.written = value;
@@ -74,7 +74,7 @@ impl Parameters {
         true
     }
 
-    /// What was written counts from now on.
+    /// Makes the written values take effect.
     pub(super) fn take_over(&mut self) {
         for parameter in &mut self.0 {
             parameter.value = parameter.written;

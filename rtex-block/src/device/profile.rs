@@ -5,7 +5,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Generator {
-    /// Command units still to go, signed.
+    /// Remaining command units, signed.
     to_go: i64,
     speed_milli: i64,
     fraction_nano: i64,
@@ -30,8 +30,8 @@ impl Generator {
         self.to_go
     }
 
-    /// One update period towards the target with at most `speed` units per second; gives the step of the command
-    /// position, and whether the target is reached. Speed 0 brings the axis to a stand and keeps it there.
+    /// Runs one update period towards the target with at most `speed` units per second; returns the step of the command
+    /// position, and whether the target is reached. Speed 0 brings the axis to rest and keeps it there.
     pub(super) fn step(&mut self, speed: i64, ramp: Ramp, update_ns: u32) -> (i32, bool) {
         if self.to_go == 0 {
             return (0, true);
@@ -55,7 +55,7 @@ impl Generator {
         (i32::try_from(step).unwrap_or(i32::MAX), self.to_go == 0)
     }
 
-    /// One update period of slowing down; gives the step, and whether the axis stands.
+    /// Runs one update period of slowing down; returns the step, and whether the axis is at rest.
     pub(super) fn brake(&mut self, ramp: Ramp, update_ns: u32) -> (i32, bool) {
         let (step, reached) = self.step(0, ramp, update_ns);
         (step, reached || self.speed_milli == 0)

@@ -1,4 +1,4 @@
-//! The blocks as the drive reads and writes them, byte by byte: nothing of it is shared with the master's codec.
+//! The blocks as the drive reads and writes them, byte by byte: it shares nothing with the master's codec.
 
 use super::literals::{BUSY, ERR, HOMING, PROFILE, WNG};
 
@@ -11,7 +11,7 @@ pub(super) struct Request {
 }
 
 impl Request {
-    /// Homing and profile have a type code of 8 bits and flags beside it, the others one of 12 bits.
+    /// Homing and profile have a type code of 8 bits and flags beside it; the other codes have a type code of 12 bits.
     const fn is_short(&self) -> bool {
         matches!(self.code, HOMING | PROFILE)
     }
@@ -37,7 +37,7 @@ impl Request {
         i32::from_le_bytes([a, b, c, d])
     }
 
-    /// The same command about something else.
+    /// The same command for a different object.
     pub(super) const fn other(mut self, by_index: bool) -> Self {
         if by_index {
             self.bytes[2] ^= 1;
@@ -47,7 +47,7 @@ impl Request {
         self
     }
 
-    /// Bytes 8-15 of the answer. `flags` are Latch_Comp and the profile flags where the layout has them.
+    /// Bytes 8-15 of the answer. `flags` are Latch_Comp and the profile flags, if the layout has them.
     pub(super) const fn answer(&self, execution: Execution, index: u16, flags: u8, data: i32) -> [u8; 8] {
         let [type_low, type_high, ..] = self.bytes;
         let low_nibble = if self.is_short() { flags } else { type_high & 0x0f };
@@ -73,7 +73,7 @@ impl Execution {
     }
 }
 
-/// Two numbers as bytes 8-15.
+/// Returns two numbers as bytes 8-15.
 pub(super) const fn pair(one: i32, two: i32) -> [u8; 8] {
     let ([a, b, c, d], [e, f, g, h]) = (one.to_le_bytes(), two.to_le_bytes());
     [a, b, c, d, e, f, g, h]
@@ -98,14 +98,14 @@ impl Block {
         Self([0x80 | mac_id, byte1, two, three, a, b, c, d, e, f, g, h, i, j, k, l])
     }
 
-    /// With the Update_Counter of a command's byte 0.
+    /// Sets the Update_Counter of a command's byte 0.
     pub(super) const fn with_counter_of(mut self, byte0: u8) -> [u8; 16] {
         self.0[0] |= byte0 & 0x60;
         self.0
     }
 }
 
-/// What the sub block of the next response says, but for Sub_Response_Data2 and 3.
+/// The content of the next response's sub block, except Sub_Response_Data2 and 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Sub {

@@ -28,8 +28,8 @@ pub enum Value {
     Code(Code),
     /// Error_Code or Sub_Error_Code.
     Error(ErrorCode),
-    /// Bytes 12-15 of an alarm answer. Which type codes ask for alarm and warning, and which for attributes, is in the manual
-    /// of the drive.
+    /// Bytes 12-15 of an alarm answer. The manual of the drive says which type codes ask for alarm and warning, and which
+    /// for attributes.
     AlarmData([u8; 4]),
     /// Four characters of a text.
     Text([u8; 4]),
@@ -71,10 +71,10 @@ pub struct Field {
     pub value: Value,
 }
 
-/// The most that a block has: 4 of bytes 0-1, 16 flags, 1, 11 of a profile answer, 10 of the sub block.
+/// The most fields that a block has: 4 of bytes 0-1, 16 flags, 1, 11 of a profile answer, 10 of the sub block.
 const MOST: usize = 42;
 
-/// The fields of a block, in its order.
+/// The fields of a block, in the order of the block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fields([Option<Field>; MOST]);

@@ -1,4 +1,4 @@
-//! A whole log of blocks: what no single block shows.
+//! Inspects a whole log, for findings that no single block shows.
 
 mod finding;
 mod shape;
@@ -26,7 +26,7 @@ pub struct LogAnalysis {
 }
 
 impl LogAnalysis {
-    /// With the update period in ns, if it is known: for the limit of the position step at this gear.
+    /// Starts a log. `update_ns` is the update period, if it is known; it and `gear` give the limit of the position step.
     pub const fn new(update_ns: Option<u32>, gear: Gear) -> Self {
         let max_step = match update_ns {
             Some(update_ns) => Some(max_step(update_ns, gear)),
@@ -35,7 +35,7 @@ impl LogAnalysis {
         Self { max_step, tracks: [Track::NEW; MacId::COUNT] }
     }
 
-    /// Takes the next block; of 32 bytes, the main half is inspected. Returns what it shows, in at most five findings.
+    /// Takes the next block; of 32 bytes, the main half is inspected. Returns at most five findings.
     pub fn block(&mut self, bytes: &[u8]) -> impl Iterator<Item = LogFinding> + use<> {
         let mut found = [None; 5];
         if let Some(main) = bytes.first_chunk::<LEN>() {
@@ -48,7 +48,7 @@ impl LogAnalysis {
         found.into_iter().flatten()
     }
 
-    /// What in the log needs attention, drive by drive.
+    /// Returns what needs attention in the log, drive by drive.
     pub fn troubles(&self) -> impl Iterator<Item = DriveTrouble> {
         let answered = self.tracks.iter().any(|track| track.responses > 0);
         (0..).zip(&self.tracks).flat_map(move |(number, track)| {
@@ -60,7 +60,7 @@ impl LogAnalysis {
         })
     }
 
-    /// At the end of the log: drives that were only on one side of it, and what is still in progress.
+    /// Returns the findings at the end of the log: drives that appeared on only one side, and what is still in progress.
     pub fn end(&self) -> impl Iterator<Item = LogFinding> {
         let both = self.tracks.iter().any(|t| t.commands > 0) && self.tracks.iter().any(|t| t.responses > 0);
         (0..).zip(&self.tracks).flat_map(move |(number, track)| {

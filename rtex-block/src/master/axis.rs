@@ -35,9 +35,9 @@ use crate::sub::Command32;
 ///  On ──stop of category 1 or 2──► Stopping ──stands──► Stopped, Held
 /// ```
 /// Call [`hear`](Self::hear) and then [`transmission`](Self::transmission) once in every update period. While the servo is off the
-/// command position follows the actual position, so switching on makes no jump. In every state but SwitchingOn, On,
-/// Stopping and Held the command is a [`ServoOff`]: Servo_On = 0 with a code at which the drive looks, whatever the caller does.
-/// SX-DSV02310, "Servo_On"; the extra waiting times of the vendor are not known.
+/// command position follows the actual position, so switching on causes no jump. In every state but SwitchingOn, On,
+/// Stopping and Held the command is a [`ServoOff`]: Servo_On = 0 with a code that makes the drive evaluate it, whatever the
+/// caller does. SX-DSV02310, "Servo_On"; any further waiting times of the vendor are not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
@@ -47,12 +47,12 @@ pub struct Axis {
     state: AxisState,
     /// Update periods left in the present state.
     left: u32,
-    /// Of the stop under way.
+    /// Category of the stop in progress.
     category: StopCategory,
-    /// What is asked for: the mode, and position, speed or torque by it.
+    /// The request of the caller: the mode, and the position, speed or torque in it.
     mode: ActiveCode,
     setpoint: i32,
-    /// What the last block said.
+    /// The content of the last block.
     wire: Wire,
     evidence: Evidence,
     watch: EchoWatch,
@@ -75,19 +75,20 @@ pub struct Axis {
     profile: Option<ProfileMove>,
 }
 
-/// What the last block said: what a caller has asked for since is not in it.
+/// The content of the last block, without later requests of the caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Wire {
     mode: ActiveCode,
     /// Command_Data1.
     value: i32,
-    /// In CP with the servo on, from the value before to this one; in another mode what the motor has moved since the last block.
+    /// In CP with the servo on, the step from the previous value to this one; in another mode, the distance moved by the
+    /// motor since the last block.
     step: i32,
 }
 
 impl Axis {
-    /// An axis whose drive has not answered yet.
+    /// Creates an axis whose drive has not answered yet.
     pub const fn new(config: AxisConfig) -> Self {
         let by_gear = max_step(config.update_ns, config.gear);
         let max_step = match config.over_speed {
@@ -126,7 +127,7 @@ impl Axis {
         }
     }
 
-    /// How it was set up.
+    /// Returns its configuration.
     pub const fn config(&self) -> &AxisConfig {
         &self.config
     }
@@ -136,13 +137,13 @@ impl Axis {
         self.state
     }
 
-    /// When the block of the last update period came, by its counter echo.
+    /// Returns when the block of the last update period came, by its counter echo.
     pub const fn arrival(&self) -> Arrival {
         self.arrival
     }
 
-    /// What is known of the actual position (Response_Data1), speed and torque. Its instant is that of the last block on time, as
-    /// [`hear`](Self::hear) was told.
+    /// Returns what is known about the actual position (Response_Data1), speed and torque. Its instant is that of the last
+    /// block on time, as passed to [`hear`](Self::hear).
     pub const fn evidence(&self) -> Evidence {
         let refused = match self.last_refusal {
             Some(error) => Some(error.class()),
@@ -157,19 +158,20 @@ impl Axis {
         self.evidence.status()
     }
 
-    /// Good blocks of the drive, and refused ones, by class.
+    /// Returns the counts of good blocks of the drive and of refused blocks, by class.
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Servo_Active was still 1 when [`Limits::inactive`](super::Limits::inactive) was over, with Servo_On = 0: take the
-    /// power away by other means. Stays until [`clear`](Self::clear).
+    /// Returns whether Servo_Active was still 1 at the end of [`Limits::inactive`](super::Limits::inactive), with Servo_On
+    /// = 0: remove the power by other means. Stays until [`clear`](Self::clear).
     pub const fn disobeys(&self) -> bool {
         self.disobeys
     }
 
-    /// Whether the servo can be switched on: it is off, the drive ready by a block of this update period that is on time, and no
-    /// request is under way that would change its position or its state. The command position is the actual one then.
+    /// Checks whether the servo can be switched on: it is off, the drive is ready according to a block of this update
+    /// period that is on time, and no request is pending that would change its position or its state. The command position
+    /// then equals the actual one.
     ///
     /// # Errors
     /// [`SwitchOnError`]: the first reason why not.
@@ -192,16 +194,15 @@ impl Axis {
 
     /// Switches the servo on, from `Off`.
     ///
-    /// # Errors
-    /// [`SwitchOnError`]; nothing has changed then.
+    /// # Errors [`SwitchOnError`]; nothing is changed.
     pub fn switch_on(&mut self) -> Result<(), SwitchOnError> {
         self.can_switch_on()?;
         self.enter(AxisState::SwitchingOn, self.config.limits.active);
         Ok(())
     }
 
-    /// Takes what an update period brought, heard until `end_ns`: the drive's response to what was `sent`. While invalid data
-    /// go out no limit runs.
+    /// Takes the result of an update period, heard until `end_ns`: the drive's response to what was `sent`. No limit runs
+    /// while invalid data are sent.
     pub fn hear(&mut self, sent: Turn, heard: &Heard, end_ns: u64) {
         let response = self.sound(heard);
         let Turn::Valid(sent) = sent else {
@@ -234,7 +235,7 @@ impl Axis {
         }
     }
 
-    /// The block of this update period, which counts as sent; in the 16-byte mode its `main` half alone.
+    /// Returns the block of this update period, which counts as sent; in the 16-byte mode only its `main` half is used.
     pub fn transmission(&mut self, turn: Turn) -> Command32 {
         let mac_id = self.config.mac_id;
         let counter = match turn {
@@ -259,8 +260,9 @@ impl Axis {
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
     }
 
-    /// Update periods since the last one in which nothing was exchanged, by the clock; three at most, because the counter does not go further.
-    /// Whether it was more than four seconds does not matter: no block is on time then, or it has been for long.
+    /// Returns the number of update periods without an exchange since the last one, by the clock; at most three, because
+    /// the counter goes no further. It does not matter whether it was more than four seconds: by then no block is on time,
+    /// or has been for a long time.
     #[expect(clippy::cast_possible_truncation, reason = "the difference counts")]
     fn missed(&mut self, end_ns: u64) -> u8 {
         let gap_ns = (end_ns as u32).wrapping_sub(self.heard_ns);
@@ -269,7 +271,7 @@ impl Axis {
         if gap_ns <= most_ns { 0 } else { periods(gap_ns.wrapping_sub(most_ns), self.config.update_ns) }
     }
 
-    /// The response, if it is sound and the drive's own; every block is counted.
+    /// Returns the response, if it is sound and comes from this drive; every block is counted.
     fn sound<'a>(&mut self, heard: &'a Heard) -> Option<&'a Response> {
         let outcome = match (heard, heard.response()) {
             (Heard::Refused(error), _) => Err(*error),
@@ -283,7 +285,7 @@ impl Axis {
     }
 }
 
-/// Whole and started update periods in this time, at most three.
+/// Returns the number of whole and started update periods in this time, at most three.
 #[cold]
 fn periods(over_ns: u32, update_ns: u32) -> u8 {
     let more = over_ns.saturating_sub(1).checked_div(update_ns).unwrap_or(2).min(2);

@@ -22,20 +22,20 @@ pub struct Expected {
     pub code: Code,
 }
 
-/// What a response of the right drive tells about the command last sent.
+/// What a response from the right drive says about the last command sent.
 ///
-/// The first two are no faults by themselves: the counter comes back with the next reception, the code one
+/// The first two are not faults in themselves: the counter comes back with the next reception, the code one
 /// command later, so the usual pair is (code N - 1, counter N). SX-DSV02310, "Update timing".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Acknowledgement {
-    /// The counter is not the one last sent.
+    /// The counter is not the last one sent.
     CounterNotEchoed,
-    /// The code is not the one last sent.
+    /// The code is not the last one sent.
     CodeNotYetEchoed,
     /// CMD_Error: the command was not accepted.
     CommandError(ErrorCode),
-    /// All echoes are there and the command was accepted.
+    /// All echoes match and the command was accepted.
     Accepted,
 }
 
@@ -46,13 +46,13 @@ servowire_core::one_line!(Acknowledgement {
     Self::Accepted => "accepted";
 });
 
-/// A response of the right drive, with what it tells about the command last sent.
+/// A response from the right drive, with what it says about the last command sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Checked {
     /// The response.
     pub response: Response,
-    /// What it tells.
+    /// What it says.
     pub acknowledgement: Acknowledgement,
 }
 
@@ -61,11 +61,12 @@ servowire_core::one_line!(Checked { Self { response, acknowledgement } => "{}: {
 impl Expected {
     /// Makes the checks that a master can make, in this order: length, C/R, MAC-ID; then counter, code, CMD_Error.
     ///
-    /// There is no check sum in a block. A flipped bit anywhere but in these fields is not noticed: of a 16-byte
-    /// response that is 112 of 128 bits.
+    /// There is no check sum in a block. A flipped bit outside of these fields is not noticed: 112 of the 128 bits of a
+    /// 16-byte response.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`] or [`Error::MacId`]: nothing of such a block may be used.
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`] or [`Error::MacId`]: no part of such a block may be
+    /// used.
     pub const fn check(&self, bytes: &[u8]) -> Result<Checked, Error> {
         let parsed = match self.size {
             BlockSize::Bytes16 => Response::parse(bytes),

@@ -1,4 +1,4 @@
-//! What an axis is set up with.
+//! The configuration of an axis.
 
 use core::num::NonZeroU16;
 
@@ -12,7 +12,7 @@ use crate::position::Gear;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Limits {
-    /// Update periods without a block on time that count as a time-out.
+    /// Number of update periods without a block on time that counts as a time-out.
     pub echo: NonZeroU16,
     /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed: the
     /// main power may be switched on at any time.
@@ -25,14 +25,14 @@ pub struct Limits {
     pub answer: u32,
     /// For a controlled deceleration ([`StopCategory::One`] and [`Two`](StopCategory::Two)).
     pub stop: u32,
-    /// Consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. One may come from
-    /// a single damaged frame; the drive holds the command before it then.
+    /// Consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. A single one may come
+    /// from a damaged frame, in which case the drive keeps the previous command.
     pub command_errors: NonZeroU16,
 }
 
 impl Limits {
-    /// `echo` for the echo of the counter and for command errors, `wait` for every other wait. The vendor's
-    /// times are not known, so there is no default.
+    /// Creates the limits: `echo` for the echo of the counter and for command errors, `wait` for every other wait. The
+    /// vendor's times are not known, so there is no default.
     pub const fn new(echo: NonZeroU16, wait: u32) -> Self {
         Self { echo, ready: None, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
     }
@@ -47,23 +47,23 @@ impl Limits {
     }
 }
 
-/// How an axis is stopped; the categories are those of IEC 60204-1. None of this is a safety function: what has to stop a motor when
-/// this program does not is hardware.
+/// How an axis is stopped; the categories are those of IEC 60204-1. None of this is a safety function: if this program
+/// fails to stop a motor, hardware has to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StopCategory {
     /// Servo-off in the same update period.
     Zero,
-    /// Slows down, then servo-off; servo-off anyway when [`Limits::stop`] is over. A profile motion is ended with
-    /// Smooth_Stop, a torque command is taken away at once, and an axis without a [deceleration](AxisConfig::deceleration) is
+    /// Slows down, then servo-off; servo-off in any case when [`Limits::stop`] has passed. A profile motion is ended with
+    /// Smooth_Stop, a torque command is removed at once, and an axis without a [deceleration](AxisConfig::deceleration) is
     /// switched off at once.
     One,
     /// Slows down as in category 1, and stays energised at rest ([`AxisState::Held`](super::AxisState::Held)).
     Two,
 }
 
-/// What an axis is set up with.
+/// The configuration of an axis.
 ///
 /// Response_Data1 must be the actual position, so Pr7.29 of the drive must be 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +73,7 @@ pub enum StopCategory {
 pub struct AxisConfig {
     /// The drive's address.
     pub mac_id: MacId,
-    /// What it does when it is switched on; [`Axis::set_mode`](super::Axis::set_mode) changes it.
+    /// Its mode when it is switched on; [`Axis::set_mode`](super::Axis::set_mode) changes it.
     pub mode: ActiveCode,
     /// Update period, ns: for the limit of the position step.
     pub update_ns: u32,
@@ -87,10 +87,9 @@ pub struct AxisConfig {
     pub max_speed: Option<u32>,
     /// Largest torque command in CT, 0.1 % of rated; `None` leaves it to the drive.
     pub max_torque: Option<u32>,
-    /// How it stops when another axis fails, `None` if it goes on; category 0 unless changed. Regardless of this setting, a
-    /// communication failure puts every axis into servo-off in the same update period, as the System Design Guide for Master
-    /// requires, and an
-    /// axis that fails itself is switched off at once.
+    /// How it stops when another axis fails; `None` if it continues. Category 0 unless changed. Regardless of this setting,
+    /// a communication failure puts every axis into servo-off in the same update period, as the System Design Guide for
+    /// Master requires, and an axis that itself fails is switched off at once.
     pub stop: Option<StopCategory>,
     /// Change of the step (CP, command units) or of the speed (CV, unit by Pr7.25) in each update period of a stop of category 1 or
     /// 2; 0 unless changed, which leaves category 0.
@@ -98,7 +97,8 @@ pub struct AxisConfig {
 }
 
 impl AxisConfig {
-    /// With electronic gear 1/1, without limits of speed and torque, and stopping at once with the others.
+    /// Creates a configuration with electronic gear 1/1, without limits of speed and torque, and with an immediate stop
+    /// when another axis fails.
     pub const fn new(mac_id: MacId, mode: ActiveCode, update_ns: u32, limits: Limits) -> Self {
         Self {
             mac_id,

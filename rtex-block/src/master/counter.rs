@@ -1,6 +1,6 @@
 use crate::header::UpdateCounter;
 
-/// What goes out in one update period.
+/// The data sent in one update period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -13,9 +13,9 @@ pub enum Turn {
 
 /// Update_Counter of the master.
 ///
-/// Invalid data (00h) go out with counter 0, the first valid block has 1, then the counter adds 1 modulo 4 in every
-/// update period even when nothing else changes; otherwise commands are not taken. With two communication
-/// periods in an update period the same block is sent twice. SX-DSV02310, "Update counter".
+/// Invalid data (00h) are sent with counter 0, and the first valid block has 1. Then the counter adds 1 modulo 4 in every
+/// update period, even if nothing else changes; otherwise drives do not take the commands. With two communication periods
+/// in an update period the same block is sent twice. SX-DSV02310, "Update counter".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CommandCounter {
@@ -24,12 +24,12 @@ pub struct CommandCounter {
 }
 
 impl CommandCounter {
-    /// A counter that starts with `invalid` update periods of invalid data.
+    /// Creates a counter that starts with `invalid` update periods of invalid data.
     pub const fn new(invalid: u32) -> Self {
         Self { invalid, last: UpdateCounter::ZERO }
     }
 
-    /// The next update period.
+    /// Moves on to the next update period.
     pub const fn next(&mut self) -> Turn {
         if let Some(left) = self.invalid.checked_sub(1) {
             self.invalid = left;

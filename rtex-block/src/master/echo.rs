@@ -2,21 +2,21 @@ use core::num::NonZeroU16;
 
 use crate::header::UpdateCounter;
 
-/// Values of the counter. A block that is as many periods old as that has the echo of a new one, so what must not be taken from an
-/// old block waits for as many new ones.
+/// Values of the counter. A block that is this many periods old has the echo of a new one, so anything that must not be
+/// taken from an old block waits for this many new ones.
 pub(super) const TURN: u8 = 4;
 
 /// When a block came, by its counter echo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Arrival {
-    /// With the echo that is due: as many counters behind the one sent last as in every exchange of this system.
+    /// With the expected echo: as many counters behind the last one sent as in every exchange of this system.
     OnTime,
-    /// With the echo of the block before: no frame came, or the drive stands still.
+    /// With the echo of the previous block: no frame came, or the drive has stopped.
     Repeated,
-    /// With the echo of another period: the answer is late, or of the frame after; the bank is the wrong one.
+    /// With the echo of another period: the answer is late or belongs to the next frame, or the wrong bank was read.
     OffTime {
-        /// Counters from the one echoed to the one sent last, modulo 4.
+        /// Difference from the echoed counter to the last one sent, modulo 4.
         lag: u8,
     },
     /// No block, or one that was refused.
@@ -32,14 +32,14 @@ servowire_core::one_line!(Arrival {
 
 /// Judges every block by its counter echo, and notices that no block comes on time.
 ///
-/// The lag from the counter sent to the echo read is the same in every exchange of a system; it is learned with the first block,
-/// and anew from a whole turn of the counter as long as the servo is off. A block with another lag is of another frame. The first
-/// block may itself be a late one, if periods without a block came before it: nobody relies on its lag then before a whole turn has
-/// had it.
+/// The lag from the counter sent to the echo read is the same in every exchange of a system; it is learned from the first
+/// block, and learned again from a whole turn of the counter as long as the servo is off. A block with a different lag
+/// belongs to a different frame. The first block may itself be late if periods without a block came before it: in that case
+/// its lag is not relied on until a whole turn has had it.
 ///
 /// `limit` consecutive samples without a block on time trip the watch, and it
-/// stays tripped: command servo-off to **all** axes then ([`ServoOff`](super::ServoOff)). The time is not given by the
-/// vendor, so the limit is the caller's. System Design Guide for Master, "Time-out by the counter echo".
+/// stays tripped: then command servo-off to **all** axes ([`ServoOff`](super::ServoOff)). The vendor does not give the
+/// time, so the caller sets the limit. System Design Guide for Master, "Time-out by the counter echo".
 ///
 /// Two traps: sampling every communication period when two of them make an update period sees every value twice
 /// (the limit must be 2 or more then), and sampling every fourth update period always sees the same value.
@@ -51,7 +51,7 @@ pub struct EchoWatch {
     updates: u16,
     last: Option<UpdateCounter>,
     lag: Option<u8>,
-    /// A lag that was seen instead, and how often in a row.
+    /// A different lag that was seen, and how often in a row.
     other: u8,
     seen: u8,
     /// Blocks that have had the lag.
@@ -59,12 +59,12 @@ pub struct EchoWatch {
 }
 
 impl EchoWatch {
-    /// A watch that trips after `limit` samples without a new echo.
+    /// Creates a watch that trips after `limit` samples without a new echo.
     pub const fn new(limit: NonZeroU16) -> Self {
         Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0, sure: 0 }
     }
 
-    /// Takes a sample where the counter sent is not known; `None` where the update period brought no block of the drive, which
+    /// Takes a sample if the counter sent is not known; `None` if the update period brought no block from the drive, which
     /// counts as unchanged. Returns whether the watch has tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
         let is_new = echo.is_some() && echo != self.last;
@@ -73,7 +73,8 @@ impl EchoWatch {
         self.is_tripped()
     }
 
-    /// Takes the echo that came after `sent`, `missed` update periods without an exchange before; `learns`: the servo is off.
+    /// Takes the echo that came after `sent`; `missed`: update periods without an exchange before it; `learns`: the servo
+    /// is off.
     pub(super) fn judge(
         &mut self,
         sent: UpdateCounter,
@@ -93,7 +94,7 @@ impl EchoWatch {
         arrival
     }
 
-    /// A new echo with this lag.
+    /// Takes a new echo with this lag.
     #[inline]
     fn place(&mut self, lag: u8, missed: u8, learns: bool) -> Arrival {
         // In a period that was missed no counter was sent, or it went out a frame later.
@@ -117,7 +118,7 @@ impl EchoWatch {
         Arrival::OffTime { lag }
     }
 
-    /// Whether the lag is that of the system, and not of a first block that was late.
+    /// Whether the lag is that of the system, not that of a late first block.
     pub(super) const fn is_sure(&self) -> bool {
         self.sure >= TURN
     }
@@ -133,19 +134,19 @@ impl EchoWatch {
         self.updates >= self.limit.get()
     }
 
-    /// An echo while invalid data go out: the one after it has to be another.
+    /// Takes an echo while invalid data are sent: the next one must be different.
     pub(super) const fn note(&mut self, echo: UpdateCounter) {
         self.last = Some(echo);
     }
 
-    /// Restarts the limit. A block that was already in the memory does not become new by it, and the lag is still that of the
+    /// Restarts the limit. This does not make a block that was already in the memory new, and the lag is still that of the
     /// system.
     pub const fn reset(&mut self) {
         self.updates = 0;
     }
 }
 
-/// Notices that receptions stop, where the receive interrupt (XINTRX) is used.
+/// Notices that receptions have stopped, if the receive interrupt (XINTRX) is used.
 ///
 /// Its handler calls [`frame_received`](Self::frame_received), the NC interrupt [`tick`](Self::tick). In the internal-timer system the
 /// receive interrupt must have the lower priority of the two, in the external-timer system the higher. System Design
@@ -158,19 +159,19 @@ pub(super) struct ReceiveWatchdog {
 }
 
 impl ReceiveWatchdog {
-    /// A watchdog that trips at the `limit`-th tick without a reception.
+    /// Creates a watchdog that trips at the `limit`-th tick without a reception.
     pub(super) const fn new(limit: NonZeroU16) -> Self {
         Self { limit, ticks: 0 }
     }
 
-    /// A frame was received. A watchdog that has tripped stays so.
+    /// Reports that a frame was received. A watchdog that has tripped stays so.
     pub(super) const fn frame_received(&mut self) {
         if !self.is_tripped() {
             self.ticks = 0;
         }
     }
 
-    /// An update period has passed; gives whether the watchdog is tripped.
+    /// Reports that an update period has passed; returns whether the watchdog has tripped.
     pub(super) const fn tick(&mut self) -> bool {
         self.ticks = self.ticks.saturating_add(1);
         self.is_tripped()

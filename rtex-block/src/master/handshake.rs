@@ -22,8 +22,8 @@ use crate::type_code::TypeCode;
 ///  go back to the normal command (0h)
 /// ```
 /// Going back is needed before the same command is *executed* again; a monitor value is refreshed while the
-/// command is held, so [`receive`](Self::receive) may be called on after `Done`. The rules follow from the meaning of the
-/// flags in SX-DSV02310; how echoes are matched is this crate's reading.
+/// command is held, so [`receive`](Self::receive) may still be called after `Done`. The rules follow from the meaning of the
+/// flags in SX-DSV02310; the matching of echoes is this crate's interpretation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Handshake {
@@ -36,7 +36,8 @@ pub struct Handshake {
 }
 
 impl Handshake {
-    /// A handshake for `request`, sent to `mac_id` with `cyclic`; it times out when `limit` responses have left it pending.
+    /// Creates a handshake for `request`, sent to `mac_id` with `cyclic`; it times out after `limit` responses without an
+    /// answer.
     ///
     /// `None` for [`NonCyclicCommand::Normal`], which has no answer, and for [`NonCyclicCommand::Profile`], which is a motion:
     /// see [`ProfileMove`](super::ProfileMove).
@@ -50,17 +51,17 @@ impl Handshake {
         }
     }
 
-    /// A handshake for reading the attributes of the alarm that is being issued: Index 0, `type_code` as the drive's manual
-    /// gives it for attributes.
+    /// Creates a handshake for reading the attributes of the present alarm: Index 0, with the `type_code` given for
+    /// attributes in the drive's manual.
     ///
-    /// The answer carries the alarm as Index_Echo and its attributes in bytes 12-15, so the echo of the type code alone is
+    /// The answer carries the alarm as Index_Echo and its attributes in bytes 12-15, so only the echo of the type code is
     /// compared. SX-DSV02310, "Alarm command".
     pub const fn alarm_attributes(mac_id: MacId, cyclic: CyclicCode, type_code: TypeCode, limit: u32) -> Self {
         let request = NonCyclicCommand::Alarm(Arguments { type_code, index: 0, data: 0 });
         Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, any_index: true }
     }
 
-    /// What to send while the handshake is pending.
+    /// Returns what to send while the handshake is pending.
     pub const fn request(&self) -> NonCyclicCommand {
         self.request
     }
@@ -70,7 +71,7 @@ impl Handshake {
         self.left
     }
 
-    /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
+    /// Takes the result of one update period: the drive's response, `None` if there was none or it was refused.
     ///
     /// `Done` carries the whole response: the data, WNG, and the echoes.
     pub fn receive(&mut self, response: Option<&Response>) -> Progress<NonCyclicResponse> {
@@ -89,7 +90,7 @@ impl Handshake {
         })
     }
 
-    /// `None` while the answer is due.
+    /// `None` while the answer is awaited.
     fn read(&self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
         if let NonCyclicResponse::CommandError(code) = response {
             return Some(Progress::Failed { error: Failure::CommandError(code) });
@@ -104,7 +105,7 @@ impl Handshake {
         }
     }
 
-    /// Whether type code and index, or the selections of a latch, are those of the request.
+    /// Whether type code and index, or the selections of a latch, match the request.
     fn is_echo(&self, response: &NonCyclicResponse) -> bool {
         match (self.request, *response) {
             (NonCyclicCommand::Reset(sent), NonCyclicResponse::Reset(results))

@@ -4,7 +4,7 @@ use crate::pack::{self, Word};
 use crate::response::Response;
 use crate::sub::{Response32, SubResponse};
 
-/// What an update period brought from one drive.
+/// What one drive sent in an update period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Heard {
@@ -19,7 +19,7 @@ pub enum Heard {
 }
 
 impl Heard {
-    /// A block as it is in the memory of the ASIC.
+    /// Decodes a block as it is in the memory of the ASIC.
     pub fn parse<W: Word>(size: BlockSize, words: &[W]) -> Self {
         let mut memory = [0; LEN32];
         let len = words.len().saturating_mul(W::BYTES);

@@ -1,6 +1,6 @@
 use super::phase::{ControlError, ControlPhase};
 
-/// What the COM LED of the master shows at a moment. Green and red exclude each other.
+/// What the COM LED of the master shows at an instant. Green and red exclude each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -26,9 +26,9 @@ pub enum Pattern {
 
 /// Patterns without a fault, by phase.
 ///
-/// In the guide's table the text "flashing green" stands in the row of PH_PREPARE, and the rows of PH_WAITING and
-/// PH_START are blank; read here as one cell over the three rows. The other possible reading has PH_WAITING dark
-/// and PH_PREPARE and PH_START flashing.
+/// In the guide's table the text "flashing green" is in the row of PH_PREPARE, and the rows of PH_WAITING and PH_START are
+/// blank; this crate reads it as one cell over the three rows. The other possible reading has PH_WAITING dark and
+/// PH_PREPARE and PH_START flashing.
 const BY_PHASE: [(ControlPhase, Pattern); 5] = [
     (ControlPhase::Init, Pattern::Steady(Led::Off)),
     (ControlPhase::Waiting, Pattern::Flashing(Led::Green)),
@@ -40,7 +40,7 @@ const BY_PHASE: [(ControlPhase, Pattern); 5] = [
 /// Half of a flashing period, ms.
 const HALF_MS: u64 = 500;
 
-/// The pattern of a state. A fault is shown in any phase: a time-out flashing red, slaves that do not match the
+/// Returns the pattern of a state. A fault is shown in any phase: a time-out flashing red, slaves that do not match the
 /// table steady red.
 pub fn pattern(phase: ControlPhase, fault: Option<ControlError>) -> Pattern {
     match fault {
@@ -50,7 +50,7 @@ pub fn pattern(phase: ControlPhase, fault: Option<ControlError>) -> Pattern {
     }
 }
 
-/// What the LED shows `t_ms` after the start of a lit half-period. System Design Guide for Master, "COM LED".
+/// Returns what the LED shows `t_ms` after the start of a lit half-period. System Design Guide for Master, "COM LED".
 pub fn led(phase: ControlPhase, fault: Option<ControlError>, t_ms: u64) -> Led {
     match pattern(phase, fault) {
         Pattern::Steady(led) => led,

@@ -17,17 +17,17 @@ pub enum Asic {
 }
 
 servowire_core::codes! {
-    /// Phase of the control function. PH_INIT is 0, so that cleared memory is the right start.
+    /// Phase of the control function. PH_INIT is 0, so cleared memory starts correctly.
     #[derive(Default)]
     pub enum ControlPhase: u8 {
-        /// At the start.
+        /// The initial phase.
         #[default]
         Init = 0 => "PH_INIT",
-        /// For the ring.
+        /// Waits for the ring.
         Waiting = 1 => "PH_WAITING",
-        /// For the first transmit data.
+        /// Waits for the first transmit data.
         Prepare = 2 => "PH_PREPARE",
-        /// For cyclic transmission.
+        /// Waits for cyclic transmission.
         Start = 3 => "PH_START",
         /// Cyclic transmission runs.
         Running = 4 => "PH_RUNNING",
@@ -39,7 +39,7 @@ servowire_core::codes! {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum ControlError {
-    /// The slaves found are not those of the table, or a MAC-ID is there twice. It stays until the system is reset.
+    /// The slaves found are not those in the table, or a MAC-ID occurs twice. It stays until the system is reset.
     SlaveInfoMismatch,
     /// Reception stopped in PH_RUNNING.
     Timeout,
@@ -52,7 +52,7 @@ servowire_core::one_line!(ControlError {
 
 impl core::error::Error for ControlError {}
 
-/// What a step of the phases looks at.
+/// The inputs of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -60,7 +60,7 @@ impl core::error::Error for ControlError {}
 pub struct Inputs {
     /// State of the ASIC.
     pub asic: Asic,
-    /// Outcome of the comparison with the slave table, once there is one.
+    /// Outcome of the comparison with the slave table, once it is known.
     pub slave_info: Option<SlaveInfo>,
     /// The first transmit data are written.
     pub tx_ready: bool,
@@ -68,7 +68,7 @@ pub struct Inputs {
     pub timeout: bool,
 }
 
-/// The control function's phases.
+/// The phases of the control function.
 ///
 /// ```text
 ///  PH_INIT ──► PH_WAITING ──► PH_PREPARE ──► PH_START ──► PH_RUNNING
@@ -76,9 +76,9 @@ pub struct Inputs {
 ///   INITIAL or   slaves match    transmit       RUNNING
 ///   RING-CONFIG  (else fault)    data written
 /// ```
-/// At most one transition a step, no way back, and nothing moves once there is an error. The names of the phases
-/// and the two errors are from the System Design Guide for Master; its figures of the transitions were not
-/// available, so the conditions are this crate's reading.
+/// A step makes at most one transition, never back, and none once there is an error. The names of the phases
+/// and the two errors are from the System Design Guide for Master; its figures of the transitions were not available, so
+/// the conditions are this crate's interpretation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PhaseControl {
@@ -102,7 +102,7 @@ impl PhaseControl {
         self.error
     }
 
-    /// One step; call it from the main loop.
+    /// Makes one step; call it from the main loop.
     pub const fn step(&mut self, inputs: Inputs) {
         if self.error.is_some() {
             return;

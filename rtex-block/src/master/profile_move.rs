@@ -14,13 +14,13 @@ use crate::type_code::Nibble;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MoveStage {
-    /// Code 10h is out; the drive has not echoed it yet, or still moves.
+    /// Code 10h has been sent; the drive has not echoed it yet, or is still moving.
     Preparing,
-    /// Code 17h is out, and In_Progress has not been 1 yet.
+    /// Code 17h has been sent, and In_Progress has not been 1 yet.
     Starting,
     /// In_Progress was 1: the drive generates the position command.
     Moving,
-    /// The motion has ended, well or not; the code is 10h again.
+    /// The motion has ended, successfully or not; the code is 10h again.
     Ended,
 }
 
@@ -31,7 +31,7 @@ pub enum MoveStage {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CommandEnded {
-    /// In_Position in the same response: whether the deviation was inside the window already.
+    /// In_Position in the same response: whether the deviation was already inside the window.
     pub in_position: bool,
     /// WNG: executed with a restriction.
     pub warning: bool,
@@ -40,7 +40,7 @@ pub struct CommandEnded {
 /// Profile motion: the change of the code from 10h to 17h starts it while In_Progress is 0.
 ///
 /// Target speed may be changed while the axis moves ([`Axis::set_move_speed`](super::Axis::set_move_speed)); speed 0, or
-/// [`PAUSE`](crate::ControlBits::PAUSE), makes it stand with In_Progress still 1. After the end the code goes
+/// [`PAUSE`](crate::ControlBits::PAUSE), holds it at rest with In_Progress still 1. After the end the code goes
 /// back to 10h, ready for the next motion. System Design Guide for Master, "Profile position control".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -51,7 +51,7 @@ pub struct ProfileMove {
     target_speed: i32,
     stage: MoveStage,
     progress: Progress<CommandEnded>,
-    /// Why it is being broken off.
+    /// Why it is being aborted.
     broken: Option<StopReason>,
     latch_sel1: Nibble,
     monitor_sel: u8,
@@ -60,12 +60,12 @@ pub struct ProfileMove {
 }
 
 impl ProfileMove {
-    /// A motion to `target_position` (by the type code absolute or relative), unit of the speed by Pr7.25; the
+    /// Creates a motion to `target_position` (absolute or relative, by the type code), unit of the speed by Pr7.25; the
     /// drive has `limit` update periods to get ready and to set In_Progress.
     ///
-    /// A motion of no length may never set it, and fails as [`NotStarted`](Failure::NotStarted) then. That In_Progress
+    /// A motion of zero length may never set it, and then fails as [`NotStarted`](Failure::NotStarted). That In_Progress
     /// may come later than the first echo of 17h is inferred: the vendor does not say when it rises. Before a relative
-    /// motion read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
+    /// motion, read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
     pub const fn new(mac_id: MacId, type_code: u8, target_position: i32, target_speed: i32, limit: u32) -> Self {
         Self {
             mac_id,
@@ -82,13 +82,13 @@ impl ProfileMove {
         }
     }
 
-    /// With Latch_Sel1 and Monitor_Sel, which the drive echoes; an answer with other ones is an older one.
+    /// Adds Latch_Sel1 and Monitor_Sel, which the drive echoes; an answer with other values is an older one.
     #[must_use]
     pub const fn with_latch(self, latch_sel1: Nibble, monitor_sel: u8) -> Self {
         Self { latch_sel1, monitor_sel, ..self }
     }
 
-    /// Another target speed, valid at once.
+    /// Sets a new target speed, valid at once.
     pub(super) const fn set_speed(&mut self, target_speed: i32) {
         self.target_speed = target_speed;
     }
@@ -98,7 +98,7 @@ impl ProfileMove {
         self.target_position
     }
 
-    /// What to send now: the normal command (code 10h) before the start and after the end, otherwise 17h.
+    /// Returns what to send now: the normal command (code 10h) before the start and after the end, otherwise 17h.
     pub const fn request(&self) -> NonCyclicCommand {
         match self.stage {
             MoveStage::Starting | MoveStage::Moving => NonCyclicCommand::Profile {
@@ -111,7 +111,7 @@ impl ProfileMove {
         }
     }
 
-    /// How far it is.
+    /// Returns its state.
     pub(super) const fn progress(&self) -> Progress<CommandEnded> {
         self.progress
     }
@@ -136,8 +136,8 @@ impl ProfileMove {
         self.monitor_data
     }
 
-    /// It ends for this reason, or because the servo is off, and for no other: at once, or, where the drive `slows` down, with In_Progress. An end that is not
-    /// `confirmed` was one of this kind.
+    /// Ends the motion for this reason, or because the servo is off, and for no other: at once or, if the drive `slows`
+    /// down, together with In_Progress. An end that is not `confirmed` was one of this kind.
     pub(super) fn break_off(&mut self, reason: Option<StopReason>, confirmed: bool, slows: bool) {
         match self.progress {
             Progress::Pending { .. } if slows => self.broken = self.broken.or(reason),
@@ -187,14 +187,14 @@ impl ProfileMove {
         }
     }
 
-    /// CMD_Error refuses the start. During the motion it is the damage of one frame: the drive moves on.
+    /// CMD_Error refuses the start. During the motion it is the effect of one damaged frame: the drive keeps moving.
     fn refuse(&mut self, response: &Response) {
         if let (MoveStage::Starting, NonCyclicResponse::CommandError(code)) = (self.stage, response.noncyclic()) {
             self.fail(Failure::CommandError(code));
         }
     }
 
-    /// The limit for getting ready and starting; a motion under way has none.
+    /// Checks the limit for getting ready and starting; a motion in progress has none.
     fn wait(&mut self) {
         let (Progress::Pending { left }, MoveStage::Preparing | MoveStage::Starting) = (self.progress, self.stage)
         else {
@@ -213,7 +213,7 @@ impl ProfileMove {
     }
 }
 
-/// Why a motion is broken off.
+/// Why a motion is aborted.
 fn broken(reason: Option<StopReason>) -> Failure {
     reason.map_or(Failure::ServoOff, Failure::Stopped)
 }

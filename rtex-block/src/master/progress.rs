@@ -12,12 +12,12 @@ use crate::type_code::Pr;
 pub enum Progress<T> {
     /// Not finished.
     Pending {
-        /// Update periods until it fails for lack of an answer.
+        /// Remaining update periods until it fails for lack of an answer.
         left: u32,
     },
     /// Finished.
     Done {
-        /// What it was made for.
+        /// Its result.
         value: T,
     },
     /// Failed.
@@ -38,7 +38,7 @@ impl<T: fmt::Display> fmt::Display for Progress<T> {
 }
 
 impl<T> Progress<T> {
-    /// What `then` makes of the value, once it is there.
+    /// Applies `then` to the value, once it is available.
     pub(super) fn and_then<U>(self, then: impl FnOnce(T) -> Progress<U>) -> Progress<U> {
         match self {
             Self::Pending { left } => Progress::Pending { left },
@@ -54,7 +54,7 @@ impl<T> Progress<T> {
 }
 
 impl<T: Copy> Progress<T> {
-    /// How it ended, if it did.
+    /// Returns how it ended, if it did.
     pub(super) const fn ended(&self) -> Option<Self> {
         if self.is_pending() { None } else { Some(*self) }
     }
@@ -65,23 +65,24 @@ impl<T: Copy> Progress<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Failure {
-    /// ERR: the command was accepted and failed while it was executed.
+    /// ERR: the command was accepted but failed during execution.
     Execution,
     /// CMD_Error: the command was not accepted.
     CommandError(ErrorCode),
-    /// No answer within the caller's limit. Whether the drive has executed the command is not known.
+    /// No answer within the caller's limit. It is not known whether the drive has executed the command.
     TimedOut,
-    /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may start yet.
+    /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may still
+    /// start.
     NotStarted,
     /// The servo was switched off, or was not on.
     ServoOff,
-    /// Broken off: the axis has stopped, or is stopping, for this reason.
+    /// Aborted: the axis has stopped, or is stopping, for this reason.
     Stopped(StopReason),
-    /// The axis did not take the request of a procedure.
+    /// The axis did not accept the request of a procedure.
     NotSent(AskError),
     /// The axis is not in the mode that the procedure needs.
     Mode,
-    /// The parameter has another value than was written to it.
+    /// The parameter does not have the value that was written to it.
     Differs(Pr),
 }
 

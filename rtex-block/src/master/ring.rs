@@ -9,8 +9,8 @@ use crate::sub::Command32;
 /// All axes of a ring, in step: one call in every update period.
 ///
 /// As soon as one axis fails the others stop in the same call: at once if the communication has failed (no block comes on
-/// time), as the System Design Guide for Master asks for, otherwise each as its [configuration](super::AxisConfig::stop) says,
-/// which is at once unless changed.
+/// time), as the System Design Guide for Master requires; otherwise each as its [configuration](super::AxisConfig::stop)
+/// says, which is at once unless changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ring<const N: usize> {
@@ -20,7 +20,7 @@ pub struct Ring<const N: usize> {
     fellows: Fellows,
 }
 
-/// What the axes of a ring learn of each other: for rings whose axes stand elsewhere than in a [`Ring`].
+/// What the axes of a ring learn about each other, for rings whose axes are stored elsewhere than in a [`Ring`].
 ///
 /// In every update period each axis is [looked at](Self::look) after it has heard its block, and then
 /// each is [told](Self::tell), before it transmits.
@@ -42,7 +42,7 @@ impl Fellows {
         self.timed_out = false;
     }
 
-    /// Looks at the axis at a place of the ring.
+    /// Examines the axis at a place of the ring.
     pub const fn look(&mut self, place: u8, axis: &Axis) {
         if self.failed.is_none() && matches!(axis.state(), AxisState::Stopped(_)) {
             self.failed = Some(place);
@@ -50,7 +50,8 @@ impl Fellows {
         self.timed_out |= axis.has_lost_its_drive();
     }
 
-    /// Tells an axis: what one has failed of, the others do as they were told; all are off if the communication has failed.
+    /// Tells an axis about a failure: the others stop as configured, and all are switched off if the communication has
+    /// failed.
     pub fn tell(&self, axis: &mut Axis) {
         let Some(place) = self.failed else { return };
         let reason = StopReason::OtherAxis { place };
@@ -61,7 +62,7 @@ impl Fellows {
         }
     }
 
-    /// The place of the axis that failed first.
+    /// Returns the place of the axis that failed first.
     pub const fn failed(&self) -> Option<u8> {
         self.failed
     }
@@ -94,8 +95,8 @@ servowire_core::one_line!(RingFailure { Self { place, reason } => "axis {}: {}",
 impl core::error::Error for RingFailure {}
 
 impl<const N: usize> Ring<N> {
-    /// A ring that sends `invalid` update periods of invalid data (00h) before the first valid commands. It has 1 to 32
-    /// axes; any other number does not compile.
+    /// Creates a ring that sends `invalid` update periods of invalid data (00h) before the first valid commands. It has 1
+    /// to 32 axes; any other number does not compile.
     ///
     /// ```compile_fail,E0080
     /// # use core::num::NonZeroU16;
@@ -121,22 +122,22 @@ impl<const N: usize> Ring<N> {
         Ok(Self { counter: CommandCounter::new(invalid), sent: Turn::Invalid, axes, fellows: Fellows::new() })
     }
 
-    /// The axes, in the order they were given.
+    /// Returns the axes, in the order in which they were passed.
     pub const fn axes(&self) -> &[Axis; N] {
         &self.axes
     }
 
-    /// The axes, for set-points and requests between two updates.
+    /// Returns the axes, for set-points and requests between two updates.
     pub const fn axes_mut(&mut self) -> &mut [Axis; N] {
         &mut self.axes
     }
 
-    /// The counter that the last commands carried.
+    /// Returns the counter of the last commands.
     pub const fn counter(&self) -> &CommandCounter {
         &self.counter
     }
 
-    /// The axis that stopped the ring.
+    /// Returns the axis that stopped the ring.
     pub fn failure(&self) -> Option<RingFailure> {
         let place = self.fellows.failed()?;
         match self.axes.get(usize::from(place))?.state() {
@@ -145,8 +146,8 @@ impl<const N: usize> Ring<N> {
         }
     }
 
-    /// Takes the responses to the last commands, heard until `end_ns`, and gives the next commands; in the 16-byte mode their
-    /// `main` halves alone go out.
+    /// Takes the responses to the last commands, heard until `end_ns`, and returns the next commands; in the 16-byte mode
+    /// only their `main` halves are sent.
     pub fn update(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         for (axis, heard) in self.axes.iter_mut().zip(heard) {
             axis.hear(self.sent, heard, end_ns);
@@ -157,14 +158,13 @@ impl<const N: usize> Ring<N> {
         self.axes.each_mut().map(|axis| axis.transmission(sent))
     }
 
-    /// Invalid data (00h, counter 0) for all drives.
+    /// Returns invalid data (00h, counter 0) for all drives.
     pub(super) fn invalid(&mut self) -> [Command32; N] {
         self.axes.each_mut().map(|axis| axis.transmission(Turn::Invalid))
     }
 
-    /// Returns whether these blocks are of more than one frame: the echoes of one frame are equal. A drive whose processing
-    /// stands still
-    /// looks like that too.
+    /// Returns whether these blocks come from more than one frame: the echoes of one frame are equal. A drive whose
+    /// processing has stopped looks the same.
     pub fn is_torn(&self, heard: &[Heard; N]) -> bool {
         let mut echoes = self.axes.iter().zip(heard).filter_map(|(axis, heard)| {
             let response = heard.response().filter(|response| response.mac_id == axis.config().mac_id)?;
@@ -177,7 +177,7 @@ impl<const N: usize> Ring<N> {
     /// Switches all axes on, if all of them are off and ready.
     ///
     /// # Errors
-    /// [`RingSwitchOnError`]: the first axis that is not; none is switched on then.
+    /// [`RingSwitchOnError`]: the first axis that is not; no axis is switched on.
     pub fn switch_on(&mut self) -> Result<(), RingSwitchOnError> {
         for (axis, place) in self.axes.iter().zip(0..) {
             axis.can_switch_on().map_err(|error| RingSwitchOnError { place, error })?;
@@ -199,13 +199,13 @@ impl<const N: usize> Ring<N> {
         self.share_failures();
     }
 
-    /// The communication has failed for this reason.
+    /// Reports that the communication has failed for this reason.
     pub(super) fn fail(&mut self, reason: StopReason) {
         self.axes.iter_mut().for_each(|axis| axis.fail(reason));
         self.share_failures();
     }
 
-    /// Leaves the stop: every axis waits for Servo_Ready again, or goes on from [`Held`](AxisState::Held).
+    /// Leaves the stop: every axis waits for Servo_Ready again, or continues from [`Held`](AxisState::Held).
     pub fn clear(&mut self) {
         self.fellows = Fellows::new();
         self.axes.iter_mut().for_each(Axis::clear);
@@ -221,7 +221,7 @@ impl<const N: usize> Ring<N> {
         self.axes.iter().any(Axis::has_lost_its_drive)
     }
 
-    /// What one axis has failed of, the others learn.
+    /// Tells the others why one axis has failed.
     fn share_failures(&mut self) {
         self.fellows.begin();
         for (place, axis) in (0..).zip(&self.axes) {

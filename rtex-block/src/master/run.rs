@@ -1,4 +1,4 @@
-//! The common job: whatever a ring is to do, one update period after the other.
+//! The common jobs of a ring, one update period after another.
 
 use super::axis::Axis;
 use super::procedure::{Home, Procedure, Request};
@@ -20,18 +20,18 @@ pub enum Ended<E> {
     Line(E),
     /// An axis has stopped.
     Ring(RingFailure),
-    /// An axis does not get ready: it reports an alarm.
+    /// An axis does not become ready: it reports an alarm.
     Alarm {
         /// Its place in the ring.
         place: u8,
     },
-    /// The update periods are over.
+    /// The limit of update periods has passed.
     Limit,
     /// The ring has no axis in this place.
     Place,
     /// The axes cannot be switched on.
     SwitchOn(RingSwitchOnError),
-    /// A set-point was not taken.
+    /// A set-point was not accepted.
     Setpoint(SetpointError),
     /// A request, a procedure or a motion failed.
     Failed(Failure),
@@ -54,8 +54,8 @@ impl<E: core::fmt::Display> core::fmt::Display for Ended<E> {
 
 impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for Ended<E> {}
 
-/// A ring that is kept in step, and the common jobs on it, one at a time: for a machine's start-up, for tests and for
-/// tools. Each call continues until its job is done, and the other axes hold their set-points meanwhile; a program that moves
+/// Keeps a ring in step and does common jobs on it, one at a time: for the start-up of a machine, for tests and for tools.
+/// Each call returns when its job is done, and the other axes hold their set-points meanwhile; a program that moves
 /// several axes at once keeps its [procedures](super::procedure) itself and calls [`update`](Self::update).
 ///
 /// ```
@@ -100,7 +100,7 @@ pub trait Run<const N: usize> {
     /// The ring.
     fn ring_mut(&mut self) -> &mut Ring<N>;
 
-    /// Waits for the next update period and makes its exchange; gives when it began, in ns.
+    /// Waits for the next update period and makes its exchange; returns when the period began, in ns.
     ///
     /// # Errors
     /// Those of the line.
@@ -114,7 +114,7 @@ pub trait Run<const N: usize> {
         (0..updates).try_for_each(|_| step(self).map(|_| ()))
     }
 
-    /// Update periods until `done`; `None`: without a limit.
+    /// Runs update periods until `done`; `None`: without a limit.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Limit`]
@@ -204,8 +204,8 @@ pub trait Run<const N: usize> {
         }
     }
 
-    /// Cyclic positions from any source, in CP: `position` gives for the instant of each update period, and for a place, where the
-    /// axis is to be, `None` at the end of its motion. Ends when all have ended.
+    /// Follows cyclic positions from any source, in CP. For the instant of each update period and the place of an axis,
+    /// `position` returns where the axis has to be, or `None` at the end of its motion. Ends when all motions have ended.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Setpoint`]
@@ -226,7 +226,7 @@ pub trait Run<const N: usize> {
     }
 }
 
-/// One update period; an axis that has stopped ends the job.
+/// Makes one update period; an axis that has stopped ends the job.
 fn step<const N: usize, R: Run<N> + ?Sized>(run: &mut R) -> Result<u64, Ended<R::Error>> {
     let now_ns = run.update().map_err(Ended::Line)?;
     match run.ring_mut().failure() {

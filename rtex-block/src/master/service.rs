@@ -1,4 +1,4 @@
-//! Everything that a master does, behind two calls: one in the interrupt, one in the main loop.
+//! A complete master behind two calls: one in the interrupt, one in the main loop.
 
 use core::num::NonZeroU16;
 
@@ -16,13 +16,13 @@ use crate::pack::{self, SizeMismatch, Word};
 use crate::sub::Command32;
 use crate::timing::{Periods, TimerSystem};
 
-/// What a master is set up with.
+/// The configuration of a master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MasterConfig {
-    /// Size of the blocks; all drives of a ring have the same here.
+    /// Size of the blocks, which is the same for all drives of a ring here.
     pub size: BlockSize,
     /// Communication and update period.
     pub periods: Periods,
@@ -31,12 +31,13 @@ pub struct MasterConfig {
     /// Update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the vendor's
     /// number is not known).
     pub invalid: u32,
-    /// Update periods without [`Master::frame_received`] that count as a time-out; `None` where the receive interrupt is not used.
+    /// Update periods without [`Master::frame_received`] that count as a time-out; `None` if the receive interrupt is not
+    /// used.
     pub watchdog: Option<NonZeroU16>,
 }
 
 impl MasterConfig {
-    /// Without receive watchdog, with the slave table in the order of the ring.
+    /// Creates a configuration without a receive watchdog.
     pub const fn new(size: BlockSize, periods: Periods, timer: TimerSystem) -> Self {
         Self { size, periods, timer, invalid: 4, watchdog: None }
     }
@@ -59,16 +60,16 @@ pub enum SetupError {
     /// The periods do not work with the timer system.
     #[error("the periods do not work with the timer system")]
     Timer,
-    /// An axis reckons with another update period.
+    /// An axis is configured for a different update period.
     #[error("the axis of drive {mac_id} has a different update period")]
     UpdatePeriod {
-        /// The drive of the axis.
+        /// MAC-ID of the drive of the axis.
         mac_id: MacId,
     },
-    /// The slave table does not list the axis in its place.
+    /// The slave table does not list the axis at its place.
     #[error("the slave table does not list drive {mac_id} in the place of its axis")]
     Table {
-        /// The drive of the axis.
+        /// MAC-ID of the drive of the axis.
         mac_id: MacId,
     },
 }
@@ -80,14 +81,14 @@ pub enum SetupError {
 /// * The NC interrupt calls [`exchange`](Self::exchange) or [`exchange_words`](Self::exchange_words): it reads the blocks of the last reception and writes the next
 ///   commands, before anything else is calculated. In the external-timer system it comes from the host's timer, in the
 ///   internal-timer system from XSYNC.
-/// * The receive interrupt (XINTRX), where it is used, calls [`frame_received`](Self::frame_received). External timer: its priority is
-///   above that of the NC interrupt, and it switches the reception bank. Internal timer: its priority is below.
+/// * The receive interrupt (XINTRX), if used, calls [`frame_received`](Self::frame_received). External timer: its priority
+///   is above that of the NC interrupt, and it switches the reception bank. Internal timer: its priority is below.
 ///
-/// The exchange must be over before the next frame starts. If it is not, the bank switch is put off and the commands go out
+/// The exchange must end before the next frame starts. If it does not, the bank switch is delayed and the commands are sent
 /// one communication period later ([`Periods::frames_late`]).
 ///
-/// Outside PH_RUNNING an exchange writes invalid data (00h, counter 0) and looks at nothing. System Design Guide for Master,
-/// chapters 1 and 2.
+/// Outside PH_RUNNING an exchange writes invalid data (00h, counter 0) and ignores what was received. System Design Guide
+/// for Master, chapters 1 and 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Master<const N: usize> {
@@ -100,7 +101,7 @@ pub struct Master<const N: usize> {
 }
 
 impl<const N: usize> Master<N> {
-    /// A master in PH_INIT.
+    /// Creates a master in PH_INIT.
     ///
     /// # Errors
     /// [`SetupError`]
@@ -122,8 +123,8 @@ impl<const N: usize> Master<N> {
         Ok(Self { config, table, ring, phases: PhaseControl::new(), watchdog, prepared: false })
     }
 
-    /// One turn of the main loop: the state of the ASIC, and the slaves that the ring configuration found, once they are
-    /// known.
+    /// Takes one turn of the main loop: the state of the ASIC, and the slaves found by the ring configuration, once they
+    /// are known.
     pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> ControlPhase {
         let slave_info = found.map(|found| compare(&self.table, found));
         let timeout = self.is_timed_out();
@@ -146,28 +147,29 @@ impl<const N: usize> Master<N> {
         self.phases.error()
     }
 
-    /// What the COM LED shows `t_ms` after the start of a lit half-period.
+    /// Returns what the COM LED shows `t_ms` after the start of a lit half-period.
     pub fn led(&self, t_ms: u64) -> Led {
         led(self.phases.phase(), self.phases.error(), t_ms)
     }
 
-    /// How it was set up.
+    /// Returns its configuration.
     pub const fn config(&self) -> &MasterConfig {
         &self.config
     }
 
-    /// The ring, for reading.
+    /// Returns the ring, for reading.
     pub const fn ring(&self) -> &Ring<N> {
         &self.ring
     }
 
-    /// The ring, for set-points, requests, switching on and off. Its [`update`](Ring::update) belongs to the exchange.
+    /// Returns the ring, for set-points, requests, switching on and off. Its [`update`](Ring::update) belongs to the
+    /// exchange.
     pub const fn ring_mut(&mut self) -> &mut Ring<N> {
         &mut self.ring
     }
 
-    /// From the receive interrupt: a frame has come. Returns whether the handler has to switch the reception bank, as in the
-    /// external-timer system.
+    /// Reports that a frame has come; call it from the receive interrupt. Returns whether the handler has to switch the
+    /// reception bank, as in the external-timer system.
     pub const fn frame_received(&mut self) -> bool {
         if let Some(watchdog) = &mut self.watchdog {
             watchdog.frame_received();
@@ -175,7 +177,7 @@ impl<const N: usize> Master<N> {
         self.config.timer.reception_first()
     }
 
-    /// The exchange, with blocks that are decoded already and were heard until `end_ns`.
+    /// Makes the exchange with blocks that are already decoded and were heard until `end_ns`.
     pub fn exchange(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         if !self.is_running() {
             self.prepared |= self.phases.phase() == ControlPhase::Prepare;
@@ -190,11 +192,10 @@ impl<const N: usize> Master<N> {
         commands
     }
 
-    /// The exchange over memory of bytes, or of 16- or 32-bit words packed as [`pack`](crate::pack) says, heard until `end_ns`: the
-    /// blocks of all axes one after the other, in the order of the axes.
+    /// Makes the exchange over memory of bytes, or of 16- or 32-bit words packed as [`pack`](crate::pack) says, heard until
+    /// `end_ns`: the blocks of all axes follow one another, in the order of the axes.
     ///
-    /// # Errors
-    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
+    /// # Errors [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written.
     pub fn exchange_words<W: Word>(&mut self, rx: &[W], tx: &mut [W], end_ns: u64) -> Result<(), SizeMismatch> {
         let size = self.config.size;
         let bytes = size.bytes().saturating_mul(N);
@@ -216,8 +217,8 @@ impl<const N: usize> Master<N> {
         Ok(())
     }
 
-    /// Leaves the stop after a time-out, an alarm or a stop of the caller: every axis waits for Servo_Ready again. A mismatch
-    /// of the slaves stays until the system is reset.
+    /// Leaves the stop after a time-out, an alarm or a stop by the caller: every axis waits for Servo_Ready again. A
+    /// mismatch of the slaves stays until the system is reset.
     pub fn clear(&mut self) {
         self.ring.clear();
         self.phases.release_timeout();

@@ -5,7 +5,7 @@ use crate::control::ControlBits;
 use crate::header::{MacId, UpdateCounter};
 
 servowire_core::codes! {
-    /// The cyclic codes with which a drive looks at Servo_On: all but NOP.
+    /// The cyclic codes with which a drive evaluates Servo_On: all but NOP.
     pub enum ActiveCode: u8 {
         /// PP.
         ProfilePosition = 1 => "PP",
@@ -32,9 +32,9 @@ impl ActiveCode {
 
 /// A command that switches a servo off, regardless of what the drive did before.
 ///
-/// A block of zeros does not: its code is NOP, with which a drive ignores Servo_On and goes on with the command
-/// before it. A value of this type always has Servo_On = 0 and a code of the drive's modes, so clearing the
-/// transmit memory can be replaced by sending one of these to each axis. SX-DSV02310, "NOP command".
+/// A block of zeros does not: its code is NOP, with which a drive ignores Servo_On and continues with the previous command.
+/// A value of this type always has Servo_On = 0 and the code of one of the drive's modes, so send one of these to each axis
+/// instead of clearing the transmit memory. SX-DSV02310, "NOP command".
 ///
 /// ```
 /// use rtex_block::{Command, CommandBlock, ControlBits, CyclicCode, MacId, UpdateCounter, master::ServoOff};
@@ -51,14 +51,14 @@ impl ActiveCode {
 pub struct ServoOff(Command);
 
 impl ServoOff {
-    /// Servo off with nothing else in the block.
+    /// Creates a servo-off command with nothing else in the block.
     pub const fn new(mac_id: MacId, update_counter: UpdateCounter, code: ActiveCode) -> Self {
         Self(Command { cyclic: code.cyclic(), ..Command::idle(mac_id, update_counter) })
     }
 
-    /// The command after `before`: counter one on, Servo_On cleared, everything else kept.
+    /// Creates the command that follows `before`: the counter advanced by one, Servo_On cleared, everything else kept.
     ///
-    /// `None` if a drive would not look at Servo_On in it: the code is NOP, or a pair it does not accept.
+    /// `None` if a drive would not evaluate Servo_On in it: the code is NOP, or a pair it does not accept.
     pub const fn after(before: &Command) -> Option<Self> {
         if matches!(before.cyclic, CyclicCode::Nop) || !before.code().is_allowed() {
             return None;

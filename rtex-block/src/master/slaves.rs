@@ -2,8 +2,8 @@ use crate::header::MacId;
 
 /// One entry of the slave information table.
 ///
-/// That it holds the MAC-ID and the kind of slave follows from the name of the error; the vendor's layout and
-/// its values of the kind could not be read, so the kind is a plain number that is only compared.
+/// The name of the error implies that it holds the MAC-ID and the kind of slave. The vendor's layout and its values of the
+/// kind could not be read, so the kind is a plain number that is only compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,9 +21,9 @@ pub struct Slave {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum SlaveInfo {
-    /// All as in the table.
+    /// All slaves are as in the table.
     Match,
-    /// One is missing, too many, of another kind, or a MAC-ID is there twice.
+    /// A slave is missing, superfluous or of a different kind, or a MAC-ID occurs twice.
     Mismatch,
 }
 

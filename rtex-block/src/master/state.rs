@@ -1,4 +1,4 @@
-//! States of an axis, why it stops, and what it refuses.
+//! States of an axis, reasons for a stop, and refusals.
 
 use crate::error::ErrorClass;
 use crate::error_code::ErrorCode;
@@ -9,28 +9,28 @@ use crate::header::MacId;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum StopReason {
-    /// No block has come on time for the limit: the echo of the counter stands still, or is that of other periods.
+    /// No block has come on time for the limit: the echo of the counter does not change, or is that of other periods.
     EchoTimeout,
     /// No block came on time because the blocks in this place come from the drive with this address: the axes are not
     /// listed in the order of the ring, or the drive's switches are set wrong.
     WrongMacId(MacId),
-    /// No block came on time because every block was refused; the class of the last one.
+    /// No block came on time because every block was refused; carries the class of the last refusal.
     Refused(ErrorClass),
     /// The receive watchdog has tripped.
     ReceiveTimeout,
     /// Alarm = 1.
     Alarm,
-    /// Servo_Ready went to 0 while the servo was wanted on.
+    /// Servo_Ready went to 0 while the servo was commanded on.
     NotReady,
     /// Servo_Active went to 0 by itself.
     NotActive,
-    /// Servo_Ready did not come in time.
+    /// Servo_Ready did not go to 1 in time.
     ReadyTimeout,
-    /// Servo_Active did not come in time.
+    /// Servo_Active did not go to 1 in time.
     ActiveTimeout,
-    /// Servo_Active did not go in time, or came by itself: the drive does not obey.
+    /// Servo_Active did not go to 0 in time, or went to 1 by itself: the drive does not obey.
     InactiveTimeout,
-    /// The command was not accepted for the limit; the last Error_Code.
+    /// The command was not accepted for as long as the limit; carries the last Error_Code.
     CommandError(ErrorCode),
     /// Another axis failed.
     OtherAxis {
@@ -44,7 +44,7 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Whether commands or responses do not get through: every axis must be switched off then.
+    /// Returns whether commands or responses do not get through, in which case every axis must be switched off.
     pub(super) const fn is_communication(self) -> bool {
         matches!(self, Self::EchoTimeout | Self::WrongMacId(_) | Self::Refused(_) | Self::ReceiveTimeout)
     }
@@ -79,11 +79,12 @@ pub enum AxisState {
     Off,
     /// Servo_On = 1, waiting for Servo_Active.
     SwitchingOn,
-    /// Energised: the set-point counts.
+    /// Energised: the axis follows the set-point.
     On,
-    /// Slowing down; set-points are not taken.
+    /// Slowing down; set-points are not accepted.
     Stopping(StopReason),
-    /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not taken.
+    /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not
+    /// accepted.
     Held(StopReason),
     /// Servo_On = 0, waiting for Servo_Active = 0.
     SwitchingOff,
@@ -114,7 +115,7 @@ servowire_core::one_line!(AxisState {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SwitchOnError {
-    /// Its servo is not off: the state that it is in.
+    /// Its servo is not off; carries the present state.
     State(AxisState),
     /// This update period brought no position: no good block, or one that was not on time.
     OldPosition,
@@ -122,7 +123,7 @@ pub enum SwitchOnError {
     Alarm,
     /// Servo_Ready is 0.
     NotReady,
-    /// A request is under way that changes the position or the state of the drive.
+    /// A request is pending that changes the position or the state of the drive.
     Busy,
 }
 
@@ -136,7 +137,7 @@ servowire_core::one_line!(SwitchOnError {
 
 impl core::error::Error for SwitchOnError {}
 
-/// An axis of a ring that cannot be switched on, so that none is.
+/// An axis of a ring that cannot be switched on, so no axis is switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RingSwitchOnError {
@@ -150,7 +151,7 @@ servowire_core::one_line!(RingSwitchOnError { Self { place, error } => "axis {}:
 
 impl core::error::Error for RingSwitchOnError {}
 
-/// A set-point or a mode that an axis does not accept; it keeps the one before.
+/// A set-point or a mode that an axis does not accept; it keeps the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -166,19 +167,19 @@ pub enum SetpointError {
     /// Err27.4.
     #[error("a step of {step} command units is too large")]
     Step {
-        /// Wrapping difference to the command position before.
+        /// Wrapping difference from the previous command position.
         step: i32,
     },
     /// The speed or torque exceeds the limit of the configuration.
     #[error("{rate} exceeds the limit of the axis")]
     Rate {
-        /// What was asked for.
+        /// The value requested.
         rate: i32,
     },
-    /// A profile motion or a request is under way.
+    /// A profile motion or a request is in progress.
     #[error("a profile motion or a request is under way")]
     Busy,
-    /// The axis does not stand, or where it stands is not known: its mode is not changed with the servo on.
+    /// The axis is not at rest, or its position is not known: its mode is not changed with the servo on.
     #[error("the axis does not stand")]
     NotStanding,
 }
@@ -189,15 +190,15 @@ pub enum SetpointError {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum AskError {
-    /// Another request, or a profile motion, is under way, or its last echoes are.
+    /// Another request or a profile motion is in progress, or its last echoes are still due.
     #[error("another request or a profile motion is under way")]
     Busy,
-    /// The normal command has no answer, and a profile motion is started with
+    /// The normal command has no answer, and a profile motion must be started with
     /// [`Axis::start_move`](super::Axis::start_move).
     #[error("no request that is answered")]
     NotARequest,
     /// A reset, or setting a position, with the servo on: the drive would lose its state, or the set-point would stay in
-    /// the old coordinates and make a jump. In CP any homing type counts as such whose meaning is not known.
+    /// the old coordinates and make a jump. In CP this includes any homing type whose meaning is not known.
     #[error("not while the servo is on")]
     ServoOn,
 }

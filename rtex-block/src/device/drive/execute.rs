@@ -54,7 +54,7 @@ impl Drive {
         Ok(())
     }
 
-    /// What bytes 8-15 of the response say; `shown` is its byte 2.
+    /// Returns bytes 8-15 of the response; `shown` is its byte 2.
     pub(super) fn noncyclic(&self, shown: u8) -> [u8; 8] {
         if let Some(code) = self.error {
             return error(code);
@@ -93,7 +93,7 @@ impl Drive {
         }
     }
 
-    /// Latch_Comp1 and 2 as they are now; the answers may be later.
+    /// Latch_Comp1 and 2 as they are now; the answers may show them later.
     pub(super) const fn latch_flags(&self) -> u8 {
         let [one, two] = self.latches;
         (if one.is_some() { LATCH_COMP1 } else { 0 }) | (if two.is_some() { LATCH_COMP2 } else { 0 })
@@ -105,8 +105,8 @@ impl Drive {
         self.latched & LATCH_COMP1 | if near { NEAR } else { 0 }
     }
 
-    /// Command_Data3, where the command does not need it itself; the old feed-forward stays otherwise, and where the new one
-    /// is refused.
+    /// Takes Command_Data3 as feed-forward, unless the command needs it itself. In that case, and if the new value is
+    /// refused, the old feed-forward stays.
     fn feed(&mut self, request: &Request) -> Result<(), u16> {
         let own = match (request.code, request.type_code()) {
             (HOMING, HOMING_ACTUAL | HOMING_COMMAND) | (PARAMETER, PARAMETER_WRITE) => true,
@@ -256,7 +256,7 @@ impl Drive {
     }
 }
 
-/// What a latch position is before the latch is complete.
+/// Value of a latch position before the latch is complete.
 const UNDEFINED: i32 = 0x5a5a_5a5a;
 
 /// Bytes 12-15 of an alarm answer.
@@ -274,7 +274,8 @@ pub(super) fn text(code: u16, index: u16) -> Result<i32, u16> {
     Ok(group.iter().take(4).rev().fold(0, |word, character| word << 8 | i32::from(*character)))
 }
 
-/// Whether the master holds a command rather than asks for another. Target speed and feed-forward may change meanwhile.
+/// Whether the master is holding a command rather than making a new request. Target speed and feed-forward may change
+/// meanwhile.
 fn is_same(old: &Request, new: &Request) -> bool {
     let same = old.code == new.code && old.type_code() == new.type_code();
     same && match old.code {

@@ -1,9 +1,9 @@
-//! What a drive does at present.
+//! What a drive is doing at present.
 
 use crate::device::wire::Request;
 use crate::error_code::Alarm;
 
-/// A command that is being executed, or was and is still held by the master.
+/// A command that is being executed, or that has been executed and is still held by the master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Job {
@@ -16,9 +16,9 @@ pub(super) struct Job {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Outcome {
     Value(i32),
-    /// A monitor value, read anew for every response.
+    /// A monitor value, read again for every response.
     Live(u16),
-    /// Attributes of the alarm that is being issued, which is the index echo.
+    /// Attributes of the present alarm, whose number is the index echo.
     Attributes(Alarm),
     Failed,
 }

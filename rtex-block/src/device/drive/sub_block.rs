@@ -7,7 +7,8 @@ use crate::device::parameters::{SUB_FEED_FORWARD, SUB_RESPONSE_DATA};
 use crate::device::wire::Sub;
 
 impl Drive {
-    /// Takes a sub block with what [`check`](crate::device::check()) says of it. Bytes 24-31 count even if the code does not.
+    /// Takes a sub block with the verdict of [`check`](crate::device::check()). Bytes 24-31 are valid even if the code is
+    /// not.
     pub(super) fn serve_sub(&mut self, sub: [u8; 16], error: Option<u16>) {
         let [byte16, type_code, low, high, _, _, _, _, feed @ ..] = sub;
         let (code, index) = (byte16 & 0x0f, u16::from_le_bytes([low, high]));

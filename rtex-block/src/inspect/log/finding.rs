@@ -1,34 +1,35 @@
-//! What a log shows between its blocks.
+//! Findings that concern more than one block of a log.
 
 use core::fmt;
 
 use crate::code::Code;
 use crate::header::{MacId, UpdateCounter};
 
-/// Something that a log shows between its blocks.
+/// A finding that concerns more than one block of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum LogFinding {
-    /// The echo of the counter stands still for more than the two communications that an update period can have.
+    /// The echo of the counter has not changed for more than the two communications that an update period can have.
     EchoStands {
         /// Responses in a row with the same echo.
         responses: u32,
     },
-    /// The echo of the counter stood still for longer than that, and goes on.
+    /// The echo of the counter had not changed for longer than that, and counts again.
     EchoGoesOn {
         /// Responses in a row with the same echo.
         responses: u32,
     },
-    /// The counter of the commands did not go on by one, nor stay for the second communication of an update period.
+    /// The counter of the commands neither advanced by one nor stayed the same for the second communication of an update
+    /// period.
     CounterJumps {
         /// Before.
         from: UpdateCounter,
         /// Now.
         to: UpdateCounter,
     },
-    /// The code of the commands has come back, later than one command after the other.
+    /// The code of the commands has come back, but later than one command after it was sent.
     CodeLate {
         /// Responses from the first command with this code to its echo.
         responses: u32,
@@ -37,50 +38,49 @@ pub enum LogFinding {
     PositionStep {
         /// The step, command units.
         step: i32,
-        /// The largest, command units.
+        /// The largest permitted, command units.
         max: u32,
     },
     /// A request was answered.
     Answered {
         /// Responses from the first command with the request to the first answer without Busy.
         responses: u32,
-        /// Of these, with Busy.
+        /// Number of these with Busy.
         busy: u32,
     },
-    /// An alarm command with Index 0 was answered with another index. Only the read-out of attributes does that: bytes 12-15 are
-    /// no alarm and no warning.
+    /// An alarm command with Index 0 was answered with another index. Only reading the attributes does that: bytes 12-15
+    /// are neither alarm nor warning.
     Attributes {
-        /// Index_Echo: the alarm that is being issued.
+        /// Index_Echo: the present alarm.
         alarm: u16,
         /// Bytes 12-15, byte 12 in bits 7-0.
         bits: u32,
     },
-    /// Another request, or the normal command, takes the place of a request that was not answered in more than three
-    /// responses.
+    /// Another request, or the normal command, replaces a request that had no answer in more than three responses.
     GivenUp {
         /// The code of the request.
         code: Code,
         /// Responses since the first command with it.
         responses: u32,
-        /// Of these, with Busy.
+        /// Number of these with Busy.
         busy: u32,
     },
-    /// The drive has answered before, and not to the last commands: more than the two communications that an update period
-    /// can have.
+    /// The drive has answered before but not to the last commands, for more than the two communications that an update
+    /// period can have.
     NoAnswer {
         /// Commands without an answer.
         commands: u32,
     },
-    /// The drive was silent for longer than that, and answers.
+    /// The drive was silent for longer than that, and answers again.
     AnswersAgain {
         /// Commands without an answer.
         commands: u32,
     },
-    /// Drives were sent commands, and this one never answered.
+    /// Commands were sent to this drive, and it never answered.
     NeverAnswered(MacId),
-    /// This drive answers and was never sent a command.
+    /// This drive answers although no command was sent to it.
     NeverAsked(MacId),
-    /// At the end of the log something of a drive goes on.
+    /// Something is still in progress for a drive at the end of the log.
     AtEnd(MacId, Unfinished),
 }
 
@@ -89,7 +89,7 @@ servowire_core::codes! {
     pub enum Trouble: u8 {
         /// It reported an alarm.
         Alarm = 1 => "reported an alarm",
-        /// Its counter echo stood still: the communication, or the drive, did.
+        /// Its counter echo did not change: the communication, or the drive, had stopped.
         EchoStood = 2 => "sent a counter echo that stood still",
         /// It did not answer.
         Silence = 3 => "did not answer",
@@ -113,12 +113,12 @@ pub struct DriveTrouble {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Unfinished {
-    /// The echo of the counter stands still.
+    /// The echo of the counter does not change.
     Echo {
         /// Responses in a row with the same echo.
         responses: u32,
     },
-    /// The drive is silent.
+    /// The drive does not answer.
     Silence {
         /// Commands without an answer.
         commands: u32,
@@ -129,7 +129,7 @@ pub enum Unfinished {
         code: Code,
         /// Responses since the first command with it.
         responses: u32,
-        /// Of these, with Busy.
+        /// Number of these with Busy.
         busy: u32,
     },
     /// The code of the commands has not come back.

@@ -1,4 +1,4 @@
-//! Size, byte order and beginning of a log.
+//! Block size, byte order and starting offset of a log.
 
 use crate::block::BlockSize;
 use crate::inspect::strict;
@@ -12,13 +12,14 @@ pub struct LogShape {
     pub size: BlockSize,
     /// How many bytes of each word are in reversed order: 1 for none, 2 or 4.
     pub word: usize,
-    /// Bytes before the first whole block: not 0 where the log begins in the middle of one.
+    /// Bytes before the first whole block: not 0 if the log begins in the middle of one.
     pub skip: usize,
 }
 
 impl LogShape {
-    /// The size, byte order and beginning with which most of the blocks make sense. `None` if nothing does, or if there are
-    /// fewer than four blocks after the NOPs from before the start: they look alike in every shape, so give more of the log then.
+    /// Guesses the size, byte order and beginning with which most of the blocks make sense. `None` if nothing makes sense,
+    /// or if fewer than four blocks follow the NOPs from before the start. NOPs look alike in every shape, so pass more of
+    /// the log in that case.
     ///
     /// In a log of 32-byte blocks every second piece of 16 bytes is a sub block: a command's begins with 80h, 82h or 8Ah, which
     /// read as a main block would be a response of drive 0, 2 or 10.
@@ -36,7 +37,7 @@ impl LogShape {
         Self::best(shifted, bytes, 900)
     }
 
-    /// The first of those that score best, with a score of at least `least`; a larger size only where it explains more.
+    /// Returns the first of those that score best, with a score of at least `least`; a larger size only if it explains more.
     fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
         let mut best: Option<(Self, usize)> = None;
         for shape in shapes {
@@ -48,7 +49,7 @@ impl LogShape {
         best.map(|(shape, _)| shape)
     }
 
-    /// Sound blocks after the first ones that are NOPs, in thousandths.
+    /// Share of sound blocks after the leading NOPs, in thousandths.
     fn score(self, bytes: &[u8]) -> Option<usize> {
         let (mut good, mut all) = (0_usize, 0_usize);
         let blocks = bytes.get(self.skip..)?.chunks_exact(self.size.bytes());
@@ -59,7 +60,7 @@ impl LogShape {
         good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
     }
 
-    /// A block with its bytes in order.
+    /// Returns a block with its bytes in order.
     fn turned(self, block: &[u8]) -> [u8; 32] {
         let mut turned = [0; 32];
         for (to, from) in turned.chunks_exact_mut(self.word).zip(block.chunks_exact(self.word)) {
@@ -70,12 +71,12 @@ impl LogShape {
         turned
     }
 
-    /// Code 00h: nothing else in the block is sure to tell anything.
+    /// Code 00h: nothing else in the block is sure to mean anything.
     fn is_nop(self, block: &[u8]) -> bool {
         self.turned(block).get(1).is_some_and(|byte1| byte1 & 0x7f == 0)
     }
 
-    /// Whether a block of this shape is what an encoder writes.
+    /// Whether a block of this shape could come from an encoder.
     fn is_sound(self, block: &[u8]) -> bool {
         self.turned(block).get(..self.size.bytes()).is_some_and(|turned| strict(turned).is_ok())
     }

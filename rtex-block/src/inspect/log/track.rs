@@ -1,4 +1,4 @@
-//! One drive of a log: what is kept of it from block to block.
+//! One drive of a log: its state from block to block.
 
 use super::finding::{LogFinding, Unfinished};
 use crate::code::{Code, CyclicCode};
@@ -10,13 +10,14 @@ use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::step;
 use crate::response::ResponseBlock;
 
-/// Responses, or commands, that are normal between cause and effect: two communications in an update period, and one of delay.
+/// Normal number of responses or commands between cause and effect: two communications in an update period, and one of
+/// delay.
 pub(super) const NORMAL: u32 = 3;
 
-/// What is asked: the code and bytes 8, 10 and 11.
+/// A request: the code and bytes 8, 10 and 11.
 type Request = (Code, [u8; 3]);
 
-/// What is kept of a drive.
+/// The state of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Track {
@@ -27,17 +28,17 @@ pub(super) struct Track {
     counter: Option<UpdateCounter>,
     sent_twice: bool,
     echo: Option<UpdateCounter>,
-    /// Responses in a row with this echo, and whether that was said.
+    /// Responses in a row with this echo, and whether this was reported.
     same: u32,
     stands: bool,
     position: Option<i32>,
-    /// The code of the commands, and the responses since it is that; `None` once it has come back.
+    /// The code of the commands, and the responses since it was first sent; `None` once it has come back.
     code: Option<Code>,
     awaited: Option<u32>,
-    /// The request that is out, and, until it is answered, the responses and the busy ones of them.
+    /// The pending request and, until it is answered, the number of responses and of busy responses.
     request: Option<Request>,
     open: Option<(u32, u32)>,
-    /// Alarm was 1, the echo stood still, and commands had no answer, at any time.
+    /// Whether at any time Alarm was 1, the echo did not change, and commands had no answer.
     pub(super) alarmed: bool,
     pub(super) stood: bool,
     pub(super) fell_silent: bool,
@@ -63,7 +64,7 @@ impl Track {
         fell_silent: false,
     };
 
-    /// The counter of a command.
+    /// Takes the counter of a command.
     pub(super) fn count(&mut self, to: UpdateCounter, nop: bool) -> Option<LogFinding> {
         let last = self.counter.replace(to);
         let repeated = last == Some(to) && !self.sent_twice;
@@ -72,7 +73,7 @@ impl Track {
         (from.next() != to).then_some(LogFinding::CounterJumps { from, to })
     }
 
-    /// The command position. Without Servo_On the drive follows nothing.
+    /// The command position. Without Servo_On the drive does not follow it.
     pub(super) fn go(&mut self, block: CommandBlock<'_>, limit: Option<u32>) -> Option<LogFinding> {
         let at = (block.code().cyclic() == Some(CyclicCode::CyclicPosition)).then(|| block.command_data1());
         let last = core::mem::replace(&mut self.position, at);
@@ -81,7 +82,7 @@ impl Track {
         (on && step.unsigned_abs() > max).then_some(LogFinding::PositionStep { step, max })
     }
 
-    /// Code and request of a command.
+    /// Takes code and request of a command.
     pub(super) fn ask(&mut self, block: CommandBlock<'_>) -> Option<LogFinding> {
         let code = block.code();
         if self.code.replace(code) != Some(code) {
@@ -98,7 +99,7 @@ impl Track {
         (responses > NORMAL).then_some(LogFinding::GivenUp { code, responses, busy })
     }
 
-    /// The counter of a response. Counters that stand at 0 go out before the start.
+    /// Takes the counter of a response. Before the start, counters stay at 0.
     pub(super) fn echo(&mut self, echo: UpdateCounter) -> Option<LogFinding> {
         if self.echo.replace(echo) == Some(echo) {
             self.same = self.same.saturating_add(1);
@@ -113,7 +114,7 @@ impl Track {
         (stood && responses > NORMAL).then_some(LogFinding::EchoGoesOn { responses })
     }
 
-    /// The code of a response.
+    /// Takes the code of a response.
     pub(super) fn come_back(&mut self, code: Code) -> Option<LogFinding> {
         let responses = self.awaited?.saturating_add(1);
         if self.code != Some(code) {
@@ -124,7 +125,7 @@ impl Track {
         (responses > NORMAL).then_some(LogFinding::CodeLate { responses })
     }
 
-    /// The answer in a response, if it is one to the request that is out: with its type code, or an error answer.
+    /// Returns the answer in a response, if it belongs to the pending request: one with its type code, or an error answer.
     pub(super) fn answer(&mut self, block: ResponseBlock<'_>) -> Option<LogFinding> {
         let ((code, [type_code, ..]), (responses, busy)) = self.request.zip(self.open)?;
         let responses = responses.saturating_add(1);
@@ -140,7 +141,7 @@ impl Track {
         None
     }
 
-    /// The attributes of an alarm, if that is what the answer to the request that is out says.
+    /// Returns the attributes of an alarm, if the answer to the pending request contains them.
     pub(super) fn attributes(&self, block: ResponseBlock<'_>) -> Option<LogFinding> {
         let ((_, [_, 0, 0]), NonCyclicResponse::Alarm(results)) = (self.request?, block.noncyclic()) else {
             return None;
@@ -149,7 +150,7 @@ impl Track {
         (results.index != 0).then_some(LogFinding::Attributes { alarm: results.index, bits })
     }
 
-    /// What goes on at the end; a request that is open says more than its code.
+    /// What is still in progress at the end; a pending request says more than its code.
     pub(super) fn unfinished(&self) -> [Option<Unfinished>; 3] {
         let echo = (self.stands && self.same > NORMAL).then_some(Unfinished::Echo { responses: self.same });
         let silent = self.responses > 0 && self.unanswered > NORMAL;

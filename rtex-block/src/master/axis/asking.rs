@@ -1,4 +1,4 @@
-//! Requests on their way.
+//! Pending requests.
 
 use crate::master::echo::TURN;
 use crate::master::handshake::Handshake;
@@ -7,23 +7,24 @@ use crate::master::sub_handshake::SubHandshake;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::sub::SubResponse;
 
-/// For how many blocks the normal code has come back. A whole turn of the counter lies between two requests, so what an old block
-/// says is no answer to the next one: the echoes tell requests of one kind apart by their index, and not by their data.
+/// Number of blocks for which the normal code has come back. A whole turn of the counter lies between two requests, so an
+/// old block cannot be taken for the answer to the next one: echoes distinguish requests of one kind by their index, not by
+/// their data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Quiet(u8);
 
 impl Quiet {
-    /// From the end of a request or a motion on.
+    /// Restarts the count at the end of a request or a motion.
     pub(super) const BROKEN: Self = Self(0);
 
-    /// Whether the normal code has come back for a turn.
+    /// Whether the normal code has come back for a whole turn.
     #[inline]
     pub(super) const fn is_kept(self) -> bool {
         self.0 >= TURN
     }
 
-    /// A block on time, with the normal code or another one.
+    /// Takes a block on time, with the normal code or another one.
     #[inline]
     pub(super) const fn hear(&mut self, is_normal: bool) {
         if !self.is_kept() {
@@ -32,7 +33,7 @@ impl Quiet {
     }
 }
 
-/// A request of one block: it is on its way, or its outcome waits to be taken.
+/// A request in one block: it is pending, or its outcome has not been taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Slot<H, T> {
@@ -49,7 +50,7 @@ impl<H: Copy, T: Copy> Slot<H, T> {
         }
     }
 
-    /// The outcome, once.
+    /// Returns the outcome, once.
     pub(super) const fn take(&mut self) -> Option<Progress<T>> {
         let Self::Ended(progress) = *self else { return None };
         *self = Self::Empty;
@@ -62,7 +63,7 @@ impl<H: Copy, T: Copy> Slot<H, T> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Main {
     pub(super) slot: Slot<Handshake, NonCyclicResponse>,
-    /// It must be over before the servo is switched on.
+    /// It must have ended before the servo is switched on.
     pub(super) needs_servo_off: bool,
     pub(super) quiet: Quiet,
     /// In_Progress was 0 in the last block of a motion.

@@ -18,7 +18,7 @@ use crate::status::StatusFlags;
 use crate::sub::{SubCode, SubCommand, SubResponse};
 use crate::type_code::{Nibble, TypeCode, homing};
 
-/// Resets, and the homing types that set a position. `unknown`: the other homing types too, but for the one that reads.
+/// Resets, and the homing types that set a position. `unknown`: the other homing types too, except the one that reads.
 const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
     match request {
         NonCyclicCommand::Reset(_) => true,
@@ -31,8 +31,8 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
     }
 }
 
-/// The drive goes on with the block before, so this is no answer: the request is in the next block again, and may be under way
-/// already.
+/// The drive continues with the previous block, so this is no answer: the request is in the next block again, and may
+/// already be in progress.
 fn is_thrown_away(response: &Response) -> bool {
     response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
 }
@@ -40,14 +40,13 @@ fn is_thrown_away(response: &Response) -> bool {
 impl Axis {
     /// Sends a non-cyclic command and holds it until it is answered; see [`take_outcome`](Self::take_outcome).
     ///
-    /// In between the normal command goes out until it has come back for a whole turn of the counter: what an old block says is no
-    /// answer to the next request. Until then the axis is busy.
+    /// Between two requests the normal command is sent until it has come back for a whole turn of the counter, so that an
+    /// old block cannot be taken for the answer to the next request. Until then the axis is busy.
     ///
-    /// A homing type other than those that are confirmed may give the axis new coordinates. In CP the set-point would stay in
-    /// the old ones, so with the servo on it is refused there; latches have [`ask_latch`](Self::ask_latch).
+    /// A homing type that is not confirmed may give the axis new coordinates. In CP the set-point would stay in the old
+    /// ones, so such a type is refused there with the servo on; for latches use [`ask_latch`](Self::ask_latch).
     ///
-    /// # Errors
-    /// [`AskError`]; nothing is sent then.
+    /// # Errors [`AskError`]; nothing is sent.
     pub fn ask(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
         let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
         let servo_off = needs_servo_off(&request, self.mode == ActiveCode::CyclicPosition);
@@ -55,8 +54,8 @@ impl Axis {
     }
 
     /// Sends a homing command of the latch mode, in any mode and with the servo on or off. `type_code` arms the latches, or
-    /// disarms them, or reads their state ([`homing::LATCH_STATE`]); it must be one that leaves the coordinates alone. Then
-    /// follow Latch_Sel1, Latch_Sel2 and Monitor_Sel. SX-DSV02310, "Latch mode".
+    /// disarms them, or reads their state ([`homing::LATCH_STATE`]); it must be one that leaves the coordinates alone. The
+    /// other arguments are Latch_Sel1, Latch_Sel2 and Monitor_Sel. SX-DSV02310, "Latch mode".
     ///
     /// # Errors
     /// [`AskError::Busy`]; [`AskError::ServoOn`] for the types 21h and 22h, which set a position.
@@ -71,9 +70,9 @@ impl Axis {
         self.begin(handshake.ok_or(AskError::NotARequest)?, needs_servo_off(&request, false))
     }
 
-    /// Reads the attributes of the alarm that is being issued, with the type code that the drive's manual gives for them.
-    /// The answer carries the alarm as its index and the attributes as its data; which bit tells that the alarm can be
-    /// cleared is in the manual too ([`Attributes::is_clearable`](crate::master::procedure::Attributes::is_clearable)).
+    /// Reads the attributes of the present alarm, with the type code given in the drive's manual.
+    /// The answer carries the alarm as its index and the attributes as its data; the manual also says which bit means that
+    /// the alarm can be cleared ([`Attributes::is_clearable`](crate::master::procedure::Attributes::is_clearable)).
     ///
     /// # Errors
     /// [`AskError::Busy`]
@@ -83,7 +82,7 @@ impl Axis {
         self.begin(Handshake::alarm_attributes(mac_id, cyclic, type_code, limit), false)
     }
 
-    /// Sends a homing command in CV at speed 0 with the servo on, where no position is commanded.
+    /// Sends a homing command in CV at speed 0 with the servo on, a state in which no position is commanded.
     pub(in crate::master) fn ask_rebasing(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
         let still = self.wire.mode == ActiveCode::CyclicVelocity && (self.wire.value, self.setpoint) == (0, 0);
         if self.mode != ActiveCode::CyclicVelocity || !still {
@@ -98,7 +97,7 @@ impl Axis {
         self.main.slot.asking().is_none() && self.main.quiet.is_kept() && !self.is_moving()
     }
 
-    /// Update periods until the present request times out; the whole limit if none is under way.
+    /// Update periods until the present request times out; the whole limit if none is pending.
     pub(in crate::master) const fn answer_left(&self) -> u32 {
         match self.main.slot.asking() {
             Some(handshake) => handshake.left(),
@@ -106,12 +105,12 @@ impl Axis {
         }
     }
 
-    /// The outcome of the last request, once.
+    /// Returns the outcome of the last request, once.
     pub const fn take_outcome(&mut self) -> Option<Progress<NonCyclicResponse>> {
         self.main.slot.take()
     }
 
-    /// Sends a sub-command (32-byte mode) and holds it until it is answered; it runs beside everything else.
+    /// Sends a sub-command (32-byte mode) and holds it until it is answered; it runs in parallel with everything else.
     ///
     /// # Errors
     /// [`AskError::Busy`], or [`AskError::NotARequest`] for the normal sub-command.
@@ -124,7 +123,7 @@ impl Axis {
         Ok(())
     }
 
-    /// The outcome of the last sub-command, once.
+    /// Returns the outcome of the last sub-command, once.
     pub const fn take_sub_outcome(&mut self) -> Option<Progress<SubResponse>> {
         self.sub.slot.take()
     }
@@ -158,7 +157,7 @@ impl Axis {
         }
     }
 
-    /// A motion begins after a turn of the normal code, like a request.
+    /// Like a request, a motion begins after a whole turn of the normal code.
     fn serve_motion(&mut self, response: Option<&Response>) {
         let Some(profile) = &mut self.profile else { return };
         if self.control.intersects(ControlBits::HARD_STOP.union(ControlBits::SMOOTH_STOP)) {

@@ -27,15 +27,15 @@ impl Axis {
         self.max_step
     }
 
-    /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0; back in the mode of
-    /// the last block it is what that said.
+    /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0; if the mode
+    /// returns to that of the last block, it is the set-point in that block.
     ///
-    /// With the servo on the axis has to stand: the actual position is one or two update periods old when it becomes the
+    /// With the servo on the axis must be at rest: the actual position is one or two update periods old when it becomes the
     /// command position. A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
     ///
     /// # Errors
-    /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] on the way from off to on or
-    /// back and during a stop, [`SetpointError::NotStanding`]; the mode is kept then.
+    /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] between off and on and during
+    /// a stop, [`SetpointError::NotStanding`]; the mode is kept.
     pub fn set_mode(&mut self, mode: ActiveCode) -> Result<(), SetpointError> {
         let is_on = match self.state {
             AxisState::SwitchingOn | AxisState::SwitchingOff | AxisState::Stopping(_) | AxisState::Held(_) => {
@@ -65,7 +65,7 @@ impl Axis {
         Ok(())
     }
 
-    /// Whether the axis stands, as far as it can be told, for a change to this mode.
+    /// Whether the axis is at rest, as far as can be determined, for a change to this mode.
     fn stands(&self, mode: ActiveCode) -> bool {
         let commanded = match self.wire.mode {
             ActiveCode::CyclicPosition => self.wire.step == 0,
@@ -78,14 +78,14 @@ impl Axis {
         commanded && (mode != ActiveCode::CyclicPosition || known)
     }
 
-    /// Control bits other than Servo_On, which the state decides.
+    /// Sets the control bits other than Servo_On, which the state decides.
     pub const fn set_control(&mut self, control: ControlBits) {
         self.control = control.difference(ControlBits::SERVO_ON);
     }
 
-    /// Command_Data3 where the command does not need it itself: velocity or torque feed-forward by Pr7.35, as long as the
-    /// servo is on. With Pr7.35 = 0 it must stay 0, or the drive answers 0032h. While a command needs bytes 12-15 itself
-    /// (homing types 21h and 22h, parameter write, profile motion) the drive keeps the last value.
+    /// Sets Command_Data3 for commands that do not need it themselves: velocity or torque feed-forward by Pr7.35, as long
+    /// as the servo is on. With Pr7.35 = 0 it must stay 0, or the drive answers 0032h. While a command needs bytes 12-15
+    /// itself (homing types 21h and 22h, parameter write, profile motion) the drive keeps the last value.
     ///
     /// # Errors
     /// [`SetpointError::NotOn`]
@@ -95,8 +95,8 @@ impl Axis {
         Ok(())
     }
 
-    /// Sub_Command_Data2 and 3 of the 32-byte mode: feed-forward by Pr7.36 and Pr7.37 (numbers inferred), as long as the
-    /// servo is on.
+    /// Sets Sub_Command_Data2 and 3 of the 32-byte mode: feed-forward by Pr7.36 and Pr7.37 (numbers inferred), as long as
+    /// the servo is on.
     ///
     /// # Errors
     /// [`SetpointError::NotOn`]
@@ -106,10 +106,10 @@ impl Axis {
         Ok(())
     }
 
-    /// The next command position, in CP.
+    /// Sets the next command position, in CP.
     ///
     /// # Errors
-    /// [`SetpointError`]; the position before is kept then.
+    /// [`SetpointError`]; the previous position is kept.
     pub fn set_position(&mut self, position: i32) -> Result<(), SetpointError> {
         self.must_be_on()?;
         // The first position after a change of the mode is that of the axis.
@@ -125,10 +125,10 @@ impl Axis {
         Ok(())
     }
 
-    /// The next speed in CV (unit by Pr7.25) or torque in CT (0.1 % of rated).
+    /// Sets the next speed in CV (unit by Pr7.25) or torque in CT (0.1 % of rated).
     ///
     /// # Errors
-    /// [`SetpointError`]; the value before is kept then.
+    /// [`SetpointError`]; the previous value is kept.
     pub fn set_rate(&mut self, rate: i32) -> Result<(), SetpointError> {
         self.must_be_on()?;
         let limit = match self.mode {
@@ -144,7 +144,7 @@ impl Axis {
     /// Starts a profile motion, in PP; unit of the speed by Pr7.25.
     ///
     /// # Errors
-    /// [`SetpointError`]; a motion under way goes on then.
+    /// [`SetpointError`]; a motion in progress continues.
     pub fn start_move(&mut self, type_code: u8, target: i32, speed: i32) -> Result<(), SetpointError> {
         self.start_move_with_latch(type_code, target, speed, Nibble::ZERO, 0)
     }
@@ -152,7 +152,7 @@ impl Axis {
     /// Like [`start_move`](Self::start_move), with Latch_Sel1 and Monitor_Sel; the answers are in [`profile`](Self::profile).
     ///
     /// # Errors
-    /// [`SetpointError`]; a motion under way goes on then.
+    /// [`SetpointError`]; a motion in progress continues.
     pub fn start_move_with_latch(
         &mut self,
         type_code: u8,
@@ -174,10 +174,10 @@ impl Axis {
         Ok(())
     }
 
-    /// Changes the speed of the motion under way, if there is one.
+    /// Changes the speed of the motion in progress, if there is one.
     ///
     /// # Errors
-    /// [`SetpointError::NotOn`], [`SetpointError::Rate`]; the speed before is kept then.
+    /// [`SetpointError::NotOn`], [`SetpointError::Rate`]; the previous speed is kept.
     pub fn set_move_speed(&mut self, speed: i32) -> Result<(), SetpointError> {
         self.must_be_on()?;
         within(speed, self.config.max_speed)?;
@@ -187,14 +187,14 @@ impl Axis {
         Ok(())
     }
 
-    /// The profile motion that is under way, or that has ended and was not yet taken.
+    /// Returns the profile motion that is in progress, or that has ended and was not yet taken.
     pub const fn profile(&self) -> Option<&ProfileMove> {
         self.profile.as_ref()
     }
 
-    /// The progress of the profile motion; once it has ended, this returns its end and forgets it. It is done when the axis has
-    /// stayed on
-    /// for a turn of the counter after In_Progress went to 0: the reason why a motion was broken off may be shown later than that.
+    /// Returns the progress of the profile motion; once the motion has ended, returns its end and forgets it. It is done
+    /// when the axis has stayed on for a turn of the counter after In_Progress went to 0: the reason why a motion was
+    /// aborted may appear after that.
     pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let progress = self.profile?.progress();
         if matches!(progress, Progress::Done { .. }) && !self.main.quiet.is_kept() {

@@ -1,4 +1,4 @@
-//! How an axis stops. A stop wins over everything, and a later one is never gentler than the one under way.
+//! How an axis stops. A stop takes precedence over everything, and a later stop never makes the one in progress gentler.
 
 use super::Axis;
 use crate::control::ControlBits;
@@ -13,14 +13,14 @@ impl Axis {
         self.stop_for(StopReason::Requested, category);
     }
 
-    /// Servo off until [`clear`](Self::clear). The first reason stays.
+    /// Servo off until [`clear`](Self::clear). The first reason is kept.
     pub(in crate::master) fn fail(&mut self, reason: StopReason) {
         if !matches!(self.state, AxisState::Stopped(_)) {
             self.enter(AxisState::Stopped(reason), 0);
         }
     }
 
-    /// Stops the axis for this reason; a stop under way is made no gentler.
+    /// Stops the axis for this reason; a stop in progress is never made gentler.
     pub(in crate::master) fn stop_for(&mut self, reason: StopReason, category: StopCategory) {
         match self.state {
             AxisState::On if category > StopCategory::Zero && self.can_slow_down() => {
@@ -46,7 +46,8 @@ impl Axis {
         }
     }
 
-    /// Leaves `Stopped`, where the axis waits for Servo_Ready again with the servo off, or `Held`, where it is on again.
+    /// Leaves `Stopped`, after which the axis waits for Servo_Ready again with the servo off, or `Held`, after which it is
+    /// on again.
     pub fn clear(&mut self) {
         match self.state {
             AxisState::Held(_) => self.enter(AxisState::On, 0),
@@ -62,7 +63,7 @@ impl Axis {
         }
     }
 
-    /// One update period of a controlled deceleration, from what was sent last.
+    /// Makes one update period of a controlled deceleration, starting from the last value sent.
     pub(super) fn slow_down(&mut self, reason: StopReason) {
         let moves = match self.mode {
             // Asked for and not yet sent: the axis stands, and the last block says nothing in this mode.
@@ -91,7 +92,7 @@ impl Axis {
         }
     }
 
-    /// A deceleration is known, if the host makes it.
+    /// Returns whether the deceleration is known, if the host makes it.
     const fn can_slow_down(&self) -> bool {
         match self.mode {
             ActiveCode::CyclicPosition | ActiveCode::CyclicVelocity => self.config.deceleration > 0,
@@ -100,7 +101,7 @@ impl Axis {
         }
     }
 
-    /// A step or a speed, one deceleration closer to 0.
+    /// Returns a step or a speed one deceleration closer to 0.
     fn less(&self, value: i32) -> i32 {
         let magnitude = value.unsigned_abs().saturating_sub(self.config.deceleration);
         // No larger in magnitude than it was.
@@ -117,12 +118,12 @@ impl Axis {
         }
     }
 
-    /// The motor follows what the block says.
+    /// Returns whether the motor follows the block.
     pub(super) const fn is_energised(&self) -> bool {
         matches!(self.state, AxisState::On | AxisState::Stopping(_) | AxisState::Held(_))
     }
 
-    /// The set-point of an axis that does not move by command.
+    /// Returns the set-point of an axis that does not move by command.
     pub(super) fn rest(&mut self) {
         self.setpoint = if self.mode == ActiveCode::CyclicPosition { self.evidence.last().position() } else { 0 };
     }

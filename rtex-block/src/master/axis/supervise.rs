@@ -1,4 +1,4 @@
-//! What makes an axis change its state by itself.
+//! State changes that an axis makes by itself.
 
 use super::Axis;
 use crate::error::Error;
@@ -10,8 +10,8 @@ use crate::response::Response;
 use crate::status::StatusFlags;
 
 impl Axis {
-    /// Silence, refusals, alarm, readiness, activity, and the limit of the state. An alarm counts in any block of the drive, what
-    /// else it says in one that is on time.
+    /// Checks silence, refusals, alarm, readiness, activity, and the limit of the state. An alarm counts in any block of
+    /// the drive, everything else only in one that is on time.
     pub(super) fn supervise(&mut self, response: Option<&Response>, on_time: Option<&Response>) {
         if self.watch.is_tripped() {
             self.fail(self.silence());
@@ -27,17 +27,17 @@ impl Axis {
         self.wait(on_time);
     }
 
-    /// Whether no block comes on time any more, in whichever state.
+    /// Whether blocks have stopped coming on time, in any state.
     pub(in crate::master) const fn is_silent(&self) -> bool {
         self.watch.is_tripped()
     }
 
-    /// Whether the communication with its drive has failed, be it stopped for another reason before.
+    /// Whether the communication with its drive has failed, even if the axis was stopped for another reason before.
     pub(in crate::master) const fn has_lost_its_drive(&self) -> bool {
         self.is_silent() || matches!(self.state(), AxisState::Stopped(reason) if reason.is_communication())
     }
 
-    /// Why no block comes on time.
+    /// Returns why no block comes on time.
     fn silence(&self) -> StopReason {
         match self.last_refusal {
             Some(Error::MacId { got, .. }) => StopReason::WrongMacId(MacId::truncate(got)),
@@ -46,7 +46,7 @@ impl Axis {
         }
     }
 
-    /// Counts CMD_Error, but for the refusal of a request or of the start of a motion.
+    /// Counts CMD_Error, except for the refusal of a request or of the start of a motion.
     fn count_refusals(&mut self, response: &Response) {
         if !response.cmd_error {
             self.refused = 0;
@@ -63,7 +63,7 @@ impl Axis {
         }
     }
 
-    /// Alarm, readiness and activity by the state.
+    /// Checks alarm, readiness and activity by the state.
     fn follow(&mut self, status: StatusFlags) {
         let [alarm, ready, active] =
             [StatusFlags::ALARM, StatusFlags::SERVO_READY, StatusFlags::SERVO_ACTIVE].map(|flag| status.contains(flag));
@@ -89,7 +89,7 @@ impl Axis {
         }
     }
 
-    /// The limit of the present state.
+    /// Checks the limit of the present state.
     fn wait(&mut self, on_time: Option<&Response>) {
         let reason = match self.state {
             AxisState::Starting if self.config.limits.ready.is_none() => return,

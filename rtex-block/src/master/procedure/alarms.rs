@@ -1,4 +1,4 @@
-//! What a drive tells about its alarms.
+//! What a drive reports about its alarms.
 
 use super::ask::{Ask, procedure};
 use crate::error_code::Alarm;
@@ -23,8 +23,8 @@ pub struct AlarmHistory<'a> {
 procedure!(AlarmHistory<'a>, ());
 
 impl<'a> AlarmHistory<'a> {
-    /// With the type code of the history as the drive's manual gives it, whose index counts from 1; fills `entries` from the latest
-    /// alarm. Main and sub code 0 are an empty entry.
+    /// Creates the procedure. `type_code` is that of the history in the drive's manual, with an index that counts from 1;
+    /// `entries` is filled from the latest alarm. Main and sub code 0 are an empty entry.
     pub const fn new(type_code: TypeCode, entries: &'a mut [Alarm]) -> Self {
         Self { ask: Ask::NEW, type_code, entries, place: 0, end: None }
     }
@@ -50,10 +50,10 @@ impl<'a> AlarmHistory<'a> {
     }
 }
 
-/// The attributes of the alarm that is being issued, as the drive sent them.
+/// The attributes of the present alarm, as the drive sent them.
 ///
-/// Whether the alarm can be cleared is one of them. Which bit says so is in the drive's manual; the pages of SX-DSV02310
-/// at hand do not give it, and neither do they say how the number of an alarm is packed into an index.
+/// Whether the alarm can be cleared is one of them. The drive's manual says which bit; the available pages of SX-DSV02310
+/// give neither the bit nor the packing of an alarm number into an index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -65,7 +65,7 @@ pub struct Attributes {
 }
 
 impl Attributes {
-    /// Returns whether the alarm can be cleared, by the bits that the drive's manual names for that.
+    /// Returns whether the alarm can be cleared, according to the bits named in the drive's manual.
     ///
     /// ```
     /// use rtex_block::master::procedure::{Attributes, ClearableIf};
@@ -81,8 +81,8 @@ impl Attributes {
     }
 }
 
-/// How the attributes of an alarm say that it can be cleared. The documents at hand do not tell, so this is for the reader of
-/// the drive's manual. A mask without a bit says nothing: no alarm is clearable by it.
+/// How the attributes of an alarm say that it can be cleared. The available documents do not say, so take it from the
+/// drive's manual. An empty mask says nothing: by it no alarm is clearable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -93,7 +93,8 @@ pub enum ClearableIf {
     Unset(u32),
 }
 
-/// Reads the attributes of the alarm that is being issued (Index 0). A drive without an alarm refuses, or answers as its manual says.
+/// Reads the attributes of the present alarm (Index 0). A drive without an alarm refuses the request, or answers as its
+/// manual says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlarmAttributes {
@@ -105,7 +106,7 @@ pub struct AlarmAttributes {
 procedure!(AlarmAttributes, Attributes);
 
 impl AlarmAttributes {
-    /// With the type code of the attributes as the drive's manual gives it.
+    /// Creates the procedure with the type code of the attributes given in the drive's manual.
     pub const fn new(type_code: TypeCode) -> Self {
         Self { ask: Ask::NEW, type_code, end: None }
     }
@@ -131,21 +132,21 @@ impl AlarmAttributes {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Clearing {
-    /// Alarm is 0. Where it was so from the beginning nothing was sent.
+    /// Alarm is 0. If Alarm was 0 from the beginning, nothing was sent.
     Cleared,
-    /// The drive failed to clear it (ERR), or said that it did and Alarm stayed 1: the cause is still there, or the alarm goes
-    /// with the control power only.
+    /// The drive failed to clear it (ERR), or reported success while Alarm stayed 1: the cause persists, or only switching
+    /// off the control power clears the alarm.
     NotClearable,
 }
 
-/// Clears the alarm and looks whether it is gone: the answer to "can this alarm be cleared?" for which no attribute has to be
-/// known.
+/// Clears the alarm and checks whether it is gone: this answers "can this alarm be cleared?" without any knowledge of
+/// attributes.
 ///
-/// The command is sent once, and Alarm of the blocks received after its answer decides, not the answer alone.
-/// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
+/// The command is sent once. The Alarm flag of the blocks received after its answer decides, not the answer alone.
+/// [`Failure::CommandError`]: the drive does not know the type code, which says nothing about the alarm.
 /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all.
 ///
-/// An axis with an alarm is stopped; after the alarm [`Axis::clear`](Axis::clear) makes it start again.
+/// An axis with an alarm is stopped; once the alarm is gone, [`Axis::clear`](Axis::clear) restarts it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClearAlarm {
@@ -163,8 +164,8 @@ pub struct ClearAlarm {
 procedure!(ClearAlarm, Clearing);
 
 impl ClearAlarm {
-    /// With the type code that clears the present alarm as the drive's manual gives it (Index 0); Alarm has `limit` update
-    /// periods to go to 0 after the answer.
+    /// Creates the procedure with the type code, given in the drive's manual, that clears the present alarm (Index 0);
+    /// Alarm has `limit` update periods to go to 0 after the answer.
     pub const fn new(type_code: TypeCode, limit: u32) -> Self {
         Self { ask: Ask::NEW, type_code, limit, left: limit, good: None, answer: None, end: None }
     }
@@ -201,7 +202,7 @@ impl ClearAlarm {
         Progress::Pending { left: self.left }
     }
 
-    /// Alarm is 1, or nothing is known of it; `accepted`: though the drive says that it has cleared it.
+    /// Alarm is 1, or nothing is known about it; `accepted`: although the drive says that it has cleared it.
     const fn wait(&mut self, accepted: bool) -> Progress<Clearing> {
         match self.left.checked_sub(1) {
             Some(left) => {

@@ -1,4 +1,4 @@
-//! What all procedures have in common.
+//! Code common to all procedures.
 
 use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
@@ -8,17 +8,18 @@ use crate::noncyclic_response::NonCyclicResponse;
 
 /// What a [runner](crate::master::Run) runs: the inherent methods of a procedure, which have the same names.
 pub trait Procedure {
-    /// What it is made for.
+    /// The value that it produces.
     type Value;
 
-    /// Starts over, after the exchange of an update period.
+    /// Restarts the procedure; call it after the exchange of an update period.
     fn start(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
 
-    /// To be called after every later exchange, until it has ended.
+    /// Continues the procedure; call it after every later exchange, until it has ended.
     fn receive(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
 }
 
-/// One request of a procedure: sent as soon as the axis takes it, then awaited. Both waits have the limit of an answer.
+/// One request of a procedure: sent as soon as the axis accepts it; then its answer is awaited. Both waits have the limit
+/// of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Ask {
@@ -29,12 +30,12 @@ pub(super) struct Ask {
 impl Ask {
     pub(super) const NEW: Self = Self { asked: false, waited: 0 };
 
-    /// The answer to `request`, when it is there.
+    /// Returns the answer to `request`, once it has come.
     pub(super) fn receive(&mut self, axis: &mut Axis, request: NonCyclicCommand) -> Progress<NonCyclicResponse> {
         self.receive_with(axis, |axis| axis.ask(request))
     }
 
-    /// The answer to what `send` asks for, when it is there.
+    /// Returns the answer to the request made by `send`, once it has come.
     pub(super) fn receive_with(
         &mut self,
         axis: &mut Axis,
@@ -59,18 +60,20 @@ impl Ask {
     }
 }
 
-/// `start` and `receive` of a procedure with a `next`, which gives what an update period has brought, a `reset`, and an `end`.
+/// Defines `start` and `receive` of a procedure from its `next`, which returns the progress of one update period, its
+/// `reset`, and its `end`.
 macro_rules! procedure {
     ($procedure:ident $(<$life:lifetime>)?, $value:ty) => {
         impl $(<$life>)? $procedure $(<$life>)? {
-            /// Starts over, after the exchange of an update period.
+            /// Restarts the procedure; call it after the exchange of an update period.
             pub fn start(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
                 self.reset();
                 self.end = None;
                 self.receive(axis)
             }
 
-            /// Call it after the exchange of every later update period. Once done or failed, it stays so.
+            /// Continues the procedure; call it after the exchange of every later update period. Once done or failed, it
+            /// stays so.
             pub fn receive(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
                 let progress = match self.end {
                     Some(end) => end,
@@ -108,7 +111,7 @@ pub struct Request {
 procedure!(Request, NonCyclicResponse);
 
 impl Request {
-    /// Of anything that [`Axis::ask`] sends.
+    /// Creates the procedure for any request that [`Axis::ask`] sends.
     pub const fn new(request: NonCyclicCommand) -> Self {
         Self { ask: Ask::NEW, sent: request, end: None }
     }

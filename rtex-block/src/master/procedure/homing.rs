@@ -24,9 +24,9 @@ pub(super) const fn command(type_code: u8, setting_data: i32) -> NonCyclicComman
 
 /// Sets a position of the drive (homing types 21h and 22h), once, and reads it back. Only with the servo off.
 ///
-/// `Done` carries the position as read back: a motor that is free may have turned since. The command is never sent twice. If its
-/// answer does not come, the position read back decides: `Done` if it is the one to be set, otherwise [`Failure::TimedOut`], and the
-/// effect is not known.
+/// `Done` carries the position as read back: a released motor may have turned since. The command is never sent twice. If its
+/// answer does not come, the position read back decides: `Done` if it equals the one to be set, otherwise
+/// [`Failure::TimedOut`], and the effect is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SetPosition {
@@ -84,14 +84,15 @@ impl SetPosition {
 
 /// Homing by the drive: the command with the caller's type code, and then the end of the drive's motion.
 ///
-/// Only in PP, where the drive generates the position command. In CP the host does: the drive would take up new coordinates
-/// between two set-points, and the next one, still in the old ones, would be a jump by the whole offset. In CV and CT nobody
-/// watches In_Progress, as the drive generates no position command. How a drive homes there is not in the documents at hand.
+/// Only in PP, where the drive generates the position command. In CP the host generates it: the drive would adopt new
+/// coordinates between two set-points, and the next set-point, still in the old ones, would be a jump by the whole offset.
+/// In CV and CT the drive generates no position command, so In_Progress tells nothing. The available documents do not say
+/// how a drive homes in these modes.
 ///
-/// `Done` when Homing_Complete is 1 and In_Progress is 0 for a turn of the counter, the axis on all the time, and at least one of
-/// the two was different since the command went out: Homing_Complete may be left from an earlier homing. Broken off it fails with
-/// the reason of the axis. If it does not end in time the axis is stopped (category 1) for
-/// [`HomingTimeout`](StopReason::HomingTimeout). The command is never sent twice.
+/// `Done` when Homing_Complete is 1 and In_Progress is 0 for a turn of the counter, the axis on all the time, and at least
+/// one of the two has been different since the command was sent: Homing_Complete may be left from an earlier homing. If the
+/// homing is aborted, it fails for the reason that stopped the axis. If it does not end in time, the axis is stopped
+/// (category 1) for [`HomingTimeout`](StopReason::HomingTimeout). The command is never sent twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Home {
@@ -100,9 +101,9 @@ pub struct Home {
     limit: u32,
     left: u32,
     accepted: bool,
-    /// Homing_Complete was 0, or In_Progress 1: what it says now is not left from an earlier homing.
+    /// Homing_Complete was 0, or In_Progress 1: so its present value is not left from an earlier homing.
     fresh: bool,
-    /// Blocks on time that show standstill before it begins, and its end.
+    /// Number of blocks on time that show standstill before it begins, and that show its end.
     blocks: u8,
     end: Option<Progress<()>>,
 }
@@ -110,8 +111,8 @@ pub struct Home {
 procedure!(Home, ());
 
 impl Home {
-    /// A homing of this type; the drive has `limit` update periods after it has accepted the command, and another motion as many
-    /// before it to end.
+    /// Creates a homing of this type. The drive has `limit` update periods after it has accepted the command; a motion
+    /// before it has as many to end.
     pub const fn new(type_code: u8, limit: u32) -> Self {
         let ask = Ask::NEW;
         Self { ask, type_code, limit, left: limit, accepted: false, fresh: false, blocks: 0, end: None }
@@ -158,7 +159,7 @@ impl Home {
         self.wait(axis)
     }
 
-    /// Blocks on time in a row of which that is so.
+    /// Number of consecutive blocks on time of which this is true.
     fn for_a_turn(&mut self, axis: &Axis, is_so: bool) -> u8 {
         if axis.arrival() == Arrival::OnTime {
             self.blocks = if is_so { self.blocks.saturating_add(1) } else { 0 };

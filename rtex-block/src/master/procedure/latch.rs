@@ -11,7 +11,7 @@ use crate::type_code::{Nibble, homing};
 const LPOS: [u8; 2] = [0x09, 0x0a];
 const COMP: [LatchFlags; 2] = [LatchFlags::LATCH_COMP1, LatchFlags::LATCH_COMP2];
 
-/// The positions that were caught, command units.
+/// The positions caught, command units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -33,8 +33,8 @@ enum Stage {
 
 /// Arms latch 1, latch 2 or both, and waits for their positions. SX-DSV02310, "Latch mode".
 ///
-/// The state is read (type 50h) before arming, and after it again and again. A position counts only with its Latch_Comp,
-/// and only if that was 0 before arming or at any time since: what an earlier latch has left is not the answer.
+/// The state is read (type 50h) before arming, and repeatedly afterwards. A position counts only with its Latch_Comp,
+/// and only if that was 0 before arming or at any time since: a position left from an earlier latch is not the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latch {
@@ -45,7 +45,7 @@ pub struct Latch {
     limit: u32,
     left: u32,
     stage: Stage,
-    /// Latch_Comp was seen at 0, so 1 is not left from an earlier latch.
+    /// Latch_Comp was seen at 0, so a 1 is not left from an earlier latch.
     fresh: [bool; 2],
     caught: [Option<i32>; 2],
     end: Option<Progress<Caught>>,
@@ -54,18 +54,19 @@ pub struct Latch {
 procedure!(Latch, Caught);
 
 impl Latch {
-    /// Latch 1: arms with the type code `arm` and the trigger `selection` (Latch_Sel1), both as the drive's manual gives them;
-    /// the trigger has `limit` update periods.
+    /// Creates the procedure for latch 1: arms it with the type code `arm` and the trigger `selection` (Latch_Sel1), both
+    /// from the drive's manual; the trigger has `limit` update periods.
     pub const fn first(arm: u8, selection: Nibble, limit: u32) -> Self {
         Self::new(arm, [selection, Nibble::ZERO], [true, false], limit)
     }
 
-    /// Latch 2, with its trigger in Latch_Sel2.
+    /// Creates the procedure for latch 2, with its trigger in Latch_Sel2.
     pub const fn second(arm: u8, selection: Nibble, limit: u32) -> Self {
         Self::new(arm, [Nibble::ZERO, selection], [false, true], limit)
     }
 
-    /// Both latches, with the triggers of Latch_Sel1 and Latch_Sel2; done when both have caught.
+    /// Creates the procedure for both latches, with the triggers of Latch_Sel1 and Latch_Sel2; done when both have caught a
+    /// position.
     pub const fn both(arm: u8, selections: [Nibble; 2], limit: u32) -> Self {
         Self::new(arm, selections, [true; 2], limit)
     }
@@ -89,7 +90,7 @@ impl Latch {
         *self = Self::new(self.arm, self.selections, self.wanted, self.limit);
     }
 
-    /// What was caught so far.
+    /// The positions caught so far.
     pub const fn caught(&self) -> Caught {
         let [latch1, latch2] = self.caught;
         Caught { latch1, latch2 }
@@ -125,7 +126,7 @@ impl Latch {
         self.wanted.get(place) == Some(&true) && self.caught.get(place) == Some(&None)
     }
 
-    /// An answer with `data` of the latch at `place`.
+    /// Takes an answer with `data` of the latch at `place`.
     fn read(&mut self, latch: LatchFlags, place: usize, data: i32) {
         if self.stage == Stage::Watching {
             let mut latches = self.caught.iter_mut().zip(COMP).zip(self.fresh);

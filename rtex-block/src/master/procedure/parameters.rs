@@ -18,7 +18,7 @@ pub struct ParameterValue {
 }
 
 impl ParameterValue {
-    /// A value of a parameter.
+    /// Creates a value of a parameter.
     pub const fn new(pr: Pr, value: i32) -> Self {
         Self { pr, value }
     }
@@ -39,7 +39,7 @@ pub struct Backup<'a> {
 procedure!(Backup<'a>, ());
 
 impl<'a> Backup<'a> {
-    /// With the type code for reading as the drive's manual gives it; fills in the values of the list.
+    /// Creates the procedure with the type code for reading given in the drive's manual; it fills in the values of the list.
     pub const fn new(read: TypeCode, list: &'a mut [ParameterValue]) -> Self {
         Self { ask: Ask::NEW, read, list, place: 0, end: None }
     }
@@ -63,12 +63,12 @@ const fn request(type_code: TypeCode, pr: Pr, data: i32) -> NonCyclicCommand {
     NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data })
 }
 
-/// Writes a list of parameters, each one read back and compared. Nothing is written twice: if the answer to a write is missing,
-/// the value that is read back decides.
+/// Writes a list of parameters and reads each one back to compare it. Nothing is written twice: if the answer to a write is
+/// missing, the value that is read back decides.
 ///
-/// Writing is not storing: what must survive a power cycle is stored with a command of its own, and some parameters are
-/// valid only after a reset. [`Failure::Differs`] names the parameter that did not take its value; after any other failure the
-/// parameter at [`place`](Self::place) may have either value.
+/// Writing is not storing: a value that must survive a power cycle is stored with a separate command, and some parameters
+/// take effect only after a reset. [`Failure::Differs`] names the parameter that did not take its value; after any other
+/// failure the parameter at [`place`](Self::place) may have the old or the new value.
 #[derive(Debug)]
 pub struct Restore<'a> {
     ask: Ask,
@@ -83,7 +83,7 @@ pub struct Restore<'a> {
 procedure!(Restore<'a>, ());
 
 impl<'a> Restore<'a> {
-    /// With the type code for reading as the drive's manual gives it.
+    /// Creates the procedure with the type code for reading given in the drive's manual.
     pub const fn new(read: TypeCode, list: &'a [ParameterValue]) -> Self {
         Self { ask: Ask::NEW, read, list, place: 0, written: None, end: None }
     }
@@ -117,7 +117,7 @@ impl<'a> Restore<'a> {
         })
     }
 
-    /// Place in the list of the parameter that is written at present.
+    /// Returns the place in the list of the parameter being written.
     pub const fn place(&self) -> usize {
         self.place
     }

@@ -11,12 +11,13 @@ use crate::type_code::homing;
 /// Sets the actual position (21h) of an axis in CP **with the servo on**: the end of a homing that the host moves, towards a switch
 /// or a latch.
 ///
-/// Dangerous, for the drive takes up other coordinates while the motor is energised: a command position in the old ones would be a
-/// jump by the whole offset. So the axis has to stand; it goes to CV at speed 0, where no position is commanded, and comes back to
-/// CP at the position in the new coordinates. In between nothing but the speed loop holds the motor: not for an axis that gravity
-/// moves. Whether a drive takes the command with the servo on is not in the documents at hand; it fails with
-/// [`Failure::Execution`] or [`Failure::CommandError`] then, and the axis is in CP again. After [`Failure::TimedOut`] the effect
-/// is not known; the command position is the actual one all the same. The command is never sent twice.
+/// This is dangerous because the drive adopts new coordinates while the motor is energised: a command position in the old
+/// ones would be a jump by the whole offset. So the axis must be at rest. It changes to CV at speed 0, in which no position
+/// is commanded, and returns to CP at the position in the new coordinates. In between only the speed loop holds the motor:
+/// do not use it for an axis that gravity can move. The available documents do not say whether a drive accepts the command
+/// with the servo on. If it does not, the procedure fails with [`Failure::Execution`] or [`Failure::CommandError`], and the
+/// axis is in CP again. After [`Failure::TimedOut`] the effect is not known; the command position is the actual one even
+/// so. The command is never sent twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RebaseWithServoOn {
@@ -32,7 +33,8 @@ pub struct RebaseWithServoOn {
 procedure!(RebaseWithServoOn, i32);
 
 impl RebaseWithServoOn {
-    /// The present position becomes `position`, command units; the changes of the mode have `limit` update periods each.
+    /// Creates the procedure that makes the present position `position`, command units; each change of the mode has `limit`
+    /// update periods.
     pub const fn new(position: i32, limit: u32) -> Self {
         Self { ask: Ask::NEW, position, limit, left: limit, answer: None, end: None }
     }
@@ -64,7 +66,7 @@ impl RebaseWithServoOn {
         }
     }
 
-    /// The mode changes as soon as the axis stands.
+    /// The mode changes as soon as the axis is at rest.
     fn change(&mut self, axis: &mut Axis, mode: ActiveCode) -> Progress<i32> {
         match (axis.set_mode(mode), self.left.checked_sub(1)) {
             (Ok(()), _) => self.left = self.limit,
