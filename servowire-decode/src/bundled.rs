@@ -1,7 +1,7 @@
-//! The captures that are decoded when no file is named: published hardware logs and a firmware's trace,
-//! rendered as lines.
+//! The captures that are decoded when no file is named: published hardware logs and the trace of a firmware, converted to
+//! line levels.
 
-/// Name and content. Where they come from is told in `captures/README.md`.
+/// Name and content. `captures/README.md` says where they come from.
 type Capture = (&'static str, &'static [u8]);
 
 /// T-Format.
@@ -19,6 +19,6 @@ pub(crate) const NIKON: [Capture; 3] = [
     ("captures/nikon-artinchip-crc.vcd", include_bytes!("../captures/nikon-artinchip-crc.vcd")),
 ];
 
-/// HIPERFACE DSL: not hardware, but the vendor's firmware on a model of its core.
+/// HIPERFACE DSL: not recorded from hardware, but from the vendor's firmware running on a model of its core.
 pub(crate) const HDSL: [Capture; 1] =
     [("captures/hdsl-fw-startup.vcd", include_bytes!("../captures/hdsl-fw-startup.vcd"))];

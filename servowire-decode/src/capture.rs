@@ -1,7 +1,7 @@
-//! Capture files: what a logic analyser, a simulator or a serial port recorded.
+//! Capture files: recordings of a logic analyser, a simulator or a serial port.
 //!
-//! One file per format under `capture/`. Every reader streams with fixed buffers and yields the same: level changes of named
-//! channels with their times ([`Line`]), or bytes ([`ByteLog`]).
+//! One file per format under `capture/`. Every reader streams with fixed buffers and yields one of two things: level
+//! changes of named channels with their times ([`Line`]), or bytes ([`ByteLog`]).
 
 pub mod analyzer;
 mod archive;
@@ -38,7 +38,7 @@ pub use recording::{Change, Hole, Line};
 
 use crate::fault::{At, Fault};
 
-/// Opens a capture, finding its format from its beginning, else from its name.
+/// Opens a capture, finding its format from its beginning, otherwise from its name.
 pub fn open(input: Input, mut hints: Hints) -> Result<Capture, Fault> {
     let mut input = if hints.format.is_none_or(Format::is_text) { input.unpacked()? } else { input };
     if hints.sample_rate.is_none() && hints.record_size.is_none() {
@@ -56,7 +56,7 @@ pub fn open(input: Input, mut hints: Hints) -> Result<Capture, Fault> {
     decoder(input, format, hints)
 }
 
-/// The format that the first bytes show beyond doubt.
+/// Returns the format that the first bytes identify beyond doubt.
 fn known(head: &[u8]) -> Option<Format> {
     const VCD: [&[u8]; 7] = [b"$comment", b"$date", b"$enddefinitions", b"$scope", b"$timescale", b"$var", b"$version"];
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
@@ -90,10 +90,10 @@ fn known(head: &[u8]) -> Option<Format> {
     }
 }
 
-/// What an FST file begins with: a header block of 329 bytes.
+/// The first bytes of an FST file: a header block of 329 bytes.
 const FST: &[u8] = &[0, 0, 0, 0, 0, 0, 0, 1, 0x49];
 
-/// What the tables of analysers and oscilloscopes begin with.
+/// The first words of the tables of analysers and oscilloscopes.
 const TABLES: &[&[u8]] = &[
     b"time",
     b"zeit",
@@ -159,7 +159,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
     })
 }
 
-/// What a file begins with, for people.
+/// Describes the beginning of a file, for people.
 fn seen(head: &[u8]) -> String {
     let line = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
     match std::str::from_utf8(line) {
@@ -173,7 +173,7 @@ fn seen(head: &[u8]) -> String {
     }
 }
 
-/// The format from the first bytes, else from what was said and from the name.
+/// Returns the format from the first bytes, otherwise from the hints and the name.
 fn guess(input: &mut Input, has_rate: bool) -> Result<Format, Fault> {
     let head = input.peek()?;
     if head.is_empty() {

@@ -1,4 +1,4 @@
-//! What every protocol gives: one row of the table in `protocols.rs`.
+//! What every protocol provides: one row of the table in `protocols.rs`.
 
 use std::fmt;
 use std::io;
@@ -19,28 +19,28 @@ pub struct Facts {
     pub name: &'static str,
     /// Its name as people write it.
     pub title: &'static str,
-    /// A line about it, for the help of a program.
+    /// A line about it, for the help text of a program.
     pub about: &'static str,
-    /// What it is decoded from, for a message to users who have something else.
+    /// The input from which it is decoded, for a message to users who have something else.
     pub needs: &'static str,
     /// The names of all fields that its events on a line or in packets may have.
     pub fields: &'static [&'static str],
     /// Its nominal bit rates on a recorded line; empty if there is no such line.
     pub rates: &'static [u32],
-    /// What its frames prove on a recorded line.
+    /// How strongly its frames prove the protocol on a recorded line.
     pub weights: Weights,
-    /// It has one rate, by the clock of its master: a recording may hold one sample per bit.
+    /// It has one rate, set by the clock of its master: a recording may have one sample per bit.
     pub clocked: bool,
-    /// An answer says what it is without its request.
+    /// An answer can be identified without its request.
     pub answers_alone: bool,
-    /// A frame in a log carries a check, so that it is not found where there is none.
+    /// A frame in a log carries a check, so other bytes are not mistaken for one.
     pub checked: bool,
     /// Published recordings: names and contents, each a VCD.
     pub captures: &'static [(&'static str, &'static [u8])],
 }
 
 impl Facts {
-    /// For a protocol that has neither a line nor captures.
+    /// Creates the description of a protocol that has neither a line nor captures.
     pub const NONE: Self = Self {
         name: "",
         title: "",
@@ -56,22 +56,22 @@ impl Facts {
     };
 }
 
-/// A protocol: what is known of it, and its decoders.
+/// A protocol: its description and its decoders.
 pub trait Codec: Sync {
-    /// What is known of it; the fields are those of the codec itself.
+    /// Its description; the fields are those of the codec itself.
     fn facts(&self) -> &'static Facts;
 
-    /// A decoder for one idle-high line at `rate` bits a second.
+    /// Returns a decoder for one idle-high line at `rate` bits per second.
     fn line(&self, _rate: u32, _settings: &Settings) -> Option<Box<dyn LineDecoder>> {
         None
     }
 
-    /// A decoder for a log of bytes that begins with `sample`.
+    /// Returns a decoder for a log of bytes that begins with `sample`.
     fn log(&self, _settings: &Settings, _sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
         None
     }
 
-    /// A packet of a network as an event.
+    /// Decodes a network packet to an event.
     fn packet(&self, _packet: &Packet) -> Option<Event> {
         None
     }
@@ -102,7 +102,7 @@ impl fmt::Debug for dyn Codec {
 
 /// Turns a log of bytes into events.
 pub trait LogDecoder {
-    /// What there is to say of the log as a whole, before its frames.
+    /// Returns remarks about the log as a whole, before its frames.
     fn note(&self) -> Option<String> {
         None
     }
@@ -110,30 +110,30 @@ pub trait LogDecoder {
     /// Bytes that followed each other, without times.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// A burst, or what stands in the place of one.
+    /// Takes a burst, or what is in place of one.
     fn take(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         let Some(what) = &burst.spoilt else { return self.burst(burst, out) };
         self.spoilt(out)?;
         out.event(&Event::new(Place::Line(burst.line), None, "line", Vec::new(), Refusal::new("hex", what).into()))
     }
 
-    /// A line of the log could not be read: it may have been the answer that is waited for.
+    /// Reports that a line of the log could not be read: it may have been the awaited answer.
     fn spoilt(&mut self, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// The log ends.
+    /// Ends the log.
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// What was found of the log as a whole.
+    /// Returns the findings about the log as a whole.
     fn found(&self) -> Found {
         Found::default()
     }
 }
 
-/// What was found about a log as a whole, at its end.
+/// Findings about a log as a whole, at its end.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Why it cannot be read as it was written.
+    /// The reason why it cannot be read as written.
     pub misread: Option<String>,
-    /// What needs attention although every frame is good.
+    /// Anything that needs attention although every frame is good.
     pub trouble: Option<String>,
 }

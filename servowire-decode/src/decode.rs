@@ -12,7 +12,8 @@ use crate::settings::Settings;
 use crate::sink::{Sink, Tally};
 use crate::{line, log};
 
-/// Decodes a capture called `file` to its end; without `protocol`, it is found. Events before a fault have been given to `out`.
+/// Decodes a capture called `file` to its end; without `protocol`, the protocol is detected. Events before a fault have
+/// already been passed to `out`.
 pub fn decode(
     file: &str,
     capture: Capture,

@@ -1,4 +1,4 @@
-//! What was said on a line: the one form into which every protocol decodes and from which every output prints.
+//! Events on a line: the common form into which every protocol decodes and from which every output prints.
 
 use std::borrow::Cow;
 use std::fmt::{Display, Write as _};
@@ -10,7 +10,7 @@ use crate::time::Time;
 /// A frame, or the absence of an expected one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
-    /// Where in the capture.
+    /// Its place in the capture.
     pub place: Place,
     /// Who spoke.
     pub direction: Option<Direction>,
@@ -20,22 +20,23 @@ pub struct Event {
     pub fields: Vec<Field>,
     /// The position that the frame carries.
     pub position: Option<Position>,
-    /// The encoder, drive or device that speaks or is addressed, if the protocol has addresses and this one is known.
+    /// Address of the encoder, drive or device that sends or is addressed, if the protocol has addresses and this one is
+    /// known.
     pub address: Option<u32>,
-    /// What happened with this frame that belongs in a list of events: an alarm, a servo that is switched on.
+    /// What happened in this frame and belongs in a list of events: an alarm, or a servo that is switched on.
     pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
     /// Whether the frame is good.
     pub verdict: Verdict,
-    /// Whether the times of its place are counted, for instance by the update counter of a drive, rather than measured.
+    /// Whether the times of its place are counted rather than measured, for instance by the update counter of a drive.
     pub counted: bool,
-    /// Whether this is not a frame but a remark about the recording, which is not counted.
+    /// Whether this is a remark about the recording instead of a frame; remarks are not counted.
     pub remark: bool,
 }
 
 impl Event {
-    /// Without position and delay.
+    /// Creates an event without position and delay.
     pub fn new(
         place: Place,
         direction: Option<Direction>,
@@ -58,24 +59,24 @@ impl Event {
         }
     }
 
-    /// Says where fields are, by their names.
+    /// Sets the places of fields, by their names.
     #[must_use]
     pub(crate) fn locate(mut self, span: impl Fn(&str) -> Option<Span>) -> Self {
         self.fields.iter_mut().for_each(|field| field.span = span(field.name));
         self
     }
 
-    /// A frame whose beginning is not in the capture, which is not a fault of the line.
+    /// Creates the event of a frame whose beginning is not in the capture, which is not a fault of the line.
     pub fn cut(place: Place) -> Self {
         Self::remark(place, "cut", "the capture begins inside a frame")
     }
 
-    /// A remark about the recording at `place`.
+    /// Creates a remark about the recording at `place`.
     pub fn remark(place: Place, kind: &'static str, note: impl Display) -> Self {
         Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
     }
 
-    /// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+    /// Marks part of a frame at the end of the capture: the rest is not known, so the frame is not sound.
     pub(crate) fn cut_off(place: Place) -> Self {
         Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
     }
@@ -96,7 +97,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// When it ends; `None` in a log without times.
+    /// Returns when it ends; `None` in a log without times.
     pub fn end(self) -> Option<Time> {
         match self {
             Self::Time { end, .. } => Some(end),
@@ -105,7 +106,7 @@ impl Place {
     }
 }
 
-/// Who spoke on a line with two ends.
+/// The sender on a line with two ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// The controller.
@@ -121,7 +122,7 @@ pub struct Field {
     pub name: &'static str,
     /// Its value.
     pub value: Value,
-    /// Its place; `None` for a statement about the whole frame, whose place is that of the event.
+    /// Its place; `None` if it describes the whole frame, whose place is that of the event.
     pub span: Option<Span>,
 }
 
@@ -132,12 +133,12 @@ pub struct Span {
     pub first: u32,
     /// Its last bit.
     pub last: u32,
-    /// From when to when these bits were on the line.
+    /// The time during which these bits were on the line.
     pub place: Place,
 }
 
 impl Span {
-    /// Bits `first` to `last` of a frame at `place`, of `count` bits that follow each other.
+    /// Returns the place of bits `first` to `last` of a frame of `count` consecutive bits at `place`.
     pub(crate) fn even(place: Place, count: u32, first: u32, last: u32) -> Self {
         let place = match place {
             Place::Time { start, end } => {
@@ -151,38 +152,38 @@ impl Span {
 }
 
 impl Field {
-    /// A field that describes the frame as a whole.
+    /// Creates a field that describes the frame as a whole.
     pub fn new(name: &'static str, value: Value) -> Self {
         Self { name, value, span: None }
     }
 
-    /// A number without a unit.
+    /// Creates a field with a number without a unit.
     pub fn number(name: &'static str, value: impl Into<i64>) -> Self {
         Self::measured(name, value, "")
     }
 
-    /// A number with its unit.
+    /// Creates a field with a number and its unit.
     pub fn measured(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Self {
         Self::new(name, Value::Number { value: value.into(), unit })
     }
 
-    /// A code or check value of this many hex digits.
+    /// Creates a field with a code or check value of this many hex digits.
     pub fn hex(name: &'static str, value: impl Into<u64>, digits: usize) -> Self {
         Self::new(name, Value::Hex { value: value.into(), digits })
     }
 
-    /// Named bits, with the names that the protocol's crate gives them.
+    /// Creates a field of named bits, with the names used by the protocol's crate.
     pub fn flags<F: Flags<Bits: Into<u64>>>(name: &'static str, flags: &F, digits: usize) -> Self {
         let set = flags.iter_names().map(|(name, _)| name).collect();
         Self::new(name, Value::Flags { raw: flags.bits().into(), digits, set })
     }
 
-    /// Anything that implements `Display`.
+    /// Creates a field from anything that implements `Display`.
     pub fn text(name: &'static str, what: impl Display) -> Self {
         Self::new(name, Value::Text(what.to_string()))
     }
 
-    /// Bytes or words in hex, this many digits each, a space between them.
+    /// Creates a field of bytes or words in hex, with this many digits each, separated by spaces.
     pub fn digits(name: &'static str, values: impl IntoIterator<Item = impl Into<u64>>, digits: usize) -> Self {
         let mut text = String::new();
         for value in values {
@@ -194,7 +195,7 @@ impl Field {
     }
 }
 
-/// A value with what is needed to print it.
+/// A value with the information needed to print it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// A number; the unit may be empty.
@@ -236,21 +237,21 @@ pub enum Value {
 pub struct Position {
     /// Its name in the protocol's own words, such as `VPOS`. Positions with different names or addresses are different series.
     pub name: &'static str,
-    /// Counts, turns included if the frame carries them.
+    /// The position in counts, including turns if the frame carries them.
     pub counts: i64,
-    /// Counts after which the value wraps, if it does.
+    /// Number of counts after which the value wraps, if it does.
     pub span: Option<u64>,
     /// Counts per turn, if the resolution is known and the axis turns.
     pub per_turn: Option<u64>,
 }
 
 impl Position {
-    /// In turns, if the resolution is known.
+    /// Returns the position in turns, if the resolution is known.
     pub fn turns(&self) -> Option<f64> {
         self.per_turn.map(|counts| self.counts as f64 / counts as f64)
     }
 
-    /// The move from `before`, the shorter one where the value wraps.
+    /// Returns the move from `before`, the shorter way if the value wraps.
     pub(crate) fn moved_from(&self, before: &Self) -> i64 {
         let moved = self.counts.wrapping_sub(before.counts);
         let Some(span) = self.span.and_then(|span| i64::try_from(span).ok()).filter(|span| *span > 0) else {
@@ -270,7 +271,7 @@ pub enum Verdict {
     Refused(Box<Refusal>),
 }
 
-/// The class of an answer that was due and did not come.
+/// The class of an answer that was expected but did not come.
 pub(crate) const NO_RESPONSE: &str = "no_response";
 
 /// Why a frame was refused.
@@ -280,18 +281,18 @@ pub struct Refusal {
     pub class: &'static str,
     /// A sentence that says what arrived and what was expected.
     pub reason: String,
-    /// The field by its name.
+    /// The name of the field.
     pub field: Option<String>,
-    /// The bit of that field, in the order of the line.
+    /// The bit in that field, in the order of the line.
     pub bit: Option<u32>,
-    /// When that was, in picoseconds.
+    /// When that bit was on the line, in picoseconds.
     pub time: Option<Time>,
-    /// What probably caused it.
+    /// The probable cause.
     pub cause: Option<String>,
 }
 
 impl Refusal {
-    /// The reason alone, without a place.
+    /// Creates a refusal with a reason but without a place.
     pub fn new(class: &'static str, reason: impl Display) -> Self {
         Self { class, reason: reason.to_string(), field: None, bit: None, time: None, cause: None }
     }
@@ -304,7 +305,7 @@ impl From<Refusal> for Verdict {
 }
 
 impl Verdict {
-    /// The capture ends inside a frame: what comes then is not known, so it is not sound.
+    /// The capture ends inside a frame: the rest is not known, so the frame is not sound.
     pub(crate) fn cut_off() -> Self {
         let cause = Some("the file was cut off, or recording stopped there".to_owned());
         Refusal { cause, ..Refusal::new("truncated", "the capture ends inside a frame") }.into()

@@ -1,4 +1,4 @@
-//! What is wrong with an input file, in a sentence that a person can act on.
+//! Faults of an input file, each as a sentence that a person can act on.
 
 use std::fmt;
 use std::io;
@@ -7,7 +7,7 @@ use std::io;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}{at}: {what}")]
 pub struct Fault {
-    /// The file as the user named it.
+    /// The name of the file as given by the user.
     pub file: String,
     /// Where in the file.
     pub at: At,
@@ -20,9 +20,9 @@ pub struct Fault {
 pub enum At {
     /// The file as a whole.
     File,
-    /// A line of a text file, from 1.
+    /// A line of a text file, counted from 1.
     Line(u64),
-    /// An offset in a binary file, from 0.
+    /// An offset in a binary file, counted from 0.
     Byte(u64),
 }
 
@@ -37,7 +37,7 @@ impl fmt::Display for At {
 }
 
 impl Fault {
-    /// A fault of `file`.
+    /// Creates a fault of `file`.
     pub fn new(file: &str, at: At, what: impl Into<String>) -> Self {
         Self { file: file.to_owned(), at, what: what.into() }
     }
@@ -48,9 +48,9 @@ impl Fault {
 pub enum Stop {
     /// The input is broken from here on, or nothing in it can be decoded.
     Fault(Fault),
-    /// All was decoded, and shows something that somebody has to look after.
+    /// Everything was decoded, and shows something that needs attention.
     Trouble(Fault),
-    /// The output takes nothing more.
+    /// The output accepts nothing more.
     Output(io::Error),
 }
 

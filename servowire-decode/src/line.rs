@@ -1,4 +1,4 @@
-//! From a recorded line to what is said on it: find the channels, the protocol, the rate and the polarity, then receive.
+//! From a recorded line to its events: find the channels, the protocol, the rate and the polarity, then receive.
 
 mod again;
 pub(crate) mod evidence;
@@ -29,7 +29,8 @@ use crate::output::Output;
 use crate::protocols::meant;
 use crate::settings::Settings;
 
-/// Takes what comes next as samples where that can be, else as changes; whether there is more, or why it cannot be read.
+/// Takes the next data as samples if possible, otherwise as changes; returns whether there is more, or why it cannot be
+/// read.
 fn read(
     line: &mut dyn Line,
     decoder: &mut PushDecoder,
@@ -59,7 +60,7 @@ fn skip(line: &mut dyn Line, decoder: &PushDecoder, out: &Output<'_>) -> Result<
     }
 }
 
-/// Decodes what is said on the lines of a capture.
+/// Decodes the lines of a capture.
 pub(crate) fn decode(
     file: &str,
     line: &mut dyn Line,

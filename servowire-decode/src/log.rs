@@ -19,7 +19,7 @@ use crate::time::{SECOND, Time};
 /// Bursts by which the protocol is recognised.
 const SAMPLE: usize = 256;
 
-/// Decodes a log; of an unknown protocol, by the one of which most holds.
+/// Decodes a log; if the protocol is unknown, with the one that has the most good frames.
 pub(crate) fn decode(
     file: &str,
     mut log: ByteLog,
@@ -72,17 +72,17 @@ pub(crate) fn decode(
     }
 }
 
-/// Times of day and dates begin with the first, as a capture does; others are times of the log already.
+/// Times of day and dates are counted from the first one, as in a capture; other times are already times of the log.
 fn since_first(burst: Burst, origin: &mut Option<Time>) -> Burst {
     let first = |time| if time < LATER { Time::ZERO } else { time };
     let time = burst.time.map(|time| time.since(*origin.get_or_insert_with(|| first(time))));
     Burst { time, ..burst }
 }
 
-/// What begins later is a time of day or a date.
+/// A log that begins later than this has times of day or dates.
 const LATER: Time = Time::from_ps(1_000 * SECOND as i128);
 
-/// Takes a burst; of lines in one piece, when they are complete.
+/// Takes a burst, or joined lines once they are complete.
 fn join(reader: &mut dyn LogDecoder, burst: Burst, whole: &mut Option<Burst>, out: &mut dyn Sink) -> io::Result<()> {
     match whole {
         Some(whole) if burst.spoilt.is_none() && whole.bytes.len() < MOST_JOINED => {
@@ -99,5 +99,5 @@ fn join(reader: &mut dyn LogDecoder, burst: Burst, whole: &mut Option<Burst>, ou
     }
 }
 
-/// Bytes of lines that are taken in one piece, at most.
+/// Maximum number of bytes of joined lines.
 const MOST_JOINED: usize = 1 << 24;

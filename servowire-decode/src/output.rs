@@ -1,4 +1,4 @@
-//! Where events go: text, JSON Lines, a VCD beside, statistics.
+//! Outputs for events: text, JSON Lines, CSV, a VCD, statistics.
 
 pub mod filter;
 pub mod json;
@@ -21,18 +21,18 @@ use crate::time::Time;
 
 /// All outputs of one file together.
 pub struct Output<'a> {
-    /// All get all events, the first one first.
+    /// Every printer gets all events, the first printer first.
     printers: Vec<&'a mut dyn Printer>,
     filter: Option<&'a mut filter::Filter>,
-    /// Called after every block that was read.
+    /// Called after every block read.
     progress: Option<&'a dyn Fn()>,
     /// Takes what the user should know but did not ask for.
     notes: Option<&'a dyn Fn(&Note)>,
-    /// Says whether the user has enough.
+    /// Returns whether the user has seen enough.
     enough: Option<&'a dyn Fn() -> bool>,
-    /// Reading ends so many picoseconds after the first refused frame.
+    /// Reading ends this many picoseconds after the first refused frame.
     until_error: Option<i64>,
-    /// That is then.
+    /// The time at which reading ends.
     last: Option<Time>,
     done: bool,
     /// Frames so far.
@@ -45,7 +45,7 @@ pub struct Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// `printer` gets all events of the file called `file`.
+    /// Creates an output in which `printer` gets all events of the file called `file`.
     pub fn new(file: &str, printer: &'a mut dyn Printer) -> Self {
         Self {
             printers: vec![printer],
@@ -63,7 +63,7 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// A further printer gets the events too, if there is one.
+    /// Adds a second printer that gets the events too, if there is one.
     #[must_use]
     pub fn with_beside(mut self, printer: Option<&'a mut dyn Printer>) -> Self {
         self.printers.extend(printer);
@@ -76,25 +76,25 @@ impl<'a> Output<'a> {
         Self { enough: Some(enough), ..self }
     }
 
-    /// Stops so many picoseconds after the first refused frame that is shown; 0: with it.
+    /// Stops this many picoseconds after the first refused frame that is shown; 0: at that frame.
     #[must_use]
     pub fn until_error(self, after: i64) -> Self {
         Self { until_error: Some(after.max(0)), ..self }
     }
 
-    /// Called after every block that was read.
+    /// Calls `progress` after every block read.
     #[must_use]
     pub fn with_progress(self, progress: &'a dyn Fn()) -> Self {
         Self { progress: Some(progress), ..self }
     }
 
-    /// Takes what the user should know but did not ask for.
+    /// Takes notes: what the user should know but did not ask for.
     #[must_use]
     pub fn with_notes(self, notes: &'a dyn Fn(&Note)) -> Self {
         Self { notes: Some(notes), ..self }
     }
 
-    /// Shows only what passes.
+    /// Shows only frames that pass the filter.
     #[must_use]
     pub fn with_filter(self, filter: &'a mut filter::Filter) -> Self {
         Self { filter: Some(filter), ..self }
@@ -105,47 +105,47 @@ impl<'a> Output<'a> {
         self.printers.iter().any(|printer| printer.wants_changes())
     }
 
-    /// The file begins.
+    /// Begins the file.
     pub fn begin(&mut self) -> io::Result<()> {
         let Self { printers, origin, .. } = self;
         printers.iter_mut().try_for_each(|printer| printer.begin(origin))
     }
 
-    /// The file is at its end.
+    /// Ends the file.
     pub fn end(&mut self) -> io::Result<()> {
         let Self { printers, origin, .. } = self;
         printers.iter_mut().try_for_each(|printer| printer.end(origin))
     }
 
-    /// The channels of the capture. The lines found so far are decoded.
+    /// Passes on the channels of the capture. The lines found so far are decoded.
     pub fn channels(&mut self, channels: &[String]) -> io::Result<()> {
         let Self { printers, origin, .. } = self;
         printers.iter_mut().try_for_each(|printer| printer.channels(origin, channels))
     }
 
-    /// A further line is decoded; it has the next number, from 0.
+    /// Adds a decoded line; it has the next number, from 0.
     pub(crate) fn begin_lane(&mut self, lane: Lane) {
         self.origin.lanes.push(lane);
     }
 
-    /// The events that follow are of this line.
+    /// Sets the line of the events that follow.
     pub fn lane(&mut self, lane: usize) {
         self.origin.speaks = lane;
     }
 
-    /// A change of any channel.
+    /// Passes on a change of any channel.
     pub fn change(&mut self, change: &Change) -> io::Result<()> {
         self.printers.iter_mut().try_for_each(|printer| printer.change(change))
     }
 
-    /// A block was read.
+    /// Reports that a block was read.
     pub fn tick(&self) {
         if let Some(progress) = self.progress {
             progress();
         }
     }
 
-    /// The refused frames and the missing answers in a sentence; `None` if all are good.
+    /// Returns the refused frames and the missing answers in a sentence; `None` if all are good.
     pub fn refusals(&self) -> Option<String> {
         let Tally { ok, refused, missing } = self.chosen;
         let said = |cause: &Option<String>| cause.as_ref().map_or(String::new(), |cause| format!(" ({cause})"));
@@ -172,17 +172,17 @@ impl<'a> Output<'a> {
             || self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
     }
 
-    /// Returns whether the user has enough: whatever follows is dropped.
+    /// Returns whether the user has seen enough: everything that follows is dropped.
     pub fn is_done(&self) -> bool {
         self.done || self.enough.is_some_and(|enough| enough())
     }
 
-    /// Tells that nothing arrives for a while: what is complete is shown.
+    /// Reports that nothing arrives for a while: whatever is complete is shown.
     pub fn flush(&mut self) -> io::Result<()> {
         self.printers.iter_mut().try_for_each(|printer| printer.flush())
     }
 
-    /// Something the user should know.
+    /// Passes on something that the user should know.
     pub fn note(&self, note: &Note) {
         if let Some(notes) = self.notes {
             notes(note);

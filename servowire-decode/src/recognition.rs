@@ -1,4 +1,4 @@
-//! What was recognised of a capture, and why: values that print as a sentence.
+//! What was recognised in a capture, and why, as values that print as a sentence.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,10 +7,10 @@ use crate::codec::Codec;
 use crate::line::receive::Rates;
 use crate::sink::Tally;
 
-/// Spikes are worth a word from one in this many edges on.
+/// Spikes are mentioned if there is at least one in this many edges.
 const SPIKY: u64 = 50;
 
-/// A rate in bits a second as Mbit/s.
+/// Shows a rate in bits per second as Mbit/s.
 pub(crate) fn mbit(rate: f64) -> f64 {
     rate / 1e6
 }
@@ -18,23 +18,23 @@ pub(crate) fn mbit(rate: f64) -> f64 {
 /// The protocol recognised on a line, and the evidence for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recognition {
-    /// Its channel by name, or that of the requests and that of the answers.
+    /// The name of its channel, or of the channels of the requests and the answers.
     pub channels: Vec<String>,
     /// The protocol.
     pub protocol: &'static dyn Codec,
     /// The rate of the protocol in bits per second.
     pub rate: u32,
-    /// Whether the line is decoded upside down.
+    /// Whether the line is decoded inverted.
     pub inverted: bool,
-    /// The level at which the line rests, if it does.
+    /// The level at which the line idles, if it does.
     pub idle: Option<bool>,
     /// The rate that the runs of the line suggest, in bits per second.
     pub seen: Option<f64>,
-    /// What was measured on the line.
+    /// The measurements of the line.
     pub rates: Rates,
     /// The first frames by their verdict.
     pub tally: Tally,
-    /// Whether these are all.
+    /// Whether these are all frames.
     pub whole: bool,
     /// The next best protocol and rate of the same channel, if it is close.
     pub rival: Option<(&'static dyn Codec, u32)>,
@@ -99,7 +99,7 @@ impl fmt::Display for Recognition {
     }
 }
 
-/// What a user who decodes a capture should know without asking.
+/// Notes to a user who decodes a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
     /// A line was found.
@@ -109,48 +109,48 @@ pub enum Note {
         /// What is on the line.
         line: Recognition,
     },
-    /// A line is something else than what it was said to be.
+    /// A line is not what it was said to be.
     LineRather {
         /// The file.
         file: String,
         /// What it looks like.
         line: Recognition,
     },
-    /// More channels move than are tried.
+    /// More channels have edges than are tried.
     Channels {
         /// The file.
         file: String,
-        /// How many move.
+        /// Number of channels with edges.
         moving: usize,
-        /// How many were tried.
+        /// Number of channels tried.
         tried: usize,
     },
-    /// Packets of ordinary network traffic were passed over.
+    /// Packets of ordinary network traffic were skipped.
     Traffic {
         /// The file.
         file: String,
-        /// Their numbers by what they are.
+        /// Their numbers by kind.
         packets: BTreeMap<&'static str, u64>,
     },
     /// A log of bytes was recognised.
     Log {
         /// The protocol.
         protocol: &'static dyn Codec,
-        /// The first frames that hold, in per cent.
+        /// Share of good frames among the first ones, in per cent.
         share: u64,
     },
-    /// A log is something else than what it was said to be.
+    /// A log is not what it was said to be.
     LogRather {
         /// The protocol.
         protocol: &'static dyn Codec,
         /// The first frames by their verdict.
         tally: Tally,
     },
-    /// What a log looks like as a whole.
+    /// The appearance of a log as a whole.
     Shape(String),
 }
 
-/// Packets of ordinary network traffic in words.
+/// Describes packets of ordinary network traffic.
 pub(crate) fn traffic(packets: &BTreeMap<&'static str, u64>) -> String {
     let kinds: Vec<String> = packets.iter().map(|(name, count)| format!("{name} {count}")).collect();
     format!("{} packets of ordinary network traffic ({})", packets.values().sum::<u64>(), kinds.join(", "))

@@ -1,4 +1,4 @@
-//! Where events go one by one, and the simplest place: a tally.
+//! The receiver of single events, and the simplest one: a tally.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use crate::event::{Event, Verdict};
 
 /// Takes events in the order of the line.
 pub trait Sink {
-    /// The next event.
+    /// Takes the next event.
     fn event(&mut self, event: &Event) -> io::Result<()>;
 }
 
@@ -22,7 +22,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// What is wrong: refused frames and missing answers.
+    /// The number of faults: refused frames and missing answers.
     pub fn faults(self) -> u64 {
         self.refused + self.missing
     }

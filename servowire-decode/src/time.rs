@@ -1,4 +1,4 @@
-//! Instants of a capture, and what the formats write of them.
+//! Instants of a capture, and conversions from the file formats.
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Neg, Sub};
@@ -8,9 +8,9 @@ use serde::{Serialize, Serializer};
 /// Picoseconds in a second.
 pub const SECOND: i64 = 1_000_000_000_000;
 
-/// An instant of a capture in picoseconds: since its beginning or its trigger (before that it is negative), or since 1970 where
-/// the format tells the date. There is room for any number of years; what lies between two instants is a plain number of
-/// picoseconds, which ends at 106 days.
+/// An instant of a capture in picoseconds: since its beginning or its trigger (negative before the trigger), or since 1970
+/// if the format gives the date. It can hold any number of years; the time between two instants is a plain number of
+/// picoseconds, at most 106 days.
 ///
 /// In memory it need not be aligned to more than eight bytes: edges with a level take 24.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,12 +18,12 @@ pub const SECOND: i64 = 1_000_000_000_000;
 pub struct Time(i128);
 
 impl Time {
-    /// The beginning of a capture that does not give another one.
+    /// The beginning of a capture that does not specify another one.
     pub const ZERO: Self = Self(0);
-    /// After all captures.
+    /// An instant after all captures.
     pub const MAX: Self = Self(i128::MAX);
 
-    /// From picoseconds.
+    /// Creates an instant from picoseconds.
     pub const fn from_ps(picoseconds: i128) -> Self {
         Self(picoseconds)
     }
@@ -56,7 +56,7 @@ impl Time {
         if self < before { i64::MIN } else { i64::MAX }
     }
 
-    /// The same instant on a clock that is 0 at `origin`.
+    /// Returns the same instant on a clock that is 0 at `origin`.
     #[must_use]
     pub(crate) const fn since(self, origin: Self) -> Self {
         Self(self.0.saturating_sub(origin.0))
@@ -90,7 +90,7 @@ impl Sub<i64> for Time {
     }
 }
 
-/// The way from one to the other, at most 106 days.
+/// Returns the time from one to the other, at most 106 days.
 impl Sub for Time {
     type Output = i64;
 
@@ -125,7 +125,7 @@ impl Serialize for Time {
 /// The longest time there is: 30 million years.
 const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
 
-/// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
+/// Converts decimal seconds (`-0.000012345`, `1.5e-6`) to picoseconds; further digits are dropped.
 pub(crate) fn from_decimal(text: &str) -> Option<Time> {
     let text = text.trim();
     let (negative, digits) = match text.strip_prefix('-') {
@@ -147,13 +147,13 @@ pub(crate) fn from_decimal(text: &str) -> Option<Time> {
     (time < MOST).then_some(Time(if negative { -time } else { time }))
 }
 
-/// Seconds as a floating point number in picoseconds; nothing for what no capture can hold.
+/// Converts floating-point seconds to picoseconds; `None` if no capture can hold the result.
 pub(crate) fn from_seconds(seconds: f64) -> Option<Time> {
     let time = (seconds * 1e12).round();
     (time.abs() < MOST as f64).then_some(Time(time as i128))
 }
 
-/// A frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
+/// Reads a frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
 /// A small `m` means mega, as in sigrok.
 pub fn frequency(text: &str) -> Option<f64> {
     let bare = text.trim();
@@ -176,7 +176,7 @@ pub fn frequency(text: &str) -> Option<f64> {
     (number.is_finite() && number >= 0.0).then_some(number * factor)
 }
 
-/// A time as people write it, with its unit: `500us`, `0.5 ms`, `-2s`; in picoseconds.
+/// Reads a time as people write it, with its unit: `500us`, `0.5 ms`, `-2s`; in picoseconds.
 pub fn duration(text: &str) -> Option<Time> {
     let bare = text.trim();
     let digits = bare.trim_end_matches(char::is_alphabetic);
@@ -192,17 +192,17 @@ pub fn duration(text: &str) -> Option<Time> {
     from_seconds(number * picoseconds / 1e12)
 }
 
-/// Sample indices in picoseconds and back.
+/// Converts sample indices to picoseconds and back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clock {
     rate: u64,
-    /// A number of samples and the picoseconds that they take, in the smallest whole numbers.
+    /// A number of samples and their duration in picoseconds, in the smallest whole numbers.
     samples: u64,
     picoseconds: u64,
 }
 
 impl Clock {
-    /// `rate` in samples a second, 1 to 10^12.
+    /// Creates a clock; `rate` in samples per second, 1 to 10^12.
     pub fn new(rate: u64) -> Self {
         let rate = rate.clamp(1, SECOND as u64);
         let (mut common, mut rest) = (SECOND as u64, rate);
@@ -212,12 +212,12 @@ impl Clock {
         Self { rate, samples: rate / common, picoseconds: SECOND as u64 / common }
     }
 
-    /// Samples a second.
+    /// Samples per second.
     pub fn rate(self) -> u64 {
         self.rate
     }
 
-    /// When sample `index` was taken.
+    /// Returns when sample `index` was taken.
     #[inline]
     pub fn time(self, index: u64) -> Time {
         let time = index.checked_mul(self.picoseconds).and_then(|time| time.checked_add(self.samples / 2));
@@ -240,14 +240,14 @@ impl Clock {
         u64::try_from(samples / u128::from(self.picoseconds)).unwrap_or(u64::MAX)
     }
 
-    /// The same where 64 bits do not hold the product.
+    /// Does the same if the product exceeds 64 bits.
     #[cold]
     fn late(self, index: u64) -> Time {
         let time = u128::from(index) * u128::from(self.picoseconds) + u128::from(self.samples / 2);
         Time((time / u128::from(self.samples)) as i128)
     }
 
-    /// The sample nearest to a time that is not negative.
+    /// Returns the sample nearest to a non-negative time.
     pub fn index(self, time: Time) -> u64 {
         let index =
             time.0.max(0).saturating_mul(self.rate.into()).saturating_add(i128::from(SECOND / 2)) / i128::from(SECOND);

@@ -1,11 +1,12 @@
-//! Tables of bytes that an analyser of Logic 2 found on a line: the data table of all analysers, and the table of one.
+//! Tables of the bytes that a Logic 2 analyser found on a line: the data table of all analysers, and the table of a single
+//! one.
 //!
 //! ```text
 //! name,type,start_time,duration,"data"                 Time [s],Value,Parity Error,Framing Error
 //! "Async Serial","data",0.000592672,0.0000038,0x1A     0.000592672000000,0x1A,,
 //! ```
-//! A row is a byte with its time. The line is drawn again from them: a start bit, eight bits with the lowest first, a
-//! delimiter. So gaps part the frames, and two analysers are two channels.
+//! A row is a byte with its time. The line is reconstructed from the rows: a start bit, eight bits with the lowest first, a
+//! delimiter. So gaps separate the frames, and two analysers are two channels.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -18,11 +19,11 @@ use crate::time::Time;
 
 /// Rows looked at for the names of the analysers and the length of a bit.
 const SAMPLE: usize = 4096;
-/// Changes given at once.
+/// Changes returned at once.
 const BLOCK: usize = 4096;
-/// The most edges that are drawn and not given yet; bytes that follow each other leave a few.
+/// Maximum number of edges that are drawn but not yet returned; consecutive bytes leave a few.
 const MOST_DRAWN: usize = 1 << 12;
-/// The most analysers.
+/// Maximum number of analysers.
 const CHANNELS: usize = 64;
 /// Logic 2 draws a byte from the edge of its start bit to the middle of its delimiter.
 const DRAWN_BITS: f64 = 9.5;
@@ -40,7 +41,7 @@ pub(super) struct Analyzer {
     bit: f64,
     /// The first time, where times are dates.
     origin: Option<Time>,
-    /// What is drawn and not given yet, the earliest first.
+    /// Edges drawn but not yet returned, the earliest first.
     drawn: BinaryHeap<Reverse<(Time, u64, u16, bool)>>,
     sequence: u64,
     begun: bool,
@@ -153,7 +154,7 @@ impl Analyzer {
         Ok(table)
     }
 
-    /// Length of a bit in picoseconds: by the durations, else by bytes that follow each other at once.
+    /// Length of a bit in picoseconds: from the durations, otherwise from bytes that follow each other without a gap.
     fn length(&self) -> Option<f64> {
         let mut durations: Vec<i64> = self.waiting.iter().filter_map(|(_, row)| row.duration).collect();
         durations.sort_unstable();
@@ -223,7 +224,7 @@ impl Analyzer {
         }))
     }
 
-    /// Draws a byte; what is earlier than it can be given.
+    /// Draws a byte; edges earlier than it can then be returned.
     fn draw(&mut self, row: &Row) -> Result<(), String> {
         let Some(channel) = self.channels.iter().position(|known| *known == row.name) else {
             return Err(format!("the analyser {:?} has no byte before this one", row.name));
@@ -256,7 +257,7 @@ impl Analyzer {
         self.sequence += 1;
     }
 
-    /// Gives what is earlier than `time`.
+    /// Returns the edges earlier than `time`.
     fn give(&mut self, time: Time, changes: &mut Vec<Change>) {
         while let Some(Reverse((at, _, channel, level))) = self.drawn.peek().copied().filter(|edge| edge.0.0 < time) {
             self.drawn.pop();

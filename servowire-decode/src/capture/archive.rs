@@ -126,7 +126,7 @@ struct Chunk {
     crc: u32,
 }
 
-/// A chunk that is being unpacked.
+/// A chunk being unpacked.
 enum Open {
     Stored(Take<Box<dyn SeekRead>>),
     Deflated(Box<DeflateDecoder<Take<Box<dyn SeekRead>>>>),
@@ -148,13 +148,13 @@ impl Open {
     }
 }
 
-/// The chunks of a session one after the other.
+/// The chunks of a session, one after another.
 struct Chunks {
-    /// Those that are left; what cannot be read is the last.
+    /// The remaining chunks; one that cannot be read is the last.
     left: std::vec::IntoIter<io::Result<Chunk>>,
     /// Between two chunks.
     file: Option<Box<dyn SeekRead>>,
-    /// With its check sum, and that of what was read of it.
+    /// With its checksum, and the checksum of the bytes read so far.
     open: Option<(Open, u32, Crc)>,
 }
 
@@ -184,7 +184,7 @@ impl Chunks {
         Self { left: chunks.into_iter(), file: Some(archive.into_inner()), open: None }
     }
 
-    /// The next chunk; none after the last.
+    /// Returns the next chunk; `None` after the last.
     fn next(&mut self) -> io::Result<Option<(Open, u32, Crc)>> {
         let (Some(chunk), Some(mut file)) = (self.left.next().transpose()?, self.file.take()) else { return Ok(None) };
         file.seek(SeekFrom::Start(chunk.start))?;
@@ -217,9 +217,9 @@ impl Read for Chunks {
     }
 }
 
-/// Samples of a block of a DSView channel at most; blocks are shorter at the beginning and at the end.
+/// Maximum number of samples in a block of a DSView channel; blocks are shorter at the beginning and at the end.
 const DSVIEW_BLOCK: u64 = 1 << 24;
-/// How many bytes of all channels are searched for changes at once.
+/// Number of bytes of all channels that are searched for changes at once.
 const PIECE: usize = 1 << 12;
 
 /// A DSView session, version 2 or 3.
@@ -281,7 +281,7 @@ impl Dsview {
         })
     }
 
-    /// The next block of all channels; whether there is one.
+    /// Reads the next block of all channels; returns whether there is one.
     fn load(&mut self) -> Result<bool, Fault> {
         self.before += 8 * self.data.first().map_or(0, |data| data.len() as u64);
         self.data.clear();

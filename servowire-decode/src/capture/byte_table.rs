@@ -1,11 +1,11 @@
-//! Tables of messages: a row a message, with its bytes in one cell, and when it was and who sent it in others.
+//! Tables of messages: one row per message, with its bytes in one cell, and its time and sender in others.
 //!
 //! ```text
 //! time_us,direction,axis,data
 //! 0.0,command,5,45 20 80 00 E8 03 00 00 00 00 00 00 00 00 00 00
 //! ```
-//! The columns stand in any order, and others beside them are left alone. Times are seconds, if the heading names no other unit, or
-//! dates.
+//! The columns may be in any order, and other columns are ignored. Times are dates, or seconds unless the heading names
+//! another unit.
 
 use super::hexlog::{Burst, words};
 use super::input::Input;
@@ -47,7 +47,7 @@ impl Columns {
         (time.is_some() || direction.is_some()).then_some(Self { separator, time, direction, data })
     }
 
-    /// What a row says.
+    /// The content of a row.
     fn burst(&self, line: u64, row: &str) -> Result<Burst, String> {
         let cells = titles(row, self.separator);
         let cell = |index: usize| cells.get(index).map_or("", String::as_str);
@@ -114,12 +114,12 @@ impl ByteTable {
         &mut self.lines.input
     }
 
-    /// Whether its rows say when they were.
+    /// Returns whether its rows have times.
     pub(super) fn has_times(&self) -> bool {
         self.columns.time.is_some()
     }
 
-    /// The message of the next row; if the row cannot be read, the reason. `None` at the end.
+    /// Returns the message of the next row; if the row cannot be read, the reason. `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         let mut text = Vec::new();
         while self.lines.next(&mut text)? {

@@ -1,6 +1,6 @@
-//! Logs of a CAN bus, as `candump` of can-utils writes them: known, so that they can be refused for what they are.
+//! Logs of a CAN bus, as `candump` of can-utils writes them: recognised only to be refused with a clear message.
 
-/// What to say of them.
+/// The message for them.
 pub(super) const REFUSED: &str = "a log of a CAN bus (candump): none of the protocols that are decoded runs on CAN. If an \
     adapter carried bytes of a serial line, cut them out, one burst per line, and give --bytes";
 

@@ -9,9 +9,9 @@ use crate::time::Time;
 pub struct Column {
     /// Its name.
     pub name: String,
-    /// When it takes a level; the first is that at the beginning.
+    /// The times at which it takes a level; the first belongs to the level at the beginning.
     pub times: Vec<Time>,
-    /// The level from then on, one for each time.
+    /// The level from that time onwards, one for each time.
     pub levels: Vec<bool>,
 }
 

@@ -13,9 +13,9 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::Time;
 
-/// The file is read in this many parts, so that it is never in memory as a whole.
+/// Number of parts in which the file is read, so that it is never in memory as a whole.
 const PARTS: u64 = 64;
-/// The most channels.
+/// Maximum number of channels.
 const CHANNELS: usize = 65_535;
 
 /// The type of a block that holds a whole file, packed by gzip; its own length and that of the file follow.
@@ -23,8 +23,7 @@ const WRAPPED: u8 = 254;
 
 const DAMAGED: &str = "not valid FST: the file is damaged";
 
-/// The library panics on some damaged files. That is their fault, not ours: `guard` comes back from it, and there is no
-/// result.
+/// The library panics on some damaged files. The files are at fault: `guard` returns from the panic, without a result.
 fn guarded<T>(guard: Option<Guard>, call: impl FnOnce() -> T) -> Option<T> {
     let Some(guard) = guard else { return Some(call()) };
     let (mut call, mut result) = (Some(call), None);
@@ -32,7 +31,7 @@ fn guarded<T>(guard: Option<Guard>, call: impl FnOnce() -> T) -> Option<T> {
     result
 }
 
-/// What a file packed as a whole holds. The library would believe what the file says of its own length.
+/// Unpacks a file that is packed as a whole. The library would trust the length stated in the file.
 fn unwrapped(mut input: Input) -> Result<Input, Fault> {
     if input.peek()?.first() != Some(&WRAPPED) {
         return Ok(input);
@@ -119,7 +118,7 @@ impl Fst {
     }
 }
 
-/// A stamp in picoseconds.
+/// Converts a stamp to picoseconds.
 fn picoseconds(stamp: u64, exponent: i32) -> Option<Time> {
     let power = exponent + 12;
     let factor = 10_u128.checked_pow(power.unsigned_abs())?;

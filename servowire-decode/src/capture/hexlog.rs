@@ -1,7 +1,7 @@
 //! Bytes as text: a log of a serial monitor or a debugger, a dump, an array of C or Rust.
 //!
-//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `TX: 1A -> RX: 1A 20` are all read; what follows `#` or `//` is a remark.
-//! A line of a log is what followed without a pause; a dump or an array is one burst.
+//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `TX: 1A -> RX: 1A 20` are all read; text after `#` or `//` is a comment.
+//! The bytes of one line of a log followed each other without a pause; a dump or an array is one burst.
 
 mod dump;
 pub(super) mod words;
@@ -14,13 +14,14 @@ use crate::fault::{At, Fault};
 use crate::time::Time;
 use dump::{Dump, Row};
 
-/// The longest line that is read; longer ones are not a log of a servo line.
+/// Maximum length of a line; a file with longer ones is not a log of a servo line.
 const LONGEST: usize = 1 << 16;
-/// Bytes of a dump that are given at once, and letters of an array: a frame that lies across the end is lost.
+/// Maximum number of bytes of a dump, or characters of an array, that are returned at once: a frame that crosses the end is
+/// lost.
 const MOST: usize = 1 << 24;
-/// Lines by which a log is known where nothing else says that it is one.
+/// Number of lines by which a log is recognised if nothing else identifies it.
 const SEEN: usize = 24;
-/// Lines of bytes for each line that is not, where nothing else says that it is a log.
+/// Minimum number of lines of bytes for each other line, if nothing else identifies a log.
 const SOUND: usize = 8;
 
 /// A log of bytes.
@@ -28,14 +29,14 @@ pub struct HexLog {
     input: Input,
     text: Vec<u8>,
     line: u64,
-    /// Bytes were read: this is a log.
+    /// Bytes were read, so this is a log.
     good: bool,
     shape: Shape,
     ready: VecDeque<Burst>,
     over: bool,
 }
 
-/// What the text is, by its beginning.
+/// The kind of text, judged by its beginning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Shape {
     Unknown,
@@ -44,7 +45,7 @@ enum Shape {
     Array { open: bool, cells: String, from: u64 },
 }
 
-/// Bytes of a dump so far, from line and address on.
+/// Bytes of a dump so far, with the line and address of the first.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct Gathered {
     line: u64,
@@ -57,28 +58,28 @@ struct Gathered {
 pub struct Burst {
     /// Its number, from 1.
     pub line: u64,
-    /// When it was sent, if the log says so.
+    /// When it was sent, if the log gives a time.
     pub time: Option<Time>,
-    /// Who sent it, if the log says so.
+    /// Who sent it, if the log names the sender.
     pub direction: Option<Direction>,
     /// Its content; at least one byte, unless it is damaged.
     pub bytes: Vec<u8>,
-    /// Why the line is not bytes.
+    /// Why the line could not be read as bytes.
     pub spoilt: Option<String>,
 }
 
 impl Burst {
-    /// Bytes from `line`.
+    /// Creates a burst of the bytes in `line`.
     pub fn new(line: u64, bytes: Vec<u8>) -> Self {
         Self { line, time: None, direction: None, bytes, spoilt: None }
     }
 
-    /// What `line` says.
+    /// Creates a burst from the content of `line`.
     pub(super) fn of(line: u64, said: words::Said) -> Self {
         Self { time: said.time, direction: said.direction, ..Self::new(line, said.bytes) }
     }
 
-    /// A line that is not bytes, and why.
+    /// Creates the entry for a line that could not be read as bytes, with the reason.
     pub(super) fn spoilt(line: u64, what: String) -> Self {
         Self { spoilt: Some(what), ..Self::new(line, Vec::new()) }
     }
@@ -97,7 +98,7 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
     bad.saturating_mul(SOUND) <= good && bytes > 1
 }
 
-/// What the first lines of a text are.
+/// Classifies the first lines of a text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Sample {
     /// Lines with bytes.
@@ -105,7 +106,7 @@ struct Sample {
     /// Lines that are something else.
     bad: usize,
     bytes: usize,
-    /// A line says when it was.
+    /// A line has a time.
     timed: bool,
 }
 
@@ -140,7 +141,7 @@ fn array_begins(text: &str) -> bool {
 }
 
 impl HexLog {
-    /// A log from its beginning.
+    /// Reads a log from its beginning.
     pub fn new(input: Input) -> Self {
         Self {
             input,
@@ -158,12 +159,12 @@ impl HexLog {
         &mut self.input
     }
 
-    /// Whether its first lines say when they were. To be asked before anything is read.
+    /// Returns whether its first lines have times. Call it before anything is read.
     pub(super) fn has_times(&mut self) -> bool {
         self.input.peek().is_ok_and(|head| Sample::of(&String::from_utf8_lossy(head)).timed)
     }
 
-    /// The next burst; `None` at the end.
+    /// Returns the next burst; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         if self.shape == Shape::Unknown {
             let head = String::from_utf8_lossy(self.input.peek()?).into_owned();
@@ -222,7 +223,7 @@ impl HexLog {
     }
 }
 
-/// A line of a dump; at the `end` what was gathered is a burst.
+/// Takes a line of a dump; at the `end` the bytes gathered form a burst.
 fn dump_line(
     dump: Dump,
     text: &str,
@@ -272,7 +273,7 @@ fn dump_line(
     Ok(())
 }
 
-/// A line of an array in C or Rust: what is between the innermost brackets after a `=` is a burst.
+/// Takes a line of an array in C or Rust: the bytes between the innermost brackets after a `=` form a burst.
 fn array_line(
     text: &str,
     number: u64,

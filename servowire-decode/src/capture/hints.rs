@@ -1,4 +1,4 @@
-//! File formats by their names, and what the user said about the files.
+//! Names of file formats, and hints from the user about the files.
 
 /// File formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -7,7 +7,7 @@ pub enum Format {
     Vcd,
     /// A table of levels or voltages.
     Csv,
-    /// A table of bytes of an analyser of Saleae Logic 2.
+    /// A table of bytes from a Saleae Logic 2 analyser.
     AnalyzerTable,
     /// A waveform of a Tektronix oscilloscope.
     Isf,
@@ -21,7 +21,7 @@ pub enum Format {
     SigrokText,
     /// A file of the OLS client.
     Ols,
-    /// One sample in one or more whole bytes, a bit a channel.
+    /// One sample in one or more whole bytes, one bit per channel.
     Raw,
     /// One channel, eight samples a byte, the oldest in bit 0.
     Packed,
@@ -36,7 +36,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All of them: with their names on a command line, the one to show first, and a line for its help.
+    /// All formats, with their names on a command line (the one to show first) and a line of help.
     pub const ALL: [(Self, &'static [&'static str], &'static str); 15] = [
         (Self::Vcd, &["vcd"], "Value change dump (IEEE 1364)"),
         (Self::Csv, &["csv", "saleae-csv"], "A table of a logic analyser or an oscilloscope"),
@@ -55,7 +55,7 @@ impl Format {
         (Self::Pcapng, &["pcapng", "pcap"], "Packets of a network capture, pcap or pcapng"),
     ];
 
-    /// Text may be packed; of the others the first bytes are the format's own.
+    /// Text may be packed; the other formats are identified by their first bytes.
     pub(super) fn is_text(self) -> bool {
         matches!(
             self,
@@ -71,13 +71,13 @@ impl Format {
     }
 }
 
-/// Makes a call and returns even if the call panics. Without a guard, the argument is called directly.
+/// Calls a function and returns even if it panics. Without a guard, the argument is called directly.
 pub type Guard = fn(&mut dyn FnMut());
 
-/// What the user said about the files.
+/// Hints from the user about the files.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Hints {
-    /// The format; otherwise it is found from the content and the name.
+    /// The format; if unset, it is found from the content and the name.
     pub format: Option<Format>,
     /// Samples per second of a raw file.
     pub sample_rate: Option<u64>,
@@ -85,10 +85,10 @@ pub struct Hints {
     pub unit_size: usize,
     /// Bytes of a record.
     pub record_size: Option<usize>,
-    /// The voltage above which a column of a table is high; otherwise half-way between its levels.
+    /// The voltage above which a column of a table is high; if unset, half-way between its levels.
     pub threshold: Option<f64>,
     /// The file is still growing: reading waits for its end.
     pub grows: bool,
-    /// How to call the library for FST, which panics on some damaged files; by default directly.
+    /// How to call the library for FST, which panics on some damaged files; by default it is called directly.
     pub guard: Option<Guard>,
 }

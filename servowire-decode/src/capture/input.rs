@@ -1,4 +1,4 @@
-//! The file below a reader: buffered, metered for the progress bar, with faults that carry its name.
+//! The file behind a reader: buffered, with a byte count for the progress bar, and with faults that carry its name.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
@@ -12,12 +12,12 @@ use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
 
-/// Bytes by which a file is known.
+/// Bytes by which a file is recognised.
 pub(super) const HEAD: usize = 1 << 12;
 
-/// Files inside files are unpacked so deep.
+/// Maximum depth to which packed files inside packed files are unpacked.
 const DEEPEST: u8 = 4;
-/// What has to be read backwards and cannot be is held in memory, up to this many bytes.
+/// Input that must be read backwards but cannot be is held in memory, up to this many bytes.
 const MOST_HELD: u64 = 1 << 28;
 
 /// A reader that can go back.
@@ -25,16 +25,16 @@ pub trait SeekRead: BufRead + Seek {}
 
 impl<R: BufRead + Seek> SeekRead for R {}
 
-/// What is recorded while it is read: a pipe, or a file that is still growing.
+/// Input that is recorded while it is read: a pipe, or a file that is still growing.
 pub trait Live: Read {
-    /// Whether something is there, or the end; may wait for a moment.
+    /// Returns whether data, or the end, are available; may wait for a moment.
     fn is_ready(&mut self) -> bool;
 
-    /// Whether what is complete should be shown although more comes all the time; asked after each block.
+    /// Returns whether complete events should be shown although more data keep coming; called after each block.
     fn is_overdue(&mut self) -> bool;
 }
 
-/// What is below a file.
+/// The source of a file.
 enum Source {
     Stream(Box<dyn Read>),
     File(Box<dyn SeekRead>),
@@ -62,26 +62,26 @@ pub struct Input {
     name: String,
     depth: u8,
     reader: BufReader<Source>,
-    /// The beginning, gathered to see what it is, and how much of it was taken.
+    /// The beginning, read ahead to recognise the file, and how much of it has been taken.
     head: Vec<u8>,
     head_taken: usize,
     taken: Rc<Cell<u64>>,
-    /// Somebody else counts.
+    /// The bytes are counted elsewhere.
     quiet: bool,
 }
 
 impl Input {
-    /// Any reader.
+    /// Reads from any reader.
     pub fn over(name: &str, reader: impl Read + 'static) -> Self {
         Self::of(name, Source::Stream(Box::new(reader)))
     }
 
-    /// A reader that can go back: formats that are read backwards need not be held in memory.
+    /// Reads from a reader that can seek: formats that are read backwards need not be held in memory.
     pub fn seeking(name: &str, reader: impl SeekRead + 'static) -> Self {
         Self::of(name, Source::File(Box::new(reader)))
     }
 
-    /// What is recorded while it is read.
+    /// Reads input that is recorded while it is read.
     pub fn live(name: &str, source: impl Live + 'static) -> Self {
         Self::of(name, Source::Live(Box::new(source)))
     }
@@ -98,22 +98,22 @@ impl Input {
         }
     }
 
-    /// Returns whether it may be silent for a while.
+    /// Returns whether it may deliver nothing for a while.
     pub(crate) fn is_live(&self) -> bool {
         matches!(self.reader.get_ref(), Source::Live(_))
     }
 
-    /// Returns whether what is complete should be shown now.
+    /// Returns whether complete events should be shown now.
     pub(crate) fn is_due(&mut self) -> bool {
         self.reader.get_mut().live().is_some_and(Live::is_overdue) || self.pauses()
     }
 
-    /// Whether a read would have to wait: nothing is there, and nothing comes for a moment.
+    /// Returns whether a read would have to wait: nothing is available, and nothing arrives for a moment.
     pub(crate) fn pauses(&mut self) -> bool {
         self.head_taken == self.head.len() && self.waits()
     }
 
-    /// Unpacks gzip and zstd, as often as they are packed.
+    /// Unpacks gzip and zstd, repeatedly if they are nested.
     pub(crate) fn unpacked(mut self) -> Result<Self, Fault> {
         let head = self.peek()?;
         let packed = match head {
@@ -138,7 +138,7 @@ impl Input {
         Self { depth, quiet: true, taken: meter, ..unpacked }.unpacked()
     }
 
-    /// Text with two bytes per character, converted to UTF-8.
+    /// Converts text with two bytes per character to UTF-8.
     pub(crate) fn in_utf8(mut self) -> Result<Self, Fault> {
         let Some(unit) = utf16::mark(self.peek()?) else { return Ok(self) };
         let (name, meter) = (self.name.clone(), self.meter());
@@ -146,7 +146,7 @@ impl Input {
         Ok(Self { quiet: true, taken: meter, ..text })
     }
 
-    /// The same content in a form that can be read backwards.
+    /// Returns the same content in a form that can be read backwards.
     pub(crate) fn seekable(mut self) -> Result<Box<dyn SeekRead>, Fault> {
         if let Source::File(file) = self.reader.get_mut() {
             let mut file = std::mem::replace(file, Box::new(Cursor::new(Vec::new())));
@@ -163,7 +163,7 @@ impl Input {
         Ok(Box::new(Cursor::new(bytes)))
     }
 
-    /// The beginning of the file without consuming it: 4 KiB, or the whole file if it is shorter.
+    /// Returns the beginning of the file without consuming it: 4 KiB, or the whole file if it is shorter.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
         // What was taken of the beginning is no longer it.
         self.head.drain(..self.head_taken);
@@ -182,7 +182,7 @@ impl Input {
         Ok(&self.head)
     }
 
-    /// Whether nothing more than the head is there for a moment.
+    /// Returns whether nothing but the head is available for the moment.
     fn waits(&mut self) -> bool {
         self.reader.buffer().is_empty() && self.reader.get_mut().live().is_some_and(|source| !source.is_ready())
     }
@@ -197,12 +197,12 @@ impl Input {
         Rc::clone(&self.taken)
     }
 
-    /// A fault of this file.
+    /// Creates a fault of this file.
     pub fn fault(&self, at: At, what: impl Into<String>) -> Fault {
         Fault::new(&self.name, at, what)
     }
 
-    /// The reader ended with an error at `at`.
+    /// Creates the fault of a reader that ended with an error at `at`.
     pub(crate) fn io_fault(&self, at: At, error: &io::Error) -> Fault {
         self.fault(at, format!("cannot be read: {}", plain(error)))
     }
@@ -232,7 +232,8 @@ impl Input {
         }
     }
 
-    /// Appends the next line, with its end, to `text`; how many bytes it has. A line of `most` bytes or more is refused, in the words of `what`.
+    /// Appends the next line, with its line end, to `text`; returns its length in bytes. A line of `most` bytes or more is
+    /// refused with the message `what`.
     pub(super) fn line(
         &mut self,
         text: &mut Vec<u8>,
@@ -244,7 +245,7 @@ impl Input {
         if got == most { Err(self.fault(at, what())) } else { Ok(got) }
     }
 
-    /// Fills `buffer` as far as the file goes; of one that pauses, with the whole units of `unit` bytes that are there.
+    /// Fills `buffer` as far as the file goes; if the input pauses, with the whole units of `unit` bytes that are available.
     pub(crate) fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
         let mut filled = 0;
         while let Some(free) = buffer.get_mut(filled..).filter(|free| !free.is_empty()) {
@@ -290,7 +291,7 @@ impl BufRead for Input {
     }
 }
 
-/// The system's words without its error number, and one sentence for all packed files that are not whole.
+/// Returns the system's message without its error number, and one sentence for all incomplete packed files.
 fn plain(error: &io::Error) -> String {
     let text = error.to_string();
     if error.kind() == io::ErrorKind::UnexpectedEof || text.contains("UnexpectedEof") {

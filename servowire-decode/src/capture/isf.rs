@@ -4,7 +4,8 @@
 //! :WFMPRE:BYT_NR 1;BIT_NR 8;ENCDG BINARY;BN_FMT RI;...;NR_PT 2500;XINCR 5.0E-8;XZERO 0;PT_OFF 0;YMULT 4.0E-2;...
 //! :CURVE #42500<2500 bytes>
 //! ```
-//! The words are long or short; volts = (sample - `YOFF`) `YMULT` + `YZERO`, time = `XZERO` + (number - `PT_OFF`) `XINCR`.
+//! The keywords are long or short; volts = (sample - `YOFF`) `YMULT` + `YZERO`, time = `XZERO` + (number - `PT_OFF`)
+//! `XINCR`.
 
 use std::io::{BufRead, Read};
 
@@ -16,7 +17,7 @@ use crate::time::Time;
 
 /// The longest preamble.
 const LONGEST: usize = 1 << 12;
-/// Samples read at once, and looked at for the levels.
+/// Samples read at once, and examined for the levels.
 const BLOCK: usize = 1 << 16;
 
 /// A waveform after its preamble.
@@ -30,7 +31,7 @@ pub struct Isf {
     /// Time of the first sample and from one to the next, in picoseconds.
     start: f64,
     period: f64,
-    /// Bytes of the curve that are still due; none where the file goes on to its end.
+    /// Remaining bytes of the curve; `None` if it extends to the end of the file.
     left: Option<u64>,
     threshold: Threshold,
     /// Samples that were read to know the levels.
@@ -56,7 +57,7 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
             && text.windows(6).any(|six| six.eq_ignore_ascii_case(b":CURV ") || six.eq_ignore_ascii_case(b":CURVE")))
 }
 
-/// The items of a preamble: words in upper case and their values; `;` in quotes parts nothing.
+/// Returns the items of a preamble: keywords in upper case and their values; a `;` in quotes is not a separator.
 fn items(text: &str) -> Vec<(String, String)> {
     let (mut out, mut item, mut quoted) = (Vec::new(), String::new(), false);
     for letter in text.chars().chain([';']) {
@@ -133,7 +134,7 @@ impl Isf {
         Ok(waveform)
     }
 
-    /// The next samples in volts; none at the end.
+    /// Returns the next samples in volts; none at the end.
     fn samples(&mut self) -> Result<Vec<f64>, Fault> {
         let volts = |raw: f64| raw * self.scale + self.zero;
         let Encoding::Binary { bytes, signed, big } = self.encoding else {

@@ -1,4 +1,4 @@
-//! What a file turns out to be.
+//! The kinds of files.
 
 use super::byte_table::ByteTable;
 use super::hexlog::{Burst, HexLog};
@@ -14,19 +14,19 @@ pub enum Capture {
     Edges(Box<dyn Line>),
     /// Samples at a fixed rate.
     Samples(Raw),
-    /// Bytes that were written down, with their times or without.
+    /// Logged bytes, with or without times.
     Bytes(ByteLog),
     /// Packets of a network.
     Packets(Pcapng),
 }
 
-/// Bytes that were written down, in bursts.
+/// Logged bytes, in bursts.
 pub enum ByteLog {
     /// Hex digits, one burst per line.
     Hex(HexLog),
     /// Records of one size.
     Records(Records),
-    /// A table, a burst a row.
+    /// A table with one burst per row.
     Table(ByteTable),
 }
 
@@ -41,7 +41,7 @@ impl Capture {
 }
 
 impl ByteLog {
-    /// The next burst; `None` at the end.
+    /// Returns the next burst; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         match self {
             Self::Hex(log) => log.burst(),
@@ -59,7 +59,7 @@ impl ByteLog {
         }
     }
 
-    /// Returns whether the next burst has to be waited for.
+    /// Returns whether reading the next burst would have to wait.
     pub(crate) fn pauses(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.input().pauses(),

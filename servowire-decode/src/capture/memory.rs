@@ -1,4 +1,4 @@
-//! A recording that somebody has in memory already.
+//! A recording that is already in memory.
 
 use super::recording::{Change, Line};
 use crate::fault::Fault;
@@ -17,8 +17,8 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Of channels called `names`, with their `changes` in the order of time; the first of a channel is its level at the
-    /// beginning. The recording ends at `end`.
+    /// Creates a recording of channels called `names`, with their `changes` in the order of time; the first of a channel is
+    /// its level at the beginning. The recording ends at `end`.
     pub fn new(names: Vec<String>, changes: Vec<Change>, end: Time) -> Self {
         Self { names, changes, end, next: 0 }
     }

@@ -1,15 +1,16 @@
-//! Files of the OLS client and of `sigrok-cli -O ols`: a word at a sample number, where the level changes or at all.
+//! Files of the OLS client and of `sigrok-cli -O ols`: a word for each sample number, or only for those at which a level
+//! changes.
 
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::{self, Clock, Time};
 
-/// Changes given at once.
+/// Changes returned at once.
 const BLOCK: usize = 4096;
 /// A longer line cannot belong to this format.
 const LONGEST: usize = 1 << 12;
-/// The most channels.
+/// Maximum number of channels.
 const CHANNELS: u32 = 64;
 
 /// An OLS file after its heading.

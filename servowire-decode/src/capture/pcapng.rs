@@ -13,14 +13,14 @@ use super::input::Input;
 use crate::fault::{At, Fault};
 use crate::time::Time;
 
-/// What a pcapng file begins with.
+/// The first bytes of a pcapng file.
 pub(super) const MAGIC: &[u8] = b"\x0a\x0d\x0d\x0a";
 
-/// What a pcap file begins with: stamps in microseconds or nanoseconds, in either order of bytes.
+/// The first bytes of a pcap file: stamps in microseconds or nanoseconds, in either order of bytes.
 pub(super) const CLASSIC: [&[u8]; 4] =
     [b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d"];
 
-/// Units of time in a second, as a power of ten, where the interface does not say it.
+/// Units of time in a second, as a power of ten, if the interface does not give them.
 const MICROSECONDS: u8 = 6;
 
 /// A network capture.
@@ -39,11 +39,11 @@ enum Reader {
 /// A packet as it was on the network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
-    /// When, in picoseconds.
+    /// When it was captured, in picoseconds.
     pub time: Time,
     /// Link type of its interface.
     pub link: DataLink,
-    /// To the capturing side (`Some(true)`) or from it, if the file says so.
+    /// Whether it went to the capturing side (`Some(true)`) or came from it, if the file says so.
     pub inbound: Option<bool>,
     /// Whether the file says that its bytes end with their frame check sequence. Most network cards strip it, and most files do
     /// not say.
@@ -53,7 +53,8 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// Its kind by EtherType, if that belongs to ordinary network traffic. Frames of a drive bus without an EtherType are not.
+    /// Returns its kind by EtherType, if it is ordinary network traffic. Frames of a drive bus without an EtherType are not
+    /// ordinary traffic.
     pub fn traffic(&self) -> Option<&'static str> {
         if self.link != DataLink::ETHERNET {
             return None;
@@ -75,7 +76,7 @@ impl Packet {
 }
 
 impl Pcapng {
-    /// A capture from its beginning.
+    /// Reads a capture from its beginning.
     pub fn new(mut input: Input) -> Result<Self, Fault> {
         let (name, live) = (input.name().to_owned(), input.is_live());
         let classic = !input.peek()?.starts_with(MAGIC);
@@ -93,7 +94,7 @@ impl Pcapng {
         self.live
     }
 
-    /// The next packet; `None` at the end.
+    /// Returns the next packet; `None` at the end.
     pub fn packet(&mut self) -> Result<Option<Packet>, Fault> {
         loop {
             let reader = match &mut self.reader {

@@ -1,4 +1,4 @@
-//! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the inside of a session.
+//! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the content of a session.
 
 use super::input::Input;
 use super::recording::{Change, Hole, Line};
@@ -9,7 +9,7 @@ use crate::time::{Clock, Time};
 /// How a file holds a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// One channel, eight samples a byte, the oldest in bit 0.
+    /// One channel, eight samples per byte, the oldest in bit 0.
     Bit,
     /// This many bytes per sample, little endian, bit k = channel k.
     Bytes(usize),
@@ -31,7 +31,7 @@ pub struct Raw {
     filled: Option<(usize, u64)>,
     /// The samples of one channel in it, eight a byte.
     packed: Vec<u8>,
-    /// The last sample, for the changes.
+    /// The last sample, from which changes are determined.
     last: Option<u64>,
     samples: u64,
     /// Reported when the whole samples before it have been taken.
@@ -41,7 +41,7 @@ pub struct Raw {
 }
 
 impl Raw {
-    /// `rate` in samples a second. Channels are called by their numbers.
+    /// Creates a recording; `rate` in samples per second. Channels are named by their numbers.
     pub fn new(input: Input, rate: u64, unit: Unit) -> Self {
         let bits = match unit {
             Unit::Bit => 1,
@@ -79,12 +79,12 @@ impl Raw {
         }
     }
 
-    /// Between sample numbers and times.
+    /// Converts between sample numbers and times.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// Reads a block; gives its length in bytes and in samples, 0 at the end.
+    /// Reads a block; returns its length in bytes and in samples, 0 at the end.
     fn fill(&mut self) -> Result<(usize, u64), Fault> {
         if let Some(filled) = self.filled.take() {
             return Ok(filled);

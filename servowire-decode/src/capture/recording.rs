@@ -1,18 +1,18 @@
-//! A recording of lines, whatever the format of its file.
+//! A recording of lines, in any file format.
 
 use super::input::Input;
 use super::samples::Samples;
 use crate::fault::Fault;
 use crate::time::Time;
 
-/// A channel takes a level.
+/// A change of a channel to a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Change {
-    /// When, in picoseconds of the capture's own time (negative before its trigger).
+    /// When it happens, in picoseconds of the capture's own time (negative before its trigger).
     pub time: Time,
     /// Index into [`Line::channels`].
     pub channel: u16,
-    /// The level from here on.
+    /// The level from here onwards.
     pub level: bool,
 }
 
@@ -27,13 +27,13 @@ pub struct Hole {
 
 /// A recording of lines.
 pub trait Line {
-    /// The channels by name. A change refers to them by index.
+    /// The names of the channels. A change refers to them by index.
     fn channels(&self) -> &[String];
 
-    /// Appends the next changes, in the order of time, and says whether there may be more.
+    /// Appends the next changes, in the order of time, and returns whether there may be more.
     ///
-    /// The first change of a channel is its level at the beginning. With a fault, the changes before it were
-    /// appended; nothing more will come.
+    /// The first change of a channel is its level at the beginning. After a fault, the changes before it have been
+    /// appended, and nothing more will come.
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
 
     /// The next samples of a channel instead of the next changes, of a recording of samples in which no other channel moves
@@ -44,10 +44,10 @@ pub trait Line {
         None
     }
 
-    /// The time up to which the recording was read, in picoseconds.
+    /// Returns the time up to which the recording was read, in picoseconds.
     fn reached(&self) -> Time;
 
-    /// The hole in the recording before what was read last, if there is one.
+    /// Returns the hole in the recording before the last data read, if there is one.
     fn hole(&mut self) -> Option<Hole> {
         None
     }
@@ -62,7 +62,7 @@ pub trait Line {
         Ok(false)
     }
 
-    /// What is read, if it is read as it comes.
+    /// Returns the input, if it is read as it arrives.
     fn input(&mut self) -> Option<&mut Input> {
         None
     }

@@ -1,4 +1,4 @@
-//! Binary records of one size: what a host copied out of a reception memory, one after the other.
+//! Binary records of one size: a host's copies of its reception memory, one after another.
 
 use super::hexlog::Burst;
 use super::input::Input;
@@ -12,17 +12,17 @@ pub struct Records {
 }
 
 impl Records {
-    /// A log from its beginning; `size` in bytes.
+    /// Reads a log from its beginning; `size` in bytes.
     pub fn new(input: Input, size: usize) -> Self {
         Self { input, size: size.max(1), record: 0 }
     }
 
-    /// The file that is read.
+    /// Returns the file being read.
     pub(super) fn input(&mut self) -> &mut Input {
         &mut self.input
     }
 
-    /// The next record, numbered from 1; `None` at the end.
+    /// Returns the next record, numbered from 1; `None` at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         let mut bytes = vec![0; self.size];
         self.record += 1;

@@ -1,4 +1,4 @@
-//! Saleae Logic 2 binary export, versions 0 and 1: one digital channel a file, little endian.
+//! Saleae Logic 2 binary export, versions 0 and 1: one digital channel per file, little endian.
 //!
 //! ```text
 //! 0   "<SALEAE>"
@@ -6,7 +6,7 @@
 //! 0:  16  u32 first level  20  f64 begin  28  f64 end  36  u64 number of transitions  44  f64 times in seconds
 //! 1:  16  u64 number of chunks, each: u32 first level, f64 sample rate, f64 begin, f64 end, u64 number, f64 times
 //! ```
-//! What lies between two chunks was not recorded.
+//! Time between two chunks was not recorded.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::time::{self, Time};
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
-/// Bytes of the header before the first chunk, and of a chunk's own.
+/// Bytes of the header before the first chunk, and of the header of a chunk.
 const HEADER: usize = 16;
 const CHUNK: usize = 28;
 
@@ -25,7 +25,7 @@ const CHUNK: usize = 28;
 pub struct SaleaeBinary {
     input: Input,
     channel: [String; 1],
-    /// Whether chunks tell their sample rate.
+    /// Whether chunks give their sample rate.
     rates: bool,
     chunks: u64,
     level: bool,
@@ -188,7 +188,7 @@ impl Line for SaleaeBinary {
     }
 }
 
-/// The next N bytes; zeros where they are missing, which the length check before rules out.
+/// The next N bytes; zeros if they are missing, which an earlier length check rules out.
 fn take<const N: usize>(rest: &mut &[u8]) -> [u8; N] {
     let Some((first, after)) = rest.split_first_chunk::<N>() else { return [0; N] };
     *rest = after;

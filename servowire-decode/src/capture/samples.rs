@@ -1,28 +1,28 @@
-//! A block of packed samples, as a decoder takes it that needs no edges one by one.
+//! A block of packed samples, for a decoder that does not need individual edges.
 
 use std::ops::RangeInclusive;
 
 use crate::time::{Clock, Time};
 
-/// Samples of one channel, eight a byte, the oldest in bit 0.
+/// Samples of one channel, eight per byte, the oldest in bit 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
     bytes: &'a [u8],
     /// Number of the first sample.
     first: u64,
-    /// The level of the sample before it, or of itself where there is none.
+    /// The level of the sample before it, or of the first sample itself if there is none before it.
     before: bool,
     clock: Clock,
     inverted: bool,
 }
 
 impl<'a> Samples<'a> {
-    /// `first`: number of the first sample; `before`: the level of the one before it.
+    /// Creates a block. `first`: number of the first sample; `before`: the level of the sample before it.
     pub fn new(bytes: &'a [u8], first: u64, before: bool, clock: Clock) -> Self {
         Self { bytes, first, before, clock, inverted: false }
     }
 
-    /// The same line upside down.
+    /// Returns the same samples, inverted.
     #[must_use]
     pub fn inverted(self) -> Self {
         Self { inverted: !self.inverted, before: !self.before, ..self }
@@ -48,12 +48,12 @@ impl<'a> Samples<'a> {
         self.bytes.last().map_or(self.before, |last| (last >> 7 == 1) != self.inverted)
     }
 
-    /// Between sample numbers and times.
+    /// Converts between sample numbers and times.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// 64 samples from number `at` on, the oldest in bit 0, if all of them exist.
+    /// Returns 64 samples that begin at number `at`, the oldest in bit 0, if all of them exist.
     #[inline]
     pub fn word(&self, at: u64) -> Option<u64> {
         let place = at.checked_sub(self.first)?;
@@ -70,7 +70,7 @@ impl<'a> Samples<'a> {
         Some(if self.inverted { !word } else { word })
     }
 
-    /// The number of the first sample from `at` on whose level is not `level`.
+    /// Returns the number of the first sample, `at` or later, whose level is not `level`.
     #[inline]
     pub fn change(&self, mut at: u64, level: bool) -> Option<u64> {
         let same = if level { u64::MAX } else { 0 };
@@ -83,7 +83,7 @@ impl<'a> Samples<'a> {
         self.last_change(at, level)
     }
 
-    /// The same in the last samples.
+    /// Does the same in the last samples.
     #[cold]
     fn last_change(&self, at: u64, level: bool) -> Option<u64> {
         (at..self.end()).find(|at| {
@@ -93,7 +93,7 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// All changes, by time.
+    /// Returns all changes, by time.
     pub fn changes(self) -> impl Iterator<Item = (Time, bool)> + 'a {
         let mut numbers = Vec::new();
         self.numbers(&mut numbers);

@@ -1,4 +1,4 @@
-//! `sigrok-cli -O bits`, `-O hex` and `-O ascii`: a line of samples for each channel, round after round.
+//! `sigrok-cli -O bits`, `-O hex` and `-O ascii`: one line of samples for each channel, repeated in rounds.
 
 use super::input::Input;
 use super::recording::{Change, Line};
@@ -7,11 +7,11 @@ use crate::time::{self, Clock, Time};
 
 /// A longer line cannot belong to this format.
 const LONGEST: usize = 1 << 20;
-/// More channels has no device.
+/// No device has more channels.
 const CHANNELS: usize = 1024;
 
-/// Takes the lines that `sigrok-cli` writes in front of every form of output when it reads a file itself (`-i` or `-I`), such
-/// as `META samplerate: 20000000`; the rate in them. Samples of `-O binary` follow them too.
+/// Takes the lines that `sigrok-cli` writes before any form of output when it reads a file itself (`-i` or `-I`), such as
+/// `META samplerate: 20000000`; returns the rate in them. Samples of `-O binary` follow them too.
 pub(super) fn announced(input: &mut Input) -> Result<Option<u64>, Fault> {
     let mut rate = None;
     while input.peek()?.starts_with(b"META ") {
@@ -133,7 +133,7 @@ impl SigrokText {
         Ok(())
     }
 
-    /// Takes lines, round after round; with a fault, those before it are taken.
+    /// Takes lines, round after round; on a fault, the lines before it have been taken.
     fn rounds(&mut self, lines: &[(String, Vec<bool>)], changes: &mut Vec<Change>) -> Result<(), Fault> {
         for round in lines.chunks(self.channels.len().max(1)) {
             let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);

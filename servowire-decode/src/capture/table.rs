@@ -1,9 +1,9 @@
 //! CSV of logic analysers and oscilloscopes: Saleae, sigrok, DSView, Kingst, WaveForms, Rigol, Siglent, Tektronix,
 //! Keysight, PicoScope.
 //!
-//! They differ in separators, headings and units, so the table is taken as it is: data begin where two lines of numbers
-//! follow each other, the names stand above. A column of 0 and 1 is a channel; a column of voltages becomes one, with a
-//! threshold half-way between its levels.
+//! They differ in separators, headings and units, so nothing is assumed about the table: data begin where two lines of
+//! numbers follow each other, and the names are above them. A column of 0 and 1 is a channel; a column of voltages becomes
+//! one, with a threshold half-way between its levels.
 
 pub(super) mod cell;
 mod heading;
@@ -21,13 +21,13 @@ use heading::{Heading, Times};
 pub(super) use heading::{separator, titles, unit};
 use threshold::Threshold;
 
-/// Changes given at once.
+/// Changes returned at once.
 const BLOCK: usize = 4096;
-/// Longer lines are no table.
+/// Maximum length of a line.
 const LONGEST: usize = 1 << 20;
-/// Rows looked at for the kinds of the columns and the levels of voltages.
+/// Rows examined for the kinds of the columns and the levels of voltages.
 const SAMPLE: usize = 1 << 14;
-/// Cells looked at.
+/// Cells examined.
 const SAMPLE_CELLS: usize = 1 << 18;
 
 /// A table after its heading.
@@ -51,7 +51,7 @@ pub struct Table {
     since: Option<Time>,
     hole: Option<Hole>,
     over: bool,
-    /// The last row comes first: all changes have to be known before the first is given.
+    /// The last row comes first, so all changes have to be known before the first is returned.
     backwards: bool,
     turned: VecDeque<Change>,
 }
@@ -79,7 +79,7 @@ impl Lines {
         Self { input, line: 0 }
     }
 
-    /// The next line into `text`, without its end; whether there was one.
+    /// Reads the next line into `text`, without its line end; returns whether there was one.
     pub(super) fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
         text.clear();
         let at = At::Line(self.line + 1);
@@ -151,7 +151,7 @@ impl Table {
         })
     }
 
-    /// Reads a table that is written backwards to its end, as if time ran the other way, and turns it round.
+    /// Reads a table that is written backwards to its end, as if time ran backwards, and reverses it.
     fn turn(&mut self) -> Result<(), Fault> {
         let mut changes = Vec::new();
         let end = loop {
@@ -243,7 +243,7 @@ impl Table {
         }
     }
 
-    /// Takes a row, or says what is wrong with it and leaves everything as it was.
+    /// Takes a row, or returns what is wrong with it and changes nothing.
     fn row(&mut self, row: &[u8], changes: &mut Vec<Change>) -> Result<(), String> {
         let cells = self.heading.split(row);
         let needed = self.columns.last().map_or(0, |column| column.index);
@@ -280,7 +280,7 @@ impl Table {
     }
 }
 
-/// Numbered rows that are read and not yet taken.
+/// Numbered rows that were read but not yet taken.
 type Waiting = VecDeque<(u64, Vec<u8>)>;
 
 /// The lines of a heading, and the first two rows after it: up to the second of two lines of numbers.
@@ -305,7 +305,7 @@ fn beginning(lines: &mut Lines) -> Result<(Vec<Vec<u8>>, Waiting), Fault> {
     Ok((above, waiting))
 }
 
-/// Which columns are channels: all cells levels, or all voltages.
+/// Finds the columns that are channels: all their cells are levels, or all are voltages.
 fn columns(heading: &Heading, rows: &Waiting, threshold: Option<f64>) -> (Vec<Column>, Vec<String>) {
     let mut digital = vec![true; heading.columns()];
     let mut numbers: Vec<Vec<f64>> = vec![Vec::new(); heading.columns()];

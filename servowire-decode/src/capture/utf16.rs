@@ -14,11 +14,11 @@ pub(super) fn mark(head: &[u8]) -> Option<fn([u8; 2]) -> u16> {
     }
 }
 
-/// Such a text in UTF-8. The mark stays in front; half a character becomes the sign for none.
+/// Such a text in UTF-8. The byte order mark is kept; half a character becomes the replacement character.
 pub(super) struct Utf16<R> {
     text: R,
     unit: fn([u8; 2]) -> u16,
-    /// Bytes of a character that is not whole.
+    /// Bytes of an incomplete character.
     kept: Vec<u8>,
     out: Vec<u8>,
     taken: usize,
@@ -29,7 +29,7 @@ impl<R: Read> Utf16<R> {
         Self { text, unit, kept: Vec::new(), out: Vec::new(), taken: 0 }
     }
 
-    /// Turns what comes next; whether there was something.
+    /// Converts the next bytes; returns whether there were any.
     fn turn(&mut self) -> io::Result<bool> {
         let from = self.kept.len();
         self.kept.resize(from + BLOCK, 0);

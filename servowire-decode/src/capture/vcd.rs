@@ -18,16 +18,16 @@ use codes::{Code, Codes};
 use header::Header;
 use tick::Tick;
 
-/// Changes given at once.
+/// Changes returned at once.
 const BLOCK: usize = 4096;
-/// Bytes read at once. A word that is longer is no word.
+/// Bytes read at once. Maximum length of a word.
 const BUFFER: usize = 1 << 18;
 
 /// A VCD file after its header. Channels are the variables of one bit, and the bits of small vectors.
 pub struct Vcd {
     input: Input,
     buffer: Vec<u8>,
-    /// What is unread of the buffer.
+    /// The unread part of the buffer.
     from: usize,
     to: usize,
     /// The line at the beginning of the buffer.
@@ -44,11 +44,11 @@ pub struct Vcd {
     ended: bool,
 }
 
-/// What a piece of the body asks for.
+/// How to continue after a piece of the body.
 enum Next {
-    /// It was taken; go on after it.
+    /// It was taken; continue after it.
     Taken(usize),
-    /// It may go on after the buffer.
+    /// It may continue after the buffer.
     More,
 }
 
@@ -75,7 +75,7 @@ impl Vcd {
         })
     }
 
-    /// The line of what is read next.
+    /// Returns the line of the next piece.
     fn here(&self) -> At {
         let read = self.buffer.get(..self.from).unwrap_or_default();
         At::Line(self.line + memchr_iter(b'\n', read).count() as u64)
@@ -85,7 +85,7 @@ impl Vcd {
         self.input.fault(self.here(), what)
     }
 
-    /// Moves what is left to the front and reads on.
+    /// Moves the rest to the front and reads more.
     fn fill(&mut self) -> Result<(), Fault> {
         let At::Line(line) = self.here() else { return Ok(()) };
         self.line = line;
@@ -133,8 +133,8 @@ impl Vcd {
         result.map_err(|what| self.fault(what))
     }
 
-    /// Takes what almost every body is made of, stamps that do not go back and levels of codes of one or two letters,
-    /// as long as they are whole; how much of `rest` is left then.
+    /// Takes the usual pieces of a body (stamps that do not go back, and levels of codes of one or two letters) as long as
+    /// they are complete; returns how much of `rest` is left.
     fn plain(&mut self, mut rest: &[u8], changes: &mut Vec<Change>, enough: usize) -> usize {
         while changes.len() < enough {
             let (level, code) = match *rest {
@@ -165,7 +165,7 @@ impl Vcd {
         rest.len()
     }
 
-    /// One stamp, value change or command. At the end of the file a word ends there.
+    /// One stamp, value change or command. At the end of the file a word ends as well.
     fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, String> {
         let length = word(rest);
         let (text, after) = rest.split_at(length);
@@ -202,7 +202,7 @@ impl Vcd {
         Ok(Next::Taken(length))
     }
 
-    /// The word goes on after the buffer, or the file ends in it.
+    /// The word continues after the buffer, or the file ends in it.
     fn open(&self) -> Result<Next, String> {
         if self.ended {
             return Err("the file ends in the middle of a value change: it was cut off".to_owned());
@@ -294,7 +294,8 @@ impl Vcd {
     }
 }
 
-/// The level of a port's state: who drives it does not matter, but two who disagree make it unknown.
+/// Returns the level of a port's state: it does not matter which side drives it, but two sides that disagree make it
+/// unknown.
 fn level(state: u8) -> u8 {
     match state {
         b'D' | b'd' | b'L' | b'l' | b'0' => b'0',
@@ -304,7 +305,7 @@ fn level(state: u8) -> u8 {
     }
 }
 
-/// The digits at the front as a number, and what is after the blank that ends them; none where it is not so.
+/// Returns the digits at the front as a number, and the rest after the blank that ends them; `None` for anything else.
 fn stamp(digits: &[u8]) -> Option<(u64, &[u8])> {
     let (mut stamp, mut rest) = (0_u64, digits);
     while let [digit @ b'0'..=b'9', after @ ..] = rest {

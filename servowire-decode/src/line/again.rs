@@ -1,8 +1,8 @@
-//! What is done where a frame failed: its edges are looked at again.
+//! Second reading of a failed frame from its edges.
 //!
-//! When a driver lets go of the line, it may dip for a bit before the bias pulls it up, or somebody disturbs it: a receiver takes
-//! that for a start bit, and the frame behind it is lost. Here it is read a second time, from the next edge on. And where a frame
-//! stays broken, its edges may tell that two have driven the line.
+//! When a driver releases the line, the line may dip for a bit before the bias pulls it up, or it may be disturbed. A
+//! receiver takes that for a start bit, and the following frame is lost. Here it is read a second time, from the next edge
+//! onwards. If a frame stays broken, its edges may show that two drivers were active at once.
 
 use super::evidence::Weights;
 use super::receive::EdgeReceiver;
@@ -12,15 +12,15 @@ use super::trial::{Trial, is_failed};
 use crate::event::{Event, Field, Place, Value, Verdict};
 use crate::time::Time;
 
-/// Edges that are looked at again at most: those of an exchange or two.
+/// Maximum number of edges read again: those of one or two exchanges.
 pub(super) const MOST_AGAIN: usize = 400;
-/// Pulses that are passed over in them at most.
+/// Maximum number of pulses skipped in them.
 const ROUNDS: usize = 4;
-/// The longest low pulse that may be none of the frame, in bits.
+/// The longest low pulse that need not belong to the frame, in bits.
 const LONGEST_PULSE: f64 = 1.75;
-/// So long the line is high behind it at least, in bits: nobody answers earlier.
+/// Shortest high level after it, in bits: nobody answers earlier.
 const QUIET: f64 = 3.0;
-/// So soon after a frame its driver lets go, in bits.
+/// Time after a frame within which its driver releases the line, in bits.
 const LETS_GO: f64 = 2.5;
 
 /// Where a frame failed.
@@ -30,15 +30,15 @@ pub(super) struct Failed<'a, P> {
     pub(super) before: &'a P,
     pub(super) weights: Weights,
     pub(super) edges: &'a [Edge],
-    /// Where the frames begin that are told already.
+    /// Where the frames begin that were already passed on.
     pub(super) passed: &'a [Time],
-    /// Until when the line has rested.
+    /// The time until which the line has been idle.
     pub(super) now: Time,
     /// Picoseconds of a bit.
     pub(super) bit: f64,
 }
 
-/// A low pulse that was passed over.
+/// A low pulse that was skipped.
 #[derive(Debug, Clone, Copy)]
 struct Pulse {
     time: Time,
@@ -49,9 +49,9 @@ struct Pulse {
 pub(super) struct Better<P> {
     pub(super) protocol: P,
     pub(super) receiver: EdgeReceiver,
-    /// Events behind those that are told already.
+    /// Events after those that were already passed on.
     pub(super) events: Vec<Event>,
-    /// Dips of drivers that let go, and how long they were together, in bits.
+    /// Dips of drivers that released the line, and their total length in bits.
     pub(super) dips: u64,
     pub(super) dip_bits: f64,
 }
@@ -61,7 +61,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         Trial::of(self.receiver, self.before, self.weights, edges, self.now)
     }
 
-    /// Whether a reading has the frames that are told already.
+    /// Whether a reading contains the frames that were already passed on.
     fn goes_on(&self, trial: &Trial<P>) -> bool {
         let same = |(start, event): (&Time, &Event)| match event.place {
             Place::Time { start: own, .. } => !is_failed(event) && ((own - *start) as f64).abs() < self.bit,
@@ -70,7 +70,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         trial.heard.events.len() >= self.passed.len() && self.passed.iter().zip(&trial.heard.events).all(same)
     }
 
-    /// Low pulses that may be none of a frame: the places of their falling edges.
+    /// Low pulses that need not belong to a frame: the places of their falling edges.
     fn pulses(&self, edges: &[Edge]) -> Vec<(usize, Pulse)> {
         let pulse = |(at, fall): (usize, &Edge)| {
             let rise = edges.get(at + 1).filter(|_| !fall.level)?;
@@ -81,7 +81,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         edges.iter().enumerate().filter_map(pulse).collect()
     }
 
-    /// A reading without some pulses in which more frames hold.
+    /// A reading without some pulses in which more frames are good.
     pub(super) fn again(&self) -> Option<Better<P>> {
         let mut edges = self.edges.to_vec();
         let mut best = self.trial(&edges);
@@ -112,7 +112,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         (!pulses.is_empty()).then(|| self.told(best, &pulses))
     }
 
-    /// The events, with what was passed over beside them.
+    /// Returns the events, with remarks about the skipped pulses.
     fn told(&self, best: Trial<P>, pulses: &[Pulse]) -> Better<P> {
         let mut events = best.heard.events;
         let (mut dips, mut dip_bits) = (0, 0.0);
@@ -136,7 +136,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
     }
 }
 
-/// Says something beside the fields of an event.
+/// Adds a remark to the fields of an event.
 fn note(event: &mut Event, what: &str) {
     let known = event.fields.iter_mut().find(|field| field.name == "note");
     match known.map(|field| &mut field.value) {
@@ -148,16 +148,17 @@ fn note(event: &mut Event, what: &str) {
     }
 }
 
-/// An edge further from the grid of the others, in bits, is of another grid.
+/// An edge further than this from the grid of the others, in bits, belongs to another grid.
 const OFF_GRID: f64 = 0.27;
-/// Edges off the grid that two drivers leave in a frame at least, and one in so many of all.
+/// Minimum number of edges off the grid that two drivers leave in a frame, and minimum share: one in this many.
 const FEWEST_OFF: usize = 4;
 const SHARE_OFF: usize = 6;
-/// So often the edges of a frame change from one grid to the other at least. One speaker behind the other changes once.
+/// Minimum number of times that the edges of a frame change from one grid to the other. Two speakers in turn change grid
+/// once.
 const FEWEST_TURNS: usize = 4;
 
-/// Names what the edges of a frame that failed tell of its cause: two that drive at once have two clocks, so that no grid fits all
-/// edges. `bit`: that of the speaker, in picoseconds.
+/// Names the cause of a failed frame as shown by its edges: two drivers at once have two clocks, so no grid fits all edges.
+/// `bit`: the bit length of the speaker, in picoseconds.
 pub(super) fn blame(event: &mut Event, edges: &[Edge], bit: f64) {
     let Place::Time { start, end } = event.place else { return };
     let Verdict::Refused(refusal) = &mut event.verdict else { return };

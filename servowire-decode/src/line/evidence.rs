@@ -1,4 +1,4 @@
-//! How much speaks for a protocol: what its frames say, weighed by how hardly they come about by chance.
+//! Evidence for a protocol: its frames, weighted by how unlikely they are to occur by chance.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -24,10 +24,10 @@ const ONLY_THE_CHECK: i64 = 4;
 const REJECTED: i64 = 10;
 /// A frame that is not valid.
 const NO_FRAME: i64 = -6;
-/// Worse than this, more does not help.
+/// Below this share, more frames do not help.
 const HOPELESS: i64 = -90;
 
-/// From here on a line is what it was taken for.
+/// From this score, a line is considered recognised.
 pub(super) const CERTAIN: i64 = 20;
 
 /// Weighs events.
@@ -44,7 +44,7 @@ pub(super) struct Evidence {
     pub(super) tally: Tally,
     /// Where sound frames begin, in picoseconds, and what they hold.
     pub(super) starts: Vec<(Time, u64)>,
-    /// Up to when the line was heard.
+    /// The time up to which the line was heard.
     pub(super) until: Time,
 }
 
@@ -66,7 +66,7 @@ impl Evidence {
         self.score < HOPELESS
     }
 
-    /// Whether most of what sounds here sounds there too, within `near` picoseconds and as long as both were heard.
+    /// Whether most of the sound frames here also occur there, within `near` picoseconds and while both were heard.
     pub(super) fn is_part_of(&self, other: &Self, near: i64) -> bool {
         let heard = |(start, content): &&(Time, u64)| {
             let at = other.starts.partition_point(|(there, _)| *there < *start - near);
@@ -116,7 +116,7 @@ impl Sink for Evidence {
     }
 }
 
-/// A number that stands for kind and fields of an event, but not for what depends on the frames before it.
+/// A hash of the kind and fields of an event, except what depends on the frames before it.
 fn content(event: &Event) -> u64 {
     let mut hasher = DefaultHasher::new();
     event.kind.hash(&mut hasher);

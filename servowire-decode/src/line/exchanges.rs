@@ -1,4 +1,4 @@
-//! A start-stop protocol on a line: fields from edges, frames from fields, and a second try where a frame failed.
+//! A start-stop protocol on a line: fields from edges, frames from fields, and a second attempt if a frame fails.
 
 use std::io;
 
@@ -23,9 +23,9 @@ pub(crate) struct StartStopLine<P> {
     bit: i64,
     /// The level at the beginning was given.
     begun: bool,
-    /// The first changes, as long as it is not known where the first field begins.
+    /// The first changes, until it is known where the first field begins.
     opening: Vec<(Time, bool)>,
-    /// Changes with which the opening was tried in vain.
+    /// Number of changes with which the opening was tried without success.
     tried: usize,
     /// Of a line without bias.
     floating: Option<Floating>,
@@ -34,25 +34,25 @@ pub(crate) struct StartStopLine<P> {
     room: Vec<u64>,
 }
 
-/// What has been said since the line rested the last time.
+/// The edges since the line was last idle.
 struct Told<P> {
-    /// The protocol as it was then.
+    /// The state of the protocol at that time.
     before: P,
-    /// Where frames begin that were passed on.
+    /// Where the frames begin that were passed on.
     passed: Vec<Time>,
-    /// Events from the first frame on that failed.
+    /// Events from the first failed frame onwards.
     failed: Vec<Event>,
-    /// Second tries that are left, as long as none helps.
+    /// Remaining second attempts, as long as none helps.
     luck: u32,
     dips: u64,
     dip_bits: f64,
 }
 
-/// Second tries in a row that need not help.
+/// Consecutive second attempts that need not help.
 const LUCK: u32 = 24;
-/// Changes from which the first field is found at most.
+/// Maximum number of changes used to find the first field.
 const OPENING: usize = 256;
-/// Bits of idle line after which what was said at first is over.
+/// Bits of idle line after which the opening has ended.
 const OPENED: i64 = 60;
 /// Falling edges that may be the first start bit.
 const STARTS: u32 = 18;
@@ -83,7 +83,7 @@ impl Sink for Watch<'_> {
     }
 }
 
-/// The last level of a recording is taken to last. If a frame does not hold so, it was cut off.
+/// The last level of a recording is taken to last. A frame that is not good under this assumption was cut off.
 struct Held<'a> {
     out: &'a mut dyn Sink,
     end: Time,
@@ -103,7 +103,7 @@ impl Sink for Held<'_> {
 }
 
 impl<P: StartStop + Clone> StartStopLine<P> {
-    /// `bit`: nominal length in picoseconds; `weights`: what sound frames of the protocol prove.
+    /// `bit`: nominal length in picoseconds; `weights`: how much sound frames of the protocol prove.
     pub(crate) fn new(bit: f64, protocol: P, weights: Weights) -> Self {
         let receiver = EdgeReceiver::new(bit, P::CONTENT_BITS);
         Self::with(receiver, protocol, weights, bit as i64, LUCK)
@@ -115,7 +115,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         Self { receiver, protocol, weights, bit, begun: false, opening, tried: 0, floating: None, told, room }
     }
 
-    /// Gives the fields that are complete to the protocol.
+    /// Passes the complete fields to the protocol.
     fn give(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let Told { passed, failed, .. } = &mut self.told;
         let mut watch = Watch { out, passed, failed };
@@ -125,7 +125,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         if self.receiver.is_between() { self.settle(self.receiver.begun(), out) } else { Ok(()) }
     }
 
-    /// The line rests until `now`: what failed is tried again; then all is told.
+    /// The line is idle until `now`: failed frames are tried again; then all events are passed on.
     fn settle(&mut self, now: Option<Time>, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(now) = now {
             let Told { passed, failed, .. } = &mut self.told;
@@ -193,13 +193,13 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         Ok(())
     }
 
-    /// Reads what lies before `time` on a line without bias, if it is over then.
+    /// Reads the edges before `time` on a line without bias, if the frame has ended by then.
     fn float_until(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         let Some(floating) = self.floating.as_mut().filter(|floating| floating.is_over(time)) else { return Ok(()) };
         floating.read(&mut self.receiver, &mut self.protocol, self.weights, out)
     }
 
-    /// Nothing more is known from `time` on; `cut`: what becomes of a frame that is not over.
+    /// Nothing is known after `time`; `cut`: what becomes of an unfinished frame.
     fn end(&mut self, time: Time, cut: &Verdict, out: &mut dyn Sink) -> io::Result<()> {
         if !self.opening.is_empty() {
             self.open(true, out)?;
@@ -222,7 +222,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         self.protocol.finish(time, &mut out)
     }
 
-    /// Whether the line is at work when the recording begins, so that the first falling edge need not be a start bit.
+    /// Whether the line is busy when the recording begins, so that the first falling edge need not be a start bit.
     fn begins_inside(&self) -> bool {
         match self.opening.as_slice() {
             [(begin, true), (fall, _), ..] => *fall - *begin < i64::from(P::CONTENT_BITS + 3) * self.bit,
@@ -230,7 +230,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         }
     }
 
-    /// What a line would make of the opening.
+    /// Returns what a line would make of the opening.
     fn trial(&self, mut line: Self, evidence: &mut Evidence) -> io::Result<()> {
         for (time, level) in &self.opening {
             line.take(*time, *level, evidence)?;
@@ -239,13 +239,13 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         line.finish(end, evidence)
     }
 
-    /// A line that has heard nothing but that it begins.
+    /// Creates a line that has only begun.
     fn fresh(&self, skipped: u32, luck: u32) -> Self {
         let receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS).beginning_at(skipped);
         Self::with(receiver, self.protocol.clone(), self.weights, self.bit, luck)
     }
 
-    /// Whether the line is low rather than high where nothing is said on it.
+    /// Whether the line is low rather than high when idle.
     fn rests_low(&self) -> bool {
         let (mut high, mut low) = (0_i64, 0_i64);
         for pair in self.opening.windows(2) {
@@ -259,8 +259,8 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         low > high || high == 0 && ends_low
     }
 
-    /// What was said at first is over: finds the start bit from which most of it holds, and takes it. Where the line rests low and
-    /// hardly anything holds, more of it is waited for, unless it is the `last` chance.
+    /// Ends the opening: finds the start bit from which most of it is good, and takes it. If the line idles low and hardly
+    /// any frame is good, waits for more, unless it is the `last` chance.
     fn open(&mut self, last: bool, out: &mut dyn Sink) -> io::Result<()> {
         let whole = 2 * i64::from(P::CONTENT_BITS + 2) * self.bit;
         let falls = |(_, level): &&(Time, bool)| !level;

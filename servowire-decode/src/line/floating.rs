@@ -1,8 +1,8 @@
 //! A line without bias: between frames nobody drives it, and it floats low.
 //!
 //! Its frames end with a falling edge that is no start bit, and begin out of a low level: with a rising edge where the driver is on
-//! a little before the start bit, or with the first 1, so that the edge of the start bit is not there. In the change of
-//! direction the line is low too, and no length tells that from a field of zeros: what holds, does.
+//! a little before the start bit, or with the first 1, in which case the start bit has no edge. The line is also low during
+//! a change of direction, and its length cannot be told from a field of zeros; only the checks of the frames decide.
 
 use std::io;
 
@@ -15,13 +15,13 @@ use crate::event::{Direction, Event};
 use crate::sink::Sink;
 use crate::time::Time;
 
-/// Bits of one level after which what was said is over.
+/// Bits of one level after which a piece has ended.
 const REST: f64 = 26.0;
-/// Edges of one piece at most.
+/// Maximum number of edges in a piece.
 const MOST_EDGES: usize = 400;
 /// The shortest low run in a change of direction, in bits: both drivers hold the line for a part of it.
 const SHORTEST_GAP: f64 = 2.2;
-/// A driver lets go of the line so many bits before the end of its frame at most, and so many behind it.
+/// A driver releases the line at most this many bits before the end of its frame, and at most this many after it.
 const LETS_GO: [f64; 2] = [0.6, 2.6];
 /// Pieces after which the way in which frames begin is known.
 const KNOWN: u32 = 3;
@@ -45,7 +45,7 @@ const WAYS: [[Begin; 2]; 4] = [
     [Begin::Hidden, Begin::Seen],
 ];
 
-/// Gathers the edges of a line that floats low, and reads them piece by piece.
+/// Collects the edges of a line that floats low, and reads them piece by piece.
 #[derive(Debug, Clone)]
 pub(super) struct Floating {
     bit: f64,
@@ -72,7 +72,7 @@ impl Floating {
         self.spikes.reach(time)
     }
 
-    /// Whether the piece is over before `time`.
+    /// Whether the piece ends before `time`.
     pub(super) fn is_over(&self, time: Time) -> bool {
         let rests = |last: &Edge| (time - last.time) as f64 > REST * self.bit;
         self.piece.last().is_some_and(rests) || self.piece.len() >= MOST_EDGES
@@ -83,7 +83,7 @@ impl Floating {
         self.piece.push(edge);
     }
 
-    /// Reads the piece in the way in which most of it holds.
+    /// Reads the piece in the way in which most of its frames are good.
     pub(super) fn read<P: StartStop + Clone>(
         &mut self,
         receiver: &mut EdgeReceiver,
@@ -137,7 +137,7 @@ impl Floating {
 }
 
 impl Floating {
-    /// Whether a sound request ends where the line is let go.
+    /// Whether a sound request ends where the line is released.
     fn ends_request<P>(&self, trial: &Trial<P>, fall: Time) -> bool {
         let [before, behind] = LETS_GO.map(|bits| (bits * self.bit) as i64);
         let is_there = |event: &Event| {
@@ -159,8 +159,8 @@ fn runs(piece: &[Edge], wanted: impl Fn(f64) -> bool) -> Vec<usize> {
     piece.windows(2).enumerate().filter_map(low).collect()
 }
 
-/// The same piece of a line that is high where nobody drives it: before its first edge, behind its last one, and from the falling
-/// edges at `idle` on.
+/// Returns the same piece of a line that is high while nobody drives it: before its first edge, behind its last one, and
+/// from the falling edges at `idle` on.
 fn raised(piece: &[Edge], idle: &[usize], way: [Begin; 2], low_bits: [u32; 2], bit: f64) -> Vec<Edge> {
     let mut out = Vec::with_capacity(piece.len() + 2);
     let [request, answer] = way;

@@ -1,4 +1,4 @@
-//! A line that is decoded: one channel, or two that are the same conversation.
+//! A line that is decoded: one channel, or two that carry the same conversation.
 
 use std::io;
 
@@ -33,18 +33,17 @@ pub trait LineDecoder {
     /// The line has not changed until `time`.
     fn reach(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// The recording has a hole: nothing is known of the line there.
+    /// The recording has a hole, in which nothing is known about the line.
     fn hole(&mut self, hole: Hole, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The capture ends at `time`.
     fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// What was measured of the line.
+    /// Returns the measurements of the line.
     fn rates(&self) -> Rates;
 }
 
-/// The wires of a lane as one idle-high line: a wire that is at work is low, so that both together are a half-duplex
-/// line.
+/// The wires of a lane combined to one idle-high line: an active wire is low, so both together are a half-duplex line.
 #[derive(Debug, Clone)]
 pub(crate) struct Wires {
     taps: Vec<Tap>,
@@ -53,7 +52,7 @@ pub(crate) struct Wires {
 }
 
 impl Wires {
-    /// One tap, or that of the requests and that of the answers.
+    /// One tap, or one for the requests and one for the answers.
     pub(crate) fn new(taps: &[Tap]) -> Self {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
@@ -64,13 +63,13 @@ impl Wires {
         self.level = Some(level);
     }
 
-    /// Nothing is known of the levels any more.
+    /// Forgets the levels.
     pub(crate) fn forget(&mut self) {
         self.levels.fill(None);
         self.level = None;
     }
 
-    /// The level of the line after a change of a channel, where it changes.
+    /// Returns the level of the line after a change of a channel, if it changes.
     pub(crate) fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
         for (tap, own) in self.taps.iter().zip(&mut self.levels) {
             if tap.channel == channel {

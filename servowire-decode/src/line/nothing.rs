@@ -1,4 +1,4 @@
-//! Why nothing was found on a capture's channels, in a line.
+//! Explains in one line why nothing was found on a capture's channels.
 
 use super::survey::{Edges, seen_rate};
 use crate::codec::Codec;
@@ -25,7 +25,7 @@ pub(super) fn nothing(
     strange(name(channel), edges, protocol)
 }
 
-/// A channel that moves and holds nothing.
+/// A channel with edges but without frames.
 fn strange(name: &str, edges: &Edges, protocol: Option<&'static dyn Codec>) -> String {
     let of_lines = || meant(protocol).filter(|protocol| !protocol.rates.is_empty());
     let rates = |protocol: &'static dyn Codec| {

@@ -1,4 +1,4 @@
-//! All channels of a recording while it comes: which are decoded, which are nothing, which have hardly moved yet.
+//! All channels of a recording as it arrives: which are decoded, which carry nothing, which have had hardly any edges yet.
 
 mod judge;
 
@@ -20,7 +20,7 @@ const ENOUGH: usize = 1 << 9;
 /// Changes of undecided channels that are kept together.
 const MOST_KEPT: usize = 1 << 20;
 
-/// An edge of a channel that is not judged yet: its time, and in the lowest bit the level. There may be very many of them.
+/// An edge of an undecided channel: its time, and the level in the lowest bit. There may be very many of them.
 #[derive(Debug, Clone, Copy)]
 struct Kept(i128);
 
@@ -45,7 +45,7 @@ enum State {
     Open(Vec<Kept>),
     /// Part of a line that is decoded.
     Taken(usize),
-    /// Nothing, or more of what is decoded already; looked at again after this many edges, if at all.
+    /// Nothing, or a repetition of what is decoded already; examined again after this many edges, if at all.
     Passed(Option<u64>),
 }
 
@@ -60,7 +60,7 @@ pub struct PushDecoder {
     file: String,
     names: Vec<String>,
     protocol: Option<&'static dyn Codec>,
-    /// The channels that the user named; everything else is of no interest.
+    /// The channels that the user named; all others are ignored.
     only: Option<Vec<u16>>,
     candidates: Candidates,
     states: Vec<State>,
@@ -73,7 +73,7 @@ pub struct PushDecoder {
     kept: usize,
     /// Changes held back when they were judged early.
     tried: usize,
-    /// Channels that have enough edges to be judged.
+    /// Channels with enough edges to be judged.
     due: bool,
     /// For messages when nothing was found: the busiest channel's first edges.
     busiest: Option<(u16, Vec<(Time, bool)>)>,
@@ -82,7 +82,8 @@ pub struct PushDecoder {
 }
 
 impl PushDecoder {
-    /// For a recording called `file` with channels of these names; without `protocol`, all are tried.
+    /// Creates a decoder for a recording called `file` with channels of these names; without `protocol`, all protocols are
+    /// tried.
     pub fn new(
         file: &str,
         names: &[String],
@@ -117,7 +118,7 @@ impl PushDecoder {
         })
     }
 
-    /// The next changes, in the order of time; the first of a channel is its level at the beginning.
+    /// Takes the next changes, in the order of time; the first of a channel is its level at the beginning.
     pub fn changes(&mut self, changes: &[Change], out: &mut Output<'_>) -> io::Result<()> {
         for change in changes {
             self.change(*change, out)?;
@@ -182,8 +183,7 @@ impl PushDecoder {
         running.decoder.samples(samples, out)
     }
 
-    /// Tells that nothing else has changed until `time`. Call it after each piece: it judges what was held back until more is
-    /// known.
+    /// Reports that nothing else has changed until `time`. Call it after each piece: it judges the changes held back so far.
     pub fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         if self.is_due() {
             self.judge(false, false, out)?;
@@ -191,7 +191,7 @@ impl PushDecoder {
         self.reach_lines(time, out)
     }
 
-    /// Tells that nothing arrives for a while: what is certain so far is decoded and shown.
+    /// Reports that nothing arrives for a while: whatever is certain so far is decoded and shown.
     pub fn pause(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         self.early(out)?;
         self.reach_lines(time, out)?;
@@ -206,7 +206,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// Tells of a gap in the recording before the next changes.
+    /// Reports a gap in the recording before the next changes.
     pub fn hole(&mut self, hole: Hole, out: &mut Output<'_>) -> io::Result<()> {
         if let Some(held) = &self.held {
             self.holes.push((held.len(), hole));
@@ -219,7 +219,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// Ends the recording at `time`. Lines in which nothing was found, or that were inverted, are a fault.
+    /// Ends the recording at `time`. It is a fault if nothing was found on the lines, or if they were inverted.
     pub fn finish(mut self, time: Time, out: &mut Output<'_>) -> Result<(), Stop> {
         self.end(time, out)?;
         Ok(self.verdict(out)?)
@@ -234,7 +234,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// What there is to say against the recording as a whole.
+    /// Returns what is wrong with the recording as a whole.
     pub(super) fn verdict(&self, out: &Output<'_>) -> Result<(), Fault> {
         if self.found.is_empty() {
             let busiest = self.busiest.as_ref().map(|(channel, edges)| (*channel, edges.as_slice()));

@@ -1,6 +1,6 @@
 //! Start-stop fields from the edges of a line whose speakers keep their own time.
 //!
-//! Edges are gathered until the line rests. What follows without a change of direction was sent by one clock: its bit
+//! Edges are gathered until the line is idle. All fields up to a change of direction were sent by one clock: its bit
 //! length is fitted to the edges, then every field is read on the grid that fits it best. So a controller and an encoder
 //! may be off by some per cent each, and jitter and spikes move no bit.
 
@@ -15,9 +15,9 @@ use super::start_stop::LineField;
 use crate::capture::samples::Turns;
 use crate::time::Time;
 
-/// Bits without a field after which somebody else may speak.
+/// Bits without a field after which another speaker may follow.
 const OTHER_SPEAKER: f64 = 3.0;
-/// Edges of an open burst that are kept at most; further ones are read as far as whole fields go.
+/// Maximum number of edges kept of an open burst; beyond that, whole fields are read.
 const MOST_EDGES: usize = 512;
 /// A line that is low for longer ends a burst too, in picoseconds: 13 days. So 64 bits hold the times of a burst from its beginning.
 const LONGEST_LOW: i64 = 1 << 60;
@@ -30,26 +30,26 @@ pub(crate) struct EdgeReceiver {
     spikes: Spikes,
     /// The open burst; it begins with a falling edge.
     burst: Vec<Edge>,
-    /// Bit lengths heard, the last one first.
+    /// Bit lengths measured, the last one first.
     heard: Vec<f64>,
-    /// Sum of measured bit lengths in parts of the nominal, and how many.
+    /// Sum of measured bit lengths relative to the nominal one, and their number.
     rates: Rates,
-    /// Fields that end a burst, for the caller to take.
+    /// Complete fields, for the caller to take.
     fields: Vec<LineField>,
     /// Spikes dropped before the next field.
     dropped: u32,
-    /// A line that is high for longer rests, in picoseconds.
+    /// A line that is high for longer is idle, in picoseconds.
     rest: i64,
     /// Falling edges of the first burst that are no start bits, until it has been read.
     skipped: u32,
     /// Edges that were read, until they are [forgotten](Self::forget).
     past: Vec<Edge>,
-    /// Bit lengths that had been heard when they were.
+    /// Bit lengths known when they were read.
     heard_before: Vec<f64>,
 }
 
 impl EdgeReceiver {
-    /// For fields of `content_bits`, 8 or 16, of bits of `bit` picoseconds.
+    /// Creates a receiver for fields of `content_bits`, 8 or 16, with bits of `bit` picoseconds.
     pub(crate) fn new(bit: f64, content_bits: u32) -> Self {
         Self {
             bit,
@@ -68,24 +68,24 @@ impl EdgeReceiver {
         }
     }
 
-    /// One that has measured what was measured until edges were forgotten, and holds nothing.
+    /// Creates an empty receiver with the measurements up to the last time edges were forgotten.
     #[must_use]
     pub(super) fn emptied(&self) -> Self {
         let heard = self.heard_before.clone();
         Self { heard_before: heard.clone(), heard, rates: self.rates, ..Self::new(self.bit, self.content_bits) }
     }
 
-    /// What was measured since edges were forgotten was no speaker.
+    /// Discards the measurements since edges were forgotten: they came from no speaker.
     pub(super) fn unlearn(&mut self) {
         self.heard.clone_from(&self.heard_before);
     }
 
-    /// What `other` has measured of the speakers is true of these.
+    /// Adopts the measurements that `other` has made of the speakers.
     pub(super) fn learn(&mut self, other: &Self) {
         self.heard.clone_from(&other.heard);
     }
 
-    /// Takes edges behind which the line rests.
+    /// Takes edges after which the line is idle.
     pub(super) fn feed(&mut self, edges: &[Edge]) {
         for edge in edges {
             self.edge(*edge);
@@ -93,7 +93,7 @@ impl EdgeReceiver {
         self.close();
     }
 
-    /// The edges that were read since they were forgotten.
+    /// Returns the edges read since they were last forgotten.
     pub(super) fn past(&self) -> &[Edge] {
         &self.past
     }
@@ -104,17 +104,17 @@ impl EdgeReceiver {
         self.heard_before.clone_from(&self.heard);
     }
 
-    /// The bit length that fits the speaker who was heard last, in picoseconds.
+    /// Returns the bit length of the last speaker, in picoseconds.
     pub(super) fn bit_heard(&self) -> f64 {
         self.heard.first().copied().unwrap_or(self.bit)
     }
 
-    /// Whether all edges were read but for the first of what follows.
+    /// Whether all edges were read except the first of the next burst.
     pub(super) fn is_between(&self) -> bool {
         self.burst.len() < 2
     }
 
-    /// When what follows has begun, if it has.
+    /// When the next burst began, if it has.
     pub(super) fn begun(&self) -> Option<Time> {
         self.burst.first().map(|first| first.time)
     }
@@ -125,7 +125,7 @@ impl EdgeReceiver {
         Self { skipped, ..self }
     }
 
-    /// What was measured so far.
+    /// Returns the measurements so far.
     pub(crate) fn rates(&self) -> Rates {
         let mut rates = self.rates;
         (rates.spikes_at, rates.spike_bits) = self.spikes.near_edges();
@@ -203,7 +203,7 @@ impl EdgeReceiver {
         !self.fields.is_empty()
     }
 
-    /// The fields that are complete.
+    /// Returns the complete fields.
     pub(crate) fn take(&mut self) -> std::vec::Drain<'_, LineField> {
         self.fields.drain(..)
     }

@@ -5,10 +5,10 @@ use crate::time::Time;
 /// Shorter runs are spikes, in bits: above a sample at four samples a bit, below a bit with jitter at both ends.
 const SHORTEST_RUN: f64 = 0.375;
 
-/// A cluster between equal levels that holds the other one for so long is a bit in pieces, in bits.
+/// A cluster between equal levels that spends this long at the other level is a bit in pieces; in bits.
 const TORN_BIT: f64 = 0.5;
 
-/// A spike within so many bits behind an edge is of it.
+/// A spike within this many bits after an edge belongs to it.
 const NEAR: f64 = 0.7;
 
 /// An edge between two levels that last.
@@ -16,7 +16,7 @@ const NEAR: f64 = 0.7;
 pub(crate) struct Edge {
     /// When, in picoseconds.
     pub(crate) time: Time,
-    /// The level from here on.
+    /// The level from here onwards.
     pub(crate) level: bool,
     /// Spikes dropped since the edge before.
     pub(crate) spikes: u32,
@@ -25,7 +25,8 @@ pub(crate) struct Edge {
 /// Drops spikes from a line.
 ///
 /// Between two levels that last lies one edge, or a cluster of short runs (ringing). A cluster becomes one edge, placed
-/// so that each level keeps its time; a cluster between equal levels is gone. Memory is constant however long it is.
+/// so that each level keeps its time; a cluster between equal levels disappears. The memory needed is constant, however long
+/// the cluster is.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spikes {
     bit: f64,
@@ -43,12 +44,12 @@ pub(crate) struct Spikes {
     dropped: u32,
     /// The edge before.
     last: Time,
-    /// Clusters near a rising edge and near a falling one, and how long their spikes were together, in bits.
+    /// Clusters near a rising edge and near a falling one, and the total length of their spikes, in bits.
     near: [u64; 2],
     near_bits: f64,
 }
 
-/// Up to two edges: those of a bit that was torn come together.
+/// Up to two edges: those of a bit in pieces come together.
 pub(crate) type Edges = [Option<Edge>; 2];
 
 impl Spikes {
@@ -71,12 +72,12 @@ impl Spikes {
         }
     }
 
-    /// Spikes that were near a rising edge and near a falling one, and how long they were together, in bits.
+    /// Spikes that were near a rising edge and near a falling one, and their total length, in bits.
     pub(crate) fn near_edges(&self) -> ([u64; 2], f64) {
         (self.near, self.near_bits)
     }
 
-    /// The same as [`change`](Self::change) where the change before was an edge and nothing else, as nearly always.
+    /// Does the same as [`change`](Self::change) if the previous change was a clean edge, as it nearly always is.
     #[inline]
     pub(crate) fn plain_change(&mut self, time: Time, level: bool) -> Option<Edge> {
         let is_plain = self.edges == 1 && level != self.level && (time - self.since) >= self.shortest;
@@ -146,7 +147,7 @@ impl Spikes {
         self.cluster(solid)
     }
 
-    /// What a cluster of short runs after `solid` amounts to.
+    /// Returns the edges that a cluster of short runs after `solid` amounts to.
     #[cold]
     fn cluster(&mut self, solid: bool) -> Edges {
         let (count, other) = (self.edges, self.other);
@@ -167,7 +168,7 @@ impl Spikes {
         [Some(self.edge(self.begun, !solid)), Some(self.edge(after, solid))]
     }
 
-    /// Counts a cluster that holds spikes with the edge that it is near, if there is one.
+    /// Counts a cluster of spikes with the edge that it is near, if there is one.
     fn classify(&mut self, solid: bool, other: i64) {
         let rings = self.level != solid;
         // A spike beside an edge of the line, or in front of the one that ends the cluster.
@@ -188,7 +189,7 @@ impl Spikes {
         self.solid.map(|_| (self.since, self.level))
     }
 
-    /// The last change of the line and the level since, where no spike is about.
+    /// The last change of the line and the level since, if no spike is near.
     pub(crate) fn settled(&self) -> Option<(Time, bool)> {
         (self.solid == Some(self.level) && self.edges == 0 && self.dropped == 0).then_some((self.since, self.level))
     }

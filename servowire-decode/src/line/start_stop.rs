@@ -1,4 +1,4 @@
-//! What a start-stop protocol takes and gives.
+//! Input and output of a start-stop protocol.
 
 use std::io;
 
@@ -18,8 +18,8 @@ pub struct LineField {
     pub end: Time,
     /// Spikes that were dropped before it or in it.
     pub spikes: u32,
-    /// For the first field of a speaker: the bits of the line from its start bit on, as long as it speaks, the first in
-    /// bit 0; those after it are 1. Otherwise 0.
+    /// For the first field of a speaker: the bits of the line from its start bit until the speaker stops, the first in bit
+    /// 0; the bits after that are 1. Otherwise 0.
     pub bits: u128,
 }
 
@@ -31,17 +31,17 @@ pub trait StartStop {
     /// The capture begins, at `start`.
     fn begin(&mut self, start: Time);
 
-    /// Bits for which a line is low at the beginning of a request, and of an answer: the start bit and what is 0 behind it in
-    /// each of them.
+    /// Number of bits for which the line is low at the beginning of a request, and of an answer: the start bit and the bits
+    /// after it that are always 0.
     const FIRST_LOW: [u32; 2];
 
-    /// The next field of the line.
+    /// Takes the next field of the line.
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// The line has rested until `now`: a frame that nothing can follow any more is over.
+    /// The line has been idle until `now`: a frame that can no longer continue ends.
     fn rest(&mut self, now: Time, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// Whether no frame is begun and not over.
+    /// Returns whether no frame is unfinished.
     fn is_between(&self) -> bool;
 
     /// The recording ends, at `end`.

@@ -1,7 +1,7 @@
-//! What the first edges of channels tell: which of them carry a protocol, which, how fast, which way up.
+//! Finds out from their first edges which channels carry a protocol, which protocol, how fast, and with which polarity.
 //!
-//! Every rate of every protocol is tried on every channel that moves, both ways up; a trial ends early where hardly
-//! anything holds. So a spike, a slow encoder or a decoy never hides a line.
+//! Every rate of every protocol is tried on every channel with edges, in both polarities; a trial ends early if hardly any
+//! frame is good. So a spike, a slow encoder or a decoy never hides a line.
 
 use super::evidence::{CERTAIN, Evidence};
 use super::lane::{Tap, Wires};
@@ -12,13 +12,13 @@ use crate::recognition::Recognition;
 use crate::settings::Settings;
 use crate::time::Time;
 
-/// Edges of a channel that are looked at.
+/// Number of edges of a channel that are examined.
 pub(super) const SAMPLE: usize = 3000;
 /// Edges after which a trial may be given up.
 const PIECE: usize = 96;
-/// Fewer changes, the level at the beginning included, are no traffic: the shortest frame has four edges.
+/// Fewer changes, including the level at the beginning, are not traffic: the shortest frame has four edges.
 pub(super) const FEWEST: usize = 5;
-/// A rival within this share of the best score is worth a word.
+/// A rival within this share of the best score is mentioned.
 const CLOSE: f64 = 0.5;
 
 /// The edges of a channel, by time.
@@ -29,7 +29,7 @@ pub(super) type Edges = [(Time, bool)];
 pub(super) struct Speech {
     /// The protocol.
     pub(super) protocol: &'static dyn Codec,
-    /// Bits a second.
+    /// Bits per second.
     pub(super) rate: u32,
 }
 
@@ -40,13 +40,13 @@ pub(super) struct Found {
     pub(super) speech: Speech,
     pub(super) evidence: Evidence,
     pub(super) rates: Rates,
-    /// The level at which the line rests, where it does.
+    /// The level at which the line idles, if it does.
     pub(super) idle: Option<bool>,
-    /// Bits a second that the runs look like.
+    /// Bits per second suggested by the runs.
     pub(super) seen: Option<f64>,
     /// The next best reading of the same channel.
     pub(super) rival: Option<(Speech, i64)>,
-    /// Whether all that was said was looked at.
+    /// Whether everything on the line was examined.
     pub(super) whole: bool,
 }
 
@@ -93,7 +93,7 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// As far as the options leave it open.
+    /// The candidates that the options leave open.
     pub(super) fn new(protocol: Option<&'static dyn Codec>, settings: Settings, pair: Option<[u16; 2]>) -> Self {
         let rated = |protocol: &'static dyn Codec| {
             let rates: Vec<u32> = match settings.line.bit_rate {
@@ -118,7 +118,7 @@ impl Candidates {
         self.pair
     }
 
-    /// The best reading of two channels as one line.
+    /// Returns the best reading of two channels as one line.
     pub(super) fn read_pair(&self, channels: [u16; 2], edges: [&Edges; 2]) -> Option<Found> {
         let edges = edges.map(|edges| edges.get(..SAMPLE.min(edges.len())).unwrap_or_default());
         let mut best: Option<Found> = None;
@@ -136,7 +136,7 @@ impl Candidates {
         best
     }
 
-    /// The best reading of a channel, and the one after it.
+    /// Returns the best reading of a channel, and the second best.
     pub(super) fn read(&self, channel: u16, edges: &Edges) -> Option<Found> {
         let edges = edges.get(..SAMPLE.min(edges.len()))?;
         let mut best: Option<Found> = None;
@@ -176,7 +176,7 @@ impl Candidates {
         Some(best)
     }
 
-    /// What a protocol makes of one channel, or of two as one line.
+    /// Returns what a protocol makes of one channel, or of two as one line.
     pub(super) fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges]) -> (Evidence, Rates) {
         let mut evidence = Evidence::new(speech.protocol.weights);
         let Some(mut decoder) = speech.protocol.line(speech.rate, &self.settings) else {
@@ -213,8 +213,8 @@ impl Candidates {
         (evidence, decoder.rates())
     }
 
-    /// Lines among the readings of channels: what is heard twice is taken once, requests and answers on two channels
-    /// are one line.
+    /// Picks the lines among the readings of channels: a line heard twice is taken once; requests and answers on two
+    /// channels are one line.
     pub(super) fn lines(
         &self,
         mut readings: Vec<Found>,
@@ -237,7 +237,7 @@ impl Candidates {
         lines
     }
 
-    /// Answers of HIPERFACE DSL say nothing by themselves: they are looked for on every channel that is nothing else.
+    /// Answers of HIPERFACE DSL prove nothing by themselves, so they are looked for on every channel that is nothing else.
     fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| {
             let evidence = &found.evidence;
@@ -314,7 +314,7 @@ fn mark(found: &Found) -> (i64, bool, bool) {
     (found.evidence.score, found.idle.is_none_or(|idle| idle != inverted), !inverted)
 }
 
-/// Whether runs of about this bit are there at all. Spikes beside every edge are two of three runs.
+/// Whether there are any runs of about this bit length. Spikes beside every edge are two of three runs.
 fn may_run_at(edges: &Edges, bit: f64) -> bool {
     let (mut short, mut fitting, mut all) = (0_u32, 0_u32, 0_u32);
     for pair in edges.windows(2).take(1024) {
@@ -327,8 +327,8 @@ fn may_run_at(edges: &Edges, bit: f64) -> bool {
     5 * short <= 4 * all && 12 * fitting >= all
 }
 
-/// The level of what is longer than any field's run, by time. What was before the first edge may have been before the power was
-/// on: it counts only where nothing else does.
+/// The level of what is longer than any field's run, by time. The level before the first edge may be from before power-on:
+/// it counts only if nothing else does.
 pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
     let later = edges.get(1..).unwrap_or_default();
     level_of_rest(later, bit).or_else(|| level_of_rest(edges, bit))
@@ -348,7 +348,7 @@ fn level_of_rest(edges: &Edges, bit: i64) -> Option<bool> {
 }
 
 /// The rate that the runs of a channel look like, in bits a second: the shortest length that is too frequent to be a
-/// spike. None where there is hardly a run.
+/// spike. `None` if there are hardly any runs.
 pub(super) fn seen_rate(edges: &Edges) -> Option<f64> {
     let mut lengths: Vec<f64> = edges
         .windows(2)

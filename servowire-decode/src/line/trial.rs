@@ -1,4 +1,4 @@
-//! What a decoder would make of some edges, without anybody hearing of it.
+//! Trial readings: what a decoder would make of some edges, without any output.
 
 use std::io;
 
@@ -10,7 +10,7 @@ use crate::event::{Event, Verdict};
 use crate::sink::Sink;
 use crate::time::Time;
 
-/// Whether an event is a frame that came and does not hold. What an encoder refuses, it refuses in a sound frame.
+/// Whether an event is a frame that came and is not good. A refusal by an encoder is itself a sound frame.
 pub(super) fn is_failed(event: &Event) -> bool {
     match &event.verdict {
         Verdict::Ok => false,
@@ -18,12 +18,12 @@ pub(super) fn is_failed(event: &Event) -> bool {
     }
 }
 
-/// Events that were heard, and what speaks for them.
+/// The events of a reading, and the evidence for it.
 #[derive(Debug)]
 pub(super) struct Heard {
     pub(super) events: Vec<Event>,
     pub(super) evidence: Evidence,
-    /// Frames that do not hold.
+    /// Frames that are not good.
     pub(super) failed: usize,
 }
 
@@ -32,19 +32,19 @@ impl Heard {
         Self { events: Vec::new(), evidence: Evidence::new(weights), failed: 0 }
     }
 
-    /// Whether there is an answer, and nothing that does not hold.
+    /// Whether there is an answer, and no frame that is not good.
     pub(super) fn is_perfect(&self) -> bool {
         self.failed == 0 && self.evidence.answers > 0
     }
 
-    /// Frames in front of the first that failed.
+    /// Frames before the first that failed.
     fn sound(&self) -> usize {
         let sound = self.events.iter().take_while(|event| !is_failed(event));
         sound.filter(|event| event.verdict.is_ok()).count()
     }
 
-    /// More of it holds: more answers, more in front of what failed, or all of it. A request alone proves little, and a piece of an answer may look like another
-    /// one, to which there is none.
+    /// Whether more of it is good: more answers, more frames before the first that failed, or all of them. A request alone
+    /// proves little, and part of an answer may look like a request, which then has no answer.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let more = self.evidence.answers > other.evidence.answers && self.failed <= other.failed;
         let whole = self.failed == 0 && other.failed > 0;
@@ -62,7 +62,7 @@ impl Sink for Heard {
     }
 }
 
-/// A reading of some edges by a receiver and a protocol as they were before them.
+/// A reading of some edges by a receiver and a protocol in their state before these edges.
 #[derive(Debug)]
 pub(super) struct Trial<P> {
     pub(super) receiver: EdgeReceiver,
@@ -71,7 +71,7 @@ pub(super) struct Trial<P> {
 }
 
 impl<P: StartStop + Clone> Trial<P> {
-    /// Reads `edges`, behind which the line rests until `now`.
+    /// Reads `edges`, after which the line is idle until `now`.
     pub(super) fn of(receiver: &EdgeReceiver, protocol: &P, weights: Weights, edges: &[Edge], now: Time) -> Self {
         let mut trial = Self { receiver: receiver.emptied(), protocol: protocol.clone(), heard: Heard::new(weights) };
         trial.receiver.feed(edges);

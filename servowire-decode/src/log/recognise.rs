@@ -10,21 +10,21 @@ use crate::sink::Tally;
 
 /// Bytes of a burst by which it is recognised.
 const MOST_TRIED: usize = 1 << 14;
-/// Per cent of the frames that hold where a log is what it was taken for.
+/// Per cent of the frames that are good if a log is what it was taken for.
 const SURE: u64 = 80;
-/// Lines of fewer bytes are written as they came.
+/// Shorter lines contain bytes as they arrived.
 const NARROW: usize = 8;
 
-/// What a log may be.
+/// A possible reading of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Reading {
     pub(super) protocol: &'static dyn Codec,
-    /// Its lines are as long as the tool that wrote them makes them, wherever the frames end.
+    /// The tool that wrote its lines set their length, regardless of where frames end.
     pub(super) wrapped: bool,
 }
 
-/// All of them. Lines as they are come before lines in one piece. What has no check comes last among equals, and only as it
-/// is; what leaves fewest refused wins.
+/// All of them. Lines as they are come before lines joined together. Among equals a protocol without a check comes last,
+/// and only with lines as they are; the reading with the fewest refused frames wins.
 fn readings() -> impl Iterator<Item = Reading> {
     let of = |checked: bool, wrapped: bool| {
         let codecs = CODECS.iter().filter(move |codec| codec.checked == checked);
@@ -33,7 +33,7 @@ fn readings() -> impl Iterator<Item = Reading> {
     of(true, false).chain(of(true, true)).chain(of(false, false))
 }
 
-/// The reading that was asked for, or the one of which most holds, and a decoder for it.
+/// Returns the reading that was asked for, or the one with the most good frames, and a decoder for it.
 pub(super) fn recognise(
     bursts: &[Burst],
     protocol: Option<&'static dyn Codec>,
@@ -65,7 +65,7 @@ pub(super) fn recognise(
 /// The first bursts of a log, as they are tried.
 struct Sample<'a> {
     lines: Vec<Burst>,
-    /// All of them in one piece, where the lines may be those of a dump.
+    /// All of them joined, if the lines may be those of a dump.
     joined: Option<[Burst; 1]>,
     settings: &'a Settings,
 }
@@ -95,14 +95,14 @@ impl<'a> Sample<'a> {
         Some(tally)
     }
 
-    /// The reading of which most holds, among those of the protocols that are meant.
+    /// Returns the reading with the most good frames, among those of the protocols in question.
     fn best(&self, meant: impl Fn(&'static dyn Codec) -> bool) -> Option<(Tally, Reading)> {
         let tried = readings().filter(|reading| meant(reading.protocol));
         let tried = tried.filter_map(|reading| Some((self.tally(reading)?, reading)));
         tried.reduce(|best, next| if share(next.0) > share(best.0) { next } else { best })
     }
 
-    /// What the log is rather than what was asked for, of which `held` per cent hold.
+    /// Returns what the log is if it differs from what was asked for, of which `held` per cent of the frames are good.
     fn rather(&self, asked: &'static dyn Codec, held: u64) -> Option<(Tally, &'static dyn Codec)> {
         let (other, reading) = self.best(|known| known != asked)?;
         // Of what has no check not one may be refused, and hardly anything hold as it was meant.
@@ -115,7 +115,7 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// Whether all lines have as many bytes as a dump's, but for the last.
+/// Whether all lines except the last have as many bytes as those of a dump.
 fn may_be_wrapped(bursts: &[Burst]) -> bool {
     let Some((last, rest)) = bursts.split_last() else { return false };
     let width = bursts.first().map_or(0, |first| first.bytes.len());
@@ -127,7 +127,7 @@ fn may_be_wrapped(bursts: &[Burst]) -> bool {
         && !bursts.iter().any(said)
 }
 
-/// Frames that hold, in per cent.
+/// Good frames, in per cent.
 fn share(tally: Tally) -> u64 {
     (100 * tally.ok).checked_div(tally.ok + tally.faults()).unwrap_or(0)
 }

@@ -6,24 +6,24 @@ use super::printer::Origin;
 use crate::event::{Direction, Event, Place};
 use crate::time::Time;
 
-/// What the user wants to see; an empty field lets everything through.
+/// The frames that the user wants to see; an empty field lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Choice {
-    /// The whole name of a frame or its last word, in any case.
+    /// The whole name of a frame or its last word, in upper or lower case.
     pub kinds: Vec<String>,
-    /// Of an encoder, drive or device.
+    /// Name of an encoder, drive or device.
     pub address: Option<i64>,
-    /// Only what this encoder sends and what is sent to it; by its name, channel or address.
+    /// Only frames sent by or to this encoder, given by its name, channel or address.
     pub encoder: Option<String>,
     /// The first instant that is shown.
     pub from: Option<Time>,
-    /// Nothing is shown from here on.
+    /// Nothing is shown from this instant onwards.
     pub to: Option<Time>,
     /// Only refused frames.
     pub errors: bool,
 }
 
-/// Lets through what was chosen.
+/// Lets the chosen frames through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Filter {
     choice: Choice,
@@ -31,11 +31,12 @@ pub struct Filter {
     passed: BTreeMap<usize, bool>,
 }
 
-/// After the last time that is asked for, reading goes on for so long: frames that began before it end, in picoseconds.
+/// Reading continues for this long after the last time requested, in picoseconds, so that frames which began before it can
+/// end.
 const REST: i64 = 10_000_000_000;
 
 impl Filter {
-    /// Lets through what the user chose.
+    /// Lets the frames through that the user chose.
     pub fn new(choice: Choice) -> Self {
         Self { choice, passed: BTreeMap::new() }
     }
@@ -55,12 +56,12 @@ impl Filter {
         self.choice.errors
     }
 
-    /// Whether nothing of interest can come any more once a recording was read up to `time`.
+    /// Returns whether nothing of interest can follow once a recording was read up to `time`.
     pub(super) fn is_over(&self, time: Time) -> bool {
         self.choice.to.is_some_and(|to| time > to + REST)
     }
 
-    /// Whether an event is asked for; of those that are, only the refused ones may be shown.
+    /// Returns whether an event was requested; of the requested ones, perhaps only the refused ones are shown.
     pub(super) fn takes(&mut self, origin: &Origin, event: &Event) -> bool {
         let is_meant = |encoder: &String| origin.is_meant(origin.speaker(event), encoder);
         self.choice.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)

@@ -1,4 +1,4 @@
-//! JSON Lines: an object a frame.
+//! JSON Lines: one object per frame.
 
 use std::io::{self, Write};
 
@@ -34,7 +34,7 @@ impl<W: Write> Printer for JsonLines<W> {
     }
 }
 
-/// An event as the README describes it; keys that say nothing are left out.
+/// An event as described in the README; keys without content are omitted.
 struct Object<'a> {
     origin: &'a Origin,
     event: &'a Event,

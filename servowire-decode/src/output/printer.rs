@@ -1,4 +1,4 @@
-//! A form of output, and what it is told beside the events.
+//! A form of output, and what it is told besides the events.
 
 use std::io;
 
@@ -15,33 +15,33 @@ pub struct Lane {
     pub channels: Vec<u16>,
     /// Its protocol.
     pub protocol: &'static dyn Codec,
-    /// Bits per second, by the protocol.
+    /// Nominal bits per second of the protocol.
     pub rate: u32,
 }
 
-/// Where events come from: the file, its lines that are decoded, and the one that speaks.
+/// Where events come from: the file, its decoded lines, and the line of the present event.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Origin {
     /// The name of the file.
     pub file: String,
     /// The lines found so far.
     pub lanes: Vec<Lane>,
-    /// The number of the line that speaks, from 0; a log of bytes has none.
+    /// Returns the number of the line of the present event, from 0; a log of bytes has none.
     pub speaks: usize,
 }
 
 impl Origin {
-    /// The line that speaks; none in a log of bytes.
+    /// Returns the line of the present event; `None` in a log of bytes.
     pub fn lane(&self) -> Option<&Lane> {
         self.lanes.get(self.speaks)
     }
 
-    /// Who sends an event, or is addressed by it.
+    /// Returns the sender of an event, or the one addressed by it.
     pub fn speaker(&self, event: &Event) -> Speaker {
         Speaker { lane: self.speaks, address: event.address }
     }
 
-    /// Whether a speaker is meant by what a person wrote: its name, its channel, its address, or both as `A/3`.
+    /// Returns whether a text from the user means this speaker: its name, its channel, its address, or both as `A/3`.
     pub(crate) fn is_meant(&self, speaker: Speaker, what: &str) -> bool {
         let channel = self.lanes.get(speaker.lane).map_or("", |lane| lane.channel.as_str());
         let address = speaker.address.map(|address| address.to_string());
@@ -49,7 +49,8 @@ impl Origin {
         what == channel || address.as_deref() == Some(what) || both || what == self.name(speaker)
     }
 
-    /// A readable name of a speaker: its channel, if there are several, and its address. Empty if there is no other speaker.
+    /// Returns a readable name of a speaker: its channel, if there are several, and its address. Empty if there is no other
+    /// speaker.
     pub fn name(&self, speaker: Speaker) -> String {
         let lane = self.lanes.get(speaker.lane).filter(|_| self.lanes.len() > 1);
         let address = speaker.address.map(|address| format!("address {address}"));
@@ -68,35 +69,35 @@ pub struct Speaker {
 
 /// A form of output that is written file by file.
 pub trait Printer {
-    /// A file begins.
+    /// Begins a file.
     fn begin(&mut self, _origin: &Origin) -> io::Result<()> {
         Ok(())
     }
 
-    /// The channels of the capture; the lines that `origin` names so far are decoded.
+    /// Takes the channels of the capture; the lines named by `origin` so far are decoded.
     fn channels(&mut self, _origin: &Origin, _channels: &[String]) -> io::Result<()> {
         Ok(())
     }
 
-    /// Whether it takes the changes of the channels: they cost time.
+    /// Returns whether it takes the changes of the channels, which cost time.
     fn wants_changes(&self) -> bool {
         false
     }
 
-    /// A change of any channel. The events made of it come later.
+    /// Takes a change of any channel. The events made from it come later.
     fn change(&mut self, _change: &Change) -> io::Result<()> {
         Ok(())
     }
 
-    /// The next event.
+    /// Takes the next event.
     fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()>;
 
-    /// Nothing comes for a while: what is complete is shown.
+    /// Nothing arrives for a while: whatever is complete is shown.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 
-    /// The file is at its end.
+    /// Ends the file.
     fn end(&mut self, _origin: &Origin) -> io::Result<()> {
         Ok(())
     }

@@ -11,7 +11,7 @@ use crate::time::Time;
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
-/// Events that are listed of each; further ones are counted.
+/// Events that are listed of each kind; further ones are counted.
 const EVENTS: usize = 1_000;
 
 /// Collects figures and prints them at the end of a file.
@@ -26,7 +26,7 @@ pub struct Stats<W> {
 pub struct Table {
     /// Its name; empty if there is only one.
     pub speaker: String,
-    /// What is counted, and the figures; what belongs to the row above has no name.
+    /// The quantity and its figures; a row that belongs to the row above has no name.
     pub rows: Vec<(&'static str, String)>,
 }
 
@@ -46,7 +46,7 @@ struct Figures {
     ok: u64,
     kinds: BTreeMap<String, u64>,
     refused: BTreeMap<&'static str, u64>,
-    /// Start of the last frame of the side that keeps the cycle.
+    /// Start of the last frame of the side that sets the cycle.
     last_start: Option<(Option<Direction>, Time)>,
     cycle: Spread,
     delay: Spread,
@@ -56,14 +56,14 @@ struct Figures {
     untimed: u64,
     jumps: u64,
     listed: Vec<Jump>,
-    /// Times are counted and say nothing of a cycle.
+    /// Times are counted and say nothing about a cycle.
     counted: bool,
-    /// What happened, and where; and how much of it there was.
+    /// Events with their places, and their number.
     happened: Vec<(Place, String)>,
     events: usize,
 }
 
-/// A position, and how far it moved at most.
+/// A position, and its largest move.
 #[derive(Debug, Clone, Copy)]
 struct Followed {
     last: Position,
@@ -78,7 +78,7 @@ struct Jump {
     moved: i64,
 }
 
-/// Least, most, mean and deviation of a series, in picoseconds.
+/// Minimum, maximum, mean and standard deviation of a series, in picoseconds.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spread {
     count: u64,
@@ -172,7 +172,7 @@ impl Figures {
         }
     }
 
-    /// What there must be to tell jumps, and is not.
+    /// What is missing to detect jumps.
     fn missing(&self) -> Option<&'static str> {
         match (self.positions.is_empty(), self.untimed) {
             (false, _) => None,
@@ -181,7 +181,7 @@ impl Figures {
         }
     }
 
-    /// The cycle is that of the requests; on a line without them, that of the frames there are.
+    /// The cycle is that of the requests; on a line without requests, that of the frames present.
     fn keep_cycle(&mut self, direction: Option<Direction>, start: Time) {
         match self.last_start {
             Some((side, last)) if side == direction => self.cycle.add(start - last),
@@ -210,7 +210,7 @@ impl Figures {
         }
     }
 
-    /// The figures by what they are called; what belongs to one has no name.
+    /// Returns the figures by their names; a row that belongs to the one above has no name.
     fn rows(&self, limit: Option<u64>) -> Vec<(&'static str, String)> {
         let missing = self.refused.get(NO_RESPONSE).copied().unwrap_or(0);
         let refused = self.refused.values().sum::<u64>() - missing;
@@ -302,14 +302,14 @@ impl Gathered {
         Self { limit, by: BTreeMap::new() }
     }
 
-    /// The next event of a file.
+    /// Takes the next event of a file.
     pub fn add(&mut self, origin: &Origin, event: &Event) {
         if !event.remark {
             self.by.entry(origin.speaker(event)).or_default().add(event, self.limit);
         }
     }
 
-    /// A table for each speaker.
+    /// Returns a table for each speaker.
     pub fn tables(&self, origin: &Origin) -> Vec<Table> {
         let one = |(speaker, figures): (&Speaker, &Figures)| Table {
             speaker: origin.name(*speaker),
@@ -352,7 +352,7 @@ impl Gathered {
         }
     }
 
-    /// A line for each speaker of `all` with what it did in these figures: frames, errors, cycle, delay and position.
+    /// Returns a line for each speaker of `all` with its part in these figures: frames, errors, cycle, delay and position.
     pub fn brief(&self, all: &Self, origin: &Origin) -> Vec<String> {
         let one = |speaker: &Speaker| {
             let name = match origin.name(*speaker) {
@@ -365,7 +365,7 @@ impl Gathered {
         all.by.keys().map(one).collect()
     }
 
-    /// The figures of each speaker as an object; those that spoke in `all` and not in these have zeros.
+    /// Returns the figures of each speaker as an object; speakers that are in `all` but not in these figures have zeros.
     pub fn objects(&self, all: &Self, origin: &Origin) -> Vec<Json> {
         let mut whole = self.clone();
         for speaker in all.by.keys() {
@@ -402,7 +402,7 @@ impl<W: Write> Stats<W> {
         Self { out, json: false, gathered: Gathered::new(limit) }
     }
 
-    /// JSON Lines instead of tables.
+    /// Writes JSON Lines instead of tables.
     #[must_use]
     pub fn in_json(self) -> Self {
         Self { json: true, ..self }

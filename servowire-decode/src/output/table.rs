@@ -1,4 +1,4 @@
-//! CSV for spreadsheets: a row a frame, a column a field, numbers as numbers.
+//! CSV for spreadsheets: one row per frame, one column per field, numbers as numbers.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Value, Verdict};
 
-/// Columns that every file has; those of the fields follow, and finally what has no column of its own.
+/// Columns that every file has; the columns of the fields follow, and finally anything without its own column.
 const COLUMNS: [&str; 17] = [
     "file",
     "channel",
@@ -36,7 +36,7 @@ pub struct Csv<W: Write> {
     out: csv::Writer<W>,
     /// Names of the fields that have a column, once the heading is written.
     names: Option<Vec<&'static str>>,
-    /// What waits for the heading.
+    /// Rows that wait for the heading.
     held: Vec<Event>,
 }
 
@@ -47,7 +47,7 @@ impl<W: Write> Csv<W> {
         Self { out, names: None, held: Vec::new() }
     }
 
-    /// Writes the heading, and what waited for it.
+    /// Writes the heading, and the rows that waited for it.
     fn heading(&mut self, origin: &Origin) -> io::Result<()> {
         if self.names.is_none() {
             let mut names: Vec<&'static str> = Vec::new();
@@ -113,7 +113,7 @@ impl<W: Write> Csv<W> {
     }
 }
 
-/// Picoseconds as microseconds, exactly.
+/// Converts picoseconds to microseconds, exactly.
 fn microseconds(time: i128) -> String {
     let sign = if time < 0 { "-" } else { "" };
     let time = time.unsigned_abs();

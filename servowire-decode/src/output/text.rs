@@ -1,9 +1,9 @@
-//! One line a transaction, as wide as the terminal, else of a hundred columns; what is longer goes on below.
+//! One line per transaction, as wide as the terminal, or a hundred columns without one; longer lines continue below.
 //!
 //! ```text
 //!      10.000 us  <>  ID 3  SF EA1  ABS 3915817  ABM 0  ALMC OF BE BA  0.466802 turns  +3.00 us  ok
 //! ```
-//! `>` is a request, `<` an answer, `<>` a good request with what it got.
+//! `>` is a request, `<` an answer, `<>` a good request with its answer.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -12,14 +12,14 @@ use std::io::{self, Write};
 use super::printer::{Origin, Printer};
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 
-/// Columns of a line where there is no terminal, and the fewest of one.
+/// Columns of a line if there is no terminal, and the minimum for a terminal.
 const COLUMNS: usize = 100;
 const FEWEST: usize = 40;
-/// Wider values are left to stand out of their column.
+/// Wider values extend beyond their column.
 const WIDEST: usize = 24;
-/// What hardly ever changes is said when it does.
+/// Fields that hardly ever change are shown only when they do.
 const STEADY: &[&str] = &["ENID", "delay"];
-/// A check field that holds is said by the verdict.
+/// A good check field is covered by the verdict.
 const CHECKED: &str = "CRC";
 
 const REFUSED: &str = "REFUSED";
@@ -33,9 +33,9 @@ pub struct Text<W> {
     /// A good request of each line whose answer may follow.
     held: BTreeMap<usize, Event>,
     headings: bool,
-    /// The widest value of each field so far, so that lines of one kind stand in columns.
+    /// The widest value of each field so far, so that lines of one kind align in columns.
     widths: HashMap<&'static str, usize>,
-    /// What was last said of a line's steady fields.
+    /// The last values shown of a line's steady fields.
     steady: HashMap<(usize, &'static str), Value>,
 }
 
@@ -121,7 +121,7 @@ impl<W: Write> Text<W> {
         self.line.write(&mut self.out)
     }
 
-    /// Prints the request of line `speaks` that waits for its answer.
+    /// Prints the request of line `speaks` that is waiting for its answer.
     fn release(&mut self, origin: &Origin, speaks: usize) -> io::Result<()> {
         match self.held.remove(&speaks) {
             Some(request) => self.print(origin, speaks, &request, request.place, ">"),
@@ -130,7 +130,7 @@ impl<W: Write> Text<W> {
     }
 }
 
-/// A line in pieces that are not parted.
+/// A line made of unbreakable pieces.
 struct Columns {
     text: String,
     /// Where they begin.
@@ -150,7 +150,7 @@ impl Columns {
         };
     }
 
-    /// The place for a further piece.
+    /// Returns the place for another piece.
     fn piece(&mut self) -> &mut String {
         self.text.push_str("  ");
         self.pieces.push(self.text.len());
@@ -188,7 +188,7 @@ impl Columns {
         out.write_all(b"\n")
     }
 
-    /// A piece from a column on; one that is too long by itself is parted between its words.
+    /// Puts a piece at a column; a piece that is too long by itself is split between words.
     fn words(&self, out: &mut impl Write, piece: &str, mut at: usize, indent: usize) -> io::Result<usize> {
         for (k, word) in piece.split(' ').enumerate() {
             let width = word.chars().count();
@@ -258,14 +258,14 @@ impl<W: Write> Printer for Text<W> {
     }
 }
 
-/// A field as it is shown: its name and its value.
+/// Returns a field as shown: its name and its value.
 pub fn shown(field: &Field) -> String {
     let mut text = String::new();
     field_text(&mut text, field);
     text
 }
 
-/// A verdict as it is shown.
+/// Returns a verdict as shown.
 pub fn verdict(verdict: &Verdict) -> String {
     let mut text = String::new();
     verdict_text(&mut text, verdict);

@@ -1,4 +1,4 @@
-//! The capture again, with the decoded frames beside it as string variables (GTKWave, Surfer).
+//! A copy of the capture, with the decoded frames beside it as string variables (GTKWave, Surfer).
 
 mod ring;
 
@@ -13,7 +13,7 @@ use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 use crate::time::Time;
 use ring::{Ring, Turn};
 
-/// An event comes after the edges it was made of; edges wait so long for it, in picoseconds.
+/// An event comes after the edges from which it was made; edges wait this long for it, in picoseconds.
 const WINDOW: i64 = 2_000_000_000;
 
 /// What a string variable shows between frames. The format has no empty string.
@@ -22,13 +22,13 @@ const NOTHING: &str = "-";
 /// A VCD being written.
 pub struct VcdOut {
     writer: Writer<Box<dyn Write>>,
-    /// The capture's channels: the lines that say they are low and high.
+    /// The channels of the capture: the VCD lines that say they are low and high.
     channels: Vec<[String; 2]>,
     /// The codes of each line that was found before the header was written.
     strings: Vec<Strings>,
     /// Levels that are to be written, in the order of time.
     levels: VecDeque<Change>,
-    /// Strings that are to be written, by time and as they came.
+    /// Strings that are to be written, by time and order of arrival.
     texts: BTreeMap<(Time, u64), (IdCode, String)>,
     sequence: u64,
     /// Time of the capture that is 0 in the file.
@@ -67,14 +67,14 @@ impl VcdOut {
         }
     }
 
-    /// Writes only what lies between two times of the capture; the file keeps these times.
+    /// Writes only the part between two times of the capture; the file keeps these times.
     #[must_use]
     pub fn within(self, from: Time, to: Time) -> Self {
         Self { window: Some((from, to)), ..self }
     }
 
-    /// Writes only the line around refused frames and missing answers, so many picoseconds before and after each. Between such
-    /// pieces the channels are unknown. No more than this time is held in memory, however long the capture goes on.
+    /// Writes only the parts around refused frames and missing answers, this many picoseconds before and after each.
+    /// Between these parts the channels are unknown. No more than this span is held in memory, however long the capture is.
     #[must_use]
     pub fn around(self, picoseconds: i64) -> Self {
         Self { ring: Some(Ring::new(picoseconds.max(0))), ..self }
@@ -85,7 +85,7 @@ impl VcdOut {
         self.sequence += 1;
     }
 
-    /// The first that is written: the levels that the channels have then, and that nothing is said yet.
+    /// Writes the initial values: the levels of the channels at that time, and the string shown between frames.
     fn open(&mut self, time: Time) {
         if self.origin.is_some() {
             return;
@@ -107,7 +107,7 @@ impl VcdOut {
         self.strings.iter().flat_map(of).collect()
     }
 
-    /// Begins and ends the pieces around faults up to a time; whether what is then is written.
+    /// Begins and ends the pieces around faults up to a time; returns whether that time is within one.
     fn turn(&mut self, time: Time) -> io::Result<bool> {
         while let Some(turn) = self.ring.as_mut().and_then(|ring| ring.turn(time)) {
             let (at, begins) = match turn {
@@ -166,7 +166,7 @@ impl VcdOut {
         }
     }
 
-    /// Goes on to a time. An event older than the window is shown late rather than out of order.
+    /// Advances to a time. An event older than the window is shown late rather than out of order.
     fn stamp(&mut self, time: Time) -> io::Result<()> {
         let nanoseconds = ((time.since(self.origin.unwrap_or_default()).ps().max(0) + 500) / 1000) as u64;
         if self.written.is_none_or(|written| written < nanoseconds) {
@@ -182,7 +182,7 @@ impl VcdOut {
 }
 
 impl Printer for VcdOut {
-    /// Writes the header. A line that is found later has no place in it.
+    /// Writes the header. A line found later has no place in it.
     fn channels(&mut self, origin: &Origin, channels: &[String]) -> io::Result<()> {
         let writer = &mut self.writer;
         writer.version("servowire")?;
@@ -254,7 +254,7 @@ impl Printer for VcdOut {
         Ok(())
     }
 
-    /// Writes what is left.
+    /// Writes the rest.
     fn end(&mut self, _: &Origin) -> io::Result<()> {
         if let Some((from, _)) = self.window {
             self.open(from);

@@ -64,7 +64,7 @@ pub struct DslLine {
     bits: Bits,
     decoder: Decoder,
     bit: f64,
-    /// The sample at which the line changed last, where it comes in samples.
+    /// The sample at which the line last changed, if it comes as samples.
     since: Option<u64>,
 }
 

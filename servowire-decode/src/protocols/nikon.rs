@@ -1,8 +1,8 @@
 //! Nikon A-format: frames of a half-duplex line into requests and replies.
 //!
 //! Requests and replies begin with different sync codes. A command data frame says how many memory data frames follow;
-//! the frames of a reply follow each other without a pause, and how many they are tells the layout where the command
-//! leaves it open. A multi-response request is followed by the replies of several encoders.
+//! the frames of a reply follow each other without a pause, and their number tells the layout if the command leaves it
+//! open. A multi-response request is followed by the replies of several encoders.
 
 mod describe;
 mod frames;
@@ -150,7 +150,7 @@ impl Decoder {
         self.open.kind() == Kind::Response && self.open.broken.is_none() && expected(&self.open, asked).is_ok_and(sound)
     }
 
-    /// The open group is over.
+    /// Ends the open group.
     fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let group = std::mem::take(&mut self.open);
         let begin = self.begin.take();
@@ -223,7 +223,7 @@ impl Decoder {
     }
 }
 
-/// What probably spoilt the reply to a request.
+/// Returns what probably spoilt the reply to a request.
 fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option<String> {
     let layout =
         expected.map_or_else(|| request.expected(Resolution::default()).layout(), |expected| expected.layout());

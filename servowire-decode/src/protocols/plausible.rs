@@ -1,11 +1,12 @@
-//! What is sound and yet hardly true, said beside an `ok`; and what was done to a frame that is not.
+//! Remarks beside an `ok` about values that are valid but implausible, and about the probable damage to a frame that is not
+//! ok.
 
 use crate::event::{Place, Position};
 use crate::time::Time;
 
-/// Turns a second that no servo motor makes: 30,000 a minute.
+/// Turns per second that no servo motor reaches: 30,000 per minute.
 const FASTEST: f64 = 500.0;
-/// Moves below that, one after the other, after which a move above it is worth a word. Where positions jump from one
+/// Consecutive moves below that after which a move above it is mentioned. Where positions jump from one
 /// frame to the next, the times or the resolution are not what they seem.
 const CALM: u32 = 8;
 
@@ -17,7 +18,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// The next position; what is strange about it.
+    /// Takes the next position; returns what is strange about it.
     pub(super) fn note(&mut self, place: Place, position: Position) -> Option<String> {
         let Place::Time { start: time, .. } = place else { return None };
         let same = |before: &(Time, Position)| {

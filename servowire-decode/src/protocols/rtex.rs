@@ -1,8 +1,8 @@
 //! Panasonic RTEX: logs of data blocks, command and response.
 //!
 //! The first block of a drive is shown whole (flags that are 0 and numbers that are 0 left out), of each later one what
-//! changed since the block of the same drive and direction before it. The counter is only mentioned where it does
-//! not stand still or go on by one.
+//! changed since the block of the same drive and direction before it. The counter is mentioned only if it neither stays the
+//! same nor advances by one.
 
 mod blocks;
 mod describe;
@@ -59,7 +59,7 @@ struct Decoder {
     blocks: Blocks,
     /// What was read before the shape was known.
     held: Vec<Burst>,
-    /// Blocks are decoded, in whichever shape.
+    /// Whether blocks are being decoded, in any shape.
     began: bool,
     /// Why the log is not what it was written as.
     misread: Option<String>,
@@ -68,7 +68,7 @@ struct Decoder {
     last: HashMap<u8, Report>,
     /// Of the same: the last counter, and the update periods so far.
     updates: HashMap<u8, (u8, i64)>,
-    /// Where the last block was.
+    /// Place of the last block.
     place: Place,
 }
 
@@ -324,13 +324,13 @@ fn turned_round(response: bool) -> Verdict {
     .into()
 }
 
-/// Whether it is a block at all. A bus without a device is no drive, although its ones look like a response with an undefined
-/// code.
+/// Whether it is a block at all. A bus without a device is not a drive, although its ones look like a response with an
+/// undefined code.
 fn is_block(report: &Report) -> bool {
     report.is_usable() && report.cause() != Some(Cause::AllOnes)
 }
 
-/// A block that a drive takes is good; what strict decoding says of it is a note.
+/// A block that a drive accepts is good; anything that strict decoding reports is a note.
 fn verdict(report: &Report) -> Verdict {
     let Some(error) = report.error().filter(|_| !is_block(report)) else { return Verdict::Ok };
     let at = match error {

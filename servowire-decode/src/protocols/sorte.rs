@@ -1,8 +1,8 @@
-//! TI SORTE: the frames of a network capture, an event a packet.
+//! TI SORTE: the frames of a network capture, one event per packet.
 //!
-//! Packets of an Ethernet interface are start-up frames, with their FCS if the file says so; if it does not, frames without one,
-//! padded or not, are taken as a network card gives them, and say so. Packets of another interface are frames of the IO exchange,
-//! which have neither type nor addresses: the one with SA 0 is the master's.
+//! Packets of an Ethernet interface are start-up frames, with their FCS if the file says so. If it does not, frames without
+//! an FCS, padded or not, are accepted as a network card delivers them, with a remark. Packets of another interface are
+//! frames of the IO exchange, which have neither type nor addresses: the one with SA 0 is the master's.
 
 use std::fmt::Write as _;
 
@@ -183,7 +183,7 @@ fn fields(frame: &Frame<'_>) -> Vec<Field> {
     }
 }
 
-/// Bytes that are shown as they are, without spaces.
+/// Bytes shown unchanged, without spaces.
 fn data(bytes: &[u8]) -> Field {
     let mut digits = String::new();
     for byte in bytes {

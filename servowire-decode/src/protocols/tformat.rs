@@ -58,13 +58,13 @@ impl Codec for Tformat {
     }
 }
 
-/// A pause inside a frame that ends it, in bits: one and a half fields.
+/// Shortest pause that ends a frame, in bits: one and a half fields.
 const FIELD_TIMEOUT_BITS: i64 = 15;
 
 /// The ones in what a dip of the idle line looks like: it may be two bits long, and the answer may begin behind these.
 const IDLE: u16 = 0x1e;
 
-/// The shortest pause for the change of direction, in bits. Fields of one frame follow closer.
+/// The shortest pause for the change of direction, in bits. Fields of one frame follow more closely.
 const TURN_ROUND_BITS: i64 = 4;
 
 /// The longest answer, with some pauses in it, in bits.
@@ -151,7 +151,7 @@ impl Decoder {
         self.open.len() == answer && answer > request
     }
 
-    /// The open frame is over.
+    /// Ends the open frame.
     fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let frame = std::mem::take(&mut self.open);
         let begin = self.begin.take();
@@ -200,7 +200,7 @@ impl Decoder {
         event
     }
 
-    /// What probably spoilt the answer to a request.
+    /// Returns what probably spoilt the answer to a request.
     fn cause(&self, request: Request, frame: &Frame) -> Option<String> {
         let report = match frame.broken {
             None => inspect_bytes(request, frame.contents()),

@@ -1,13 +1,13 @@
-//! The blocks of an FST file, looked over before the library reads them: it believes every length, so that a file of a
-//! few bytes could take all memory, or send it in circles.
+//! Checks the blocks of an FST file before the library reads them: the library trusts every length, so a file of a few
+//! bytes could use up all memory or send it into an endless loop.
 
 use std::io::SeekFrom;
 
 use super::super::input::SeekRead;
 
-/// What a block holds when unpacked is at most this many times as long as the block: more than deflate can do.
+/// An unpacked block is at most this many times as long as the packed one: more than deflate can achieve.
 const PACKED: u64 = 1100;
-/// The most that a list of variables may hold.
+/// Maximum size of a list of variables.
 const MOST: u64 = 1 << 28;
 
 /// Types of blocks.
@@ -16,7 +16,7 @@ const HIERARCHY: [u8; 3] = [4, 6, 7];
 const VALUES: [u8; 3] = [1, 5, 8];
 const SKIP: u8 = 255;
 
-/// Says what is wrong with the lengths in a file; leaves it at its beginning.
+/// Reports what is wrong with the lengths in a file; leaves the file at its beginning.
 pub(super) fn check(file: &mut dyn SeekRead) -> Result<(), String> {
     let broken = |e: std::io::Error| format!("cannot be read: {}", e.to_string().to_lowercase());
     let end = file.seek(SeekFrom::End(0)).map_err(broken)?;

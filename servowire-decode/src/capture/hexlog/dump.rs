@@ -3,16 +3,16 @@
 /// How a dump writes its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Dump {
-    /// In the order of the file, of any length of group.
+    /// In the order of the file, in groups of any length.
     InOrder,
     /// Words of two bytes, the lower one last (`hexdump`).
     Swapped,
-    /// Words, the lowest byte last, in this many columns after the address (`xxd -e`): a short word stands at the right end
-    /// of its place.
+    /// Words, the lowest byte last, in this many columns after the address (`xxd -e`): a short word is aligned to the right
+    /// end of its place.
     Little(usize),
     /// Bits (`xxd -b`).
     Bits,
-    /// Octal words (`od`): not told from other numbers with certainty.
+    /// Octal words (`od`): cannot be distinguished from other numbers with certainty.
     Octal,
 }
 
@@ -20,13 +20,13 @@ pub(super) enum Dump {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Row {
     Bytes(Vec<u8>),
-    /// The row before it again, up to the next address.
+    /// The previous row, repeated up to the next address.
     Again,
     /// No bytes: the address after the last.
     End,
 }
 
-/// The address at the front, what is after it, and whether a colon parts them.
+/// The address at the front, the rest, and whether a colon separates them.
 fn address(line: &str) -> Option<(u64, &str, usize, bool)> {
     let bare = line.trim_start();
     let bare = bare.strip_prefix("0x").unwrap_or(bare);
@@ -39,7 +39,7 @@ fn address(line: &str) -> Option<(u64, &str, usize, bool)> {
 }
 
 impl Dump {
-    /// What the beginning of a file looks like; none where it is no dump.
+    /// Returns what the beginning of a file looks like; `None` if it is not a dump.
     pub(super) fn of(head: &str, whole: bool) -> Option<Self> {
         let mut lines: Vec<&str> = head.lines().filter(|line| !line.trim().is_empty()).take(16).collect();
         if !whole && lines.len() > 1 {
@@ -106,7 +106,7 @@ impl Dump {
     }
 }
 
-/// Whether the text beside the bytes matches them only if the bytes of each word are read from its end.
+/// Whether the text beside the bytes matches only if the bytes of each word are read in reverse.
 fn is_swapped(rest: &str, columns: usize) -> bool {
     let Some((groups, text)) = rest.split_at_checked(columns) else { return false };
     let (groups, text) = (groups.split_whitespace().collect::<Vec<_>>(), text.trim());

@@ -7,7 +7,7 @@ use super::super::table::cell;
 use crate::event::Direction;
 use crate::time::{self, SECOND, Time};
 
-/// Bytes that followed each other; when that was and who sent them, where the line says so.
+/// Bytes that followed each other, and their time and sender if the line gives them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(in crate::capture) struct Said {
     pub(in crate::capture) time: Option<Time>,
@@ -15,7 +15,7 @@ pub(in crate::capture) struct Said {
     pub(in crate::capture) bytes: Vec<u8>,
 }
 
-/// What a line holds: one burst, or more where it says who spoke.
+/// The content of a line: one burst, or more if it names the senders.
 pub(in crate::capture) fn line(text: &str) -> Result<Vec<Said>, String> {
     let text = text.trim_start_matches('\u{feff}').trim();
     let said = bare(text);
@@ -23,8 +23,8 @@ pub(in crate::capture) fn line(text: &str) -> Result<Vec<Said>, String> {
     if said.is_err() { titled(text).map_or(said, |said| Ok(vec![said])) } else { said }
 }
 
-/// `I (1234) encoder: 1A 20 29`, `12:30:00 PM: 1A 20 29`: bytes of two digits after words that end with a colon, a
-/// bracket or an arrow; these may say who spoke.
+/// `I (1234) encoder: 1A 20 29`, `12:30:00 PM: 1A 20 29`: bytes of two digits after words that end with a colon, a bracket
+/// or an arrow; these words may name the sender.
 fn titled(text: &str) -> Option<Said> {
     let is_byte = |word: &str| {
         let digits = word.strip_prefix("0x").unwrap_or(word);
@@ -42,7 +42,7 @@ fn titled(text: &str) -> Option<Said> {
     Some(said)
 }
 
-/// A line without words in front of its bytes, but for times and who spoke.
+/// A line whose bytes follow no other words than times and the sender.
 fn bare(text: &str) -> Result<Vec<Said>, String> {
     if let Some(bytes) = string(text) {
         return Ok(vec![Said { bytes: bytes?, ..Said::default() }]);
@@ -88,7 +88,7 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
     Ok(out.into_iter().map(|said| Said { time, ..said }).collect())
 }
 
-/// When a line says that it was, by the words that stand before its bytes: a date with a time of day, a time of day, seconds with a
+/// The time given by a line, in the words before its bytes: a date with a time of day, a time of day, seconds with a
 /// fraction, or a number with its unit.
 fn moment(words: &[&str]) -> Option<Time> {
     let bare = |word: &&str| word.trim_matches(['[', ']', '(', ')', ':']).replace(',', ".");
@@ -115,7 +115,7 @@ fn clock(word: &str) -> Option<Time> {
         .then_some(time::from_decimal(seconds)? + (hours * 60 + minutes) * 60 * SECOND)
 }
 
-/// Who spoke, by a word that says so.
+/// The sender, from a word that names it.
 pub(in crate::capture) fn speaker(word: &str) -> Option<Direction> {
     match mark(word, false) {
         Some(Mark::Speaker(direction)) => Some(direction),
@@ -137,7 +137,7 @@ fn without_remarks(text: &str) -> String {
     out
 }
 
-/// A date, a time of day, seconds with a fraction, or something of this in brackets. `followed`: it is not alone, so
+/// A date, a time of day, seconds with a fraction, or one of these in brackets. `followed`: other words follow, so
 /// `22:23:52` need not be three bytes.
 fn is_stamp(word: &str, followed: bool) -> bool {
     let (bare, bracketed) = match word.strip_prefix(['[', '(']) {
@@ -160,13 +160,13 @@ fn is_stamp(word: &str, followed: bool) -> bool {
 /// A word beside the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mark {
-    /// It says who speaks.
+    /// It names the sender.
     Speaker(Direction),
-    /// It only parts.
+    /// It is only a separator.
     Separator,
 }
 
-/// A word that is no bytes. `begun`: bytes stand before it.
+/// A word that is not bytes. `begun`: bytes come before it.
 fn mark(word: &str, begun: bool) -> Option<Mark> {
     let (request, answer) = (Mark::Speaker(Direction::Request), Mark::Speaker(Direction::Answer));
     let bare = word.trim_matches(['[', ']', '(', ')', ':', '-', '<', '>', '|']);
@@ -217,7 +217,7 @@ fn nibble(digit: u8) -> u8 {
     }
 }
 
-/// `[2, 165, 0]`: decimal where brackets and commas are there and nothing says hex.
+/// `[2, 165, 0]`: decimal if there are brackets and commas and nothing indicates hex.
 fn decimal_list(text: &str) -> Option<Vec<u8>> {
     let inside = text.trim().trim_end_matches([';', ',']);
     let between = |open: char, close: char| inside.strip_prefix(open)?.strip_suffix(close);
@@ -290,7 +290,7 @@ fn escape(letters: &mut Peekable<Chars<'_>>) -> Option<u8> {
     }
 }
 
-/// Lines of port monitors: `... IRP_MJ_WRITE Serial0 SUCCESS Length 2: 1A 20`; those without data say nothing.
+/// Lines of port monitors: `... IRP_MJ_WRITE Serial0 SUCCESS Length 2: 1A 20`; lines without data are ignored.
 fn monitored(text: &str) -> Option<Result<Vec<Said>, String>> {
     if text.contains("IOCTL_SERIAL") {
         return Some(Ok(Vec::new()));

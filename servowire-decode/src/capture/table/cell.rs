@@ -1,4 +1,4 @@
-//! What a cell of a table says.
+//! The content of a cell of a table.
 
 use crate::time::{self, Time};
 
@@ -21,7 +21,7 @@ pub(super) fn level(text: &[u8]) -> Cell {
     }
 }
 
-/// The lines of a pod: `0x3F`.
+/// Reads the lines of a pod: `0x3F`.
 pub(super) fn word(text: &[u8]) -> Option<u64> {
     let text = std::str::from_utf8(text.trim_ascii()).ok()?;
     let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"))?;

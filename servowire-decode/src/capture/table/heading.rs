@@ -1,11 +1,11 @@
-//! What stands above a table: separator, names, units, sample rate.
+//! The heading of a table: separator, names, units, sample rate.
 
 use std::collections::VecDeque;
 
 use super::cell::{self, Cell};
 use crate::time::{self, Time};
 
-/// More lines without numbers are no heading.
+/// Maximum number of lines without numbers in a heading.
 pub(super) const LONGEST: usize = 512;
 
 /// When a row was taken.
@@ -15,7 +15,7 @@ pub(super) enum Times {
     Column { index: usize, divisor: i64 },
     /// By a column of dates.
     Dates { index: usize },
-    /// One after the other, in picoseconds.
+    /// At a fixed interval, in picoseconds.
     Steps { start: Time, period: f64 },
     /// At a sample rate.
     Rate(u64),
@@ -32,7 +32,7 @@ pub(super) struct Heading {
     fixed: Option<Times>,
 }
 
-/// Whether a line is a row of data: cells of numbers, levels or dates, and hardly anything else.
+/// Whether a line is a row of data: nearly all cells are numbers, levels or dates.
 pub(super) fn is_row(line: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(line) else { return false };
     let text = text.trim().trim_end_matches([',', ';', '\t']);
@@ -84,7 +84,7 @@ pub(crate) fn titles(line: &str, separator: u8) -> Vec<String> {
     out.into_iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
-/// A remark; `#` may also be the title of a column of numbers.
+/// A comment; `#` may also be the title of a column of numbers.
 fn is_remark(line: &str) -> bool {
     line.starts_with(';') || line.starts_with('#') && !line.starts_with("#,")
 }
@@ -114,7 +114,7 @@ fn is_time(title: &str) -> bool {
         .any(|word| title.starts_with(word))
 }
 
-/// A line that only says units.
+/// A line that contains only units.
 fn is_units(cells: &[String]) -> bool {
     let known = |cell: &String| {
         let bare = cell.trim_matches(['(', ')']).to_ascii_lowercase();
@@ -125,7 +125,8 @@ fn is_units(cells: &[String]) -> bool {
 }
 
 impl Heading {
-    /// From the lines above the first row. None where they tell neither times nor a rate, and nobody `knows` it.
+    /// Reads the lines above the first row. `None` if they give neither times nor a rate, and the rate is not known
+    /// (`knows`) either.
     pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]], knows: Option<u64>) -> Option<Self> {
         let lines: Vec<String> = above.iter().map(|line| String::from_utf8_lossy(line).into_owned()).collect();
         let (remarks, lines): (Vec<&str>, Vec<&str>) =
@@ -230,7 +231,8 @@ impl Heading {
         Some(Times::Steps { start: Time::from_ps((start * 1e12) as i128), period: period * 1e12 })
     }
 
-    /// Where nothing says which column is the time: the first that grows from one row to the next, with another beside it.
+    /// Picks the column of times if nothing identifies it: the first that grows from one row to the next, with another
+    /// beside it.
     fn growing(&self, rows: &[&[u8]]) -> Option<usize> {
         let [first, second] = rows else { return None };
         let numbers = |row: &[u8]| -> Vec<Option<f64>> {
@@ -242,7 +244,7 @@ impl Heading {
         grows.filter(|_| both.count() > 1)
     }
 
-    /// Names of the channels as a remark has them; the column of times is not among them.
+    /// Names of the channels from a comment; the column of times is not among them.
     fn name_by(&mut self, channels: &[String]) {
         let mut names = channels.iter();
         let skip = self.time.map(|(index, _)| index);
@@ -267,7 +269,7 @@ impl Heading {
         split(row, self.separator)
     }
 
-    /// Whether a column may hold a channel: it is no column of times.
+    /// Whether a column may hold a channel: it is not a column of times.
     pub(super) fn may_be_channel(&self, index: usize) -> bool {
         let name = self.names.get(index).map_or("", String::as_str);
         self.time.is_none_or(|(time, _)| time != index) && !is_time(name) && !["x", "X", "#"].contains(&name)
@@ -296,7 +298,7 @@ impl Heading {
         }
     }
 
-    /// How the times are known, now that rows are there, and whether they fall.
+    /// Determines from the first rows how the times are given, and whether they decrease.
     pub(super) fn times(&self, rows: &VecDeque<(u64, Vec<u8>)>) -> Option<(Times, bool)> {
         if let Some(fixed) = self.fixed {
             return Some((fixed, false));

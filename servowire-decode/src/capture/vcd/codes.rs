@@ -1,8 +1,8 @@
-//! The short codes by which a dump calls its variables.
+//! The short codes that a dump uses for its variables.
 
 use std::collections::HashMap;
 
-/// What a code stands for: channels from its last bit on.
+/// The meaning of a code: channels, starting from its last bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Code {
     pub(super) first: u16,

@@ -9,13 +9,13 @@ use crate::fault::{At, Fault};
 
 /// A longer header cannot be one.
 const LONGEST: usize = 1 << 26;
-/// The most channels.
+/// Maximum number of channels.
 const CHANNELS: usize = 65_535;
-/// Vectors of up to this many bits are channels bit by bit, as long as there are fewer channels than this.
+/// Vectors of up to this many bits become one channel per bit, as long as there are fewer channels than this.
 const WIDEST: u16 = 64;
 const FEW: usize = 4096;
 
-/// What the header says.
+/// The content of the header.
 pub(super) struct Header {
     /// Unit of time in femtoseconds.
     pub(super) tick: u128,
@@ -44,7 +44,7 @@ struct Words<'a> {
 }
 
 impl Words<'_> {
-    /// The next word; none at the end of the file.
+    /// Returns the next word; `None` at the end of the file.
     fn next(&mut self) -> Result<Option<Vec<u8>>, Fault> {
         let mut word = Vec::new();
         loop {
@@ -163,7 +163,7 @@ impl Header {
         Ok(header)
     }
 
-    /// The channels by name, and what the codes stand for.
+    /// The names of the channels, and the meaning of the codes.
     pub(super) fn channels(&self, input: &Input) -> Result<(Vec<String>, Codes), Fault> {
         let mut known: HashMap<&str, usize> = HashMap::new();
         for variable in &self.variables {

@@ -6,7 +6,7 @@ use crate::time::Time;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Tick {
     femtoseconds: u128,
-    /// The unit, where it is whole picoseconds.
+    /// The unit, if it is a whole number of picoseconds.
     picoseconds: Option<u64>,
 }
 
@@ -17,7 +17,7 @@ impl Tick {
         Self { femtoseconds, picoseconds: whole.and_then(|unit| u64::try_from(unit).ok()) }
     }
 
-    /// When a stamp was, in picoseconds; none beyond all measure.
+    /// Converts a stamp to picoseconds; `None` if it is out of range.
     pub(super) fn time(self, stamp: u64) -> Option<Time> {
         if let Some(unit) = self.picoseconds {
             return Some(Time::from_ps((u128::from(stamp) * u128::from(unit)) as i128));
@@ -26,7 +26,7 @@ impl Tick {
         i128::try_from(time).ok().map(Time::from_ps)
     }
 
-    /// When a stamp with digits after a point was, and whether they are more than zeros.
+    /// Converts a stamp with digits after a point; also returns whether they are not all zero.
     pub(super) fn time_between(self, stamp: u64, fraction: &[u8]) -> Option<(Time, bool)> {
         let (mut part, mut unit) = (0_u128, self.femtoseconds);
         for digit in fraction {

@@ -1,4 +1,4 @@
-//! What the channels are that nobody has judged yet: a survey of their first edges, and what becomes of each.
+//! Judges the undecided channels: surveys their first edges and decides what becomes of each.
 
 use std::io;
 
@@ -11,15 +11,15 @@ use crate::output::printer::Lane;
 use crate::recognition::Note;
 use crate::settings::{Options, Settings};
 
-/// Changes looked at before decoding begins.
+/// Changes examined before decoding begins.
 const PREVIEW: usize = 1 << 16;
 /// The same of a single channel.
 const PREVIEW_OF_ONE: usize = 1 << 12;
-/// What the last chance of a line asks for: a request whose answer came.
+/// What a line needs at its last chance: a request whose answer came.
 const LEAST: i64 = 4;
 /// Channels that are tried in one survey, the busiest first.
 const MOST_TRIED: usize = 4096;
-/// A channel in which nothing was found is looked at again after this many times the edges it was judged by.
+/// A channel in which nothing was found is examined again after this many times the edges by which it was judged.
 const PATIENCE: u64 = 8;
 
 impl PushDecoder {
@@ -32,8 +32,8 @@ impl PushDecoder {
         }
     }
 
-    /// What was held back may already do: judges it if it is twice as much as the last time, and goes on holding it back
-    /// if no line is certain.
+    /// Judges the changes held back if there are twice as many as the last time, and keeps holding them back if no line is
+    /// certain.
     pub(super) fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
         let held = self.held.as_ref().map_or(0, Vec::len);
         if held < FEWEST || held < 2 * self.tried {
@@ -43,8 +43,8 @@ impl PushDecoder {
         self.judge(false, true, out)
     }
 
-    /// Judges the open channels; at the `end` also those that have hardly moved. What holds is decoded from its
-    /// first edge on.
+    /// Judges the open channels; at the `end` also those that have hardly moved. A line that is recognised is decoded from
+    /// its first edge onwards.
     pub(super) fn judge(&mut self, end: bool, early: bool, out: &mut Output<'_>) -> io::Result<()> {
         let first = self.held.is_some();
         let (judged, many) = self.moving();
@@ -88,7 +88,8 @@ impl PushDecoder {
         if first { self.replay(out) } else { Ok(()) }
     }
 
-    /// The open channels that move enough to be judged, the busiest of them where they are too many; and how many move.
+    /// The open channels with enough edges to be judged, only the busiest if there are too many; and how many have
+    /// edges.
     fn moving(&self) -> (Vec<u16>, usize) {
         let mut moving: Vec<(u16, usize)> = Vec::new();
         for (channel, state) in (0_u16..).zip(&self.states) {
@@ -104,7 +105,8 @@ impl PushDecoder {
         (moving.into_iter().map(|(channel, _)| channel).collect(), many)
     }
 
-    /// Keeps the edges of those channels no longer that are judged by enough, and of none where all together are too many.
+    /// Stops keeping the edges of channels that were judged by enough of them, and of all channels if there are too many in
+    /// all.
     fn let_go(&mut self, judged: &[u16]) {
         for &channel in judged {
             if let Some(State::Open(edges)) = self.states.get(usize::from(channel)) {
@@ -136,7 +138,7 @@ impl PushDecoder {
         self.candidates.read_pair(channels, [&edges(requests)?, &edges(answers)?])
     }
 
-    /// Lines that are good enough; the last chance is that of the best one. Behind them the channels that only repeat
+    /// Lines that are good enough; only the best line gets the last chance. After them come the channels that only repeat
     /// what is decoded.
     fn choose(&self, all: Vec<Found>, last: bool) -> (Vec<Found>, Vec<Found>) {
         let bit = |found: &Found| 1_000_000_000_000 / i64::from(found.speech.rate.max(1));
@@ -178,7 +180,7 @@ impl PushDecoder {
         taps.iter().map(|tap| self.names.get(usize::from(tap.channel)).cloned().unwrap_or_default()).collect()
     }
 
-    /// Decodes a line from now on, and what was kept of its channels.
+    /// Decodes a line from now on, including the edges kept of its channels.
     fn take(&mut self, found: Found, out: &mut Output<'_>) -> io::Result<()> {
         let Speech { protocol, rate } = found.speech;
         let Some(decoder) = protocol.line(rate, &self.candidates.settings) else { return Ok(()) };
@@ -218,7 +220,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// What a line is rather than what the user said it is.
+    /// Reports what a line is if it differs from what the user said.
     fn rather(&self, found: &Found) -> Option<Found> {
         let [tap] = *found.taps.as_slice() else { return None };
         let Some(State::Open(edges)) = self.states.get(usize::from(tap.channel)) else { return None };

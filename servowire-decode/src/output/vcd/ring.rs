@@ -1,4 +1,4 @@
-//! Which pieces of a recording lie around its faults.
+//! Finds the pieces of a recording around its faults.
 
 use std::collections::VecDeque;
 
@@ -11,13 +11,13 @@ pub(super) enum Turn {
     Ends(Time),
 }
 
-/// The pieces that are still to come, and the end of the one that is written now.
+/// The pieces still to come, and the end of the one being written.
 #[derive(Debug, Clone)]
 pub(super) struct Ring {
     around: i64,
     inside: Option<Time>,
     pieces: VecDeque<(Time, Time)>,
-    /// Nothing before this is begun again.
+    /// No piece begins before this.
     over: Option<Time>,
 }
 
@@ -36,7 +36,7 @@ impl Ring {
         self.inside.is_some()
     }
 
-    /// Something was wrong from `start` to `end`.
+    /// Reports a fault from `start` to `end`.
     pub(super) fn fault(&mut self, start: Time, end: Time) {
         let (mut from, mut to) = (start - self.around, end + self.around);
         if let Some(inside) = self.inside.as_mut().filter(|inside| **inside >= from) {
@@ -54,7 +54,7 @@ impl Ring {
         self.pieces.push_back((from, to));
     }
 
-    /// What happens next up to `time`.
+    /// Returns what happens next, up to `time`.
     pub(super) fn turn(&mut self, time: Time) -> Option<Turn> {
         if let Some(end) = self.inside.filter(|end| *end <= time) {
             (self.inside, self.over) = (None, Some(end));
