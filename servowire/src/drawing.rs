@@ -1,8 +1,8 @@
 //! The one design of all pictures: a sheet of panels, one an axis or encoder, in a title's width.
 //!
-//! Nothing stands on the data: names of rows are to the left of them, notes to the right, the legend above the panels. Each
-//! curve has a colour and a dash of its own, so that it is told apart in black and white too. On a dark screen the colours are
-//! others; printed, they are those for paper.
+//! Nothing covers the data: names of rows are to the left of them, notes to the right, the legend above the panels. Each
+//! curve has a colour and a dash of its own, so that it can be told apart in black and white too. On a dark screen the
+//! colours are others; printed, they are those for paper.
 
 mod chart;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Ctrl-C: what runs ends in order and prints its figures; the second one ends the program at once.
+//! Ctrl-C: the first one ends the program in an orderly way, with its figures printed; the second ends it at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -6,12 +6,12 @@ use std::sync::{Arc, LazyLock};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown};
 
-/// What a shell expects of a program that Ctrl-C has ended.
+/// The exit code that a shell expects of a program ended by Ctrl-C.
 const ENDED: i32 = 128 + SIGINT;
 
 static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// From now on Ctrl-C is only noted. Where the system does not let that be, it ends the program as ever.
+/// From now on Ctrl-C is only noted. If the system does not allow that, it ends the program as usual.
 pub(crate) fn note() {
     for signal in [SIGINT, SIGTERM] {
         let _ = register_conditional_shutdown(signal, ENDED, Arc::clone(&ASKED))

@@ -1,4 +1,4 @@
-//! `servowire decode --stats` while a capture comes in: figures of what came since the last ones, again and again.
+//! `servowire decode --stats` while a capture arrives: repeatedly shows the figures since the last ones.
 
 use std::cell::RefCell;
 use std::io::{self, Write};
@@ -39,7 +39,7 @@ impl<W: Write + 'static> Live<W> {
     }
 }
 
-/// Figures of the whole, and of what came since they were last shown.
+/// Figures of the whole, and of the part since they were last shown.
 struct Figures<W> {
     out: W,
     shown: Shown,
@@ -69,7 +69,7 @@ impl<W: Write> Figures<W> {
         }
     }
 
-    /// Shows what came, if it is time to.
+    /// Shows the new figures, if it is time to.
     fn show(&mut self) -> io::Result<()> {
         let now = Instant::now();
         let Some((begin, last)) = self.times.filter(|(_, last)| now - *last >= self.every) else { return Ok(()) };
@@ -95,7 +95,7 @@ impl<W: Write> Figures<W> {
         self.out.flush()
     }
 
-    /// The lines on the terminal go.
+    /// Removes the lines on the terminal.
     fn erase(&mut self) -> io::Result<()> {
         if self.shown == Shown::InPlace && self.lines > 0 {
             write!(self.out, "\x1b[{}A\x1b[J", self.lines)?;

@@ -1,4 +1,4 @@
-//! A source that may be silent for a while: a pipe, or a file that still grows.
+//! A source that may pause: a pipe, or a file that is still growing.
 
 use std::cell::RefCell;
 use std::io::{self, Read};
@@ -15,31 +15,31 @@ use crate::interrupt;
 const CHUNK: usize = 1 << 16;
 /// Chunks that wait to be taken.
 const AHEAD: usize = 4;
-/// A source that gives nothing for so long has nothing for now.
+/// A source that delivers nothing for this long has nothing for now.
 const PAUSE: Duration = Duration::from_millis(60);
-/// What comes is shown after this time at the latest, if it is complete.
+/// Complete events are shown after this time at the latest.
 const SHOWN: Duration = Duration::from_millis(250);
-/// How often it is looked whether a file has grown.
+/// How often a file is checked for growth.
 const LOOK: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// What is done again and again while nothing comes.
+    /// The call repeated while nothing arrives.
     static WAITING: RefCell<Option<Rc<dyn Fn()>>> = const { RefCell::new(None) };
 }
 
-/// From now on `call` is made again and again while this thread waits for a source that gives nothing.
+/// From now on, repeats `call` while this thread waits for a source that delivers nothing.
 pub(crate) fn while_waiting(call: impl Fn() + 'static) {
     WAITING.set(Some(Rc::new(call)));
 }
 
-/// Reads in a thread of its own, so that one can ask whether something is there.
+/// Reads in a separate thread, so that one can ask whether data are available.
 pub(crate) struct Pipe {
     chunks: Receiver<io::Result<Vec<u8>>>,
     chunk: Vec<u8>,
     taken: usize,
     fault: Option<io::Error>,
     ended: bool,
-    /// When it was last said that what came is to be shown.
+    /// When it was last reported that events are to be shown.
     shown: Instant,
 }
 
@@ -84,7 +84,7 @@ impl Pipe {
         }
     }
 
-    /// Whether a read gives something, or the end, within `patience`.
+    /// Returns whether a read delivers data, or the end, within `patience`.
     pub(crate) fn gives_within(&mut self, patience: Duration) -> bool {
         if self.is_empty() {
             match self.chunks.recv_timeout(patience) {

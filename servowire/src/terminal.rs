@@ -3,13 +3,13 @@
 use std::fmt;
 use std::io::{self, Write};
 
-/// Columns of the terminal that the standard output is; none where it is a file or a pipe.
+/// Columns of the terminal at the standard output; `None` if it is a file or a pipe.
 pub(crate) fn columns() -> Option<usize> {
     let (width, _) = terminal_size::terminal_size_of(io::stdout())?;
     Some(width.0.into())
 }
 
-/// Writes to the standard output at once; somebody who does not read on is no fault.
+/// Writes to the standard output at once; a reader that closes the pipe is not a fault.
 pub(crate) fn say(text: fmt::Arguments) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_fmt(text).and_then(|()| out.flush()) {

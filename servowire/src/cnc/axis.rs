@@ -11,7 +11,7 @@ use sorte_proto::{Direction, Pto};
 use super::driver::Driver;
 use super::periods::{Change, Generator, PERIOD};
 
-/// Steps under way at most; older ones are lost.
+/// Maximum number of steps in progress; older ones are lost.
 const UNDER_WAY: usize = 8;
 
 /// What became of the steps of an axis.
@@ -23,7 +23,7 @@ pub(super) struct Tally {
     pub(super) ordered: u64,
     /// Pulses at their time.
     pub(super) on_time: u64,
-    /// Pulses at another time.
+    /// Pulses at the wrong time.
     pub(super) late: u64,
     /// Pulses without a step: the published device makes its last step again when a frame is lost.
     pub(super) extra: u64,
@@ -111,7 +111,7 @@ impl Axis {
         }
     }
 
-    /// The generator starts anew. Pulses of a run before are over.
+    /// Restarts the generator. Pulses of a run before are over.
     pub(super) fn start(&mut self) {
         self.tally.lost += self.expected.len() as u64;
         self.expected.clear();
@@ -174,7 +174,7 @@ impl Axis {
         (self.dir, self.enabled) = (dir, levels.enabled);
     }
 
-    /// The motor takes a step; which of the expected was it?
+    /// Matches a step of the motor with one of the expected steps.
     fn pulse(&mut self, at: f64) {
         if self.enabled && self.driver.drives() {
             self.position += if self.dir { -1 } else { 1 };

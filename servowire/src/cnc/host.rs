@@ -1,4 +1,4 @@
-//! The host above the master: runs the program, watches what the axes tell, slows down, stops, and says why.
+//! The host above the master: runs the program, watches the reports of the axes, slows down, stops, and says why.
 
 use sorte_proto::Pto;
 
@@ -10,7 +10,7 @@ use super::power::Power;
 const SLOW_LAG: u16 = 32;
 /// The rate then: 12 us and more between two steps, so two cycles in a row without one.
 const SLOW: f64 = 0.3;
-/// Cycles from the last word until all pulses are over.
+/// Cycles from the last word until all pulses have ended.
 const DRAIN: u32 = 6;
 /// Cycles after which the host waits no longer for an axis that does not catch up.
 const PATIENCE: u32 = 20_000;
@@ -23,7 +23,7 @@ pub(super) struct Host {
     /// Cycles of motion; `None`: until the program is over.
     cycles: Option<u64>,
     cycle: u64,
-    /// Why the motion was ended before its time.
+    /// Why the motion was ended early.
     pub(super) ended: Option<String>,
     /// The master has started again: nothing moves until the axes are where they should be.
     resuming: bool,
@@ -50,7 +50,7 @@ impl Host {
         }
     }
 
-    /// The master starts again; what was on the way is lost.
+    /// The master restarts; words on their way are lost.
     pub(super) fn restarted(&mut self) {
         (self.resuming, self.waited) = (true, 0);
     }

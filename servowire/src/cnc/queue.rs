@@ -1,4 +1,4 @@
-//! What happens on the line, in the order of its times.
+//! Events on the line, in the order of their times.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -11,9 +11,9 @@ use super::wires::{Arrival, Hit};
 
 /// Something that happens.
 pub(super) enum Event {
-    /// The master wants to be asked.
+    /// The master needs to be polled.
     Master,
-    /// A device wants to be asked, if it has not been since.
+    /// A device needs to be polled, unless it has been since.
     Device {
         k: usize,
         call: u64,
@@ -49,7 +49,7 @@ pub(super) enum Place {
     Master { sof: f64 },
 }
 
-/// Events to come; those of the same time in the order in which they were put in.
+/// Future events; those at the same time in the order in which they were added.
 #[derive(Default)]
 pub(super) struct Queue {
     heap: BinaryHeap<Due>,

@@ -17,10 +17,10 @@ pub(super) struct Setup {
     pub(super) cycle_ns: Option<u32>,
     pub(super) build: Build,
     pub(super) physics: Physics,
-    /// Crystals are up to so wrong, and gain up to so much in a second.
+    /// Largest error of the crystals, and largest gain in a second.
     pub(super) crystal_ppm: f64,
     pub(super) drift_ppm: f64,
-    /// The cable in front of this device (from 1) is pulled in this cycle.
+    /// The cable before this device (from 1) is unplugged in this cycle.
     pub(super) unplug: Option<(usize, u64)>,
     /// This happens to the driver of this device (from 1) in this cycle.
     pub(super) driver_fault: Option<(usize, u64, Fault)>,
@@ -41,7 +41,7 @@ impl Setup {
             .with_jitter_ps((self.physics.hop_jitter_ns * 1000.0).round() as u32)
     }
 
-    /// The line as all its parts see it: the published send times where they fit, else the rule.
+    /// The line as all its parts see it: the published send times if they fit, otherwise the rule.
     pub(super) fn timing(&self) -> Timing<'_> {
         let ruled = self.ruled();
         let published = ruled.with_slots(Some(Slots::Published));

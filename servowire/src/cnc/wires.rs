@@ -19,9 +19,9 @@ pub(super) const NEIGHBOUR_NS: f64 = 360.0;
 const SPREAD_NS: f64 = 2.5;
 /// Longest cable of 100BASE-TX, at 5 ns a metre.
 pub(super) const LONGEST_CABLE_NS: u16 = 500;
-/// Wires forget what was on them so long ago.
+/// Wires forget their frames after this time.
 const FORGOTTEN_NS: f64 = 1e6;
-/// A frame that comes twice comes again so much later.
+/// A duplicated frame comes again after this time.
 const AGAIN_NS: f64 = 6000.0;
 
 /// From the first bit of a frame to the capture of its start, half a byte before the end of 0xD5.
@@ -45,7 +45,7 @@ pub(super) struct Physics {
     pub(super) asymmetry_ns: f64,
     /// Rms of what each port adds to a frame, in ns.
     pub(super) hop_jitter_ns: f64,
-    /// Captures are up to so wrong, in ns.
+    /// Largest error of a capture, in ns.
     pub(super) capture_jitter_ns: f64,
     pub(super) bit_error_rate: f64,
     /// Probabilities that a frame of the exchange is lost on a cable, and that it comes twice.

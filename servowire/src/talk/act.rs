@@ -33,7 +33,7 @@ pub(super) enum Print {
 }
 
 impl Print {
-    /// Says something to the user. Who reads no further has read enough.
+    /// Prints something to the user. A reader that closes the pipe has read enough.
     fn say(self, text: impl Display, value: impl FnOnce() -> Value) -> Result<(), Fault> {
         match self {
             Self::Text => terminal::say(format_args!("{text}\n")),
@@ -61,10 +61,10 @@ pub(super) fn read<P: Port>(encoder: &mut Encoder<P>, print: Print) -> Done {
     Ok(ExitCode::SUCCESS)
 }
 
-/// It was read just now, and the alarms stand beside it.
+/// It was read just now, and the alarms are shown beside it.
 const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
 
-/// The position and the degrees that it is, if it may be shown; why not otherwise.
+/// Returns the position and its degrees, if it may be shown; otherwise the reason.
 fn place(all: &AllData) -> Result<(Sample, f64), String> {
     let Some(Hint { resolution, .. }) = Resolution::from_enid(all.enid) else {
         return Err(format!(" (encoder ID {:#04x} does not tell their widths)", all.enid));
@@ -74,7 +74,7 @@ fn place(all: &AllData) -> Result<(Sample, f64), String> {
     Ok((sample, f64::from(sample.single_turn()) * 360.0 / f64::from(resolution.counts_per_turn())))
 }
 
-/// Position, turns and alarms in words.
+/// Describes position, turns and alarms in words.
 fn line(all: &AllData) -> String {
     let place = match place(all) {
         Ok((sample, degrees)) => {
@@ -87,7 +87,7 @@ fn line(all: &AllData) -> String {
     format!("{place}  {alarms}")
 }
 
-/// The same as an object; a position that must not be used is not in it.
+/// Returns the same as an object, without a position that must not be used.
 fn object(all: &AllData) -> Value {
     let place = place(all).ok();
     json!({
@@ -113,7 +113,7 @@ fn table<'p>(path: Option<&'p Path>, head: &[&str]) -> Result<Option<(csv::Write
     Ok(Some((csv, path)))
 }
 
-/// Between a master and its encoder, for ever.
+/// Relays between a master and its encoder, for ever.
 pub(super) fn relay<M: Port, E: Port>(
     master: M,
     encoder: &mut Link<E>,

@@ -1,4 +1,4 @@
-//! What an encoder's memory held, whose it was and when: a file that can be trusted.
+//! The content of an encoder's memory, with the encoder's identity and the date, in a file protected by a checksum.
 
 use std::time::SystemTime;
 
@@ -16,8 +16,8 @@ pub type PageData = [u8; PAGE_LEN];
 
 /// The memory of an encoder.
 ///
-/// It is kept as JSON. The check sum is CRC-32 (that of zip) over the letters of `date`, a byte each of `encoder_id`, `abs_bits` and
-/// `abm_bits` (0 if the ID says nothing of them), and the bytes of all pages.
+/// It is kept as JSON. The checksum is the CRC-32 of zip over the characters of `date`, one byte each for `encoder_id`,
+/// `abs_bits` and `abm_bits` (0 if the ID does not imply them), and the bytes of all pages.
 ///
 /// ```text
 /// {
@@ -43,7 +43,7 @@ pub struct Backup {
 
 const FORMAT: &str = "servowire T-Format EEPROM 1";
 
-/// Most pages that an encoder is known to have.
+/// The largest number of pages that any encoder is known to have.
 const MOST_PAGES: usize = 8;
 
 #[derive(Serialize, Deserialize)]
@@ -59,7 +59,7 @@ struct File {
 }
 
 impl Backup {
-    /// Pages 0 and on of an encoder with this ID, read at this time.
+    /// Creates a backup of the pages, from page 0 onwards, of an encoder with this ID, read at this time.
     pub fn new(date: SystemTime, encoder_id: u8, pages: Vec<PageData>) -> Self {
         let date = humantime::format_rfc3339_seconds(date).to_string();
         Self { date, encoder_id, widths: widths(encoder_id), pages }
@@ -75,12 +75,12 @@ impl Backup {
         self.encoder_id
     }
 
-    /// Pages 0 and on.
+    /// Pages, from page 0 onwards.
     pub fn pages(&self) -> &[PageData] {
         &self.pages
     }
 
-    /// All bytes, with their places.
+    /// Returns all bytes, with their places.
     pub fn cells(&self) -> impl Iterator<Item = (Page, Address, u8)> + '_ {
         let page = |(number, data): (u8, &PageData)| {
             let data = *data;
@@ -89,10 +89,10 @@ impl Backup {
         (0..).zip(&self.pages).flat_map(page)
     }
 
-    /// Whether it may be written to an encoder with this ID.
+    /// Checks whether it may be written to an encoder with this ID.
     ///
     /// # Errors
-    /// [`Fault::Input`]: it is another kind.
+    /// [`Fault::Input`]: the encoder is of another kind.
     pub fn fits(&self, encoder_id: u8) -> Result<(), Fault> {
         let (ours, its) = (self.widths, widths(encoder_id));
         if (self.encoder_id, ours) == (encoder_id, its) {
@@ -130,7 +130,7 @@ impl Backup {
     }
 }
 
-/// Bits of a turn and of turns that an encoder ID tells; 0 if it tells nothing.
+/// Returns the bits of a turn and of the turn count that an encoder ID implies; 0 if it implies none.
 fn widths(encoder_id: u8) -> [u8; 2] {
     let known = Resolution::from_enid(encoder_id).map(|hint| hint.resolution);
     known.map_or([0; 2], |resolution| [resolution.abs_bits(), resolution.abm_bits()])

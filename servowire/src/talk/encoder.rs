@@ -1,4 +1,4 @@
-//! An encoder at a serial port, as values: what it says, what its memory holds, what became of a reset.
+//! An encoder at a serial port: its readings, the content of its memory, and the results of resets, as values.
 
 use std::thread;
 use std::time::{Duration, SystemTime};
@@ -18,7 +18,7 @@ pub struct Encoder<P> {
     link: Link<P>,
 }
 
-/// What an encoder said by ID 3 before a reset and after it.
+/// The answers of an encoder to ID 3 before and after a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Changed {
     /// Before.
@@ -27,20 +27,20 @@ pub struct Changed {
     pub after: AllData,
 }
 
-/// A byte of the memory that is to be another one.
+/// A byte of the memory to be changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Change {
     /// Its page.
     pub page: Page,
     /// Its address in the page, below that of the page register.
     pub address: Address,
-    /// What the memory holds.
+    /// The present byte.
     pub from: u8,
-    /// What it is to hold.
+    /// The new byte.
     pub to: u8,
 }
 
-/// What has to be written so that a memory holds what a backup holds, and what it held before.
+/// The bytes to write so that a memory matches a backup, and its previous content.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Restore {
     before: Backup,
@@ -59,17 +59,17 @@ impl Restore {
     }
 }
 
-/// How far the writing of a [`Restore`] came.
+/// The progress of writing a [`Restore`].
 #[derive(Debug)]
 pub struct Written {
-    /// Bytes that were written and read back.
+    /// Bytes written and read back.
     pub bytes: usize,
-    /// Whether that was all. After [`Error::EffectUnknown`] one more byte may be written.
+    /// Whether all bytes were written. After [`Error::EffectUnknown`] one more byte may have been written.
     pub end: Result<(), Fault>,
 }
 
 impl<P: Port> Encoder<P> {
-    /// The encoder at the other end of an open port.
+    /// Connects to the encoder at the other end of an open port.
     ///
     /// # Errors
     /// [`Fault`] if no encoder answers within `timeout`.
@@ -77,12 +77,12 @@ impl<P: Port> Encoder<P> {
         Ok(Self { link: Link::open(port, timeout)? })
     }
 
-    /// Whether the adapter hears itself.
+    /// Returns whether the adapter hears itself.
     pub const fn echo(&self) -> bool {
         self.link.echo()
     }
 
-    /// Position, turns, encoder ID and alarms, by ID 3.
+    /// Reads position, turns, encoder ID and alarms with ID 3.
     ///
     /// # Errors
     /// [`Fault`].
@@ -93,7 +93,7 @@ impl<P: Port> Encoder<P> {
         }
     }
 
-    /// Clears latched alarms; position and turns stay. Which of them went is in the values.
+    /// Clears latched alarms; position and turns stay. The values show which alarms were cleared.
     ///
     /// # Errors
     /// [`Fault`].
@@ -107,20 +107,20 @@ impl<P: Port> Encoder<P> {
     /// `tolerance`: how far from 0, in turns, the count may be afterwards; see [`MultiTurnZero`].
     ///
     /// # Errors
-    /// [`Fault`]; [`Error::NotDone`] or [`Error::EffectUnknown`] in it say what became of the turns.
+    /// [`Fault`]; [`Error::NotDone`] or [`Error::EffectUnknown`] in it says what became of the turns.
     pub fn zero_turns_and_lose_multi_turn_reference(&mut self, tolerance: u32) -> Result<Changed, Fault> {
         let before = self.read()?;
         let resolution = resolution(before.enid)?;
         self.after(before, MultiTurnZero::set_and_lose_multi_turn_reference(resolution, tolerance))
     }
 
-    /// Makes the present position the zero of the turn and reads it back. **This shifts the commutation angle of the motor.** The
-    /// shaft has to stand still.
+    /// Makes the present position the zero of the turn and reads it back. **This shifts the commutation angle of the
+    /// motor.** The shaft must be at rest.
     ///
     /// `tolerance`: how far from 0, in counts, the shaft may seem to be afterwards; see [`SingleTurnZero`].
     ///
     /// # Errors
-    /// [`Fault`]; [`Error::NotDone`] or [`Error::EffectUnknown`] in it say what became of the zero.
+    /// [`Fault`]; [`Error::NotDone`] or [`Error::EffectUnknown`] in it says what became of the zero.
     pub fn zero_single_turn_and_shift_commutation_angle(&mut self, tolerance: u32) -> Result<Changed, Fault> {
         let before = self.read()?;
         let resolution = resolution(before.enid)?;
@@ -135,8 +135,8 @@ impl<P: Port> Encoder<P> {
         Ok(Changed { before, after: self.read()? })
     }
 
-    /// The first `pages` pages of the memory, with what the encoder is. The page register holds afterwards what it held before,
-    /// also if it fails.
+    /// Reads the first `pages` pages of the memory, with the identity of the encoder. The page register is restored
+    /// afterwards, even after a failure.
     ///
     /// # Errors
     /// [`Fault`]; [`Fault::PageLeft`] if the page register could not be put back.
@@ -146,10 +146,10 @@ impl<P: Port> Encoder<P> {
         Ok(Backup::new(SystemTime::now(), enid, pages))
     }
 
-    /// Compares the memory with a backup. Nothing is written, but the page register, which is put back.
+    /// Compares the memory with a backup. Nothing is written except the page register, which is restored.
     ///
     /// # Errors
-    /// [`Fault::Input`] if the backup is of an encoder of another kind; all others.
+    /// [`Fault::Input`] if the backup belongs to an encoder of another kind; all other faults.
     pub fn plan(&mut self, want: &Backup) -> Result<Restore, Fault> {
         want.fits(self.read()?.enid)?;
         let before = self.backup(want.pages().len().try_into().unwrap_or(u8::MAX))?;
@@ -159,10 +159,10 @@ impl<P: Port> Encoder<P> {
         Ok(Restore { before, changes })
     }
 
-    /// Writes what was planned, and reads each byte back. The page register holds afterwards what it held before.
+    /// Writes what was planned, and reads each byte back. The page register is restored afterwards.
     ///
-    /// `keep` stores what the memory held, [`Restore::before`], before anything is written; if it fails nothing is. A byte that
-    /// is not what was planned for, because it is another encoder by now, ends it.
+    /// `keep` stores the old content of the memory, [`Restore::before`], before anything is written; if it fails, nothing
+    /// is written. The restore ends at a byte that differs from the plan, for example because the encoder was exchanged.
     pub fn write(&mut self, restore: &Restore, keep: impl FnOnce(&Backup) -> Result<(), Fault>) -> Written {
         let mut bytes = 0;
         let end = self.read().and_then(|all| restore.before.fits(all.enid)).and_then(|()| keep(&restore.before));
@@ -186,7 +186,7 @@ impl<P: Port> Encoder<P> {
         self.link.run(EepromAccess::write(page, address, to, EEPROM_POLLING)).map(|_| ())
     }
 
-    /// The bytes of a page. The procedure looks at the selection before and after each.
+    /// Reads the bytes of a page. The procedure checks the selection before and after each byte.
     fn page(&mut self, number: u8) -> Result<PageData, Fault> {
         let missing = || Fault::Input(format!("there is no page {number}"));
         let page = Page::new(number).ok_or_else(missing)?;
@@ -203,7 +203,7 @@ impl<P: Port> Encoder<P> {
         Ok(data)
     }
 
-    /// Does something with the memory, and puts the page register back whatever becomes of it.
+    /// Does something with the memory, and restores the page register whatever the result.
     fn keeping_page<T>(&mut self, work: impl FnOnce(&mut Self) -> Result<T, Fault>) -> Result<T, Fault> {
         let page = self.selected()?;
         let done = work(self);
@@ -216,7 +216,7 @@ impl<P: Port> Encoder<P> {
         }
     }
 
-    /// The page that is selected.
+    /// Reads which page is selected.
     fn selected(&mut self) -> Result<Page, Fault> {
         let mut tries = 0;
         loop {
@@ -245,7 +245,7 @@ impl<P> From<Link<P>> for Encoder<P> {
     }
 }
 
-/// The widths that an encoder ID tells.
+/// Returns the widths that an encoder ID implies.
 fn resolution(enid: u8) -> Result<Resolution, Fault> {
     let unknown = || Fault::Input(format!("encoder ID {enid:#04x} does not tell its widths: nothing was sent"));
     Resolution::from_enid(enid).map(|hint| hint.resolution).ok_or_else(unknown)

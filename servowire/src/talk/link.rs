@@ -1,7 +1,7 @@
-//! Requests and answers through a port that tells no times.
+//! Requests and answers through a port that gives no times.
 //!
-//! On a PC nothing can be seen of the 3 us between request and answer: an adapter hands over both at once, milliseconds later.
-//! So the own echo is known by its content and by its place, and a request goes out only when the line has been read empty.
+//! A PC cannot see the 3 us between request and answer: an adapter hands over both at once, milliseconds later. So the echo
+//! of a request is recognised by its content and place, and a request is sent only after everything received has been read.
 
 use std::io;
 use std::thread;
@@ -20,12 +20,12 @@ pub struct Link<P> {
     timeout: Duration,
     echo: bool,
     began: Instant,
-    /// An answer may still be on its way.
+    /// An answer may still arrive.
     owed: bool,
 }
 
 impl<P: Port> Link<P> {
-    /// Finds out whether the adapter hears itself, by a request whose answer has another length with echo than without.
+    /// Finds out whether the adapter hears itself, with a request whose answer differs in length with and without echo.
     ///
     /// # Errors
     /// [`Fault`] if no encoder answers.
@@ -43,7 +43,7 @@ impl<P: Port> Link<P> {
         Err(fault)
     }
 
-    /// Whether the adapter hears itself.
+    /// Returns whether the adapter hears itself.
     pub const fn echo(&self) -> bool {
         self.echo
     }
@@ -53,7 +53,7 @@ impl<P: Port> Link<P> {
         u64::try_from(self.began.elapsed().as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// One request and its answer.
+    /// Makes one request and returns its answer.
     ///
     /// # Errors
     /// [`Fault`].
@@ -66,7 +66,7 @@ impl<P: Port> Link<P> {
         Ok(response)
     }
 
-    /// A request goes out, and its answer is waited for.
+    /// Sends a request and waits for its answer.
     fn ask(&mut self, request: Request) -> Result<Response, Fault> {
         let frame = request.emit();
         self.port.write_all(frame.as_bytes())?;
@@ -96,7 +96,7 @@ impl<P: Port> Link<P> {
     /// Takes a procedure through its exchanges.
     ///
     /// # Errors
-    /// [`Fault`]: the procedure's own, or at once one of the port.
+    /// [`Fault`] of the procedure, or immediately a fault of the port.
     pub fn run<R: Procedure<Request = Request, Response = Response, Error = tformat::Error>>(
         &mut self,
         mut procedure: R,
@@ -114,7 +114,7 @@ impl<P: Port> Link<P> {
         Ok(ended.outcome?)
     }
 
-    /// Reads the line empty. While an answer is owed, the adapter may be holding it back.
+    /// Reads everything received. While an answer is owed, the adapter may be holding it back.
     fn empty(&mut self) -> Result<(), Fault> {
         self.port.forget()?;
         self.port.wait(if self.owed { HELD_BACK } else { Duration::from_millis(1) })?;
@@ -129,8 +129,8 @@ impl<P: Port> Link<P> {
         Err(Fault::Input("the line does not go quiet".to_owned()))
     }
 
-    /// A good answer in its place: at the end of what came, or one byte before it; after the echo, if the adapter hears itself,
-    /// and otherwise at the beginning. A byte of noise may be in front of either.
+    /// Returns a good answer in its place: at the end of the bytes received, or one byte before it; after the echo, if the
+    /// adapter hears itself, otherwise at the beginning. A byte of noise may precede either.
     fn find(&self, request: Request, bytes: &[u8]) -> Option<Response> {
         let sent = request.emit();
         let echo: &[u8] = if self.echo { sent.as_bytes() } else { &[] };
@@ -147,7 +147,7 @@ impl<P: Port> Link<P> {
         })
     }
 
-    /// The time is over: what is wrong with what came?
+    /// Returns what is wrong with the bytes received when the time is over.
     fn judge(&self, request: Request, bytes: &[u8]) -> Result<Response, Fault> {
         let sent = request.emit();
         let answer = bytes.strip_prefix(sent.as_bytes()).filter(|_| self.echo);
@@ -172,7 +172,7 @@ impl<P: Port> Link<P> {
 /// How long an adapter may hold a short answer back: 16 ms, the latency timer of FTDI chips, and margin.
 const HELD_BACK: Duration = Duration::from_millis(20);
 
-/// More than any exchange has.
+/// More bytes than any exchange has.
 const MOST_BYTES: usize = 64;
 
 /// Nothing came for now.

@@ -1,4 +1,4 @@
-//! Serial ports, and what is to be said about them.
+//! Serial ports, and information about them.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -16,7 +16,7 @@ pub trait Port: Read + Write {
     /// # Errors
     /// That of the port.
     fn wait(&mut self, longest: Duration) -> io::Result<()>;
-    /// Throws away what was received.
+    /// Discards the bytes received.
     ///
     /// # Errors
     /// That of the port.
@@ -33,10 +33,10 @@ impl<P: SerialPort + ?Sized> Port for Box<P> {
     }
 }
 
-/// Opens a port as T-Format wants it: 8N1.
+/// Opens a port as T-Format requires: 8N1.
 ///
 /// # Errors
-/// That of the system, with what can be done about it.
+/// That of the system, with advice.
 pub fn open(name: &str, rate: BitRate) -> Result<Box<dyn SerialPort>, Fault> {
     let port = serialport::new(name, rate.bits_per_second()).timeout(Duration::from_millis(50));
     port.open().map_err(|error| {
@@ -59,14 +59,14 @@ pub fn megabits(rate: BitRate) -> f64 {
     f64::from(rate.bits_per_second()) / 1e6
 }
 
-/// What ports there are.
+/// Lists the ports.
 fn ports() -> String {
     let names: Vec<_> =
         serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect();
     if names.is_empty() { "; there is no serial port".to_owned() } else { format!("; there are {}", names.join(", ")) }
 }
 
-/// What is known about an adapter, in sentences.
+/// Describes an adapter in sentences.
 pub(super) fn about(name: &str, rate: BitRate) -> Vec<String> {
     let mut lines = Vec::new();
     let known = serialport::available_ports().unwrap_or_default();
@@ -88,7 +88,7 @@ pub(super) fn about(name: &str, rate: BitRate) -> Vec<String> {
     lines
 }
 
-/// The bit rate that an adapter makes of the one asked for; encoders want it within 2.5 %.
+/// Returns the bit rate that an adapter produces for the one requested; encoders require it within 2.5 %.
 fn made_rate(vid: u16, pid: u16, rate: BitRate) -> String {
     let asked = f64::from(rate.bits_per_second());
     // FTDI H types: 12 MHz divided by eighths; the others: 3 MHz by eighths, nothing between 2 and 3 MHz.

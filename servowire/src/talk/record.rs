@@ -1,4 +1,4 @@
-//! A port whose bytes are written down as they pass.
+//! A port whose bytes are logged as they pass.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use super::fault::Fault;
 use super::port::Port;
 
-/// A port and the log of its bytes: a line for what was sent or received without the other in between, with the seconds since
-/// the port was opened at its first byte. `servowire decode` reads it.
+/// A port and the log of its bytes. Each line holds bytes sent or received in one direction, with the time of the first
+/// byte in seconds since the port was opened. `servowire decode` reads it.
 ///
 /// ```text
 /// 0.001283 TX: 1a
@@ -19,15 +19,14 @@ use super::port::Port;
 pub struct Recorded<P> {
     port: P,
     log: Option<(File, Instant)>,
-    /// Who spoke last.
+    /// The last sender.
     last: Option<&'static str>,
 }
 
 impl<P> Recorded<P> {
-    /// Nothing is written down without a file.
+    /// Nothing is logged without a file.
     ///
-    /// # Errors
-    /// [`Fault::File`]: the file cannot be made.
+    /// # Errors [`Fault::File`]: the file cannot be created.
     pub fn new(port: P, file: Option<&Path>) -> Result<Self, Fault> {
         let made = |path: &Path| File::create(path).map_err(Fault::file(path));
         let log = file.map(made).transpose()?.map(|file| (file, Instant::now()));

@@ -1,4 +1,4 @@
-//! Between a master and its encoder, with an adapter at each: everything that is asked and answered is passed on and logged.
+//! Relays between a master and its encoder, with an adapter at each: all requests and answers are passed on and logged.
 
 use std::collections::VecDeque;
 use std::io;
@@ -11,14 +11,16 @@ use super::fault::Fault;
 use super::link::Link;
 use super::port::Port;
 
-/// How long a read waits, and so how fast the end is seen. After such a pause a request that has begun is given up.
+/// How long a read waits, and so how fast a stop is noticed. After a pause of this length an incomplete request is
+/// abandoned.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long the own answer may take to come back.
+/// How long the echo of a sent answer may take to come back.
 const ECHO: Duration = Duration::from_millis(100);
 /// Longest request.
 const MOST_BYTES: usize = 4;
 
-/// The own bytes, as an adapter that hears itself gives them back: what comes first after an answer, and is the same, is thrown away.
+/// The bytes sent, as an adapter that hears itself returns them: identical bytes that arrive first after an answer are
+/// discarded.
 #[derive(Debug)]
 pub(super) struct Echo {
     expected: VecDeque<u8>,
@@ -31,13 +33,13 @@ impl Echo {
         Self { expected: VecDeque::new(), until: Instant::now(), hears_itself }
     }
 
-    /// These bytes were sent.
+    /// Notes that these bytes were sent.
     pub(super) fn sent(&mut self, bytes: &[u8]) {
         self.expected.extend(bytes.iter().filter(|_| self.hears_itself));
         self.until = Instant::now() + ECHO;
     }
 
-    /// Whether a byte is one of them.
+    /// Returns whether a byte is one of them.
     pub(super) fn is(&mut self, byte: u8) -> bool {
         if Instant::now() > self.until || self.expected.front() != Some(&byte) {
             self.expected.clear();
@@ -48,19 +50,19 @@ impl Echo {
     }
 }
 
-/// What the master has said.
+/// What the master has sent.
 #[derive(Debug)]
 pub enum Said {
-    /// A request, and what came of it.
+    /// A request and its result.
     Request(Request, Result<Response, Fault>),
-    /// Bytes that do not form one.
+    /// Bytes that do not form a request.
     Junk(Vec<u8>),
 }
 
-/// Passes requests from the master to the encoder and answers back, until `stop` is set; `log` hears of each.
+/// Passes requests from the master to the encoder, and answers back, until `stop` is set; `log` is called for each.
 ///
-/// Requests and answers are decoded on the way, so only good ones are passed on. A PC takes milliseconds for it: the master has to wait
-/// that long.
+/// Requests and answers are decoded on the way, so only good ones are passed on. A PC takes milliseconds for this, and the
+/// master has to wait that long.
 ///
 /// # Errors
 /// [`Fault::Io`] of the master's port; [`Fault::Port`] if that of the encoder is gone; that of the log.

@@ -11,10 +11,10 @@ use super::fault::Fault;
 use super::port::Port;
 use super::relay::Echo;
 
-/// How long a read waits, and so how fast the end is seen.
+/// How long a read waits, and so how fast a stop is noticed.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What is simulated.
+/// Settings of the simulation.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulated {
     /// Bit rate.
@@ -23,14 +23,14 @@ pub struct Simulated {
     pub id: u8,
     /// Speed of the shaft in turns per minute.
     pub rpm: f64,
-    /// Whether the adapter hears itself: what comes first after an answer, and is the same, is thrown away.
+    /// Whether the adapter hears itself: identical bytes that arrive first after an answer are discarded.
     pub echo: bool,
 }
 
-/// Answers requests until `stop` is set, for ever without it.
+/// Answers requests until `stop` is set, or for ever without it.
 ///
-/// A PC answers milliseconds late; a master that waits some microseconds as it should hears nothing. For `talk` at another
-/// adapter it is soon enough.
+/// A PC answers milliseconds late; a master that waits the specified few microseconds hears nothing. For `talk` at another
+/// adapter this is fast enough.
 ///
 /// # Errors
 /// [`Fault::Io`].

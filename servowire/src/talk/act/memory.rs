@@ -1,4 +1,4 @@
-//! Backups of the memory, and their way back.
+//! Backup and restore of the memory.
 
 use std::fs;
 use std::io::Write;
@@ -31,7 +31,7 @@ pub(in crate::talk) fn backup<P: Port>(encoder: &mut Encoder<P>, file: Option<&P
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a backup into a file that is not there yet, to the disk.
+/// Writes a backup into a new file and flushes it to disk.
 fn store(backup: &Backup, file: &Path) -> Result<(), Fault> {
     let mut out = match fs::File::create_new(file) {
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => return Err(exists(file)),
@@ -84,7 +84,7 @@ pub(in crate::talk) fn restore<P: Port>(
     end.map(|()| ExitCode::SUCCESS)
 }
 
-/// Where the memory goes before it is overwritten: beside the file, with the time.
+/// Where the memory is saved before it is overwritten: beside the file, with the time.
 fn beside(file: &Path, before: &Backup) -> PathBuf {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     file.with_file_name(format!("{name}.before-{}.json", before.date().replace(':', "-")))
