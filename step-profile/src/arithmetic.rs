@@ -1,24 +1,24 @@
 use crate::interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
 use crate::pru_exact;
 
-/// Which arithmetic turns step times into cycles and sync_times.
+/// The arithmetic that converts step times to cycles and sync_times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Arithmetic {
-    /// Exact for every step time below 2^32 ns; equal to [`PruExact`](Self::PruExact) wherever that one is exact.
+    /// Exact for every step time below 2^32 ns; equal to [`PruExact`](Self::PruExact) wherever `PruExact` is exact.
     #[default]
     Corrected,
     /// Bit for bit what the PRU computes, wrap-arounds included.
     PruExact,
-    /// As [`Corrected`](Self::Corrected), and the 16 bits below the nanosecond are carried from step to step, so
-    /// that the truncation does not add up. Not what the PRU computes.
+    /// Like [`Corrected`](Self::Corrected), but the 16 bits below the nanosecond are carried from step to step, so that
+    /// truncation errors do not add up. Not what the PRU computes.
     Carried,
 }
 
 impl Arithmetic {
-    /// The time of a step at ramp entry `entry` and speed constant `speed`, split at the cycle.
+    /// Returns the time of a step at ramp entry `entry` and speed constant `speed`, split into cycles and the rest.
     #[inline]
     pub const fn interval(self, entry: u32, speed: u32) -> Interval {
         let t_step = step_time_ns(entry, speed);
@@ -30,7 +30,7 @@ impl Arithmetic {
     }
 }
 
-/// The pulse that comes `t_step` ns after one with sync_time `prev`, by true division.
+/// Returns the pulse that comes `t_step` ns after one with sync_time `prev`, by true division.
 ///
 /// Exact for every pair: `cnt * 4000 + sync == prev + t_step` and `sync < 4000`.
 ///
@@ -49,7 +49,7 @@ pub const fn corrected(t_step: u32, prev: u32) -> StepTime {
     }
 }
 
-/// The sum has 33 bits: 2^32 ns are 1073741 cycles and 3296 ns, the rest is what wrapping leaves.
+/// The sum has 33 bits: 2^32 ns are 1073741 cycles and 3296 ns, wrapping leaves the rest.
 #[cold]
 const fn corrected_wide(t_step: u32, prev: u32) -> StepTime {
     let StepTime { cnt, sync } = split(t_step.wrapping_add(prev), 0).after(3296);

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::profile::Profile;
 use crate::ramp_steps::{MoveState, RampSteps};
 
-/// One axis, driven by a call each cycle.
+/// One axis, driven by one call per cycle.
 ///
 /// ```
 /// use step_profile::{Axis, Command, Direction, Parameters, Profile, Speed};
@@ -18,7 +18,7 @@ use crate::ramp_steps::{MoveState, RampSteps};
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis<'t> {
-    /// The move; the last step taken of it is the one whose pulse comes next.
+    /// The move; the last step taken from it is the one whose pulse comes next.
     steps: Option<RampSteps<'t>>,
     /// Cycles before the cycle of that pulse.
     wait: u32,
@@ -27,7 +27,7 @@ pub struct Axis<'t> {
 }
 
 impl<'t> Axis<'t> {
-    /// An axis at rest, nothing commanded yet, DIR = 0.
+    /// Creates an axis at rest, with nothing commanded yet and DIR = 0.
     pub const fn new() -> Self {
         Self { steps: None, wait: 0, direction: Direction::Forward, commanded: 0 }
     }
@@ -36,8 +36,7 @@ impl<'t> Axis<'t> {
     ///
     /// A move of 0 steps does nothing, not even to DIR.
     ///
-    /// # Errors
-    /// [`Error::Moving`] while a move is under way.
+    /// # Errors [`Error::Moving`] while a move is in progress.
     pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
         if self.steps.is_some() {
             return Err(Error::Moving);
@@ -51,7 +50,7 @@ impl<'t> Axis<'t> {
         Ok(())
     }
 
-    /// The next cycle: at most one pulse.
+    /// Advances to the next cycle; returns at most one pulse.
     #[inline]
     pub fn tick(&mut self) -> Command {
         let direction = self.direction;
@@ -73,7 +72,7 @@ impl<'t> Axis<'t> {
     /// Aborts the move, with the ramp down.
     ///
     /// The step whose interval has begun keeps its time, since the motor may be anywhere in it; the steps after it
-    /// slow down ([`RampSteps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
+    /// slow down ([`RampSteps::abort`]). Before the first pulse nothing has moved, so the move ends at once.
     pub fn abort(&mut self) {
         match &mut self.steps {
             Some(steps) if steps.taken() > 1 => steps.abort(),
@@ -81,7 +80,7 @@ impl<'t> Axis<'t> {
         }
     }
 
-    /// What the axis is doing: the state of the step under way.
+    /// What the axis is doing: the state of the present step.
     pub fn state(&self) -> MoveState {
         self.steps.as_ref().map_or(MoveState::Idle, RampSteps::state)
     }
@@ -91,12 +90,13 @@ impl<'t> Axis<'t> {
         self.direction
     }
 
-    /// Steps commanded so far, forward less reverse ones. The shaft is not observed: whether the motor followed is not known here.
+    /// Steps commanded so far, forward less reverse ones. The shaft is not observed, so this does not say whether the motor
+    /// followed.
     pub const fn commanded(&self) -> i64 {
         self.commanded
     }
 
-    /// Declares the count of steps at which the axis stands, for instance 0 at a reference.
+    /// Sets the step count of the present position, for instance 0 at a reference.
     pub fn set_commanded(&mut self, steps: i64) {
         self.commanded = steps;
     }
@@ -108,7 +108,7 @@ impl<'t> Axis<'t> {
 pub struct Axes<'t>(pub [Axis<'t>; 4]);
 
 impl Axes<'_> {
-    /// The next cycle of all four.
+    /// Advances to the next cycle of all four.
     #[inline]
     pub fn tick(&mut self) -> [Command; 4] {
         let [a, b, c, d] = &mut self.0;

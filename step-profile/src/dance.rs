@@ -22,18 +22,18 @@ pub struct Note {
 }
 
 impl Note {
-    /// `tone` for 125 ms at full speed, and then a pause in cycles.
+    /// Creates a note: `tone` for 125 ms at full speed, followed by a pause in cycles.
     pub const fn p125(tone: Tone, pause: u32) -> Self {
         Self { speed: tone.speed(), steps: tone.p125(), pause }
     }
 
-    /// `tone` for 250 ms at full speed, and then a pause in cycles.
+    /// Creates a note: `tone` for 250 ms at full speed, followed by a pause in cycles.
     pub const fn p250(tone: Tone, pause: u32) -> Self {
         Self { speed: tone.speed(), steps: tone.p250(), pause }
     }
 }
 
-/// Dance mode: the motors run at speeds that sound, note after note.
+/// Dance mode: the motors run at audible speeds, note after note.
 ///
 /// Every note goes through the ramp up and the ramp down. After the cycle of its last pulse come the cycles of its
 /// pause, then cycle 0 of the next note.
@@ -50,11 +50,11 @@ pub struct Dance<'t> {
 }
 
 impl<'t> Dance<'t> {
-    /// The selected motors play `song`, each note with `parameters` but at its own speed. The next
+    /// Creates a dance in which the selected motors play `song`, each note with `parameters` but at its own speed. The next
     /// [`tick`](Self::tick) is cycle 0 of the first note.
     ///
     /// # Errors
-    /// [`Error::NoMotor`] if no motor is selected; those of [`Profile::new`] for the first note that has one.
+    /// [`Error::NoMotor`] if no motor is selected; those of [`Profile::new`] for the first note with an error.
     pub fn new(
         motors: Motors,
         parameters: Parameters<'t>,
@@ -70,7 +70,7 @@ impl<'t> Dance<'t> {
         Ok(Self { group: Group::new(motors), parameters, direction, song, pause: 0 })
     }
 
-    /// The next cycle: the commands of the four motors.
+    /// Advances to the next cycle and returns the commands of the four motors.
     pub fn tick(&mut self) -> [Command; 4] {
         if self.group.state() == MoveState::Idle {
             self.begin();
@@ -100,7 +100,7 @@ impl<'t> Dance<'t> {
         self.pause = 0;
     }
 
-    /// Returns whether the last note, with its pause, is over.
+    /// Returns whether the last note and its pause have ended.
     pub fn is_over(&self) -> bool {
         self.song.is_empty() && self.pause == 0 && self.group.state() == MoveState::Idle
     }

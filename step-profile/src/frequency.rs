@@ -13,17 +13,17 @@ pub struct Frequency {
 }
 
 impl Frequency {
-    /// `hz` steps a second.
+    /// Creates a frequency of `hz` steps per second.
     pub const fn from_hz(hz: u32) -> Self {
         Self { numerator: hz, denominator: 1 }
     }
 
-    /// `numerator / denominator` steps a second; `None` for a denominator of 0.
+    /// Creates a frequency of `numerator / denominator` steps per second; `None` for a denominator of 0.
     pub const fn from_ratio(numerator: u32, denominator: u16) -> Option<Self> {
         if denominator == 0 { None } else { Some(Self { numerator, denominator }) }
     }
 
-    /// Equation 5 of TIDEP0061, section 2.3.3, for a tone in tenths of a hertz: x\[kHz\] = (y\[Hz\] - 9) · 49 / 187.
+    /// Converts a tone in tenths of a hertz by Equation 5 of TIDEP0061, section 2.3.3: x\[kHz\] = (y\[Hz\] - 9) · 49 / 187.
     ///
     /// `None` for tones of 9 Hz and below, and above 87 kHz.
     pub const fn of_tone(tenths_hz: u32) -> Option<Self> {
@@ -47,7 +47,7 @@ impl Frequency {
         self.denominator
     }
 
-    /// Steps in `ms` milliseconds at this frequency, rounded half up; 2^32 - 1 if there are more.
+    /// Returns the steps in `ms` milliseconds at this frequency, rounded half up; 2^32 - 1 if there are more.
     ///
     /// Columns P125 and P250 of Table 3 in TIDEP0061, section 2.3.3.
     #[expect(clippy::cast_possible_truncation, reason = "compared with the largest 32-bit number")]
@@ -68,7 +68,7 @@ impl fmt::Display for Frequency {
     }
 }
 
-/// A frequency that is still to be checked.
+/// A frequency that is not checked yet.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Ratio {
@@ -93,12 +93,12 @@ impl<'a> arbitrary::Arbitrary<'a> for Frequency {
     }
 }
 
-/// One of the speeds that TI's `sorte_master_cfg.inc` names.
+/// One of the speeds named in TI's `sorte_master_cfg.inc`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NamedSpeed {
-    /// Steps a second.
+    /// Steps per second.
     pub hz: u32,
     /// Its constant.
     pub speed: Speed,
@@ -106,8 +106,8 @@ pub struct NamedSpeed {
 
 /// The speed constant 2^16 / f\[MHz\]: the period of full speed in microseconds, 16.16 fixed point.
 ///
-/// TIDEP0061, section 2.3.2 (operand R29 of Table 2). Any 32-bit word can be written down; whether it can be run is
-/// checked together with the ramp table by [`Profile::new`](crate::Profile::new).
+/// TIDEP0061, section 2.3.2 (operand R29 of Table 2). Any 32-bit word is accepted here; whether it can be run is checked,
+/// together with the ramp table, by [`Profile::new`](crate::Profile::new).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -150,7 +150,7 @@ impl Speed {
         NamedSpeed { hz: 100, speed: Self::HZ_100 },
     ];
 
-    /// The constant itself, as the host interface word `speed` carries it.
+    /// Creates the speed from the constant itself, as carried by the host interface word `speed`.
     pub const fn from_raw(constant: u32) -> Self {
         Self(constant)
     }
@@ -160,7 +160,7 @@ impl Speed {
         self.0
     }
 
-    /// The constant of `hz` steps a second, rounded half up.
+    /// Returns the constant of `hz` steps per second, rounded half up.
     ///
     /// # Errors
     /// [`Error::FrequencyTooLow`] below 15.26 Hz.
@@ -168,7 +168,7 @@ impl Speed {
         Self::from_frequency(Frequency::from_hz(hz))
     }
 
-    /// The constant of a step frequency, rounded half up.
+    /// Returns the constant of a step frequency, rounded half up.
     ///
     /// # Errors
     /// [`Error::FrequencyTooLow`] below 15.26 Hz.

@@ -13,7 +13,7 @@ servowire_core::number! {
 }
 
 impl Motors {
-    /// No motor: the current of all four is switched off.
+    /// No motors: the current of all four is switched off.
     pub const NONE: Self = Self::truncate(0);
     /// The first device on the line.
     pub const M1: Self = Self::truncate(1);
@@ -26,14 +26,14 @@ impl Motors {
     /// All four.
     pub const ALL: Self = Self::MAX;
 
-    /// Motor by motor whether it is selected.
+    /// For each motor, whether it is selected.
     pub const fn selected(self) -> [bool; 4] {
         let mask = self.get();
         [mask & 1 != 0, mask & 2 != 0, mask & 4 != 0, mask & 8 != 0]
     }
 
-    /// One command for all selected motors: the others hold with the same DIR, and without any selected motor all
-    /// four are switched off.
+    /// Gives one command to all selected motors: the others hold with the same DIR; if no motor is selected, all four are
+    /// switched off.
     pub fn distribute(self, command: Command) -> [Command; 4] {
         let idle = match command {
             _ if self == Self::NONE => return [Command::Disable; 4],
@@ -44,7 +44,7 @@ impl Motors {
     }
 }
 
-/// Four motors that execute exactly the same sequence, as the firmware of TIDEP0061 does it (section 2.3.2).
+/// Four motors that execute exactly the same sequence, as in the firmware of TIDEP0061 (section 2.3.2).
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Group<'t> {
@@ -54,7 +54,7 @@ pub struct Group<'t> {
 }
 
 impl<'t> Group<'t> {
-    /// The selected motors at rest, nothing commanded yet.
+    /// Creates a group with the selected motors at rest and nothing commanded yet.
     pub const fn new(motors: Motors) -> Self {
         Self { axis: Axis::new(), motors, commanded: [0; 4] }
     }
@@ -62,7 +62,7 @@ impl<'t> Group<'t> {
     /// Selects other motors.
     ///
     /// # Errors
-    /// [`Error::Moving`] while a move is under way: the motors would start or stop without a ramp.
+    /// [`Error::Moving`] while a move is in progress: the motors would start or stop without a ramp.
     pub fn select(&mut self, motors: Motors) -> Result<(), Error> {
         if self.state() != MoveState::Idle {
             return Err(Error::Moving);
@@ -74,7 +74,7 @@ impl<'t> Group<'t> {
     /// Starts a move of the selected motors.
     ///
     /// # Errors
-    /// [`Error::NoMotor`] if none is selected, [`Error::Moving`] while a move is under way.
+    /// [`Error::NoMotor`] if none is selected, [`Error::Moving`] while a move is in progress.
     pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
         if self.motors == Motors::NONE {
             return Err(Error::NoMotor);
@@ -82,7 +82,7 @@ impl<'t> Group<'t> {
         self.axis.start(profile, steps, direction)
     }
 
-    /// The next cycle: the commands of the four motors.
+    /// Advances to the next cycle and returns the commands of the four motors.
     pub fn tick(&mut self) -> [Command; 4] {
         let command = self.axis.tick();
         if let Command::Pulse { direction, .. } = command {
@@ -110,12 +110,12 @@ impl<'t> Group<'t> {
         self.motors
     }
 
-    /// Motor by motor, the steps commanded so far, forward less reverse ones.
+    /// For each motor, the steps commanded so far, forward less reverse ones.
     pub const fn commanded(&self) -> [i64; 4] {
         self.commanded
     }
 
-    /// Declares the count of steps at which the motors stand, for instance 0 at a reference.
+    /// Sets the step count of the present position, for instance 0 at a reference.
     pub fn set_commanded(&mut self, steps: [i64; 4]) {
         self.commanded = steps;
     }

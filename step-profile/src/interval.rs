@@ -21,10 +21,10 @@ impl fmt::Display for StepTime {
     }
 }
 
-/// A step time split at the cycle: `cnt` cycles and `rest` ns.
+/// A step time split into cycles and the rest: `cnt` cycles and `rest` ns.
 ///
-/// It is the same for all steps of a ramp entry, so it is computed once for each of them; what is left for every
-/// step is an addition and a comparison.
+/// It is the same for all steps of a ramp entry, so it is computed once per entry; each step then needs only an addition
+/// and a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interval {
@@ -36,10 +36,10 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The pulse that comes this long after one with sync_time `prev`.
+    /// Returns the pulse that comes this long after one with sync_time `prev`.
     ///
-    /// [`Arithmetic::Carried`](crate::Arithmetic::Carried) drops its fraction here; [`RampSteps`](crate::RampSteps) is
-    /// what carries it on.
+    /// [`Arithmetic::Carried`](crate::Arithmetic::Carried) drops its fraction here; [`RampSteps`](crate::RampSteps) carries
+    /// it over.
     #[inline]
     pub const fn after(self, prev: u32) -> StepTime {
         let sync = prev.wrapping_add(self.rest);
@@ -50,7 +50,7 @@ impl Interval {
     }
 }
 
-/// Equation 1 of TIDEP0061, section 2.3.2: the time of a step in ns, product bits 47..16.
+/// Returns the time of a step in ns, product bits 47..16 (Equation 1 of TIDEP0061, section 2.3.2).
 ///
 /// `entry` is 1000 / sin², `speed` is 2^16 / f\[MHz\]. Bits above 2^48 of the product are dropped, as on the PRU.
 #[expect(clippy::cast_possible_truncation, reason = "the PRU takes 32 bits out of the middle of the product")]

@@ -4,23 +4,23 @@ servowire_core::codes! {
     ///
     /// TIDEP0061, section 2.1; profile codes 0..=8 of TI's `sorte_master_cfg.inc`.
     pub enum Microstep: u8 {
-        /// 200 steps a turn.
+        /// 200 steps per turn.
         Full = 0 => "1/1",
-        /// 400 steps a turn.
+        /// 400 steps per turn.
         Half = 1 => "1/2",
-        /// 800 steps a turn.
+        /// 800 steps per turn.
         Quarter = 2 => "1/4",
-        /// 1600 steps a turn.
+        /// 1600 steps per turn.
         Div8 = 3 => "1/8",
-        /// 3200 steps a turn.
+        /// 3200 steps per turn.
         Div16 = 4 => "1/16",
-        /// 6400 steps a turn.
+        /// 6400 steps per turn.
         Div32 = 5 => "1/32",
-        /// 12800 steps a turn.
+        /// 12800 steps per turn.
         Div64 = 6 => "1/64",
-        /// 25600 steps a turn.
+        /// 25600 steps per turn.
         Div128 = 7 => "1/128",
-        /// 51200 steps a turn. (Section 2.3.1 prints 512000, section 2.1 has it right: 200 · 256.)
+        /// 51200 steps per turn. (Section 2.3.1 prints 512000, section 2.1 has it right: 200 · 256.)
         Div256 = 8 => "1/256",
     }
 }
@@ -41,7 +41,7 @@ impl Microstep {
         200 << self as u32
     }
 
-    /// Steps of one of the turns of position mode.
+    /// Returns the steps of one of the turns of position mode.
     pub const fn steps(self, turn: Turn) -> u32 {
         match turn {
             Turn::Quarter => 50 << self as u32,

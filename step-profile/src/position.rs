@@ -9,7 +9,7 @@ use crate::ramp_steps::MoveState;
 servowire_core::codes! {
     /// The operating modes of TI's `sorte_master_cfg.inc`.
     ///
-    /// TIDEP0061 describes position and dance, and so does this crate; the others are numbers alone.
+    /// TIDEP0061 describes position and dance, and this crate implements both; the other modes are only numbers.
     pub enum OperatingMode: u8 {
         /// Turns by a number of steps: [`PositionMode`].
         Position = 0 => "position",
@@ -31,26 +31,26 @@ servowire_core::codes! {
         Idle = 0 => "idle",
         /// One second of rest after a turn.
         Wait = 1 => "wait",
-        /// A quarter turn is under way.
+        /// A quarter turn is in progress.
         QuarterTurn = 2 => "quarter turn",
-        /// A full turn is under way.
+        /// A full turn is in progress.
         FullTurn = 3 => "full turn",
-        /// Ten turns are under way.
+        /// Ten turns are in progress.
         TenTurns = 4 => "ten turns",
     }
 }
 
-/// Position mode: the selected motors turn by a quarter, once or ten times, and rest for a second after it.
+/// Position mode: the selected motors turn by a quarter, once or ten times, and then rest for a second.
 ///
 /// TIDEP0061, section 2.3.3: any single motor, all, or none, to bring the motors to a reference position by hand.
-/// The states are TI's; that the rest follows the turn is this crate's reading of them.
+/// The states are TI's; this crate's interpretation is that the rest follows the turn.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionMode<'t> {
     group: Group<'t>,
     microstep: Microstep,
     turn: Option<Turn>,
-    /// Cycles of rest left.
+    /// Remaining cycles of rest.
     rest: u32,
 }
 
@@ -58,7 +58,7 @@ impl<'t> PositionMode<'t> {
     /// The rest after a turn in cycles: 1 s.
     pub const REST: u32 = 250_000;
 
-    /// The selected motors at rest.
+    /// Creates the mode with the selected motors at rest.
     pub const fn new(motors: Motors, microstep: Microstep) -> Self {
         Self { group: Group::new(motors), microstep, turn: None, rest: 0 }
     }
@@ -66,7 +66,7 @@ impl<'t> PositionMode<'t> {
     /// Selects other motors.
     ///
     /// # Errors
-    /// [`Error::Moving`] before the last turn and the rest after it are over.
+    /// [`Error::Moving`] before the last turn and the rest after it have ended.
     pub fn select(&mut self, motors: Motors) -> Result<(), Error> {
         if self.state() != PositionState::Idle {
             return Err(Error::Moving);
@@ -77,7 +77,7 @@ impl<'t> PositionMode<'t> {
     /// Starts a turn of the selected motors.
     ///
     /// # Errors
-    /// [`Error::Moving`] before the last turn and the rest after it are over, [`Error::NoMotor`] if no motor is
+    /// [`Error::Moving`] before the last turn and the rest after it have ended, [`Error::NoMotor`] if no motor is
     /// selected.
     pub fn start(&mut self, profile: Profile<'t>, turn: Turn, direction: Direction) -> Result<(), Error> {
         if self.state() != PositionState::Idle {
@@ -88,7 +88,7 @@ impl<'t> PositionMode<'t> {
         Ok(())
     }
 
-    /// The next cycle: the commands of the four motors.
+    /// Advances to the next cycle and returns the commands of the four motors.
     pub fn tick(&mut self) -> [Command; 4] {
         self.rest = self.rest.saturating_sub(1);
         let commands = self.group.tick();
@@ -104,7 +104,7 @@ impl<'t> PositionMode<'t> {
         self.group.abort();
     }
 
-    /// What is under way.
+    /// The present state.
     pub const fn state(&self) -> PositionState {
         match self.turn {
             Some(Turn::Quarter) => PositionState::QuarterTurn,
@@ -115,7 +115,7 @@ impl<'t> PositionMode<'t> {
         }
     }
 
-    /// Declares where the motors are: what a turn to the reference position is made for.
+    /// Sets the position of the motors: this is the purpose of a turn to the reference position.
     pub fn set_commanded(&mut self, positions: [i64; 4]) {
         self.group.set_commanded(positions);
     }

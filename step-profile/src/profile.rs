@@ -6,7 +6,7 @@ use crate::pru_exact;
 use crate::ramp::RampTable;
 use crate::runs::Runs;
 
-/// What a speed profile is made of.
+/// The parameters of a speed profile.
 ///
 /// ```
 /// use step_profile::{Parameters, Profile, Speed};
@@ -35,7 +35,7 @@ impl Parameters<'static> {
     /// 5 ns ticks. 0 would be the worst choice; see the crate's front page.
     pub const INIT_SYNC: u32 = 1000;
 
-    /// The defaults at this speed: one step per ramp entry, initial sync_time 1000 ns, the sin² ramp, corrected
+    /// Creates the defaults at this speed: one step per ramp entry, initial sync_time 1000 ns, the sin² ramp, corrected
     /// arithmetic.
     pub const fn at(speed: Speed) -> Self {
         Self {
@@ -55,12 +55,13 @@ impl<'t> Parameters<'t> {
         with_arithmetic: arithmetic, Arithmetic;
     }
 
-    /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps per ramp entry.
+    /// Chooses the shortest ramp whose acceleration stays within `acceleration` in steps/s² by setting the steps per ramp
+    /// entry.
     ///
-    /// The acceleration is that from the middle of a ramp entry to the middle of the next. Within it the speed jumps from entry
-    /// to entry, and the mean over the ramp is far below it; the crate `step-motion` uses an acceleration fully. Call it
-    /// after [`with_table`](Self::with_table). An acceleration of 0, or one that needs longer entries than there are, is
-    /// refused by [`Profile::new`].
+    /// The acceleration is that from the middle of a ramp entry to the middle of the next. Within this limit the speed
+    /// jumps from entry to entry, and the mean acceleration over the ramp is far below it; the crate `step-motion` makes
+    /// full use of an acceleration. Call it after [`with_table`](Self::with_table). An acceleration of 0, or one that needs
+    /// longer entries than there are, is refused by [`Profile::new`].
     #[must_use]
     pub fn with_acceleration(self, acceleration: u32) -> Self {
         // Hz · R = 65536·10^6. Speed at an entry s: 1000 f / s, time of it: K s / 1000 f.
@@ -80,7 +81,7 @@ impl<'t> Parameters<'t> {
         self.with_steps_per_entry(if acceleration == 0 { u32::MAX } else { steps.max(1) })
     }
 
-    /// With a ramp of your own.
+    /// Sets your own ramp.
     #[must_use]
     pub const fn with_table<'a>(self, table: &'a RampTable) -> Parameters<'a>
     where
@@ -109,7 +110,7 @@ pub struct Shape {
 pub struct Profile<'t>(Parameters<'t>);
 
 impl<'t> Profile<'t> {
-    /// Longest ramp entry in steps: 2^27 - 1, so that 32 of them fit 32 bits.
+    /// Longest ramp entry in steps: 2^27 - 1, so that 32 entries fit 32 bits.
     pub const MAX_STEPS_PER_ENTRY: u32 = (1 << 27) - 1;
 
     /// The largest speed constant whose default ramp lies wholly in the domain in which the PRU arithmetic is proved
@@ -154,12 +155,12 @@ impl<'t> Profile<'t> {
         step_time_ns(self.0.table.first(), self.0.speed.raw()) < pru_exact::EXACT_BELOW
     }
 
-    /// Time of a step at ramp entry `entry` (0..=31) in ns.
+    /// Returns the time of a step at ramp entry `entry` (0..=31) in ns.
     pub fn step_time_ns(self, entry: u8) -> u32 {
         step_time_ns(self.0.table.entry(entry), self.0.speed.raw())
     }
 
-    /// How a move of `steps` steps is divided.
+    /// Returns how a move of `steps` steps is divided.
     pub const fn shape(self, steps: u32) -> Shape {
         let ramp = self.0.steps_per_entry.saturating_mul(32);
         let lower = steps / 2;
@@ -170,9 +171,9 @@ impl<'t> Profile<'t> {
         Shape { accelerating, constant, decelerating }
     }
 
-    /// From the start of a move of `steps` steps to its last pulse, in ns.
+    /// Returns the time from the start of a move of `steps` steps to its last pulse, in ns.
     ///
-    /// True for [`Arithmetic::PruExact`] only as long as that one is exact.
+    /// For [`Arithmetic::PruExact`] this is correct only while that arithmetic is exact.
     pub fn duration_ns(self, steps: u32) -> u64 {
         let (mut ns, mut fractions) = (0_u64, 0_u64);
         for run in Runs::new(steps, self.0.steps_per_entry) {

@@ -24,9 +24,9 @@
 //! is so for d = 1 from m = 1525 on, which makes the quotient exact for t_step < [`EXACT_BELOW`], and never for d above
 //! 703.
 //!
-//! A quotient that is one too large makes the difference -d instead of r. When the previous sync_time is d or more, the
-//! sum is right again: the carry only came earlier. When it is less, the sum wraps, the unsigned comparison takes it for
-//! a late one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
+//! A quotient that is one too large makes the difference -d instead of r. If the previous sync_time is d or more, the sum
+//! is right again: the carry only came earlier. If it is less, the sum wraps, the unsigned comparison takes it for a late
+//! one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
 //! [`corrected`](crate::corrected) does not have this limit.
 
 use crate::interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
@@ -69,13 +69,13 @@ pub const fn run(entry: u32, speed: u32, prev: u32) -> Registers {
     Registers { t_step, cnt_raw, t_4us_cnt: t_step.wrapping_sub(rest), sync_raw: prev.wrapping_add(rest), cnt, sync }
 }
 
-/// The two results alone.
+/// Returns only the two results.
 #[inline]
 pub const fn step(entry: u32, speed: u32, prev: u32) -> StepTime {
     interval(step_time_ns(entry, speed)).after(prev)
 }
 
-/// A step time as whole cycles and the rest; the rest wraps below zero where the quotient is one too large.
+/// Splits a step time into whole cycles and the rest; the rest wraps below zero if the quotient is one too large.
 #[inline]
 pub const fn interval(t_step: u32) -> Interval {
     let cnt = ((t_step as u64).wrapping_mul(RECIPROCAL as u64) >> 32) as u32;

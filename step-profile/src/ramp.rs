@@ -7,7 +7,7 @@ use crate::error::Error;
 /// TIDEP0061, sections 2.3.1 and 2.3.2 (Figure 5); `SIN2_TBL32` in TI's `sorte_master_cfg.inc`. The values of the
 /// original table were never published; [`SIN2`](Self::SIN2) takes the end points x = (i + 1) π / 64, rounded to
 /// nearest. It is the choice that reaches full speed in the last interval and keeps the 100 Hz of TI's speed list
-/// within 32 bits. Any other table that never accelerates on the way down may be given instead.
+/// within 32 bits. You can use any other table instead, provided that it never accelerates on the way down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -24,10 +24,10 @@ impl RampTable {
     /// 1000 / sin²((i + 1) π / 64), rounded to nearest: 415345, 104087, 46447, ... 1002, 1000.
     pub const SIN2: &'static Self = &Self(sin2());
 
-    /// A table of your own.
+    /// Creates your own table.
     ///
     /// # Errors
-    /// [`Error::InvalidRampTable`] if an entry is below 1000 or above the one before it.
+    /// [`Error::InvalidRampTable`] if an entry is below 1000 or above the previous one.
     pub const fn new(entries: [u32; Self::LEN]) -> Result<Self, Error> {
         let mut limit = u32::MAX;
         let mut rest: &[u32] = &entries;
@@ -48,7 +48,7 @@ impl RampTable {
         &self.0
     }
 
-    /// Entry `index`; the last one for an index after the end.
+    /// Returns entry `index`, or the last one for an index after the end.
     pub fn entry(&self, index: u8) -> u32 {
         self.0.get(usize::from(index)).copied().unwrap_or(self.last())
     }

@@ -7,8 +7,8 @@ use crate::runs::{Run, Runs};
 
 /// What a move is doing.
 ///
-/// The states of TIDEP0061, section 2.3.3. In TI's `sorte_master_cfg.inc` the ramp up has three of its own
-/// (initialise, wait initialise, wait); here they are one.
+/// The states of TIDEP0061, section 2.3.3. In TI's `sorte_master_cfg.inc` the ramp up has three states (initialise, wait
+/// initialise, wait); here they are one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,7 +34,7 @@ impl fmt::Display for MoveState {
     }
 }
 
-/// One step of a move. The interval `t_step` lies before its pulse.
+/// One step of a move. The interval `t_step` precedes its pulse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -45,7 +45,7 @@ pub struct RampStep {
     pub entry: u8,
     /// Ramp up, constant speed or ramp down.
     pub state: MoveState,
-    /// Time since the previous pulse in ns; for the first step since the start of the move.
+    /// Time since the previous pulse in ns; for the first step, time since the start of the move.
     pub t_step: u32,
     /// 4us_cnt: cycles since the cycle of the previous pulse; at least 1.
     pub cnt: u32,
@@ -53,9 +53,9 @@ pub struct RampStep {
     pub cycle: u64,
     /// Start of the pulse in its cycle, in ns.
     ///
-    /// 0..=3999, but for [`PruExact`](crate::Arithmetic::PruExact) outside its exact domain. The wire cannot carry 0
-    /// and 3991..=3999; they are kept here and moved by a few nanoseconds only in the wire's word, so that the
-    /// errors do not add up.
+    /// 0..=3999, but for [`PruExact`](crate::Arithmetic::PruExact) outside its exact domain. The wire cannot carry 0 and
+    /// 3991..=3999; these values are kept here and shifted by a few nanoseconds only in the PTO word, so that the errors do
+    /// not add up.
     pub sync_time: u32,
 }
 
@@ -67,7 +67,7 @@ impl fmt::Display for RampStep {
     }
 }
 
-/// The steps of a move, one after the other.
+/// The steps of a move, one after another.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RampSteps<'t> {
@@ -76,7 +76,7 @@ pub struct RampSteps<'t> {
     entry: u8,
     t_step: u32,
     interval: Interval,
-    /// Steps left at this ramp entry.
+    /// Remaining steps at this ramp entry.
     left: u32,
     /// Number of the next step.
     index: u32,
@@ -90,7 +90,7 @@ pub struct RampSteps<'t> {
 }
 
 impl<'t> Profile<'t> {
-    /// The steps of a move of `steps` steps, from standstill to standstill.
+    /// Returns the steps of a move of `steps` steps, from standstill to standstill.
     pub const fn steps(self, steps: u32) -> RampSteps<'t> {
         RampSteps::new(self, steps)
     }
@@ -122,8 +122,8 @@ impl<'t> RampSteps<'t> {
 
     /// Aborts the rest of the move: the last step taken stays, followed by the shortest ramp down.
     ///
-    /// What is left then are the steps between the last one and the standstill: none after the first step of
-    /// a move, 32 K - 1 from full speed, and the steps that were left anyway on the way down.
+    /// The remaining steps are those between the last one and the standstill: none after the first step of a move, 32 K - 1
+    /// from full speed, and on the way down the steps that remained anyway.
     pub fn abort(&mut self) {
         let per_entry = self.profile.parameters().steps_per_entry;
         let ahead = self.remaining();
@@ -150,7 +150,7 @@ impl<'t> RampSteps<'t> {
         self.state_of(self.index.saturating_sub(1))
     }
 
-    /// Takes a step. The cycle is counted by [`Iterator::next`] alone; an axis knows it anyway.
+    /// Takes a step. Only [`Iterator::next`] counts the cycle; an axis knows it anyway.
     #[inline]
     pub(crate) fn advance(&mut self) -> Option<StepTime> {
         if self.left == 0 {

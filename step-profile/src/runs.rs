@@ -1,7 +1,7 @@
 /// The move rule as runs of steps with the same ramp entry.
 ///
-/// Step j of n takes entry min(j, n - 1 - j, 32k - 1) / k: k steps an entry upwards, the last entry as long as
-/// there is room, and the same entries downwards. A move too short for the whole ramp turns back where it is.
+/// Step j of n takes entry min(j, n - 1 - j, 32k - 1) / k: k steps per entry upwards, the last entry as long as steps
+/// remain for it, and the same entries downwards. A move too short for the whole ramp turns back where it is.
 ///
 /// ```text
 /// entry            ┌────────────┐ 31
@@ -15,7 +15,7 @@
 pub(crate) struct Runs {
     /// Steps of the move.
     steps: u32,
-    /// Steps a ramp entry, 1..2^27.
+    /// Steps per ramp entry, 1..2^27.
     per_entry: u32,
     /// First step of the next run.
     at: u32,
@@ -35,12 +35,12 @@ pub(crate) struct Run {
 const TOP: u8 = 31;
 
 impl Runs {
-    /// A move of `steps` steps with `per_entry` (1..2^27) steps per ramp entry.
+    /// Returns a move of `steps` steps with `per_entry` (1..2^27) steps per ramp entry.
     pub(crate) const fn new(steps: u32, per_entry: u32) -> Self {
         Self { steps, per_entry, at: 0, entry: 0, falling: false }
     }
 
-    /// The way down of a move that stops as soon as it can: `done` steps are made, the last of them with `depth`
+    /// Returns the ramp down of a move that stops as soon as it can: `done` steps are made, the last of them with `depth`
     /// steps between it and the standstill.
     pub(crate) const fn stop(done: u32, depth: u32, per_entry: u32) -> Self {
         let entry = match depth.saturating_sub(1).checked_div(per_entry) {

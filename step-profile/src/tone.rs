@@ -32,7 +32,7 @@ pub enum Tone {
     Fis2,
 }
 
-/// A line of Table 3.
+/// A row of Table 3.
 struct Row {
     name: &'static str,
     tenths_hz: u16,
@@ -69,7 +69,7 @@ impl Tone {
         Row { name, tenths_hz, speed, p125, p250 }
     }
 
-    /// The tone of this name, spelt as in Table 3.
+    /// Returns the tone of this name, spelt as in Table 3.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|tone| tone.name() == name)
     }
@@ -97,7 +97,7 @@ impl Tone {
         Speed::from_raw(self.row().speed)
     }
 
-    /// Steps of 125 ms at full speed. The ramps are not counted in: with one step per ramp entry a move of N steps
+    /// Steps of 125 ms at full speed. The ramps are not included: with one step per ramp entry a move of N steps
     /// lasts as long as N + 1302 steps at full speed.
     pub const fn p125(self) -> u32 {
         self.row().p125
