@@ -2,10 +2,10 @@
 
 use crate::error::Error;
 
-/// A place in a plane, in any unit: 0.1 µm reaches 107 m.
+/// A place in a plane, in any unit: units of 0.1 µm reach 107 m.
 type Point = [i32; 2];
 
-/// Which way an arc turns, seen with the second axis to the left of the first.
+/// Direction of an arc, seen with the second axis to the left of the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,10 +16,10 @@ pub enum Turning {
     Counterclockwise,
 }
 
-/// The chords of an arc, in integers: the ends of straight lines, the last one where the arc ends.
+/// The chords of an arc, in integers: the ends of straight lines, the last one at the end of the arc.
 ///
-/// The arc is halved until no chord is further from it than asked for; the ends of the chords are on the circle to 2 units,
-/// so a chord is off by `error` + 2 units at most.
+/// The arc is halved until no chord is further from it than requested; the ends of the chords are on the circle to 2 units,
+/// so a chord is off by at most `error` + 2 units.
 ///
 /// ```
 /// use step_motion::{Arc, Turning};
@@ -33,9 +33,9 @@ pub enum Turning {
 pub struct Arc {
     center: Point,
     radius: i64,
-    /// Of the longest sum of two neighbours that is split, the square.
+    /// Square of the longest sum of two neighbours that is not split further.
     split: u64,
-    /// Where it is, from the center.
+    /// Present position, from the center.
     at: [i64; 2],
     /// Ends of parts, the next one last.
     ends: [[i64; 2]; Self::DEPTH],
@@ -46,15 +46,15 @@ pub struct Arc {
 impl Arc {
     /// Four quarters, each halved as often as a number has bits.
     const DEPTH: usize = 40;
-    /// The greatest distance of `from` and `to` from the center.
+    /// Largest permitted radius, the distance of `from` and `to` from the center.
     pub const MAX_RADIUS: u32 = 1 << 30;
 
-    /// From a point on a circle around `center` to another; the whole circle if they are the same. `error` is how far a chord
-    /// may be from the arc, at least 1.
+    /// Creates the chords from one point on a circle around `center` to another; the whole circle if the points are the
+    /// same. `error` is how far a chord may be from the arc, at least 1.
     ///
     /// # Errors
-    /// [`Error::ArcRadius`] without a radius, with one above [`MAX_RADIUS`](Self::MAX_RADIUS), and if that of the two ends
-    /// differs by more than `error` and a thousandth.
+    /// [`Error::ArcRadius`] for a radius of 0 or above [`MAX_RADIUS`](Self::MAX_RADIUS), and if the radii at the two ends
+    /// differ by more than `error` plus a thousandth.
     pub fn new(from: Point, to: Point, center: Point, turning: Turning, error: u32) -> Result<Self, Error> {
         let clockwise = turning == Turning::Clockwise;
         let (at, end) = (away(from, center), away(to, center));
@@ -96,7 +96,7 @@ impl Arc {
         }
     }
 
-    /// The point on the circle in the middle of two that are a quarter apart at most.
+    /// Returns the point on the circle half-way between two points at most a quarter apart.
     fn middle(&self, [x, y]: [i64; 2]) -> [i64; 2] {
         let long = length([x, y]).max(1);
         let scaled = |x: i64| {

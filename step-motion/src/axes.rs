@@ -1,4 +1,4 @@
-//! The background's half of a path: it plans along the lines, and hands segments of all axes to the interrupt.
+//! The background half of a path: it plans along the lines, and hands segments for all axes to the interrupt.
 
 use core::sync::atomic::Ordering;
 
@@ -17,14 +17,15 @@ use crate::writer::{LONGEST, Writer, tick};
 
 /// The axes of a path, whose steps are made in an interrupt.
 ///
-/// It takes the requests of a [`PathMover`] and cuts what is planned into segments, a little ahead of the [`AxesTimer`] that runs them. A
-/// request acts where the blocks that are out end: after twice the [reach](Self::with_reach) at the latest, but for
-/// [`halt`](Self::halt), after which there is no step. Behind each block lies a stop along the path: if [`poll`](Self::poll) is not
-/// called in time the machine comes to rest on its lines, and goes on from there when it is. Each step of that stop is exact to a
-/// sixteenth of an interval, each other step to 3/4 of a tick, or 25 ns where that is more; where a block ends within two ticks of a
-/// step, or DIR changes, a step may be a tick or two late.
+/// It takes the requests of a [`PathMover`] and cuts the plan into segments, a little ahead of the [`AxesTimer`] that runs
+/// them. A request takes effect at the end of the blocks already handed out: after at most twice the
+/// [reach](Self::with_reach). Only [`halt`](Self::halt) takes effect at once: no step follows it. Each block is followed by
+/// a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to rest on its lines, and
+/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, every other step
+/// to 3/4 of a tick, or 25 ns if that is more. If a block ends within two ticks of a step, or DIR changes, a step may be a
+/// tick or two late.
 ///
-/// Four copies of the [`PathMover`] are in it: it belongs into a `static` or far from a small stack.
+/// It contains four copies of the [`PathMover`], so keep it in a `static` or on a large stack.
 ///
 /// ```
 /// use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
@@ -64,7 +65,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     end: u64,
     dirs: [Option<Direction>; N],
     made: [u32; N],
-    /// What is being made of it, and where.
+    /// What is being made from it, and where.
     stage: Stage,
     work: PathMover<N, M>,
     block: usize,
@@ -72,19 +73,19 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     /// The axis that is cut, and how many before it had nothing.
     axis: usize,
     quiet: usize,
-    /// Where the block is to end, and how often that was put off; the writers there.
+    /// Where the block is to end, and how often that was postponed; the writers there.
     until: u64,
     put_off: u8,
     joint: [Writer; N],
     coarse: u32,
-    /// The stop behind each of both blocks, with all that has been asked for since.
+    /// The stop after each of the two blocks, with all later requests.
     stops: [PathMover<N, M>; 2],
     outs: [Out<N>; 2],
-    /// The interrupt stands, and what follows begins there.
+    /// The interrupt is stopped, and the following motion begins there.
     standing: bool,
     /// It has not entered the last block yet.
     pending: bool,
-    /// What has been planned cannot be run.
+    /// The plan cannot be run.
     lost: bool,
     turn: u32,
     /// The halt that the interrupt has not confirmed.
@@ -92,7 +93,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     ticket: u32,
 }
 
-/// What the background is at.
+/// The present work of the background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Idle,
@@ -102,7 +103,7 @@ enum Stage {
     Stop,
 }
 
-/// What has been made of a block.
+/// The finished part of a block.
 #[derive(Debug, Clone, Copy)]
 struct Out<const N: usize> {
     /// The interrupt may come to its stop.
@@ -114,12 +115,12 @@ struct Out<const N: usize> {
     dirs: [Option<Direction>; N],
 }
 
-/// How often the end of a block is put off, lest a step is late for it.
+/// How often the end of a block is postponed so that no step is late because of it.
 const PUT_OFF: u8 = 8;
 
 impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
-    /// At rest at the end of what `path` has run, with the other end of the queue for the interrupt. A queue has one of them. Lines that
-    /// are in the path begin with the first request.
+    /// Creates the axes at rest at the present end of `path`, and the other end of the queue for the interrupt. A queue
+    /// serves one such pair. Lines already in the path begin with the first request.
     pub fn new(queue: &'q AxesQueue<N, S>, path: Path<N, M>) -> (Self, AxesTimer<'q, N, S>) {
         let path = PathMover::new(path).cutting();
         let clock = path.clock();
@@ -156,7 +157,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         (axes, AxesTimer::new(queue))
     }
 
-    /// With this many ticks of motion in each half of the queue, at least 4; 10 ms if nothing is said.
+    /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
@@ -172,18 +173,19 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         commanded
     }
 
-    /// Where the last line ends, in steps; after a [`stop`](Self::stop) where that will end.
+    /// The end of the last line, in steps; after a [`stop`](Self::stop), the place where it will end.
     pub const fn target(&self) -> [i64; N] {
         self.path.target()
     }
 
-    /// Returns whether no line can be pushed: the queue is full, or would be if the machine came to rest for want of background.
+    /// Returns whether no line can be pushed: the queue is full, or would be if the machine came to rest because the
+    /// background is late.
     pub fn is_full(&self) -> bool {
         let stops = self.stops.iter().enumerate().any(|(at, stop)| self.may_come_to(at) && stop.is_full());
         stops || self.path.is_full()
     }
 
-    /// Returns whether the interrupt stands and nothing is to come (or held).
+    /// Returns whether the interrupt is stopped and nothing is to come (or it is held).
     pub fn is_at_rest(&self) -> bool {
         self.halt.is_none() && self.standing && !self.pending && self.path.due().is_none()
     }
@@ -193,7 +195,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.path.is_halted()
     }
 
-    /// As [`PathMover::push`].
+    /// Does the same as [`PathMover::push`].
     ///
     /// # Errors
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -211,7 +213,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Ok(())
     }
 
-    /// As [`PathMover::move_to`].
+    /// Does the same as [`PathMover::move_to`].
     ///
     /// # Errors
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -223,25 +225,25 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Ok(())
     }
 
-    /// As [`PathMover::set_override`].
+    /// Does the same as [`PathMover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
         self.begin_anew();
         self.path.set_override(percent, self.end);
     }
 
-    /// As [`PathMover::hold`].
+    /// Does the same as [`PathMover::hold`].
     pub fn hold(&mut self) {
         self.begin_anew();
         self.path.hold(self.end);
     }
 
-    /// As [`PathMover::resume`].
+    /// Does the same as [`PathMover::resume`].
     pub fn resume(&mut self) {
         self.begin_anew();
         self.path.resume(self.end);
     }
 
-    /// As [`PathMover::stop`].
+    /// Does the same as [`PathMover::stop`].
     pub fn stop(&mut self) {
         self.begin_anew();
         self.path.stop(self.end);
@@ -261,8 +263,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         });
     }
 
-    /// No further step, from now on: the interrupt sees it without the queue. Until it has been called once more, which
-    /// [`poll`](Self::poll) asks for, lines are refused.
+    /// Makes no further step from now on: the interrupt sees this without the queue. Lines are refused until the interrupt
+    /// has been called once more, which [`poll`](Self::poll) asks for.
     pub fn halt(&mut self) {
         self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
         self.ticket = self.ticket.max(1);
@@ -273,8 +275,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.begin_anew();
     }
 
-    /// A slice of the background's work: a segment, a plan, or a look at the interrupt. Call it until it says other than
-    /// [`Work::More`], again after each request, and every half [reach](Self::with_reach).
+    /// Does a slice of the background's work: a segment, a plan, or a check of the interrupt. Call it until it returns
+    /// anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach).
     pub fn poll(&mut self) -> Work {
         if let Some(ticket) = self.halt {
             return self.confirm(ticket);
@@ -336,7 +338,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         cut || self.outs.get(block).is_some_and(|out| out.valid)
     }
 
-    /// What the stops are told, too, so that the machine goes on from there as it would have.
+    /// Passes requests to the stops too, so that the machine continues from there as it would have.
     fn tell_stops(&mut self, ask: impl Fn(&mut PathMover<N, M>, u64) -> Result<(), Error>) {
         for at in 0..2 {
             if !self.may_come_to(at) {
@@ -354,7 +356,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         if self.halt.is_some() { Err(Error::Moving) } else { Ok(()) }
     }
 
-    /// What has been cut and is not out is forgotten.
+    /// Forgets what has been cut but not handed out.
     const fn begin_anew(&mut self) {
         self.stage = Stage::Idle;
     }

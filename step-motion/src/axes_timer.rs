@@ -1,4 +1,4 @@
-//! The interrupt's half of a path: the step timers of all its axes on one clock.
+//! The interrupt half of a path: the step timers of all its axes on one clock.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -8,7 +8,7 @@ use crate::step_timer::StepTimer;
 /// Segments between [`Axes`](crate::Axes) in the background and an [`AxesTimer`] in an interrupt: a [`Queue`] of `S` slots for each of
 /// `N` axes, 1 to 16.
 ///
-/// It lies in a `static`; [`Axes::new`](crate::Axes::new) gives both ends.
+/// Put it into a `static`; [`Axes::new`](crate::Axes::new) returns both ends.
 #[derive(Debug)]
 pub struct AxesQueue<const N: usize, const S: usize> {
     pub(crate) axes: [Queue<S>; N],
@@ -35,7 +35,7 @@ impl<const N: usize, const S: usize> Default for AxesQueue<N, S> {
     }
 }
 
-/// What a call of [`AxesTimer::fire`] asks for.
+/// What the caller of [`AxesTimer::fire`] has to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FiredAxes {
@@ -45,19 +45,22 @@ pub struct FiredAxes {
 }
 
 impl FiredAxes {
-    /// The axes that make a step now, a bit each from the lowest one on. DIR of each has been right for the time that its driver needs.
+    /// The axes that make a step now, one bit each, the first axis in bit 0. DIR of each has been valid for the time that
+    /// its driver needs.
     #[inline(always)]
     pub const fn steps(self) -> u16 {
         self.steps
     }
 
-    /// The level of DIR of each axis from now on, a bit each, 1 for backwards; it never changes together with a step of the axis.
+    /// The level of DIR of each axis from now on, one bit each, 1 for backwards; it never changes together with a step of
+    /// the axis.
     #[inline(always)]
     pub const fn reverse(self) -> u16 {
         self.reverse
     }
 
-    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: there is none, stop the timer.
+    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: there is none; stop the
+    /// timer.
     #[inline(always)]
     pub const fn wait(self) -> u32 {
         self.wait
@@ -66,8 +69,8 @@ impl FiredAxes {
 
 /// The step interrupt of the axes of a path, on one timer.
 ///
-/// [`fire`](Self::fire) is called when the compare time is reached. As axes step when their place on the path is there, two of them
-/// may be a tick apart: where the new compare time is over already, call it again at once.
+/// [`fire`](Self::fire) is called when the compare time is reached. Each axis steps when the path reaches its step, so two
+/// axes may step a tick apart: if the new compare time has already passed, call it again at once.
 ///
 /// ```
 /// # use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
@@ -98,7 +101,7 @@ pub struct AxesTimer<'q, const N: usize, const S: usize> {
     queue: &'q AxesQueue<N, S>,
     axes: [(StepTimer<'q, S>, u32); N],
     reverse: u16,
-    /// What the last call has asked to wait.
+    /// The wait requested by the last call.
     wait: u32,
     /// The gate that was gone through last.
     taken: u32,
@@ -110,8 +113,8 @@ impl<'q, const N: usize, const S: usize> AxesTimer<'q, N, S> {
         Self { queue, axes, reverse: 0, wait: 0, taken: 0 }
     }
 
-    /// For measurements: axes with segments of so many steps that follow each other for ever, the first steps so many ticks apart, in a
-    /// queue that nobody else uses.
+    /// Creates axes for measurements: with segments of this many steps that follow each other for ever, the first steps
+    /// this many ticks apart, in a queue without another user.
     #[doc(hidden)]
     pub fn endless(queue: &'q AxesQueue<N, S>, count: u16, apart: u32) -> Self {
         let mut wait = 0_u32;
@@ -122,7 +125,8 @@ impl<'q, const N: usize, const S: usize> AxesTimer<'q, N, S> {
         Self { queue, axes, reverse: 0, wait: 0, taken: 0 }
     }
 
-    /// The events that are due now, and the ticks until the next one. While it stands, a call begins with what has been planned.
+    /// Returns the events that are due now, and the ticks until the next one. While the timer is stopped, a call starts the
+    /// planned motion.
     #[inline]
     pub fn fire(&mut self) -> FiredAxes {
         let halt = self.queue.axes.first().map_or(0, |queue| queue.halt.load(Ordering::Relaxed));
@@ -157,7 +161,7 @@ impl<'q, const N: usize, const S: usize> AxesTimer<'q, N, S> {
         FiredAxes { steps, reverse, wait: next }
     }
 
-    /// No step, whatever was planned; what follows begins anew.
+    /// Makes no step, whatever was planned; the next motion starts afresh.
     #[cold]
     #[inline(never)]
     fn halted(&mut self, ticket: u32) -> FiredAxes {

@@ -1,4 +1,4 @@
-//! The background's half of a motion: it plans, and hands segments to the interrupt.
+//! The background half of a motion: it plans, and hands segments to the interrupt.
 
 mod drafting;
 
@@ -17,30 +17,31 @@ use crate::real::Real;
 use crate::step_timer::StepTimer;
 use crate::writer::{LONGEST, Writer, tick};
 
-/// What [`Axis::poll`] has left to do.
+/// The work left after a call of [`Axis::poll`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Work {
     /// Call it again.
     More,
-    /// Fire the interrupt now: it stands, and there is something for it.
+    /// Fire the interrupt now: it is stopped, and there is motion for it.
     Start,
-    /// Nothing before the interrupt has gone on.
+    /// Nothing until the interrupt has progressed.
     Later,
-    /// The axis is at rest where it is to be.
+    /// The axis is at rest at its target.
     Rest,
-    /// The stop from where it was to go needs more slots than the [`Queue`] has. It comes to rest.
+    /// The stop that would be needed takes more slots than the [`Queue`] has. The axis comes to rest.
     TooFewSlots,
 }
 
 /// An axis whose steps are made in an interrupt.
 ///
-/// It takes the requests of a [`Mover`] and cuts what is planned into segments, ahead of the [`StepTimer`] that runs them. A
-/// request acts between two segments that are out: after twice the [reach](Self::with_reach) at the latest, but for
-/// [`halt`](Self::halt), after which there is no step. Each step is made within 3/4 of a tick, or 25 ns where that is more, of its exact
-/// time. Behind all that is out lies a stop, unless it ends at rest: if [`poll`](Self::poll) is not called in time the axis
-/// stops after eight times the reach at most, or comes to rest by itself within four more, and goes on from there when it is. Each step of the stop is exact to a
-/// sixteenth of an interval.
+/// It takes the requests of a [`Mover`] and cuts the plan into segments, ahead of the [`StepTimer`] that runs them. A
+/// request takes effect between two segments already handed out: after at most twice the [reach](Self::with_reach). Only
+/// [`halt`](Self::halt) takes effect at once: no step follows it. Each step is made within 3/4 of a tick of its exact time,
+/// or within 25 ns if that is more. All segments handed out are followed by a stop, unless they end at rest: if
+/// [`poll`](Self::poll) is not called in time, the axis stops after at most eight times the reach, or comes to rest by
+/// itself within four more, and continues from there at the next call. Each step of the stop is exact to a sixteenth of an
+/// interval.
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -99,14 +100,14 @@ pub struct Axis<'q, const N: usize> {
     /// Of both blocks, and of their slots.
     out: [Out; 2],
     marks: [Mark; N],
-    /// What has been planned cannot be run; nothing is made before the interrupt stands.
+    /// The plan cannot be run; nothing is made until the interrupt is stopped.
     lost: bool,
     /// The halt that the interrupt has not confirmed.
     halt: Option<u32>,
     ticket: u32,
 }
 
-/// What the background is at.
+/// The present work of the background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Idle,
@@ -164,7 +165,7 @@ pub(crate) const COARSEST: u32 = 2;
 const LEAST: u32 = 16;
 
 impl<'q, const N: usize> Axis<'q, N> {
-    /// At rest at position 0, with the other end of the queue for the interrupt. A queue has one axis.
+    /// Creates an axis at rest at position 0, and the other end of the queue for the interrupt. A queue serves one axis.
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock.
@@ -203,18 +204,18 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok((axis.with_reach(clock.hz() / 100), timer))
     }
 
-    /// With another reach in ticks, at least 16: a request acts after twice as long at the latest. 10 ms by default.
+    /// Sets the reach in ticks, at least 16: a request takes effect after at most twice the reach. 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(LEAST, LONGEST >> 3), ..self }
     }
 
-    /// As [`Mover::with_reversal_pause`].
+    /// Does the same as [`Mover::with_reversal_pause`].
     pub fn with_reversal_pause(mut self, ticks: u32) -> Self {
         self.mover = self.mover.with_reversal_pause(ticks);
         self
     }
 
-    /// As [`Mover::with_soft_limits`].
+    /// Does the same as [`Mover::with_soft_limits`].
     pub fn with_soft_limits(mut self, low: i64, high: i64) -> Self {
         self.mover = self.mover.with_soft_limits(low, high);
         self
@@ -244,7 +245,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.is_halted()
     }
 
-    /// As [`Mover::move_to`].
+    /// Does the same as [`Mover::move_to`].
     ///
     /// # Errors
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -255,7 +256,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok(())
     }
 
-    /// As [`Mover::run`].
+    /// Does the same as [`Mover::run`].
     ///
     /// # Errors
     /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -266,38 +267,38 @@ impl<'q, const N: usize> Axis<'q, N> {
         Ok(())
     }
 
-    /// As [`Mover::set_override`].
+    /// Does the same as [`Mover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
         self.mover.ask_override(percent);
         self.asked(News::Change);
     }
 
-    /// As [`Mover::hold`].
+    /// Does the same as [`Mover::hold`].
     pub fn hold(&mut self) {
         self.mover.ask_hold(true);
         self.asked(News::Change);
     }
 
-    /// As [`Mover::resume`].
+    /// Does the same as [`Mover::resume`].
     pub fn resume(&mut self) {
         self.mover.ask_hold(false);
         self.asked(News::Change);
     }
 
-    /// As [`Mover::stop`].
+    /// Does the same as [`Mover::stop`].
     pub fn stop(&mut self) {
         self.mover.ask_stop();
         self.asked(News::Change);
     }
 
-    /// As [`Mover::quick_stop`].
+    /// Does the same as [`Mover::quick_stop`].
     pub fn quick_stop(&mut self, limits: Limits) {
         self.mover.ask_quick_stop(limits);
         self.asked(News::Quick);
     }
 
-    /// No further step, from now on: the interrupt sees it without the queue. Until it has been called once more, which
-    /// [`poll`](Self::poll) asks for, moves are refused.
+    /// Makes no further step from now on: the interrupt sees this without the queue. Moves are refused until the interrupt
+    /// has been called once more, which [`poll`](Self::poll) asks for.
     pub fn halt(&mut self) {
         self.look();
         self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
@@ -311,7 +312,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
 
-    /// As [`Mover::set_commanded`].
+    /// Does the same as [`Mover::set_commanded`].
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
@@ -324,7 +325,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.set_commanded(steps, tick(self.end.end))
     }
 
-    /// As [`Mover::set_limits`].
+    /// Does the same as [`Mover::set_limits`].
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest, [`Error::SpeedAboveClock`] above half the clock.
@@ -336,7 +337,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.set_limits(limits, tick(self.end.end))
     }
 
-    /// Moves are refused before a halt has been seen, and in a quick stop.
+    /// Refuses moves until a halt has been seen, and during a quick stop.
     fn ready(&mut self) -> Result<(), Error> {
         if self.halt.is_some() {
             return Err(Error::Moving);

@@ -9,9 +9,9 @@ use crate::slope::Slope;
 pub(super) enum Bend {
     /// It grows from its start.
     Growing,
-    /// It keeps its size, maybe 0.
+    /// It stays the same, possibly 0.
     Flat,
-    /// It becomes less.
+    /// It decreases.
     Fading,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Curve {
     /// Where the next piece begins.
     pub(super) time: Real,
     pub(super) p: Real,
-    /// Time of the curve that was over before it was planned, and the distance made in it.
+    /// Time of the curve that had passed before it was planned, and the distance covered in it.
     pub(super) skipped: (Real, Real),
 }
 
@@ -101,7 +101,7 @@ impl Curve {
         self.p - self.skipped.1
     }
 
-    /// Adds a piece with its duration and distance; one without duration is left out.
+    /// Adds a piece with its duration and distance; a piece without duration is omitted.
     pub(super) fn push(&mut self, (lasts, distance): (Real, Real), [v, a, j]: [Real; 3], up: bool, bend: Bend) {
         if lasts.is_zero() {
             return;

@@ -1,4 +1,4 @@
-//! From curves to segments: stretches of steps whose times are a cubic of their number, near enough.
+//! From curves to segments: stretches of steps whose times are, closely enough, a cubic of their number.
 //!
 //! A segment joins two steps, and has the time and the pace of both. With r = 1 / v, w = a r² and y = j r³ at its start, the time
 //! at which the position is u steps further is
@@ -22,7 +22,7 @@ use crate::curve::{Bend, Curve};
 use crate::phases::{Frame, P};
 use crate::real::{Inverse, Real, THIRD, high};
 
-/// Steps of an axis on a curve as segments, one after the other.
+/// Steps of an axis on a curve as segments, one after another.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Cutter {
@@ -88,7 +88,7 @@ struct Part {
 pub(crate) struct Demand {
     /// How far off a step may be, in moments.
     pub(crate) off: Real,
-    /// For a stop that nobody is to need: it may be off by an interval times 2 to minus this, too.
+    /// For a stop that is only a precaution: it may also be off by an interval times 2 to the power of minus this.
     pub(crate) coarse: Option<u32>,
     /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
     pub(crate) time: u64,

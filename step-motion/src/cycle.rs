@@ -8,7 +8,7 @@ use servowire_core::Command;
 /// Length of the cycle in ns.
 const CYCLE_NS: u64 = 4000;
 
-/// A [`Mover`] that is called once in each cycle of 4 µs and returns what a PTO word says.
+/// A [`Mover`] that is called once in each cycle of 4 µs and returns the content of a PTO word.
 ///
 /// ```
 /// use step_motion::{Command, Limits, PtoMover};
@@ -30,7 +30,7 @@ impl PtoMover {
     /// The greatest speed: one step per cycle.
     pub const MAX_SPEED: u32 = 250_000;
 
-    /// At rest at position 0.
+    /// Creates an axis at rest at position 0.
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] above 250 kHz.
@@ -41,7 +41,7 @@ impl PtoMover {
         Ok(Self { mover: Mover::new(Clock::NANOSECONDS, limits)?, now: 0 })
     }
 
-    /// The axis, for commands; its ticks are nanoseconds.
+    /// Returns the axis, for commands; its ticks are nanoseconds.
     pub const fn mover(&mut self) -> &mut Mover {
         &mut self.mover
     }
@@ -51,7 +51,7 @@ impl PtoMover {
         self.now
     }
 
-    /// The next cycle: at most one pulse.
+    /// Advances to the next cycle; returns at most one pulse.
     #[inline]
     pub fn tick(&mut self) -> Command {
         let begin = self.now;
@@ -68,32 +68,33 @@ impl PtoMover {
     }
 }
 
-/// What a timer is loaded with next.
+/// The next value to load into a timer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reload {
-    /// Ticks until it runs out, 1 to its largest. Many timers want one less in their register.
+    /// Ticks until it runs out, from 1 to its maximum. Many timers need one less in their register.
     pub ticks: u32,
-    /// Whether a step is due then; if not, the timer is too short for the interval and this is a part of it.
+    /// Whether a step is due then; if not, the timer is too short for the interval and this is only part of it.
     pub step: bool,
 }
 
 /// The reloads of a timer from the ticks of steps.
 ///
-/// A reload is the difference of two rounded times, never a rounded interval: what rounding takes from one step the next
-/// one gets, and the error stays at half a tick.
+/// A reload is the difference of two rounded times, never a rounded interval: the rounding error of one step is made up by
+/// the next, so the error never exceeds half a tick.
 #[derive(Debug, Clone)]
 pub struct Reloads<I> {
     ticks: I,
     longest: u32,
     last: u64,
-    /// The step after `last`, if its interval is under way.
+    /// The step after `last`, if its interval has begun.
     next: Option<u64>,
 }
 
 impl<I: Iterator<Item = u64>> Reloads<I> {
-    /// From the ticks of steps, counted from the start; `longest` is what the timer holds, 65535 for 16 bits (1 for 0).
+    /// Creates the reloads from the ticks of steps, counted from the start; `longest` is the maximum of the timer, 65535
+    /// for 16 bits (0 counts as 1).
     pub fn new(ticks: I, longest: u32) -> Self {
         Self { ticks, longest: longest.max(1), last: 0, next: None }
     }

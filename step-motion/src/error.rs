@@ -1,5 +1,5 @@
 servowire_core::errors! {
-    /// Why limits, a plan or a request is refused. A refusal leaves everything as it was.
+    /// Why limits, a plan or a request is refused. A refusal changes nothing.
     pub enum Error {
         /// An axis is still moving.
         #[error("the axis is still moving")]
@@ -7,23 +7,23 @@ servowire_core::errors! {
         /// Two steps could fall into one tick of the clock.
         #[error("{speed} steps/s is too fast for this clock, at most {limit}")]
         SpeedAboveClock = 2 {
-            /// Greatest speed in steps/s, as asked for.
+            /// Greatest speed in steps/s, as requested.
             speed: u32,
-            /// Half the ticks in a second.
+            /// Half the number of ticks in a second.
             limit: u32,
         },
-        /// A move has more steps than 31 bits count.
+        /// A move has more steps than 31 bits can count.
         #[error("a move of {steps} steps, at most {limit}")]
         TooManySteps = 3 {
-            /// Steps, as asked for.
+            /// Steps, as requested.
             steps: u32,
-            /// The most: 2^31 - 1.
+            /// The maximum: 2^31 - 1.
             limit: u32,
         },
-        /// No room for another line.
+        /// There is no room for another line.
         #[error("the queue of lines is full")]
         QueueFull = 4,
-        /// An axis with 0 steps a metre.
+        /// An axis has 0 steps per metre.
         #[error("an axis with 0 steps per metre")]
         NoScale = 5,
         /// The ends of an arc are not on one circle, or it is too large.
@@ -43,9 +43,9 @@ servowire_core::errors! {
         /// The change of speed within the limits needs more steps than there are.
         #[error("{steps} steps are too few, at least {needed} needed")]
         TooShort = 8 {
-            /// Steps, as asked for.
+            /// Steps, as requested.
             steps: u32,
-            /// The least that is enough.
+            /// The smallest sufficient number.
             needed: u64,
         },
     }

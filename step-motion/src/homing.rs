@@ -10,7 +10,7 @@ use servowire_core::Direction;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct HomingConfig {
-    /// Where the switch is.
+    /// Direction of the switch.
     pub direction: Direction,
     /// Speed of the search, in steps/s.
     pub seek: u32,
@@ -20,13 +20,13 @@ pub struct HomingConfig {
     pub back_off: u32,
     /// After this many steps without a switch the search is abandoned.
     pub range: u32,
-    /// How fast to stop at the switch. The distance to rest, v² / 2a, or (v / 2)(v / a + a / j) with a jerk limit, has to fit
-    /// after it.
+    /// Limits of the stop at the switch. After the switch there must be room for the distance to rest: v² / 2a, or (v /
+    /// 2)(v / a + a / j) with a jerk limit.
     pub stop: Limits,
 }
 
 impl HomingConfig {
-    /// Back off by a tenth of the range, and stop as `stop` says.
+    /// Creates a configuration that backs off by a tenth of the range and stops within the limits `stop`.
     pub const fn new(direction: Direction, seek: u32, approach: u32, range: u32, stop: Limits) -> Self {
         Self { direction, seek, approach, back_off: range / 10, range, stop }
     }
@@ -62,7 +62,7 @@ pub enum HomingState {
     Approaching,
     /// On the switch again, slowing down.
     Settling,
-    /// At rest; position 0 is where the switch closed.
+    /// At rest; position 0 is the place where the switch closed.
     Done,
     /// No switch within the range, or it stays closed. The axis is stopped and its position is not a reference.
     Failed,
@@ -71,8 +71,8 @@ pub enum HomingState {
 /// Finds a reference switch: fast towards it, back, and slowly towards it again. Position 0 is the step at which it closes
 /// the second time.
 ///
-/// Call [`poll`](Self::poll) with the level of the switch often, at least once a step of the approach; take the steps from
-/// the [`Mover`] as ever.
+/// Call [`poll`](Self::poll) with the level of the switch often, at least once per step of the approach; take the steps
+/// from the [`Mover`] as usual.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_copy_implementations, reason = "a copy would go on from a state that is over")]
@@ -84,7 +84,7 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// Begins; a switch that is closed already is left first.
+    /// Starts a homing; if the switch is already closed, the axis first moves off it.
     ///
     /// # Errors
     /// [`Error::Moving`] if the axis is not at rest.
@@ -101,15 +101,15 @@ impl Homing {
         Ok(new)
     }
 
-    /// What it is doing.
+    /// The present state.
     pub const fn state(&self) -> HomingState {
         self.state
     }
 
-    /// Looks at the switch and commands the axis accordingly.
+    /// Checks the switch and commands the axis accordingly.
     ///
     /// # Errors
-    /// Those of the requests to the axis; the homing stays where it is then.
+    /// Those of the requests to the axis; the homing then stays in its state.
     pub fn poll(&mut self, mover: &mut Mover, switch: Switch, now: u64) -> Result<HomingState, Error> {
         let closed = switch == Switch::Closed;
         let position = mover.commanded();

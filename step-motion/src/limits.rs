@@ -1,4 +1,4 @@
-//! What a machine can take, in the units of its data sheet, and the clock that its steps are counted with.
+//! Limits of a machine, in the units of its data sheet, and the clock that counts the ticks of its steps.
 
 use core::fmt;
 
@@ -25,12 +25,12 @@ impl Clock {
     /// The fastest, in ticks per second: 2^30 - 1.
     pub const MAX_HZ: u32 = (1 << 30) - 1;
 
-    /// `None` outside 1000..=2^30 - 1.
+    /// Creates the clock; `None` outside 1000..=2^30 - 1.
     pub const fn new(hz: u32) -> Option<Self> {
         if hz < Self::MIN_HZ || hz > Self::MAX_HZ { None } else { Some(Self(hz)) }
     }
 
-    /// Ticks a second.
+    /// Ticks per second.
     pub const fn hz(self) -> u32 {
         self.0
     }
@@ -102,7 +102,7 @@ impl fmt::Display for Clock {
     }
 }
 
-/// The limit that `got` passes.
+/// Returns the limit that `got` exceeds.
 fn range(got: u64, min: u64, max: u64) -> OutOfRange {
     OutOfRange::above(got, if got < min { min } else { max })
 }
@@ -131,7 +131,8 @@ impl Limits {
     /// The greatest jerk, in steps/s³: 2^44 - 1.
     pub const MAX_JERK: u64 = (1 << 44) - 1;
 
-    /// `speed` in steps/s, `acceleration` in steps/s², each at least 1. Without a jerk limit a move is a trapezoid.
+    /// Creates limits: `speed` in steps/s, `acceleration` in steps/s², each at least 1. Without a jerk limit a move is a
+    /// trapezoid.
     ///
     /// # Errors
     /// [`OutOfRange`] for 0, and for an acceleration above [`MAX_ACCELERATION`](Self::MAX_ACCELERATION).
@@ -145,7 +146,7 @@ impl Limits {
         Ok(Self { speed, acceleration, jerk: None })
     }
 
-    /// With `jerk` in steps/s³, at least 1: a move is an S-curve.
+    /// Sets the `jerk` in steps/s³, at least 1: a move is then an S-curve.
     ///
     /// # Errors
     /// [`OutOfRange`] for 0 and above [`MAX_JERK`](Self::MAX_JERK).
@@ -161,7 +162,7 @@ impl Limits {
         Self { jerk: None, ..self }
     }
 
-    /// With another speed in steps/s, at least 1.
+    /// Replaces the speed, in steps/s, at least 1.
     ///
     /// # Errors
     /// [`OutOfRange`] for 0.
@@ -230,7 +231,7 @@ impl fmt::Display for Limits {
     }
 }
 
-/// [`Limits`] for a planner: in the caller's units of length and time.
+/// [`Limits`] for a planner, in the caller's units of length and time.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Bounds {

@@ -21,9 +21,9 @@ pub(super) struct Line<const N: usize> {
     pub(super) length: Real,
     /// Steps made there, of each axis.
     pub(super) ends: [u32; N],
-    /// What the axes can take, along the line, in units.
+    /// The limits of the axes, along the line, in units.
     pub(super) bounds: Bounds,
-    /// The speed that was asked for.
+    /// The requested speed.
     pub(super) feed: Real,
     /// Greatest speed at its start, for the corner.
     pub(super) corner: Real,
@@ -39,7 +39,7 @@ impl<const N: usize> Line<N> {
         Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None }
     }
 
-    /// With the speed at a part of what was asked for, and never more than the axes can take.
+    /// Sets the speed to a part of the requested one, never above the limits of the axes.
     pub(super) fn bounds(&self, part: Real) -> Bounds {
         self.bounds.slower(self.feed * part)
     }

@@ -1,4 +1,4 @@
-//! An axis that can be told something else at any time.
+//! An axis that accepts a new request at any time.
 
 pub(super) mod cutting;
 mod planning;
@@ -11,18 +11,18 @@ use crate::plan::{Setpoint, checked, clamp};
 use crate::stepper::Stepper;
 use servowire_core::Direction;
 
-/// A step: when, and which way.
+/// A step: its time and direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pulse {
     /// Tick of the clock.
     pub tick: u64,
-    /// DIR; it changes at a standstill only.
+    /// DIR; it changes only at a standstill.
     pub direction: Direction,
 }
 
-/// What an axis is to do.
+/// The aim of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Aim {
@@ -34,25 +34,25 @@ enum Aim {
     Run(Direction, u32),
 }
 
-/// All that has been asked for.
+/// All requests.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Wish {
     aim: Aim,
     held: bool,
     percent: u16,
-    /// What a quick stop that is under way may use, until the axis is at rest.
+    /// The limits of a quick stop in progress, until the axis is at rest.
     quick: Option<Bounds>,
 }
 
 /// An axis whose target, speed and override may change at any tick.
 ///
-/// Each request is a new plan from the present state: position, speed and, with a jerk limit, acceleration go on without
-/// a jump. A target that cannot be reached any more in this direction is reached by a stop and a move back; the position
-/// is kept all the time.
+/// Each request is a new plan from the present state: position, speed and, with a jerk limit, acceleration continue without
+/// a jump. A target that can no longer be reached in this direction is reached by a stop and a move back; the position is
+/// kept throughout.
 ///
-/// [`due`](Self::due) is the tick of the next step: load it into a compare timer, take the step with
-/// [`pulse`](Self::pulse) when it is there, and load the next. After a request load it again, for it may have moved.
+/// [`due`](Self::due) is the tick of the next step: load it into a compare timer, take the step with [`pulse`](Self::pulse)
+/// when that time has come, and load the next. Load it again after a request, because it may have changed.
 ///
 /// ```
 /// use step_motion::{Clock, Limits, Mover};
@@ -95,13 +95,13 @@ pub struct Mover {
     idle: u64,
     /// DIR of the last step; `None` if DIR may have changed since.
     dir: Option<Direction>,
-    /// What is under way is a stop.
+    /// The present plan is a stop.
     braking: bool,
     halted: bool,
 }
 
 impl Mover {
-    /// At rest at position 0.
+    /// Creates an axis at rest at position 0.
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock.
@@ -130,13 +130,13 @@ impl Mover {
         })
     }
 
-    /// With a rest before each change of direction, in ticks: what the driver and the mechanics need between a step and DIR, and
-    /// between DIR and the next step. It is kept after a [`halt`](Self::halt) too.
+    /// Sets a rest before each change of direction, in ticks: the time that the driver and the mechanics need between a
+    /// step and DIR, and between DIR and the next step. It is kept after a [`halt`](Self::halt) too.
     pub const fn with_reversal_pause(self, ticks: u32) -> Self {
         Self { pause: ticks, ..self }
     }
 
-    /// With a range that no target may leave, both ends included; [`run`](Self::run) ends at it.
+    /// Sets a range that no target may leave, both ends included; [`run`](Self::run) stops at its end.
     pub const fn with_soft_limits(self, low: i64, high: i64) -> Self {
         Self { soft: Some((low, high)), ..self }
     }
@@ -164,7 +164,7 @@ impl Mover {
         Some(pulse)
     }
 
-    /// Steps commanded so far, forward less reverse ones. Whether the motor followed is not known here.
+    /// Steps commanded so far, forward less reverse ones. This does not say whether the motor followed.
     pub const fn commanded(&self) -> i64 {
         self.commanded
     }
@@ -174,20 +174,20 @@ impl Mover {
         self.direction
     }
 
-    /// The tick at which DIR is to be switched to [`direction`](Self::direction) for the next step: in the middle of the rest
-    /// between the steps on either side, so that the driver has half of it before the edge and half of it after. `None` if DIR
-    /// does not change before the next step.
+    /// The tick at which DIR is to be switched to [`direction`](Self::direction) for the next step: in the middle of the
+    /// rest between the steps on either side, so that the driver has half of the rest before the edge and half after it.
+    /// `None` if DIR does not change before the next step.
     pub const fn turn(&self) -> Option<u64> {
         self.turn
     }
 
-    /// Position, speed, acceleration and jerk at a tick that is not before the last step.
+    /// Returns position, speed, acceleration and jerk at a tick that is not before the last step.
     pub fn at(&self, now: u64) -> Setpoint {
         let state = Setpoint::new(self.clock, self.phases.at(self.clock.moment(now)));
         state.on_axis(self.origin, self.direction)
     }
 
-    /// Returns whether the axis stands still at a tick, with no step to come (or held back).
+    /// Returns whether the axis is at rest at a tick, with no step to come (or held back).
     pub fn is_at_rest(&self, now: u64) -> bool {
         self.due.is_none() && self.clock.moment(now) >= self.phases.end()
     }
@@ -209,7 +209,8 @@ impl Mover {
         Ok(())
     }
 
-    /// Runs at a speed in steps/s until told otherwise, or to the soft limit; at most the greatest speed. 0 stops.
+    /// Runs at a speed in steps/s until another request or to the soft limit; the speed is at most the greatest one. 0
+    /// stops.
     ///
     /// # Errors
     /// [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
@@ -220,13 +221,14 @@ impl Mover {
         Ok(())
     }
 
-    /// Feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); more than 100 is 100. 0 holds.
+    /// Sets the feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); values above 100 count
+    /// as 100. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
         self.ask_override(percent);
         self.change(now);
     }
 
-    /// Feed hold: slows down to rest and keeps the target.
+    /// Slows down to rest and keeps the target (feed hold).
     pub fn hold(&mut self, now: u64) {
         self.ask_hold(true);
         self.change(now);
@@ -244,15 +246,15 @@ impl Mover {
         self.change(now);
     }
 
-    /// Slows down to rest within other limits, higher ones for a limit switch, and forgets the target. Until it is at rest, moves
-    /// are refused. Where its own limits, or those of a quick stop under way, are higher, those are used: a quick stop is never
-    /// longer than a normal one.
+    /// Slows down to rest within other limits, for example higher ones for a limit switch, and forgets the target. Moves
+    /// are refused until it is at rest. If its own limits, or those of a quick stop in progress, are higher, those are
+    /// used: a quick stop is never longer than a normal one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.ask_quick_stop(limits);
         self.stop_quickly(now);
     }
 
-    /// No further step. The position is that of the steps made; a motor at speed runs on and loses it.
+    /// Makes no further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
         let moment = self.clock.moment(now.max(self.free));
         self.halted = !self.is_at_rest(now);
@@ -261,7 +263,7 @@ impl Mover {
         self.rest(moment);
     }
 
-    /// Declares, at rest, the count of steps at which the axis stands, for instance 0 at a reference.
+    /// Sets, at rest, the step count of the present position, for instance 0 at a reference.
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
@@ -295,7 +297,7 @@ impl Mover {
 
     // What is asked for is written down first, and planned then.
 
-    /// Refuses moves in a quick stop, which is over at rest.
+    /// Refuses moves during a quick stop, which ends at rest.
     pub(super) fn ready(&mut self, at_rest: bool) -> Result<(), Error> {
         if self.wish.quick.is_some() && !at_rest {
             return Err(Error::Moving);

@@ -1,4 +1,4 @@
-//! Straight lines in several axes, one after the other.
+//! Straight lines in several axes, one after another.
 
 use crate::curve::Curve;
 use crate::error::Error;
@@ -42,7 +42,7 @@ impl AxisSetup {
     }
 }
 
-/// How it goes on along a line.
+/// How it continues along a line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Course {
     pub(super) curve: Curve,
@@ -56,9 +56,9 @@ pub(super) struct Course {
 ///
 /// Each line has one speed profile, along it; every axis follows the line within its own limits and takes its steps where
 /// the line passes k - 1/2 of them, so that no axis is ever more than half a step off. At a corner the machine keeps as
-/// much speed as if it rounded it with the given deviation; there the speed of an axis jumps by design, within the
-/// deviation. [`next_line`](Self::next_line) looks ahead over all lines that are in the queue: it never runs faster than lets it stop
-/// at the end of the last one.
+/// much speed as if it rounded it with the given deviation; there the speed of an axis jumps, by design, within the
+/// deviation. [`next_line`](Self::next_line) looks ahead over all lines that are in the queue: it never runs too fast to
+/// stop at the end of the last one.
 ///
 /// ```
 /// use step_motion::{AxisSetup, Clock, Limits, Path};
@@ -80,7 +80,7 @@ pub(super) struct Course {
 pub struct Path<const N: usize, const M: usize> {
     clock: Clock,
     axes: [AxisSetup; N],
-    /// Units a metre: the steps of the finest axis.
+    /// Units per metre: the steps of the finest axis.
     unit: Real,
     /// In units.
     deviation: Real,
@@ -104,7 +104,7 @@ pub struct Path<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// At rest at position 0 of all axes. `deviation` at corners in µm; 0 stops at each corner.
+    /// Creates a path at rest at position 0 of all axes. `deviation` at corners in µm; 0 stops at each corner.
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock, [`Error::NoScale`] for an axis with 0 steps per metre.
@@ -138,7 +138,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(new)
     }
 
-    /// With another deviation at corners in µm, at the start of lines that are pushed from now on.
+    /// Sets the deviation at corners in µm, for the start of lines pushed from now on.
     pub fn set_deviation(&mut self, deviation: u32) {
         self.deviation = self.unit * Real::new(deviation.into()) / Real::new(1_000_000);
     }
@@ -158,12 +158,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.len >= M
     }
 
-    /// Where the last line ends, in steps.
+    /// The end of the last line, in steps.
     pub const fn target(&self) -> [i64; N] {
         self.target
     }
 
-    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line of no length adds nothing.
+    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line of zero length adds nothing.
     ///
     /// # Errors
     /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more than 2^31
@@ -196,7 +196,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(())
     }
 
-    /// Plans the first line of the queue and takes it out. It begins where and when the one before it ends; after a rest no
+    /// Plans the first line of the queue and takes it out. It begins where and when the previous one ends; after a rest no
     /// earlier than [`not_before`](Self::not_before).
     pub fn next_line(&mut self) -> Option<LinePulses<N>> {
         let line = self.line(0)?;
@@ -294,7 +294,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// From a motion at a place on line `at`. With `part` of the speeds that were asked for; without one it brakes at once, and
+    /// From a motion at a place on line `at`. With `part` of the requested speeds; without one it brakes at once, and
     /// may come to rest before the end. `None` if rounding leaves no way.
     pub(super) fn course(&self, at: usize, start: Motion, place: Real, part: Option<Real>) -> Option<Course> {
         let line = self.line(at)?;
@@ -402,7 +402,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (self.over, self.gone) = (self.moment, [None; N]);
     }
 
-    /// After a rest, the next line begins no earlier than this tick.
+    /// Makes the next line begin no earlier than this tick, after a rest.
     pub fn not_before(&mut self, tick: u64) {
         if self.speed.is_zero() {
             self.moment = self.moment.max(self.clock.moment(tick));

@@ -1,4 +1,4 @@
-//! A path that can be held, slowed down and left at any time.
+//! A path that can be held, slowed down and abandoned at any time.
 
 use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
@@ -15,13 +15,13 @@ use servowire_core::Direction;
 /// new target.
 ///
 /// Each request is a new plan along the path, from the present place, speed and acceleration: within the limits of every
-/// axis, never off the line by more than half a step, and with no step lost. What cannot end on the present line goes on
-/// along the next ones.
+/// axis, never off the line by more than half a step, and with no step lost. A motion that cannot end on the present line
+/// continues along the next ones.
 ///
 /// [`due`](Self::due) is the tick of the next step of any axis: load it into a compare timer, take the step with
-/// [`pulse`](Self::pulse) when it is there, and load the next. After a request load it again, for it may have moved. A line
-/// is planned in the call that takes the last step of the one before it, half a step before it begins; a request in that time
-/// takes effect where it begins.
+/// [`pulse`](Self::pulse) when that time has come, and load the next. Load it again after a request, because it may have
+/// changed. A line is planned in the call that takes the last step of the previous one, half a step before it begins; a
+/// request during that time takes effect where it begins.
 ///
 /// ```
 /// use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
@@ -75,7 +75,7 @@ pub struct PathMover<const N: usize, const M: usize> {
 const HALF: i128 = 1 << 31;
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
-    /// At rest at the end of what `path` has run. The lines in it begin with the first request.
+    /// Creates a mover at rest at the present end of `path`. The lines in it begin with the first request.
     pub fn new(path: Path<N, M>) -> Self {
         let position = path.origin();
         Self {
@@ -124,17 +124,17 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some(pulse)
     }
 
-    /// Steps commanded so far of each axis, forward less reverse ones. Whether the motors followed is not known here.
+    /// Steps commanded so far of each axis, forward less reverse ones. This does not say whether the motors followed.
     pub const fn commanded(&self) -> [i64; N] {
         self.commanded
     }
 
-    /// Where the last line ends, in steps; after a [`stop`](Self::stop) where that will end.
+    /// The end of the last line, in steps; after a [`stop`](Self::stop), the place where it will end.
     pub const fn target(&self) -> [i64; N] {
         self.path.target()
     }
 
-    /// Lines in the queue, with the one that runs.
+    /// Lines in the queue, including the one that runs.
     pub const fn len(&self) -> usize {
         self.path.len()
     }
@@ -149,8 +149,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.is_full()
     }
 
-    /// Position, speed, acceleration and jerk of each axis at a tick that is not before the last step. Between the last step
-    /// of a line and its end, half a step later, they are those of the end.
+    /// Returns position, speed, acceleration and jerk of each axis at a tick that is not before the last step. Between the
+    /// last step of a line and its end, half a step later, they are those of the end.
     pub fn at(&self, now: u64) -> [Setpoint; N] {
         let moment = self.clock().moment(now);
         let mut states = self.commanded.map(|position| Setpoint::at_rest(position.saturating_mul(1 << 32)));
@@ -164,7 +164,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         states
     }
 
-    /// Returns whether all axes stand still at a tick, with no step to come (or held back).
+    /// Returns whether all axes are at rest at a tick, with no step to come (or held back).
     pub fn is_at_rest(&self, now: u64) -> bool {
         let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
         self.due().is_none() && self.clock().moment(now) >= over
@@ -188,14 +188,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Ok(())
     }
 
-    /// Feed override, in percent of the speeds that the lines were pushed with. The axes' limits and the speeds at corners
-    /// stay unchanged, so more than 100 is faster only where those allow it. 0 holds.
+    /// Sets the feed override, in percent of the speeds with which the lines were pushed. The axes' limits and the speeds
+    /// at corners stay unchanged, so more than 100 is faster only if those allow it. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
         self.percent = percent;
         self.replan(now);
     }
 
-    /// Feed hold: slows down to rest along the path, and keeps the rest of it.
+    /// Slows down to rest along the path, and keeps the remaining path (feed hold).
     pub fn hold(&mut self, now: u64) {
         self.held = true;
         self.replan(now);
@@ -207,7 +207,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.replan(now);
     }
 
-    /// Slows down to rest along the path and forgets the rest of it. Lines that are pushed from now on begin where it comes to
+    /// Slows down to rest along the path and forgets the remaining path. Lines pushed from now on begin where it comes to
     /// rest.
     pub fn stop(&mut self, now: u64) {
         match self.end_of_stop(now) {
@@ -233,7 +233,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
-    /// A new target: slows down to rest along the path, forgets the rest of it, and goes straight to `target` from there.
+    /// Moves to a new target: slows down to rest along the path, forgets the remaining path, and goes straight to `target`
+    /// from there.
     ///
     /// # Errors
     /// [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::QueueFull`] if the way to rest takes all lines of a full queue;
@@ -252,7 +253,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.push(target, feed, now)
     }
 
-    /// No further step, and the path is forgotten. The positions are those of the steps made; motors at speed run on and
+    /// Makes no further step and forgets the path. The positions are those of the steps made; motors at speed run on and
     /// lose them.
     pub fn halt(&mut self, now: u64) {
         self.halted = !self.is_at_rest(now);
@@ -319,7 +320,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Ok(())
     }
 
-    /// Plans anew if lines have come that let the one that runs end at another speed.
+    /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
         let other = |part| self.path.exit(0, part) != self.exit;
         if self.line.is_none() || self.part().is_some_and(other) {

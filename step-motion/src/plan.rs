@@ -1,4 +1,4 @@
-//! A move that is planned as a whole.
+//! A move planned as a whole.
 
 use core::fmt;
 use core::iter::FusedIterator;
@@ -29,7 +29,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// From rest to rest.
+    /// Plans a move from rest to rest.
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] if two steps could fall into one tick, [`Error::TooManySteps`] above 2^31 - 1.
@@ -37,9 +37,10 @@ impl Plan {
         Self::between(clock, limits, steps, 0, 0)
     }
 
-    /// From an entry speed to an exit speed, in steps/s; each at most the greatest speed. Acceleration is 0 at both ends.
+    /// Plans a move from an entry speed to an exit speed, in steps/s; each at most the greatest speed. Acceleration is 0 at
+    /// both ends.
     ///
-    /// A speed that is not 0 at a standstill (a *start speed*) shortens the first step; the motor has to be able to
+    /// An entry speed other than 0 at a standstill (a *start speed*) shortens the first step; the motor has to be able to
     /// follow it without a ramp.
     ///
     /// # Errors
@@ -77,7 +78,7 @@ impl Plan {
         self.clock
     }
 
-    /// From the start to the standstill (or the exit speed), in ticks.
+    /// Time from the start to the standstill (or the exit speed), in ticks.
     pub fn duration(&self) -> u64 {
         self.clock.tick(self.phases.end())
     }
@@ -92,7 +93,7 @@ impl Plan {
         Pulses { plan: self, stepper: Stepper::new() }
     }
 
-    /// Where the move is and how fast, at a tick after its start.
+    /// Returns position and speed of the move at a tick after its start.
     pub fn at(&self, tick: u64) -> Setpoint {
         Setpoint::new(self.clock, self.phases.at(self.clock.moment(tick)))
     }

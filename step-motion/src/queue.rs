@@ -1,10 +1,10 @@
-//! What the background hands to the step interrupt: segments in linked slots, one writer and one reader, by loads and stores of
-//! words alone.
+//! The queue from the background to the step interrupt: segments in linked slots, with one writer and one reader that use
+//! only loads and stores of words.
 //!
-//! Two blocks of slots take turns. A block is a chain of segments that are to be run, and behind it the chain of a stop from where
-//! they end. The last segment is linked to that stop at first; when the next block is ready, one store links it to that block
-//! instead. So whichever of the two the reader finds there, it is whole: more motion, or a stop. A block is written anew only
-//! after the reader has entered the other one.
+//! Two blocks of slots take turns. A block is a chain of segments to run, followed by the chain of a stop from their end.
+//! The last segment is linked to that stop at first; when the next block is ready, one store links it to that block
+//! instead. So whichever the reader finds there is complete: more motion, or a stop. A block is rewritten only after the
+//! reader has entered the other one.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -39,7 +39,7 @@ pub(crate) struct Kind {
 pub(crate) enum Joint {
     /// Nowhere.
     No,
-    /// The end of a block: on to the next one, or into the stop.
+    /// The end of a block: continues with the next one, or with the stop.
     Block,
     /// The end of a stop: at rest.
     Rest,
@@ -141,9 +141,9 @@ impl Slot {
 }
 
 /// Segments between an [`Axis`](crate::Axis) in the background and a [`StepTimer`](crate::StepTimer) in an interrupt: `N` slots
-/// of 40 bytes, at least 9. Half of them make a block; two thirds of a block are for the stop that follows it.
+/// of 40 bytes, at least 9. Half of them form a block; two thirds of a block are for the stop that follows it.
 ///
-/// It lies in a `static`; [`Axis::new`](crate::Axis::new) gives both ends.
+/// Put it into a `static`; [`Axis::new`](crate::Axis::new) returns both ends.
 #[derive(Debug)]
 pub struct Queue<const N: usize> {
     pub(crate) slots: [Slot; N],

@@ -1,4 +1,4 @@
-//! The interrupt's half of a motion: it only adds.
+//! The interrupt half of a motion: it only makes additions.
 
 use core::sync::atomic::{Ordering, fence};
 
@@ -6,7 +6,7 @@ use servowire_core::Direction;
 
 use crate::queue::{COUNT, DELTA, DIR, IDLE, JOINT, Joint, Kind, Queue, REST, Segment, Slot, TICKET};
 
-/// What a call of [`StepTimer::fire`] asks for.
+/// What the caller of [`StepTimer::fire`] has to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fired {
@@ -15,7 +15,7 @@ pub struct Fired {
 }
 
 impl Fired {
-    /// Returns whether to make a step now. DIR has been right for the time that the driver needs.
+    /// Returns whether to make a step now. DIR has been valid for the time that the driver needs.
     #[inline(always)]
     pub const fn is_step(self) -> bool {
         self.head >> DELTA != 0
@@ -27,7 +27,8 @@ impl Fired {
         if self.head & DIR == 0 { Direction::Forward } else { Direction::Reverse }
     }
 
-    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: no event follows, stop the timer.
+    /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: no event follows; stop the
+    /// timer.
     #[inline(always)]
     pub const fn wait(self) -> u32 {
         self.wait
@@ -42,7 +43,7 @@ static NOWHERE: Slot = Slot::new();
 /// The step interrupt of an axis.
 ///
 /// [`fire`](Self::fire) is called when the compare time is reached, at any clock: it takes at most 40 instructions on a Cortex-M4
-/// and 60 on a Cortex-M0+, the same ones in every call, those that go on to the next segment included.
+/// and 60 on a Cortex-M0+, and every call executes the same instructions, including a change to the next segment.
 ///
 /// ```
 /// # use step_motion::{Axis, Clock, Limits, Queue};
@@ -81,7 +82,8 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Self { queue, slot, head: STANDING, fraction: 0, interval: 0, add: 0 }
     }
 
-    /// For measurements: segments of this many steps that follow each other without end, in a queue with no other user.
+    /// Creates a timer for measurements: segments of this many steps follow each other without end, in a queue with no
+    /// other user.
     #[doc(hidden)]
     pub fn endless(queue: &'q Queue<N>, count: u16) -> Self {
         let kind = Kind { step: true, reverse: false, joint: Joint::No };
@@ -93,8 +95,8 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Self::new(queue)
     }
 
-    /// The event that is due now, and the ticks until the next one. While the timer is stopped, a call starts what has been
-    /// planned.
+    /// Returns the event that is due now, and the ticks until the next one. While the timer is stopped, a call starts the
+    /// planned motion.
     #[inline]
     pub fn fire(&mut self) -> Fired {
         let queue = self.queue;
@@ -148,7 +150,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Fired { head, wait: 0 }
     }
 
-    /// No step, whatever was planned; what follows begins anew.
+    /// Makes no step, whatever was planned; the next motion starts afresh.
     #[cold]
     #[inline(never)]
     pub(crate) fn halted(&mut self, ticket: u32) -> Fired {

@@ -5,10 +5,10 @@ use crate::cutter::{Cutter, Demand, Stretch};
 use crate::phases::Frame;
 use crate::real::Real;
 
-/// Makes the steps of an axis on a curve, one after the other.
+/// Makes the steps of an axis on a curve, one after another.
 ///
 /// Step k falls into the tick nearest to the time at which the position passes k - 1/2. The times come from segments that are exact to a
-/// part of a tick. That says in which tick a step falls, but for a few; those are searched.
+/// part of a tick. That tells in which tick most steps fall; the few others are searched.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {

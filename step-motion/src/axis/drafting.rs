@@ -1,4 +1,5 @@
-//! The blocks of an axis: where one is joined to what is out, what is cut for it, and when the interrupt is let in.
+//! The blocks of an axis: where a block is joined to those handed out, what is cut for it, and when the interrupt may enter
+//! it.
 
 use core::sync::atomic::Ordering;
 
@@ -20,9 +21,9 @@ impl<const N: usize> Axis<'_, N> {
     /// Slots for the steps of a block before those of its stop, at most.
     pub(super) const ROOM: usize = if Queue::<N>::BLOCK > 2 * LEAST_ROOM { Queue::<N>::BLOCK / 2 } else { LEAST_ROOM };
 
-    /// A slice of the background's work: a segment, a stop that is planned, or a look at the interrupt. Call it until it says
-    /// other than [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often where the slots of
-    /// a block hold less than that.
+    /// Does a slice of the background's work: a segment, the plan of a stop, or a check of the interrupt. Call it until it
+    /// returns anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often
+    /// if the slots of a block hold less than that.
     pub fn poll(&mut self) -> Work {
         if let Some(ticket) = self.halt {
             return self.confirm(ticket);
@@ -85,7 +86,7 @@ impl<const N: usize> Axis<'_, N> {
         Queue::<N>::place(slot).is_some_and(|(block, at)| block == self.block && at < out(block))
     }
 
-    /// Takes notice of where the interrupt is. Returns whether it is in a stop that nobody asked for.
+    /// Takes notice of where the interrupt is. Returns whether it is in a stop that was not requested.
     pub(super) fn look(&mut self) -> bool {
         let made = self.queue.made.load(Ordering::Acquire);
         #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
@@ -123,7 +124,7 @@ impl<const N: usize> Axis<'_, N> {
         self.forget();
     }
 
-    /// What was made of the block is of no use; what it was told is still to be done.
+    /// Discards the block; its requests still have to be carried out.
     fn forget(&mut self) {
         self.news = self.news.max(self.told);
         (self.stage, self.told, self.stop) = (Stage::Idle, News::None, None);
@@ -155,7 +156,7 @@ impl<const N: usize> Axis<'_, N> {
         Work::More
     }
 
-    /// What a segment lasts at most. A block is joined half of that ahead of the interrupt at least.
+    /// Longest duration of a segment. A block is joined half of that ahead of the interrupt at least.
     ///
     /// A request waits for the interrupt to enter a block that is linked: not longer than its distance then, a segment, and until it is seen.
     /// From there it acts after two segments and a half. All this is within twice the reach: 0.6 + 0.25 + 0.5 + 0.625.
@@ -163,7 +164,7 @@ impl<const N: usize> Axis<'_, N> {
         self.reach as u64 >> 2
     }
 
-    /// A block that only goes on is linked when it is this near: a little more than the time between two calls.
+    /// A block without a new request is linked when it is this near: a little more than the time between two calls.
     fn near(&self) -> u64 {
         u64::from(self.reach).saturating_mul(3) / 5
     }
@@ -297,7 +298,7 @@ impl<const N: usize> Axis<'_, N> {
         left <= u64::from(self.reach) << 2 && slots.saturating_add(8) <= room
     }
 
-    /// Writes down where the events of the last slot end.
+    /// Records where the events of the last slot end.
     fn mark(&mut self, before: usize) {
         let Some(out) = self.out.get(self.block) else { return };
         let end = u64::try_from(self.writer.end.saturating_sub(out.begin)).unwrap_or(0);

@@ -7,12 +7,12 @@ use servowire_core::Direction;
 
 use super::Mover;
 
-/// What [`Mover::cut`] gives.
+/// The result of [`Mover::cut`].
 #[derive(Debug)]
 pub(crate) enum Cut {
-    /// Steps, and which way.
+    /// Steps, and their direction.
     Steps(Stretch, Direction),
-    /// That was a part of the work.
+    /// Only part of the work was done.
     More,
     /// The next step is later.
     Later,
@@ -20,11 +20,11 @@ pub(crate) enum Cut {
     Rest,
 }
 
-/// What has been asked for and is not planned; of two, the greater one is to be.
+/// A request that is not planned yet; of two, the greater one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum News {
     None,
-    /// Something that a stop under way takes no notice of.
+    /// A request that a stop in progress ignores.
     Change,
     /// Another aim.
     Aim,
@@ -89,7 +89,7 @@ impl Mover {
         self.due.is_some() || self.has_work()
     }
 
-    /// Goes on with the plan, or with the one that follows.
+    /// Continues with the plan, or with the one that follows.
     pub(crate) fn proceed(&mut self) {
         if self.due.is_none() {
             self.go_on();
@@ -99,7 +99,7 @@ impl Mover {
         }
     }
 
-    /// Plans what has been asked for, from a tick on. Returns whether there is another plan.
+    /// Plans the request, from a tick onwards. Returns whether there is another plan.
     pub(crate) fn pursue(&mut self, news: News, now: u64) -> bool {
         match news {
             News::None => return false,

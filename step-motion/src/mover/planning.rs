@@ -1,4 +1,4 @@
-//! Plans of an axis, from the motion that there is to what has been asked for.
+//! Plans of an axis, from the present motion to the requested one.
 
 use crate::limits::Bounds;
 use crate::phases::{Frame, P, Phases, steps};
@@ -17,7 +17,7 @@ impl Mover {
         self.clock.moment(self.due.map_or(now, |due| now.min(due)))
     }
 
-    /// A request that changes what is under way, unless that is a quick stop. Returns whether there is another plan.
+    /// A request that changes the present motion, unless that is a quick stop. Returns whether there is another plan.
     pub(super) fn change(&mut self, now: u64) -> bool {
         let moment = self.moment(now);
         // A stop that is under way is the same one whoever asks for it.
@@ -51,7 +51,7 @@ impl Mover {
         (self.stepper, self.left) = (Stepper::new(), None);
     }
 
-    /// A plan is over: on to the aim if that is somewhere else.
+    /// Ends a plan, and continues to the aim if that is elsewhere.
     pub(super) fn go_on(&mut self) {
         let end = self.phases.end();
         if self.has_work() {
