@@ -10,13 +10,13 @@
 #include <stddef.h>
 
 /**
- * Frames of a response at most.
+ * Maximum number of frames in a response.
  */
 #define SW_AFORMAT_FRAMES 6
 
 /**
- * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
- * on, so that some time less or more than it is refused too.
+ * No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it, and
+ * all times from 2^63 ns onwards, with `SW_E_CLOCK`, so that a little less or more than it is refused too.
  */
 #define SW_NO_TIME UINT64_MAX
 
@@ -56,7 +56,7 @@
 #define SW_RTEX_NEAR (1 << 1)
 
 /**
- * Axes of a ring at most.
+ * Maximum number of axes in a ring.
  */
 #define SW_RTEX_AXES 32
 
@@ -97,7 +97,7 @@
 #define SERVOWIRE_VERSION_MINOR 1
 
 /**
- * The release of this header, behind the second dot.
+ * The release of this header, after the second dot.
  */
 #define SERVOWIRE_VERSION_PATCH 0
 
@@ -107,7 +107,8 @@
 #define SERVOWIRE_VERSION (((SERVOWIRE_VERSION_MAJOR << 16) | (SERVOWIRE_VERSION_MINOR << 8)) | SERVOWIRE_VERSION_PATCH)
 
 /**
- * Alarms of ALM, bit by bit as the specification names them; which of them a version has says sw_aformat_known_alarms().
+ * Alarms of ALM, bit by bit as the specification names them; sw_aformat_known_alarms() says which of them
+ * a version has.
  */
 enum sw_aformat_alm_t
 #ifdef __cplusplus
@@ -192,7 +193,7 @@ enum sw_aformat_error_t
 #endif // __cplusplus
  {
     /**
-     * The response ends too early.
+     * The response is too short.
      */
     SW_E_AFORMAT_TRUNCATED = -513,
     /**
@@ -228,11 +229,11 @@ enum sw_aformat_error_t
      */
     SW_E_AFORMAT_COMMAND_MISMATCH = -521,
     /**
-     * There is no such bank.
+     * The bank does not exist.
      */
     SW_E_AFORMAT_BANK_ERROR = -522,
     /**
-     * An argument comes back as another.
+     * An argument was returned with a different value.
      */
     SW_E_AFORMAT_ECHO_MISMATCH = -523,
     /**
@@ -240,7 +241,7 @@ enum sw_aformat_error_t
      */
     SW_E_AFORMAT_FRAME_CODE = -524,
     /**
-     * There is no such command.
+     * The command does not exist.
      */
     SW_E_AFORMAT_UNKNOWN_COMMAND = -525,
     /**
@@ -256,7 +257,7 @@ enum sw_aformat_error_t
      */
     SW_E_AFORMAT_DATA_RANGE = -528,
     /**
-     * No response in time.
+     * No response came in time.
      */
     SW_E_AFORMAT_NO_RESPONSE = -529,
     /**
@@ -268,7 +269,7 @@ enum sw_aformat_error_t
      */
     SW_E_AFORMAT_INTERRUPTED = -531,
     /**
-     * Whether the act was done is not known.
+     * It is not known whether the act was done.
      */
     SW_E_AFORMAT_EFFECT_UNKNOWN = -532,
     /**
@@ -399,7 +400,7 @@ typedef uint8_t sw_aformat_layout_t;
 #endif // __cplusplus
 
 /**
- * What version 3.0 leaves to the factory setting of an encoder; may be added.
+ * Factory settings of an encoder that version 3.0 leaves open; may be added.
  */
 enum sw_aformat_option_t
 #ifdef __cplusplus
@@ -424,7 +425,7 @@ typedef uint8_t sw_aformat_option_t;
 #endif // __cplusplus
 
 /**
- * In which bit of a byte the first bit of the line stands.
+ * The bit of a byte that holds the first bit of the line.
  */
 enum sw_bit_order_t
 #ifdef __cplusplus
@@ -461,7 +462,7 @@ enum sw_code_t
      */
     SW_PENDING = 1,
     /**
-     * Something is to be sent: look at the transmission.
+     * Something has to be sent: see the transmission.
      */
     SW_SEND = 2,
     /**
@@ -481,11 +482,11 @@ enum sw_code_t
      */
     SW_E_SHORT_BUFFER = -4,
     /**
-     * The clock went back or was not read in time, or `SW_NO_TIME` was handed on.
+     * The clock went back or was not read in time, or `SW_NO_TIME` was passed on.
      */
     SW_E_CLOCK = -5,
     /**
-     * There is no such value now: nothing was exchanged yet, or it was something else.
+     * There is no such value now: nothing was exchanged yet, or the exchange was of another kind.
      */
     SW_E_NO_VALUE = -6,
     /**
@@ -498,7 +499,7 @@ typedef int32_t sw_code_t;
 #endif // __cplusplus
 
 /**
- * Whose rules are followed where sources differ.
+ * Whose rules are followed if sources differ.
  */
 enum sw_hdsl_dialect_t
 #ifdef __cplusplus
@@ -527,15 +528,15 @@ enum sw_hdsl_disparity_t
 #endif // __cplusplus
  {
     /**
-     * It stands in the column that is due.
+     * It is in the expected column.
      */
     SW_HDSL_DISPARITY_OK = 0,
     /**
-     * It stands in the other column.
+     * It is in the other column.
      */
     SW_HDSL_DISPARITY_WRONG = 1,
     /**
-     * It stands in neither.
+     * It is in neither.
      */
     SW_HDSL_DISPARITY_INVALID = 2,
 };
@@ -556,7 +557,7 @@ enum sw_hdsl_error_t
      */
     SW_E_HDSL_TRUNCATED = -769,
     /**
-     * A 10-bit word stands in neither column of the 8b/10b tables.
+     * A 10-bit word is in neither column of the 8b/10b tables.
      */
     SW_E_HDSL_INVALID_WORD = -770,
     /**
@@ -616,7 +617,7 @@ enum sw_hdsl_error_t
      */
     SW_E_HDSL_SHORT_MESSAGE_START = -784,
     /**
-     * A sound message speaks of something else.
+     * A sound message concerns something else.
      */
     SW_E_HDSL_HEADER = -785,
     /**
@@ -636,7 +637,7 @@ enum sw_hdsl_error_t
      */
     SW_E_HDSL_DROPPED = -789,
     /**
-     * A message of this kind is under way.
+     * A message of this kind is in progress.
      */
     SW_E_HDSL_BUSY = -790,
     /**
@@ -656,7 +657,7 @@ enum sw_hdsl_error_t
      */
     SW_E_HDSL_NO_PULSE = -795,
     /**
-     * There is no register at this address.
+     * No register has this address.
      */
     SW_E_HDSL_NO_REGISTER = -796,
     /**
@@ -726,7 +727,7 @@ typedef uint8_t sw_hdsl_quality_event_t;
 #endif // __cplusplus
 
 /**
- * Why the link was started anew.
+ * Why the link was restarted.
  */
 enum sw_hdsl_restart_t
 #ifdef __cplusplus
@@ -738,7 +739,7 @@ enum sw_hdsl_restart_t
      */
     SW_HDSL_NO_RESTART = 0,
     /**
-     * It was asked for.
+     * A restart was requested.
      */
     SW_HDSL_RESTART_REQUESTED = 1,
     /**
@@ -762,7 +763,7 @@ enum sw_hdsl_restart_t
      */
     SW_HDSL_RESTART_QUALITY = 6,
     /**
-     * Too many acceleration words in a row could not be used.
+     * Too many consecutive acceleration words could not be used.
      */
     SW_HDSL_RESTART_ACCELERATION = 7,
     /**
@@ -865,7 +866,7 @@ enum sw_motion_error_t
      */
     SW_E_MOTION_SPEED_ABOVE_CLOCK = -1538,
     /**
-     * More steps than 31 bits count.
+     * More steps than 31 bits can count.
      */
     SW_E_MOTION_TOO_MANY_STEPS = -1539,
     /**
@@ -894,7 +895,7 @@ enum sw_motion_work_t
 #endif // __cplusplus
  {
     /**
-     * At rest where it is to be.
+     * At rest at its target.
      */
     SW_MOTION_REST = 0,
     /**
@@ -902,11 +903,11 @@ enum sw_motion_work_t
      */
     SW_MOTION_MORE = 1,
     /**
-     * Fire the interrupt now: it stands, and there is something for it.
+     * Fire the interrupt now: it is stopped, and there is motion for it.
      */
     SW_MOTION_START = 2,
     /**
-     * Nothing before the interrupt has gone on.
+     * Nothing until the interrupt has progressed.
      */
     SW_MOTION_LATER = 3,
     /**
@@ -919,7 +920,7 @@ typedef int32_t sw_motion_work_t;
 #endif // __cplusplus
 
 /**
- * How a response answers the command before.
+ * How a response answers the previous command.
  */
 enum sw_rtex_acknowledgement_t
 #ifdef __cplusplus
@@ -1010,7 +1011,7 @@ typedef uint8_t sw_rtex_asic_t;
 #endif // __cplusplus
 
 /**
- * Where an axis stands.
+ * The states of an axis.
  */
 enum sw_rtex_axis_code_t
 #ifdef __cplusplus
@@ -1026,7 +1027,7 @@ enum sw_rtex_axis_code_t
      */
     SW_RTEX_OFF = 1,
     /**
-     * Servo_On is sent, Servo_Active has not come yet.
+     * Servo_On is 1, and Servo_Active is not 1 yet.
      */
     SW_RTEX_SWITCHING_ON = 2,
     /**
@@ -1034,15 +1035,15 @@ enum sw_rtex_axis_code_t
      */
     SW_RTEX_ON = 3,
     /**
-     * Slows down; there is a reason.
+     * Slows down, for a reason.
      */
     SW_RTEX_STOPPING = 4,
     /**
-     * Stands with the servo on; there is a reason.
+     * At rest with the servo on, for a reason.
      */
     SW_RTEX_HELD = 5,
     /**
-     * Servo_On is 0, Servo_Active has not gone yet.
+     * Servo_On is 0, and Servo_Active is not 0 yet.
      */
     SW_RTEX_SWITCHING_OFF = 6,
     /**
@@ -1124,11 +1125,11 @@ enum sw_rtex_drive_error_t
      */
     SW_RTEX_ERROR_DIRECTION = 18,
     /**
-     * There is no such cyclic code.
+     * The cyclic code is not defined.
      */
     SW_RTEX_ERROR_CYCLIC_CODE = 33,
     /**
-     * There is no such non-cyclic code.
+     * The non-cyclic code is not defined.
      */
     SW_RTEX_ERROR_NON_CYCLIC_CODE = 34,
     /**
@@ -1136,7 +1137,7 @@ enum sw_rtex_drive_error_t
      */
     SW_RTEX_ERROR_CYCLIC_MODE = 46,
     /**
-     * There is no such Type_Code.
+     * The Type_Code is not defined.
      */
     SW_RTEX_ERROR_TYPE_CODE = 49,
     /**
@@ -1153,7 +1154,7 @@ typedef uint16_t sw_rtex_drive_error_t;
 #endif // __cplusplus
 
 /**
- * Refusals of RTEX, in the order of their numbers; from -0x4f0 on those of axes and procedures.
+ * Refusals of RTEX, in the order of their numbers; from -0x4f0 onwards, those of axes and procedures.
  */
 enum sw_rtex_error_t
 #ifdef __cplusplus
@@ -1169,7 +1170,7 @@ enum sw_rtex_error_t
      */
     SW_E_RTEX_TOO_LONG = -1026,
     /**
-     * A command where a response is due, or the other way round.
+     * A command in place of a response, or the other way round.
      */
     SW_E_RTEX_DIRECTION = -1027,
     /**
@@ -1177,11 +1178,11 @@ enum sw_rtex_error_t
      */
     SW_E_RTEX_MAC_ID = -1028,
     /**
-     * There is no such cyclic code.
+     * The cyclic code is not defined.
      */
     SW_E_RTEX_CYCLIC_CODE = -1029,
     /**
-     * There is no such non-cyclic code.
+     * The non-cyclic code is not defined.
      */
     SW_E_RTEX_NON_CYCLIC_CODE = -1030,
     /**
@@ -1189,11 +1190,11 @@ enum sw_rtex_error_t
      */
     SW_E_RTEX_SUB_CHK = -1031,
     /**
-     * There is no such sub-command.
+     * The sub-command is not defined.
      */
     SW_E_RTEX_SUB_COMMAND_CODE = -1032,
     /**
-     * The two codes do not go together.
+     * The two codes must not be used together.
      */
     SW_E_RTEX_CODE_PAIR = -1033,
     /**
@@ -1209,23 +1210,23 @@ enum sw_rtex_error_t
      */
     SW_E_RTEX_TOO_FAR = -1265,
     /**
-     * ERR: the command was accepted and failed while it was executed.
+     * ERR: the command was accepted but failed during execution.
      */
     SW_E_RTEX_EXECUTION = -1266,
     /**
-     * CMD_Error: the drive did not accept the command; its code is told beside.
+     * CMD_Error: the drive did not accept the command; its code is passed along.
      */
     SW_E_RTEX_COMMAND_ERROR = -1267,
     /**
-     * No answer within the limit. Whether the drive has executed the command is not known.
+     * No answer within the limit. It is not known whether the drive has executed the command.
      */
     SW_E_RTEX_TIMED_OUT = -1268,
     /**
-     * The motion did not start within the limit. It may start yet.
+     * The motion did not start within the limit. It may still start.
      */
     SW_E_RTEX_NOT_STARTED = -1269,
     /**
-     * The procedure was broken off by a stop, by servo off, or by another mode.
+     * The procedure was aborted by a stop, by servo off, or by another mode.
      */
     SW_E_RTEX_BROKEN_OFF = -1270,
 };
@@ -1250,7 +1251,7 @@ enum sw_rtex_execution_t
      */
     SW_RTEX_WNG = (1 << 6),
     /**
-     * Accepted, and failed while it was executed.
+     * Accepted, but failed during execution.
      */
     SW_RTEX_ERR = (1 << 7),
 };
@@ -1271,7 +1272,7 @@ enum sw_rtex_fault_t
      */
     SW_RTEX_NO_FAULT = 0,
     /**
-     * The slaves are others than in the table: until the system is reset.
+     * The slaves differ from the table; this stays until the system is reset.
      */
     SW_RTEX_SLAVE_INFO_MISMATCH = 1,
     /**
@@ -1416,7 +1417,7 @@ typedef uint8_t sw_rtex_noncyclic_t;
 #endif // __cplusplus
 
 /**
- * Where the control of a ring stands.
+ * The phases of the control of a ring.
  */
 enum sw_rtex_phase_t
 #ifdef __cplusplus
@@ -1489,15 +1490,15 @@ enum sw_rtex_reason_t
      */
     SW_RTEX_NOT_ACTIVE = 7,
     /**
-     * Servo_Ready did not come.
+     * Servo_Ready did not go to 1 in time.
      */
     SW_RTEX_READY_TIMEOUT = 8,
     /**
-     * Servo_Active did not come.
+     * Servo_Active did not go to 1 in time.
      */
     SW_RTEX_ACTIVE_TIMEOUT = 9,
     /**
-     * Servo_Active did not go.
+     * Servo_Active did not go to 0 in time.
      */
     SW_RTEX_INACTIVE_TIMEOUT = 10,
     /**
@@ -1509,7 +1510,7 @@ enum sw_rtex_reason_t
      */
     SW_RTEX_OTHER_AXIS = 12,
     /**
-     * It was asked to.
+     * It was requested.
      */
     SW_RTEX_REQUESTED = 13,
     /**
@@ -1517,7 +1518,7 @@ enum sw_rtex_reason_t
      */
     SW_RTEX_HOMING_TIMEOUT = 14,
     /**
-     * Another reason, of a later release.
+     * Another reason, added in a later release.
      */
     SW_RTEX_OTHER_REASON = 255,
 };
@@ -1708,15 +1709,15 @@ enum sw_sorte_error_t
      */
     SW_E_SORTE_BAD_FCS = -1282,
     /**
-     * The destination is not that of all.
+     * The destination is not the one for all devices.
      */
     SW_E_SORTE_WRONG_DESTINATION = -1283,
     /**
-     * There is no such type, or no layout of it is published.
+     * The type is not defined, or its layout is not published.
      */
     SW_E_SORTE_UNKNOWN_TYPE = -1284,
     /**
-     * The type is not the one that is due.
+     * The type is not the expected one.
      */
     SW_E_SORTE_UNEXPECTED_TYPE = -1285,
     /**
@@ -1728,7 +1729,7 @@ enum sw_sorte_error_t
      */
     SW_E_SORTE_BAD_CRC8 = -1287,
     /**
-     * Another source than the one that is due.
+     * The source is not the expected one.
      */
     SW_E_SORTE_WRONG_SOURCE = -1288,
     /**
@@ -1757,7 +1758,7 @@ typedef int32_t sw_sorte_error_t;
 #endif // __cplusplus
 
 /**
- * What a PTO word says.
+ * The content of a PTO word.
  */
 enum sw_sorte_pto_kind_t
 #ifdef __cplusplus
@@ -1827,11 +1828,11 @@ enum sw_step_error_t
 #endif // __cplusplus
  {
     /**
-     * No steps an entry.
+     * 0 steps per entry.
      */
     SW_E_STEP_ZERO_SEGMENT_LENGTH = -1793,
     /**
-     * Too many steps an entry.
+     * Too many steps per entry.
      */
     SW_E_STEP_SEGMENT_TOO_LONG = -1794,
     /**
@@ -1839,11 +1840,11 @@ enum sw_step_error_t
      */
     SW_E_STEP_STEP_RATE_TOO_HIGH = -1795,
     /**
-     * The first step takes longer than 32 bits count.
+     * The first step takes longer than 32 bits can count.
      */
     SW_E_STEP_STEP_TIME_OVERFLOW = -1796,
     /**
-     * The sync time does not lie in a cycle.
+     * The sync time is not within a cycle.
      */
     SW_E_STEP_SYNC_TIME_OUT_OF_RANGE = -1797,
     /**
@@ -1934,7 +1935,7 @@ enum sw_tformat_doubt_t
      */
     SW_TFORMAT_NO_DOUBT = 0,
     /**
-     * Nothing was heard yet.
+     * Nothing has been heard yet.
      */
     SW_TFORMAT_DOUBT_NEVER = 1,
     /**
@@ -1962,15 +1963,15 @@ enum sw_tformat_doubt_t
      */
     SW_TFORMAT_DOUBT_UPPER_BITS = 7,
     /**
-     * ALMC reports what is not tolerated.
+     * ALMC reports something that is not tolerated.
      */
     SW_TFORMAT_DOUBT_ALARMS = 8,
     /**
-     * SF reports what is not tolerated.
+     * SF reports something that is not tolerated.
      */
     SW_TFORMAT_DOUBT_STATUS = 9,
     /**
-     * Another reason, of a later release.
+     * Another reason, added in a later release.
      */
     SW_TFORMAT_DOUBT_OTHER = 255,
 };
@@ -1995,7 +1996,7 @@ enum sw_tformat_error_t
      */
     SW_E_TFORMAT_DELIMITER = -258,
     /**
-     * The frame ends too early.
+     * The frame is too short.
      */
     SW_E_TFORMAT_TRUNCATED = -259,
     /**
@@ -2027,15 +2028,15 @@ enum sw_tformat_error_t
      */
     SW_E_TFORMAT_ADDRESS_MISMATCH = -266,
     /**
-     * Another data byte than was written.
+     * The data byte differs from the one written.
      */
     SW_E_TFORMAT_DATA_MISMATCH = -267,
     /**
-     * The request did not come back as it was sent.
+     * The request did not come back as sent.
      */
     SW_E_TFORMAT_ECHO_MISMATCH = -268,
     /**
-     * No response in time.
+     * No response came in time.
      */
     SW_E_TFORMAT_NO_RESPONSE = -269,
     /**
@@ -2047,7 +2048,7 @@ enum sw_tformat_error_t
      */
     SW_E_TFORMAT_NOT_DONE = -271,
     /**
-     * Whether the act was done is not known: read back before it is tried again.
+     * Whether the act was done is not known: read back before trying again.
      */
     SW_E_TFORMAT_EFFECT_UNKNOWN = -272,
     /**
@@ -2092,23 +2093,23 @@ enum sw_tformat_id_t
      */
     SW_TFORMAT_READ_ALL = 3,
     /**
-     * A byte into the EEPROM.
+     * Writes a byte to the EEPROM.
      */
     SW_TFORMAT_WRITE_EEPROM = 6,
     /**
-     * Clears errors; ten times.
+     * Clears errors; has to be sent ten times.
      */
     SW_TFORMAT_RESET_ERRORS = 7,
     /**
-     * Makes this position the zero of the turn; ten times. Shifts the commutation angle.
+     * Makes this position the zero of the turn; has to be sent ten times. Shifts the commutation angle.
      */
     SW_TFORMAT_SET_SINGLE_TURN_ZERO = 8,
     /**
-     * Clears turns and errors; ten times. The machine loses its multi-turn reference.
+     * Clears turns and errors; has to be sent ten times. The machine loses its multi-turn reference.
      */
     SW_TFORMAT_RESET_TURNS_AND_ERRORS = 12,
     /**
-     * A byte of the EEPROM.
+     * Reads a byte of the EEPROM.
      */
     SW_TFORMAT_READ_EEPROM = 13,
 };
@@ -2146,7 +2147,7 @@ typedef uint8_t sw_tformat_sf_t;
 #endif // __cplusplus
 
 /**
- * What the widths of an encoder leave open, for sw_tformat_set_resolution(); may be added.
+ * Properties that the widths of an encoder leave open, for sw_tformat_set_resolution(); may be added.
  */
 enum sw_tformat_turns_t
 #ifdef __cplusplus
@@ -2167,8 +2168,8 @@ typedef uint8_t sw_tformat_turns_t;
 #endif // __cplusplus
 
 /**
- * What a call came to: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the `sw_..._error_t` of the
- * protocols; `sw_text()` has a text for each.
+ * The result of a call: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the
+ * `sw_..._error_t` of the protocols; `sw_text()` has a text for each.
  *
  * A refusal of a protocol is `-(256 * protocol + number)`. The numbers never change.
  */
@@ -2176,14 +2177,14 @@ typedef int32_t sw_result_t;
 
 /**
  * A line with up to eight encoders of one kind: one request, the responses, and the newest position of each. Its content is
- * private; it may be copied. One context at a time.
+ * private; it may be copied. Only one context at a time may use it.
  */
 typedef struct {
     uint64_t _private[112];
 } sw_aformat_t;
 
 /**
- * Widths of an encoder, and what its factory has set.
+ * Widths of an encoder, and its factory settings.
  */
 typedef struct {
     /**
@@ -2191,7 +2192,7 @@ typedef struct {
      */
     uint8_t st_bits;
     /**
-     * Bits of the turns; 40 with those of the single turn at most.
+     * Bits of the turns; at most 40 together with those of the single turn.
      */
     uint8_t mt_bits;
     /**
@@ -2201,11 +2202,11 @@ typedef struct {
 } sw_aformat_encoder_t;
 
 /**
- * What is to be sent, and when.
+ * The data to send, and when to send them.
  */
 typedef struct {
     /**
-     * When the first start bit is on the line.
+     * When to start the first start bit.
      */
     uint64_t start_ns;
     /**
@@ -2223,11 +2224,11 @@ typedef struct {
 } sw_aformat_transmission_t;
 
 /**
- * What an encoder sends. Fields that the layout does not have are 0.
+ * A response of an encoder. Fields that the layout does not have are 0.
  */
 typedef struct {
     /**
-     * Position bits as received, from bit 0 up; of ABS24H from bit 16 up.
+     * Position bits as received, from bit 0 upwards; for ABS24H from bit 16 upwards.
      */
     uint64_t abs;
     /**
@@ -2285,7 +2286,7 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Turns times the counts of a turn, and the single turn.
+     * Turns times the counts of a turn, plus the single turn.
      */
     int64_t counts;
     /**
@@ -2303,7 +2304,7 @@ typedef struct {
 } sw_position_t;
 
 /**
- * What a master sends. Fields that the command does not take are not looked at.
+ * A request of a master. Fields that the command does not take are ignored.
  */
 typedef struct {
     /**
@@ -2340,7 +2341,7 @@ typedef struct {
 } sw_aformat_device_t;
 
 /**
- * What an encoder sends, and when.
+ * The response of an encoder, and when it is sent.
  */
 typedef struct {
     /**
@@ -2362,7 +2363,7 @@ typedef struct {
 } sw_aformat_answer_t;
 
 /**
- * A frame of a request, of a command or of a byte of memory: only its place in the request tells which.
+ * A frame of a request, with a command or with a byte of memory: only its place in the request tells which.
  */
 typedef struct {
     /**
@@ -2382,13 +2383,13 @@ typedef struct {
      */
     uint8_t command;
     /**
-     * The byte, of a memory frame. Of a frame that was heard all are filled in.
+     * The byte, of a memory frame. In a frame that was heard, all fields are filled in.
      */
     uint8_t byte;
 } sw_aformat_frame_t;
 
 /**
- * A receiver of one response after the other from a line. Its content is private; it may be copied.
+ * A receiver of consecutive responses from a line. Its content is private; it may be copied.
  */
 typedef struct {
     uint64_t _private[16];
@@ -2404,14 +2405,14 @@ typedef struct {
 
 /**
  * A procedure of several exchanges with one encoder: it says what to send, takes what is heard, and decides what to repeat. Its
- * content is private. While it runs the line is its own.
+ * content is private. While it runs, nothing else may use the line.
  */
 typedef struct {
     uint64_t _private[80];
 } sw_aformat_procedure_t;
 
 /**
- * What the type word of the EEPROM says.
+ * The content of the type word of the EEPROM.
  */
 typedef struct {
     /**
@@ -2449,7 +2450,7 @@ typedef struct {
      */
     uint32_t one_ns;
     /**
-     * A request of one frame and the responses of all who are asked.
+     * A request of one frame and the responses of all encoders asked.
      */
     uint32_t all_ns;
     /**
@@ -2471,7 +2472,7 @@ typedef struct {
      */
     uint64_t abs;
     /**
-     * EA: who answers.
+     * EA: the address of the encoder that answers.
      */
     uint8_t ea;
     /**
@@ -2481,7 +2482,7 @@ typedef struct {
 } sw_aformat_abs40_t;
 
 /**
- * Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
+ * Nanoseconds from a free-running 32-bit timer that wraps. Only one context at a time may use it.
  */
 typedef struct {
     uint64_t _private[6];
@@ -2506,7 +2507,7 @@ typedef struct {
 } sw_hdsl_reading_t;
 
 /**
- * An answer: its six words, and what they say.
+ * An answer: its six words, and their content.
  */
 typedef struct {
     /**
@@ -2546,7 +2547,7 @@ typedef struct {
 } sw_hdsl_character_t;
 
 /**
- * What an answer is made of.
+ * The parts of an answer.
  */
 typedef struct {
     /**
@@ -2576,7 +2577,7 @@ typedef struct {
 } sw_hdsl_content_t;
 
 /**
- * A safe position with what came around it: as received, not yet a position.
+ * A safe position with what came around it: as received, not yet a valid position.
  */
 typedef struct {
     /**
@@ -2791,18 +2792,19 @@ typedef struct {
 } sw_hdsl_data_t;
 
 /**
- * A receiver: start-up, link, newest positions. Its content is private; it may be copied. One context at a time.
+ * A receiver: start-up, link, newest positions. Its content is private; it may be copied. Only one context
+ * at a time may use it.
  */
 typedef struct {
     uint64_t _private[84];
 } sw_hdsl_t;
 
 /**
- * How the messages of the last H-frame ended.
+ * How the messages that ended in the last H-frame ended.
  */
 typedef struct {
     /**
-     * SW_PENDING: none came to its end; SW_OK, or why it failed.
+     * SW_PENDING: none ended; SW_OK, or why it failed.
      */
     sw_result_t short_result;
     /**
@@ -2810,15 +2812,15 @@ typedef struct {
      */
     sw_result_t long_result;
     /**
-     * What the long one brought.
+     * The result of the long message.
      */
     sw_hdsl_data_t data;
     /**
-     * The register of the short one.
+     * The register of the short message.
      */
     uint8_t register_address;
     /**
-     * What was read of it; 0 after a write.
+     * The value read; 0 after a write.
      */
     uint8_t value;
 } sw_hdsl_finished_t;
@@ -2846,11 +2848,12 @@ typedef struct {
 } sw_hdsl_position_t;
 
 /**
- * How the H-frame that was heard last goes on, and what it brought beside the positions.
+ * How the last H-frame heard continues, and what it brought besides the positions.
  */
 typedef struct {
     /**
-     * What is driven behind the answer (TRAILER, then stuffing), the first bit of the line in bit 0 of byte 0.
+     * What to drive after the answer (TRAILER, then stuffing), the first bit of the line in bit 0 of byte
+     * 0.
      */
     uint8_t tail[24];
     /**
@@ -2878,11 +2881,11 @@ typedef struct {
      */
     uint8_t rssi;
     /**
-     * 1: no short message is under way.
+     * 1: no short message is in progress.
      */
     uint8_t short_free;
     /**
-     * 1: no long message is under way.
+     * 1: no long message is in progress.
      */
     uint8_t long_free;
     /**
@@ -2904,7 +2907,7 @@ typedef struct {
 } sw_hdsl_frame_t;
 
 /**
- * Registers of a receiver. Its content is private; it may be copied. One context at a time.
+ * Registers of a receiver. Its content is private; it may be copied. Only one context at a time may use it.
  */
 typedef struct {
     uint64_t _private[64];
@@ -2932,21 +2935,22 @@ typedef struct {
 } sw_hdsl_alignment_t;
 
 /**
- * The end of the background. It belongs to its queue: it is not copied.
+ * The background end. It belongs to its queue: it is not copied.
  */
 typedef struct {
     uint64_t _private[1040];
 } sw_motion_axis_t;
 
 /**
- * The end of the interrupt. It belongs to its queue: it is not copied.
+ * The interrupt end. It belongs to its queue: it is not copied.
  */
 typedef struct {
     uint64_t _private[9];
 } sw_motion_timer_t;
 
 /**
- * What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+ * The queue between the background and the interrupt. It is `static`: both ends hold its address, and it
+ * is never moved or copied.
  */
 typedef struct {
     uint64_t _private[656];
@@ -2971,15 +2975,16 @@ typedef struct {
 } sw_motion_limits_t;
 
 /**
- * What the interrupt does.
+ * What the interrupt has to do.
  */
 typedef struct {
     /**
-     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+     * Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none; stop
+     * the timer.
      */
     uint32_t wait;
     /**
-     * 1: make a step now. DIR has been right for the time that the driver needs.
+     * 1: make a step now. DIR has been valid for the time that the driver needs.
      */
     uint8_t step;
     /**
@@ -3018,15 +3023,15 @@ typedef struct {
 } sw_nrz_field_t;
 
 /**
- * One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be copied. One context at a
- * time.
+ * One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be
+ * copied. Only one context at a time may use it.
  */
 typedef struct {
     uint64_t _private[60];
 } sw_rtex_axis_t;
 
 /**
- * What an axis is set up with. Limits are counted in update periods.
+ * The configuration of an axis. Limits are counted in update periods.
  */
 typedef struct {
     /**
@@ -3034,7 +3039,7 @@ typedef struct {
      */
     uint32_t update_ns;
     /**
-     * Update periods of invalid data at the start; 0 if somebody else has sent them.
+     * Update periods of invalid data at the start; 0 if they were already sent elsewhere.
      */
     uint32_t invalid;
     /**
@@ -3076,11 +3081,12 @@ typedef struct {
 } sw_rtex_config_t;
 
 /**
- * Where an axis stands.
+ * The state of an axis.
  */
 typedef struct {
     /**
-     * MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, where the reason has one.
+     * MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, if
+     * the reason has one.
      */
     uint16_t detail;
     /**
@@ -3108,7 +3114,7 @@ typedef struct {
 } sw_rtex_feedback_t;
 
 /**
- * What a drive sends: as received, not yet a position.
+ * What a drive sends: as received, not yet a valid position.
  */
 typedef struct {
     /**
@@ -3146,7 +3152,7 @@ typedef struct {
 } sw_rtex_response_t;
 
 /**
- * What a controller sends.
+ * A command of a controller.
  */
 typedef struct {
     /**
@@ -3307,7 +3313,7 @@ typedef struct {
 } sw_rtex_drive_t;
 
 /**
- * A non-cyclic command under way. Its content is private; it may be copied.
+ * A non-cyclic command in progress. Its content is private; it may be copied.
  */
 typedef struct {
     uint64_t _private[6];
@@ -3318,7 +3324,7 @@ typedef struct {
  */
 typedef struct {
     /**
-     * What was read: Monitor_Data, Response_Data3, Sub_Response_Data1; 0 for none.
+     * The value read: Monitor_Data, Response_Data3 or Sub_Response_Data1; 0 for none.
      */
     int32_t data;
     /**
@@ -3336,28 +3342,29 @@ typedef struct {
 } sw_rtex_done_t;
 
 /**
- * A sub-command under way. Its content is private; it may be copied.
+ * A sub-command in progress. Its content is private; it may be copied.
  */
 typedef struct {
     uint64_t _private[4];
 } sw_rtex_sub_handshake_t;
 
 /**
- * A profile motion under way. Its content is private; it may be copied.
+ * A profile motion in progress. Its content is private; it may be copied.
  */
 typedef struct {
     uint64_t _private[10];
 } sw_rtex_move_t;
 
 /**
- * What the axes of a ring have in common. Its content is private; it may be copied. One context at a time.
+ * The common state of the axes of a ring. Its content is private; it may be copied. Only one context at a
+ * time may use it.
  */
 typedef struct {
     uint64_t _private[5];
 } sw_rtex_ring_t;
 
 /**
- * What a drive finds in a command.
+ * The faults that a drive finds in a command.
  */
 typedef struct {
     /**
@@ -3393,7 +3400,7 @@ typedef struct {
 } sw_rtex_counter_t;
 
 /**
- * A frame from the master: its output lies behind SW_SORTE_DATA_AT.
+ * A frame from the master: its output begins at SW_SORTE_DATA_AT.
  */
 typedef struct {
     /**
@@ -3407,11 +3414,11 @@ typedef struct {
 } sw_sorte_master_frame_t;
 
 /**
- * A frame from a device: its payload lies behind SW_SORTE_DATA_AT.
+ * A frame from a device: its payload begins at SW_SORTE_DATA_AT.
  */
 typedef struct {
     /**
-     * Who sends it.
+     * Address of the sender.
      */
     uint8_t address;
     /**
@@ -3433,7 +3440,7 @@ typedef struct {
      */
     uint8_t kind;
     /**
-     * DIR, 0 or 1; 0 where the driver is off.
+     * DIR, 0 or 1; 0 if the driver is off.
      */
     uint8_t direction;
 } sw_sorte_pto_t;
@@ -3461,7 +3468,7 @@ typedef struct {
 } sw_sorte_header_t;
 
 /**
- * What a PARAM frame tells all devices.
+ * The content of a PARAM frame, for all devices.
  */
 typedef struct {
     /**
@@ -3549,7 +3556,7 @@ typedef struct {
 } sw_sorte_sync_t;
 
 /**
- * A DISCOVERY frame, but for its table.
+ * A DISCOVERY frame, without its table.
  */
 typedef struct {
     /**
@@ -3601,7 +3608,7 @@ typedef struct {
      */
     uint32_t speed;
     /**
-     * Steps an entry.
+     * Steps per entry.
      */
     uint32_t k;
     /**
@@ -3615,7 +3622,7 @@ typedef struct {
 } sw_step_move_t;
 
 /**
- * How a move goes.
+ * The course of a move.
  */
 typedef struct {
     /**
@@ -3719,7 +3726,7 @@ typedef struct {
 } sw_step_tone_t;
 
 /**
- * What a master sends.
+ * A request of a master.
  */
 typedef struct {
     /**
@@ -3737,11 +3744,11 @@ typedef struct {
 } sw_tformat_request_t;
 
 /**
- * What an encoder sends. Fields that the response to this data ID does not have are 0.
+ * A response of an encoder. Fields that the response to this data ID does not have are 0.
  */
 typedef struct {
     /**
-     * Single-turn data, 24 bits, right-aligned: as received, not yet a position.
+     * Single-turn data, 24 bits, right-aligned: as received, not yet a valid position.
      */
     uint32_t abs;
     /**
@@ -3775,15 +3782,15 @@ typedef struct {
 } sw_tformat_response_t;
 
 /**
- * Where and how a frame is wrong.
+ * Where a frame is wrong, and in what way.
  */
 typedef struct {
     /**
-     * What was received: a byte, a count of fields; 0 where the error has none.
+     * The value received: a byte, or a count of fields; 0 if the error has none.
      */
     uint32_t got;
     /**
-     * What it should have been, or which of its bits must be 0.
+     * The value expected, or the bits that must be 0.
      */
     uint32_t want;
     /**
@@ -3804,7 +3811,7 @@ typedef struct {
 } sw_tformat_device_t;
 
 /**
- * What an encoder sends, and when.
+ * The response of an encoder, and when it is sent.
  */
 typedef struct {
     /**
@@ -3835,7 +3842,7 @@ typedef struct {
 } sw_tformat_t;
 
 /**
- * The times of a line, in ns: sw_tformat_get_line() gives the defaults, change what differs.
+ * The times of a line, in ns: sw_tformat_get_line() returns the defaults; change those that differ.
  */
 typedef struct {
     /**
@@ -3843,19 +3850,20 @@ typedef struct {
      */
     uint32_t bits_per_second;
     /**
-     * From the end of the request to the start bit of the response, at most; default 10 000.
+     * Longest time from the end of the request to the start bit of the response; default 10 000.
      */
     uint32_t response_timeout_ns;
     /**
-     * From the end of a field to the end of the next, at most; default one and a half field times.
+     * Longest time from the end of a field to the end of the next; default one and a half field times.
      */
     uint32_t field_timeout_ns;
     /**
-     * From the end of the request to the start bit of the response, at least; default four bits.
+     * Shortest time from the end of the request to the start bit of the response; default four bits.
      */
     uint32_t turn_around_ns;
     /**
-     * From the end of a byte to its hand-over, at most: interrupt latency, or the time after which an idle line is reported.
+     * Longest time from the end of a byte to its hand-over: interrupt latency, or the time after which an
+     * idle line is reported.
      */
     uint32_t hand_over_ns;
     /**
@@ -3867,17 +3875,18 @@ typedef struct {
      */
     uint32_t sampling_ns;
     /**
-     * 1 if the own request is received: it makes the errors clearer, and nothing depends on it.
+     * 1 if the request itself is received too: this makes the errors clearer, and nothing else depends on
+     * it.
      */
     uint8_t echo;
 } sw_tformat_line_t;
 
 /**
- * What is to be sent, and when.
+ * The data to send, and when to send them.
  */
 typedef struct {
     /**
-     * When the start bit is on the line.
+     * When to start the start bit.
      */
     uint64_t start_ns;
     /**
@@ -3889,7 +3898,7 @@ typedef struct {
      */
     uint64_t driver_on_ns;
     /**
-     * When the driver is to be switched off at the latest; at `end_ns` at the earliest.
+     * When to switch the driver off at the latest; `end_ns` is the earliest.
      */
     uint64_t driver_off_ns;
     /**
@@ -3982,21 +3991,22 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and what its encoders are.
+ * Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and the properties of
+ * its encoders.
  */
-sw_result_t sw_aformat_init(sw_aformat_t *m,
-                            uint32_t bits_per_second,
-                            const sw_aformat_encoder_t *encoder);
+sw_result_t sw_aformat_init(sw_aformat_t *m, uint32_t bits_per_second, const sw_aformat_encoder_t *encoder);
 
 /**
- * From the end of a frame to its hand-over, at most, ns; and the highest address on the line, 0..7.
+ * Sets the longest time from the end of a frame to its hand-over, ns, and the highest address on the line,
+ * 0..7.
  */
 sw_result_t sw_aformat_set_hand_over(sw_aformat_t *m, uint32_t hand_over_ns, uint8_t highest_ea);
 
 /**
- * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
- * way, and those with one answer to one encoder. SW_SEND with `to_send` filled; SW_E_NOT_FREE while an exchange is pending,
- * and before the time of sw_aformat_until_ns().
+ * Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read
+ * (0..7, 21..30) are sent this way; those with a single answer are sent to one encoder. SW_SEND with
+ * `to_send` filled; SW_E_NOT_FREE while an exchange is pending, and before the time of
+ * sw_aformat_until_ns().
  */
 sw_result_t sw_aformat_read(sw_aformat_t *m,
                             uint8_t command,
@@ -4005,9 +4015,10 @@ sw_result_t sw_aformat_read(sw_aformat_t *m,
                             sw_aformat_transmission_t *to_send);
 
 /**
- * Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
- * has a byte for each, 0 for a frame whose delimiter reads 0; NULL says that all are framed. At most 48 frames at once. SW_OK once all
- * that were asked have answered; sw_aformat_missing() tells at any time who has not.
+ * Takes frames that were heard one after another, with the last delimiter at `end_ns`: their contents, the
+ * first bit of the line in bit 0. `framed` has a byte for each, 0 for a frame whose delimiter reads 0;
+ * NULL says that all are framed. At most 48 frames at once. SW_OK once all encoders asked have answered;
+ * sw_aformat_missing() says at any time which have not.
  */
 sw_result_t sw_aformat_hear(sw_aformat_t *m,
                             const uint16_t *contents,
@@ -4016,29 +4027,31 @@ sw_result_t sw_aformat_hear(sw_aformat_t *m,
                             uint64_t end_ns);
 
 /**
- * It is `now_ns`: ends an exchange whose time is over, with SW_OK. Hand over what was received first.
+ * Sets the time to `now_ns`: ends an exchange whose time has run out, with SW_OK. Hand over received data
+ * first.
  */
 sw_result_t sw_aformat_poll(sw_aformat_t *m, uint64_t now_ns);
 
 /**
- * While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
- * SW_NO_TIME for a state that was not started.
+ * While an exchange is pending, the time at which to poll it; afterwards, the time from which the line is
+ * free. 0 if nothing was asked, SW_NO_TIME for a state that was not started.
  */
 uint64_t sw_aformat_until_ns(const sw_aformat_t *m);
 
 /**
- * Who was asked and has not answered, a bit each; 0xff for a state that was not started or has not asked.
+ * The encoders that were asked and have not answered, one bit each; 0xff for a state that was not started
+ * or has not asked.
  */
 uint8_t sw_aformat_missing(const sw_aformat_t *m);
 
 /**
- * The good response of an encoder to the newest request: raw fields. SW_E_NO_VALUE if there is none.
+ * The good response of an encoder to the newest request, as raw fields. SW_E_NO_VALUE if there is none.
  */
 sw_result_t sw_aformat_response(const sw_aformat_t *m, uint8_t ea, sw_aformat_response_t *response);
 
 /**
- * The angle of a shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.** It is
- * judged now, as by sw_tformat_angle(); the battery is tolerated.
+ * The angle of a shaft for commutation, where a turn is 2^32: **false if it must not be used, and the
+ * outputs must be switched off.** It is judged now, as by sw_tformat_angle(); the battery is tolerated.
  */
 bool sw_aformat_angle(const sw_aformat_t *m,
                       uint8_t ea,
@@ -4056,8 +4069,8 @@ bool sw_aformat_position(const sw_aformat_t *m,
                          sw_position_t *position);
 
 /**
- * The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15 (sw_bit_order_t), at most 4: start bit and
- * delimiter are left to the port.
+ * The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15
+ * (sw_bit_order_t), at most 4: the port adds start bit and delimiter.
  */
 sw_result_t sw_aformat_build(const sw_aformat_request_t *asked,
                              uint8_t order,
@@ -4066,7 +4079,7 @@ sw_result_t sw_aformat_build(const sw_aformat_request_t *asked,
                              size_t *count);
 
 /**
- * With which layout an encoder answers a request: sw_aformat_layout_t, and how many frames that has.
+ * The layout with which an encoder answers a request, sw_aformat_layout_t, and its number of frames.
  */
 sw_result_t sw_aformat_layout(const sw_aformat_request_t *asked,
                               const sw_aformat_encoder_t *encoder,
@@ -4074,7 +4087,7 @@ sw_result_t sw_aformat_layout(const sw_aformat_request_t *asked,
                               uint8_t *frames);
 
 /**
- * The response to a request from 16-bit words, a frame each, with all checks.
+ * Reads the response to a request from 16-bit words, one frame each, with all checks.
  */
 sw_result_t sw_aformat_parse(const sw_aformat_request_t *asked,
                              const sw_aformat_encoder_t *encoder,
@@ -4084,7 +4097,7 @@ sw_result_t sw_aformat_parse(const sw_aformat_request_t *asked,
                              sw_aformat_response_t *response);
 
 /**
- * A response of this layout to this command, whose request is not at hand; `ea` 255 is any.
+ * Reads a response of this layout to this command, without its request; `ea` 255 is any.
  */
 sw_result_t sw_aformat_parse_as(uint8_t command,
                                 uint8_t layout,
@@ -4095,7 +4108,8 @@ sw_result_t sw_aformat_parse_as(uint8_t command,
                                 sw_aformat_response_t *response);
 
 /**
- * The same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after the 128th are left alone.
+ * Does the same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after
+ * the 128th are ignored.
  */
 sw_result_t sw_aformat_parse_line(uint8_t command,
                                   uint8_t layout,
@@ -4106,7 +4120,7 @@ sw_result_t sw_aformat_parse_line(uint8_t command,
                                   sw_aformat_response_t *response);
 
 /**
- * Switches an encoder on: position 0, no alarms, with this address.
+ * Switches a modelled encoder on: position 0, no alarms, with this address.
  */
 sw_result_t sw_aformat_device_start(sw_aformat_device_t *device,
                                     uint8_t ea,
@@ -4119,19 +4133,19 @@ sw_result_t sw_aformat_device_start(sw_aformat_device_t *device,
 sw_result_t sw_aformat_device_set_position(sw_aformat_device_t *device, uint32_t single_turn, uint32_t turns);
 
 /**
- * The causes of these alarms (bits of ALM) come, and those of all others go. A latched alarm stays until a reset.
+ * Sets the causes of these alarms (bits of ALM), and removes those of all others. A latched alarm stays
+ * until a reset.
  */
-sw_result_t sw_aformat_device_set_alarms(sw_aformat_device_t *device,
-                                         uint16_t alm);
+sw_result_t sw_aformat_device_set_alarms(sw_aformat_device_t *device, uint16_t alm);
 
 /**
- * Puts a word into the EEPROM, as its maker does: any address.
+ * Puts a word into the EEPROM at any address, as the manufacturer does.
  */
 sw_result_t sw_aformat_device_set_eeprom(sw_aformat_device_t *device, uint8_t address, uint16_t data);
 
 /**
- * Frames were heard one after the other, as by sw_aformat_hear(): the own requests and the answers of others. SW_SEND with `answer`
- * filled, or SW_PENDING.
+ * Takes frames that were heard one after another, as sw_aformat_hear() does: its own requests and the
+ * answers of others. SW_SEND with `answer` filled, or SW_PENDING.
  */
 sw_result_t sw_aformat_device_hear(sw_aformat_device_t *device,
                                    const uint16_t *contents,
@@ -4146,7 +4160,7 @@ sw_result_t sw_aformat_device_hear(sw_aformat_device_t *device,
 sw_result_t sw_aformat_build_frame(const sw_aformat_frame_t *it, uint32_t *bits);
 
 /**
- * The word of 32 bits that TI's example shifts out: the frame behind idle line.
+ * The word of 32 bits that TI's example shifts out: the frame after idle line.
  */
 sw_result_t sw_aformat_build_word32(const sw_aformat_frame_t *it, uint32_t *word);
 
@@ -4156,7 +4170,7 @@ sw_result_t sw_aformat_build_word32(const sw_aformat_frame_t *it, uint32_t *word
 sw_result_t sw_aformat_parse_frame(uint32_t bits, uint32_t len, sw_aformat_frame_t *it);
 
 /**
- * Whether an encoder takes a request: its version (sw_aformat_option_t), and all arguments.
+ * Whether an encoder accepts a request, by its version (sw_aformat_option_t) and all arguments.
  */
 sw_result_t sw_aformat_check(const sw_aformat_request_t *asked, const sw_aformat_encoder_t *encoder);
 
@@ -4171,8 +4185,8 @@ sw_result_t sw_aformat_crc8(const uint8_t *bytes, size_t count, uint8_t order, u
 sw_result_t sw_aformat_crc3(const uint8_t *bytes, size_t count, uint8_t order, uint8_t *crc);
 
 /**
- * Prepares a receiver of responses of this layout (sw_aformat_layout_t): samples a bit, 1 for a line of bits. `idle` 1: frames of a response
- * may have idle line between them.
+ * Prepares a receiver of responses of this layout (sw_aformat_layout_t); samples per bit, 1 for a line of
+ * bits. `idle` 1: frames of a response may have idle line between them.
  */
 sw_result_t sw_aformat_receiver_start(sw_aformat_receiver_t *receiver,
                                       uint8_t layout,
@@ -4180,8 +4194,9 @@ sw_result_t sw_aformat_receiver_start(sw_aformat_receiver_t *receiver,
                                       bool idle);
 
 /**
- * One sample of the line, 0 or 1. SW_OK with the frames of a response as words, the first bit of the line in bit 15 (SW_MSB_FIRST), at most SW_AFORMAT_FRAMES;
- * SW_PENDING without; or why there was none.
+ * Takes one sample of the line, 0 or 1. SW_OK with the frames of a response as words, the first bit of the
+ * line in bit 15 (SW_MSB_FIRST), at most SW_AFORMAT_FRAMES; SW_PENDING if there is none yet; or why there
+ * was none.
  */
 sw_result_t sw_aformat_receiver_push(sw_aformat_receiver_t *receiver,
                                      uint8_t level,
@@ -4190,7 +4205,8 @@ sw_result_t sw_aformat_receiver_push(sw_aformat_receiver_t *receiver,
                                      size_t *count);
 
 /**
- * One sample of a line on which several encoders answer: as sw_aformat_receiver_push(), and what sw_aformat_bus_push() says of the response.
+ * Takes one sample of a line on which several encoders answer: as sw_aformat_receiver_push(), with the
+ * result of sw_aformat_bus_push() for the response.
  */
 sw_result_t sw_aformat_bus_sample(sw_aformat_bus_t *bus,
                                   sw_aformat_receiver_t *receiver,
@@ -4203,16 +4219,17 @@ sw_result_t sw_aformat_bus_sample(sw_aformat_bus_t *bus,
 sw_result_t sw_aformat_bus_line_ends(sw_aformat_bus_t *bus, sw_aformat_receiver_t *receiver);
 
 /**
- * Who was asked and has not even begun to answer: how many, or a refusal.
+ * The number of encoders that were asked and have not even begun to answer, or a refusal.
  */
 sw_result_t sw_aformat_bus_not_started(const sw_aformat_bus_t *bus);
 
 /**
  * A reset: command 8 (clears the status), 9 (the turns), 10 (both), 11 (gives the only encoder on the line the address `ea`) or 12
  * (**makes this position the zero of the turn and shifts the commutation angle**), eight times, and the status 30 ms later: its ALM is
- * the value. With `careful` 1 the encoder is made to begin its count anew before, and a failure tells whether it was done
- * (SW_E_AFORMAT_NOT_DONE, SW_E_AFORMAT_EFFECT_UNKNOWN); with 0 it is the eight requests of the documents. The line and the widths are
- * those of `m`, which is to be left alone meanwhile. Then sw_aformat_next().
+ * the value. With `careful` 1 the encoder is first made to restart its count, and a failure tells whether
+ * the reset was done (SW_E_AFORMAT_NOT_DONE, SW_E_AFORMAT_EFFECT_UNKNOWN); with 0 only the eight requests
+ * of the documents are sent. The line and the widths are those of `m`, which must not be used meanwhile.
+ * Continue with sw_aformat_next().
  */
 sw_result_t sw_aformat_reset(sw_aformat_procedure_t *p,
                              const sw_aformat_t *m,
@@ -4222,8 +4239,8 @@ sw_result_t sw_aformat_reset(sw_aformat_procedure_t *p,
                              uint64_t now_ns);
 
 /**
- * Reads the EEPROM word at `address`, which is the value. With `careful` 1 the first response is never trusted: an access that was
- * broken off may have left it there; with 0 the caller knows that none was.
+ * Reads the EEPROM word at `address`; the word is the value. With `careful` 1 the first response is never
+ * trusted: it may be left from an interrupted access; use 0 only if you know that there was none.
  */
 sw_result_t sw_aformat_eeprom_read(sw_aformat_procedure_t *p,
                                    const sw_aformat_t *m,
@@ -4273,16 +4290,15 @@ sw_result_t sw_aformat_detect(sw_aformat_procedure_t *p,
                               uint64_t now_ns);
 
 /**
- * What a procedure wants next: SW_SEND with `to_send` filled (hear and poll by sw_aformat_procedure_hear() and
- * sw_aformat_procedure_poll() until the exchange ends, then call this again), SW_PENDING while the exchange runs, SW_OK when the
- * procedure is done, or why it failed.
+ * Returns what a procedure needs next: SW_SEND with `to_send` filled (hear and poll by
+ * sw_aformat_procedure_hear() and sw_aformat_procedure_poll() until the exchange ends, then call this
+ * again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
  */
-sw_result_t sw_aformat_next(sw_aformat_procedure_t *p,
-                            uint64_t now_ns,
-                            sw_aformat_transmission_t *to_send);
+sw_result_t sw_aformat_next(sw_aformat_procedure_t *p, uint64_t now_ns, sw_aformat_transmission_t *to_send);
 
 /**
- * Frames were heard one after the other, as by sw_aformat_hear(). SW_PENDING, or the exchange has ended: SW_OK or its refusal.
+ * Takes frames that were heard one after another, as sw_aformat_hear() does. SW_PENDING, or the exchange
+ * has ended: SW_OK or its refusal.
  */
 sw_result_t sw_aformat_procedure_hear(sw_aformat_procedure_t *p,
                                       const uint16_t *contents,
@@ -4291,27 +4307,26 @@ sw_result_t sw_aformat_procedure_hear(sw_aformat_procedure_t *p,
                                       uint64_t end_ns);
 
 /**
- * It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+ * Sets the time to `now_ns`: ends an exchange whose time has run out. Hand over received data first.
  */
 sw_result_t sw_aformat_procedure_poll(sw_aformat_procedure_t *p, uint64_t now_ns);
 
 /**
- * While an exchange of a procedure is pending, when it is to be polled; afterwards, from when on the line is free. SW_NO_TIME for
- * a state that was not started.
+ * While an exchange of a procedure is pending, the time at which to poll it; afterwards, the time from
+ * which the line is free. SW_NO_TIME for a state that was not started.
  */
 uint64_t sw_aformat_procedure_until_ns(const sw_aformat_procedure_t *p);
 
 /**
- * What a procedure that has ended with SW_OK was made for: the EEPROM word, the type word, ALM after a reset, else 0. `ready_ns` (may
- * be NULL) is the time from which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+ * Returns the result of a procedure that has ended with SW_OK: the EEPROM word, the type word, ALM after a
+ * reset, else 0. `ready_ns` (may be NULL) is the time from which the encoder accepts requests again; it is
+ * also set after a failure, with the failure as the result.
  */
-sw_result_t sw_aformat_value(const sw_aformat_procedure_t *p,
-                             uint32_t *value,
-                             uint64_t *ready_ns);
+sw_result_t sw_aformat_value(const sw_aformat_procedure_t *p, uint32_t *value, uint64_t *ready_ns);
 
 /**
- * After sw_aformat_detect() has ended with SW_OK: the address and the widths of the encoder. SW_E_NO_VALUE before, and for a type word
- * that is not known.
+ * After sw_aformat_detect() has ended with SW_OK: the address and the widths of the encoder. SW_E_NO_VALUE
+ * before that, and for an unknown type word.
  */
 sw_result_t sw_aformat_detected(const sw_aformat_procedure_t *p,
                                 uint8_t *ea,
@@ -4334,7 +4349,7 @@ uint16_t sw_aformat_known_alarms(bool version_3);
 sw_result_t sw_aformat_milli_celsius(uint16_t raw, uint32_t *milli_celsius);
 
 /**
- * The same if the bits are a two's complement, which no document says.
+ * The same if the bits are in two's complement, which no document states.
  */
 sw_result_t sw_aformat_signed_milli_celsius(uint16_t raw, int32_t *milli_celsius);
 
@@ -4359,11 +4374,10 @@ sw_result_t sw_aformat_compose(const sw_aformat_encoder_t *encoder,
                                uint64_t *abs);
 
 /**
- * The 40 bits of a position from its halves of 24 bits, which overlap by eight (ABS24 and ABS24H). SW_E_NO_VALUE if those differ.
+ * The 40 bits of a position from its halves of 24 bits, which overlap by eight (ABS24 and ABS24H).
+ * SW_E_NO_VALUE if the overlapping bits differ.
  */
-sw_result_t sw_aformat_join(uint32_t low24,
-                            uint32_t high24,
-                            uint64_t *abs);
+sw_result_t sw_aformat_join(uint32_t low24, uint32_t high24, uint64_t *abs);
 
 /**
  * How long responses of a layout (sw_aformat_layout_t) take at a rate of the specification, in bit/s, when 1..8 encoders are asked.
@@ -4374,7 +4388,8 @@ sw_result_t sw_aformat_times(uint32_t bits_per_second,
                              sw_aformat_times_t *times);
 
 /**
- * The response of layout ABS40 to command 0 or 4 from its four frames, a 16-bit word each, with all checks; `ea` 255 is any.
+ * Reads the response of layout ABS40 to command 0 or 4 from its four frames, one 16-bit word each, with
+ * all checks; `ea` 255 is any.
  */
 sw_result_t sw_aformat_parse_abs40(uint8_t command,
                                    uint8_t ea,
@@ -4384,7 +4399,8 @@ sw_result_t sw_aformat_parse_abs40(uint8_t command,
                                    sw_aformat_abs40_t *data);
 
 /**
- * Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
+ * Begins, with the request sent, the widths of the encoders, and the addresses asked: a bit each in
+ * `asked` (bit 0 is EA 0).
  */
 sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
                                  const sw_aformat_request_t *asked,
@@ -4392,14 +4408,15 @@ sw_result_t sw_aformat_bus_start(sw_aformat_bus_t *bus,
                                  uint8_t addresses);
 
 /**
- * The same for the whole position of all who are asked: command 4 to the highest of them, for sw_aformat_bus_push_abs40().
+ * Does the same for the whole position of all encoders asked: command 4 to the highest address, for
+ * sw_aformat_bus_push_abs40().
  */
-sw_result_t sw_aformat_bus_start_abs40(sw_aformat_bus_t *bus,
-                                       uint8_t addresses);
+sw_result_t sw_aformat_bus_start_abs40(sw_aformat_bus_t *bus, uint8_t addresses);
 
 /**
- * One response of four frames came, a 16-bit word each. The results are those of sw_aformat_bus_push(), for less flash: nothing but
- * positions is known. SW_E_ARGUMENT for a bus that was started for another layout.
+ * Takes one response of four frames, one 16-bit word each. The results are those of sw_aformat_bus_push(),
+ * for less flash: it knows only positions. SW_E_ARGUMENT for a bus that was started for another
+ * layout.
  */
 sw_result_t sw_aformat_bus_push_abs40(sw_aformat_bus_t *bus,
                                       const uint16_t *words,
@@ -4419,43 +4436,40 @@ sw_result_t sw_aformat_bus_push(sw_aformat_bus_t *bus,
                                 sw_aformat_response_t *response);
 
 /**
- * Who was asked and has not given a good response, a bit each; 0xff for a state that was not started.
+ * The encoders that were asked and have not given a good response, one bit each; 0xff for a state that was
+ * not started.
  */
 uint8_t sw_aformat_bus_missing(const sw_aformat_bus_t *bus);
 
 /**
- * Tells the rate of the timer, once: at least 1 MHz (a coarser one cannot tell one field from the next: SW_E_ARGUMENT). The time is
- * 0 ns now, when the timer reads `ticks`.
+ * Sets the rate of the timer, once: at least 1 MHz (a coarser timer cannot tell one field from the next:
+ * SW_E_ARGUMENT). The time is 0 ns now, when the timer reads `ticks`.
  */
-sw_result_t sw_clock_start(sw_clock_t *clock,
-                           uint32_t timer_hz,
-                           uint32_t ticks);
+sw_result_t sw_clock_start(sw_clock_t *clock, uint32_t timer_hz, uint32_t ticks);
 
 /**
- * The time in ns since the start, from a reading of the timer. It never goes back and wraps after 584 years.
+ * Returns the time in ns since the start, from a reading of the timer. It never goes back and wraps after
+ * 584 years.
  *
  * The timer has to be read within half of its range, 12.6 s at 170 MHz. A timer that went back or was not read for too long gives
- * SW_NO_TIME, once, which all other functions refuse; then time goes on from where it was. Reading the timer and this call belong
- * into one critical section where several priorities do it.
+ * SW_NO_TIME, once, which all other functions refuse; after that, time continues from where it was.
+ * If several priorities do this, read the timer and make this call within one critical section.
  */
 uint64_t sw_clock_ns(sw_clock_t *clock,
                      uint32_t ticks);
 
 /**
- * What an answer says by the rules of a dialect (sw_hdsl_dialect_t): `len` bits of the line, the first in bit 0. Its channels are judged one
- * by one; refused is only what is no answer at all, SW_E_HDSL_TRUNCATED.
+ * Reads an answer by the rules of a dialect (sw_hdsl_dialect_t): `len` bits of the line, the first in bit
+ * 0. Its channels are judged one by one; only bits that are no answer at all are refused,
+ * SW_E_HDSL_TRUNCATED.
  */
-sw_result_t sw_hdsl_parse_answer(uint64_t bits,
-                                 uint32_t len,
-                                 uint8_t dialect,
-                                 sw_hdsl_answer_t *answer);
+sw_result_t sw_hdsl_parse_answer(uint64_t bits, uint32_t len, uint8_t dialect, sw_hdsl_answer_t *answer);
 
 /**
- * The bits of an answer, the first of the line in bit 0, at a running disparity, -1 or 1, which becomes that behind it.
+ * The bits of an answer, the first of the line in bit 0, at a running disparity, -1 or 1, which becomes
+ * the one after it.
  */
-sw_result_t sw_hdsl_build_answer(const sw_hdsl_content_t *content,
-                                 int8_t *rd,
-                                 uint64_t *bits);
+sw_result_t sw_hdsl_build_answer(const sw_hdsl_content_t *content, int8_t *rd, uint64_t *bits);
 
 /**
  * The safe positions in the eight answers of a V-frame.
@@ -4476,36 +4490,36 @@ sw_result_t sw_hdsl_device_start(sw_hdsl_device_t *device, uint32_t encoder_id);
 sw_result_t sw_hdsl_device_set_position(sw_hdsl_device_t *device, uint64_t position);
 
 /**
- * What it answers to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones where it is silent.
+ * Returns its answer to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones if it is
+ * silent.
  */
 sw_result_t sw_hdsl_device_hear(sw_hdsl_device_t *device,
                                 const sw_hdsl_transmission_t *heard,
                                 uint64_t *bits);
 
 /**
- * A tracker for an encoder with this many position bits, 8..40, by the rules of a dialect (sw_hdsl_dialect_t).
+ * Creates a tracker for an encoder with this many position bits, 8..40, by the rules of a dialect
+ * (sw_hdsl_dialect_t).
  */
-sw_result_t sw_hdsl_tracker_start(sw_hdsl_tracker_t *tracker,
-                                  uint8_t position_bits,
-                                  uint8_t dialect);
+sw_result_t sw_hdsl_tracker_start(sw_hdsl_tracker_t *tracker, uint8_t position_bits, uint8_t dialect);
 
 /**
- * An H-frame with this change of speed, -1024..1023 steps.
+ * Takes an H-frame with this change of speed, -1024..1023 steps.
  */
 sw_result_t sw_hdsl_tracker_step(sw_hdsl_tracker_t *tracker, int16_t delta_delta);
 
 /**
- * An H-frame whose acceleration must not be used.
+ * Takes an H-frame whose acceleration must not be used.
  */
 sw_result_t sw_hdsl_tracker_miss(sw_hdsl_tracker_t *tracker);
 
 /**
- * The safe position at the end of a V-frame.
+ * Takes the safe position at the end of a V-frame.
  */
 sw_result_t sw_hdsl_tracker_align(sw_hdsl_tracker_t *tracker, uint64_t vpos);
 
 /**
- * A V-frame without a safe position.
+ * Takes a V-frame without a safe position.
  */
 sw_result_t sw_hdsl_tracker_no_safe_position(sw_hdsl_tracker_t *tracker);
 
@@ -4516,7 +4530,7 @@ sw_result_t sw_hdsl_tracker_registers(const sw_hdsl_tracker_t *tracker,
                                       sw_hdsl_position_registers_t *registers);
 
 /**
- * A monitor at its start, 8, with the penalties of a dialect (sw_hdsl_dialect_t).
+ * Creates a monitor at its initial value, 8, with the penalties of a dialect (sw_hdsl_dialect_t).
  */
 sw_result_t sw_hdsl_quality_start(sw_hdsl_quality_t *quality, uint8_t dialect);
 
@@ -4562,12 +4576,12 @@ sw_result_t sw_hdsl_parse_head(const sw_hdsl_head_t *head,
                                uint8_t *extra_bits);
 
 /**
- * The bits that level a line of this disparity, which becomes that behind them.
+ * The bits that level a line of this disparity, which becomes the one after them.
  */
 sw_result_t sw_hdsl_equalisation(int8_t *disparity, uint8_t *bits);
 
 /**
- * The word of a parameter byte on a line of this disparity, which becomes that behind it.
+ * The word of a parameter byte on a line of this disparity, which becomes the one after it.
  */
 sw_result_t sw_hdsl_build_parameter(uint8_t parameter, int8_t *disparity, uint16_t *word);
 
@@ -4644,11 +4658,10 @@ sw_result_t sw_hdsl_parse_long_answer(const sw_hdsl_long_t *it,
                                       sw_hdsl_data_t *answer);
 
 /**
- * Starts a short message on a running link; its end is in sw_hdsl_finished(). SW_E_HDSL_BUSY, SW_E_HDSL_NOT_LOCKED. What fails may be
- * sent again up to the limit of tries.
+ * Starts a short message on a running link; sw_hdsl_finished() reports its end. SW_E_HDSL_BUSY,
+ * SW_E_HDSL_NOT_LOCKED. A failed message may be sent again up to the limit of tries.
  */
-sw_result_t sw_hdsl_send_short(sw_hdsl_t *m,
-                               const sw_hdsl_short_t *it);
+sw_result_t sw_hdsl_send_short(sw_hdsl_t *m, const sw_hdsl_short_t *it);
 
 /**
  * Starts a long message on a running link, which is sent once.
@@ -4661,7 +4674,7 @@ sw_result_t sw_hdsl_send_long(sw_hdsl_t *m, const sw_hdsl_long_t *it);
 sw_result_t sw_hdsl_reset_messages(sw_hdsl_t *m);
 
 /**
- * Which messages came to their end in the H-frame that was heard last.
+ * Returns which messages ended in the last H-frame heard.
  */
 sw_result_t sw_hdsl_finished(const sw_hdsl_t *m, sw_hdsl_finished_t *finished);
 
@@ -4679,13 +4692,10 @@ sw_result_t sw_hdsl_start(sw_hdsl_t *m,
 sw_result_t sw_hdsl_transmission(const sw_hdsl_t *m, sw_hdsl_transmission_t *to_send);
 
 /**
- * The H-frame is over: the samples of its window (SW_HDSL_WINDOW bytes where an encoder answers), which ended at `end_ns`. The result is
- * the state of the receiver, sw_hdsl_state_t.
+ * Ends the H-frame: takes the samples of its window (SW_HDSL_WINDOW bytes if an encoder answers), which
+ * ended at `end_ns`. The result is the state of the receiver, sw_hdsl_state_t.
  */
-sw_result_t sw_hdsl_hear(sw_hdsl_t *m,
-                         const uint8_t *samples,
-                         size_t len,
-                         uint64_t end_ns);
+sw_result_t sw_hdsl_hear(sw_hdsl_t *m, const uint8_t *samples, size_t len, uint64_t end_ns);
 
 /**
  * The same from a receiver that gives bits: the 61 of the answer, the first of the line in bit 0; all ones without an answer.
@@ -4695,13 +4705,10 @@ sw_result_t sw_hdsl_hear_bits(sw_hdsl_t *m,
                               uint64_t end_ns);
 
 /**
- * The fast position, judged now: **false if it must not be used, and the outputs have to go off**: never heard, no link, estimated, not
- * aligned with the safe one, too fast, older than `max_age_ns`.
+ * The fast position, judged now: **false if it must not be used, and the outputs must be switched off**:
+ * never heard, no link, estimated, not aligned with the safe one, too fast, older than `max_age_ns`.
  */
-bool sw_hdsl_position(const sw_hdsl_t *m,
-                      uint64_t now_ns,
-                      uint64_t max_age_ns,
-                      sw_hdsl_position_t *position);
+bool sw_hdsl_position(const sw_hdsl_t *m, uint64_t now_ns, uint64_t max_age_ns, sw_hdsl_position_t *position);
 
 /**
  * The safe position of the last V-frame, judged now: false if it must not be used.
@@ -4709,7 +4716,7 @@ bool sw_hdsl_position(const sw_hdsl_t *m,
 bool sw_hdsl_safe_position(const sw_hdsl_t *m, uint64_t now_ns, uint64_t max_age_ns, int64_t *position);
 
 /**
- * The H-frame that was heard last: what has to be driven behind its answer, and what it brought.
+ * The last H-frame heard: what has to be driven after its answer, and what it brought.
  */
 sw_result_t sw_hdsl_frame(const sw_hdsl_t *m, sw_hdsl_frame_t *frame);
 
@@ -4724,18 +4731,20 @@ sw_result_t sw_hdsl_state(const sw_hdsl_t *m);
 sw_result_t sw_hdsl_encoder_id(const sw_hdsl_t *m, uint32_t *id);
 
 /**
- * Starts the link anew at the end of the present frame (PRST).
+ * Restarts the link at the end of the present frame (PRST).
  */
 sw_result_t sw_hdsl_restart(sw_hdsl_t *m);
 
 /**
- * So many H-frames went over the line whose answers will not be heard, before the one that is heard next.
+ * Reports that this many H-frames, whose answers will not be heard, were on the line before the next one
+ * heard.
  */
 sw_result_t sw_hdsl_skip(sw_hdsl_t *m, uint8_t frames);
 
 /**
- * A receiver that keeps its frames on an external pulse: `period` eighths of a bit (13.333 ns each) from pulse to pulse, and 1..10 frames
- * for each. Otherwise as sw_hdsl_start(); SW_E_HDSL_PERIOD_TOO_SHORT, SW_E_HDSL_EXTRA_OUT_OF_RANGE.
+ * Prepares a receiver that keeps its frames on an external pulse: `period` eighths of a bit (13.333 ns
+ * each) from pulse to pulse, and 1..10 frames for each. Otherwise as sw_hdsl_start();
+ * SW_E_HDSL_PERIOD_TOO_SHORT, SW_E_HDSL_EXTRA_OUT_OF_RANGE.
  */
 sw_result_t sw_hdsl_start_synchronised(sw_hdsl_t *m,
                                        uint8_t dialect,
@@ -4761,11 +4770,10 @@ bool sw_hdsl_is_on_pulse(const sw_hdsl_t *m);
 bool sw_hdsl_is_in_step(const sw_hdsl_t *m);
 
 /**
- * The pulse of the present frame came this many eighths of a bit after its sampling edge (below 0: before it). To be told before the
- * answer is heard, in frames that are on a pulse.
+ * Reports that the pulse of the present frame came this many eighths of a bit after its sampling edge
+ * (below 0: before it). Call it before the answer is heard, in frames that are on a pulse.
  */
-sw_result_t sw_hdsl_hear_pulse(sw_hdsl_t *m,
-                               int16_t late);
+sw_result_t sw_hdsl_hear_pulse(sw_hdsl_t *m, int16_t late);
 
 /**
  * The registers of a receiver of this dialect (sw_hdsl_dialect_t) before its first frame.
@@ -4773,7 +4781,7 @@ sw_result_t sw_hdsl_hear_pulse(sw_hdsl_t *m,
 sw_result_t sw_hdsl_registers_start(sw_hdsl_registers_t *map, uint8_t dialect);
 
 /**
- * Takes over what the receiver heard last: once behind each sw_hdsl_hear().
+ * Takes over what the receiver heard last: call it once after each sw_hdsl_hear().
  */
 sw_result_t sw_hdsl_registers_apply(sw_hdsl_registers_t *map, const sw_hdsl_t *m);
 
@@ -4783,18 +4791,15 @@ sw_result_t sw_hdsl_registers_apply(sw_hdsl_registers_t *map, const sw_hdsl_t *m
 sw_result_t sw_hdsl_registers_read(sw_hdsl_registers_t *map, uint8_t address, uint8_t *value);
 
 /**
- * Looks at a register: nothing is taken.
+ * Reads a register without taking an entry.
  */
 sw_result_t sw_hdsl_registers_look(const sw_hdsl_registers_t *map, uint8_t address, uint8_t *value);
 
 /**
- * Writes a register as an application does, which starts what it stands for in the receiver: messages, resets, synchronisation. What is
- * refused leaves its value.
+ * Writes a register as an application does, which starts what it stands for in the receiver: messages,
+ * resets, synchronisation. A refused write leaves the value unchanged.
  */
-sw_result_t sw_hdsl_registers_write(sw_hdsl_registers_t *map,
-                                    sw_hdsl_t *m,
-                                    uint8_t address,
-                                    uint8_t value);
+sw_result_t sw_hdsl_registers_write(sw_hdsl_registers_t *map, sw_hdsl_t *m, uint8_t address, uint8_t value);
 
 /**
  * How far the fast position is aligned with the safe one: sw_hdsl_stage_t, or a refusal.
@@ -4896,8 +4901,8 @@ sw_result_t sw_hdsl_parse_acceleration(uint16_t raw, int16_t *delta_delta);
 sw_result_t sw_hdsl_build_acceleration(int16_t delta_delta, uint16_t *out);
 
 /**
- * An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
- * second. While it is called neither end is in use.
+ * Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. The clock of
+ * the timer has 1000 to 2^30 - 1 ticks a second. Neither end may be in use during this call.
  */
 sw_result_t sw_motion_start(sw_motion_axis_t *axis,
                             sw_motion_timer_t *timer,
@@ -4906,10 +4911,10 @@ sw_result_t sw_motion_start(sw_motion_axis_t *axis,
                             const sw_motion_limits_t *limit);
 
 /**
- * The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+ * Returns the event that is due now. Call it in the interrupt of the timer, and once when sw_motion_poll()
+ * returns SW_MOTION_START.
  */
-sw_result_t sw_motion_fire(sw_motion_timer_t *timer,
-                           sw_motion_fired_t *fired);
+sw_result_t sw_motion_fire(sw_motion_timer_t *timer, sw_motion_fired_t *fired);
 
 /**
  * Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal.
@@ -4957,17 +4962,15 @@ sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position)
 bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
 
 /**
- * Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
+ * Prepares a receiver: samples per bit, and data bits per field (8 for a UART).
  */
 sw_result_t sw_nrz_start(sw_nrz_t *receiver, uint32_t samples_per_bit, uint32_t content_bits);
 
 /**
- * `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field, SW_PENDING without.
+ * Takes `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field,
+ * SW_PENDING without.
  */
-sw_result_t sw_nrz_run(sw_nrz_t *receiver,
-                       uint8_t level,
-                       uint64_t samples,
-                       sw_nrz_field_t *field);
+sw_result_t sw_nrz_run(sw_nrz_t *receiver, uint8_t level, uint64_t samples, sw_nrz_field_t *field);
 
 /**
  * Returns the name of a result in `snake_case`, as the logs and test vectors of servowire spell it; "unknown" for a number that is
@@ -4981,16 +4984,13 @@ const char *sw_text(sw_result_t result);
 sw_result_t sw_rtex_axis_start(sw_rtex_axis_t *axis, const sw_rtex_config_t *config);
 
 /**
- * Takes what an update period brought: the block of this axis, or NULL if there was none, heard until `end_ns`. A block of another
- * length is a refused one.
+ * Takes the result of an update period: the block of this axis, or NULL if there was none, heard until
+ * `end_ns`. A block of another length is a refused one.
  */
-sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis,
-                              const uint8_t *bytes,
-                              size_t len,
-                              uint64_t end_ns);
+sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis, const uint8_t *bytes, size_t len, uint64_t end_ns);
 
 /**
- * The block of the next update period, 16 bytes, which counts as sent.
+ * Writes the block of the next update period, 16 bytes, which counts as sent.
  */
 sw_result_t sw_rtex_axis_transmit(sw_rtex_axis_t *axis, uint8_t *bytes, size_t size);
 
@@ -5016,19 +5016,20 @@ sw_result_t sw_rtex_axis_stop(sw_rtex_axis_t *axis,
 sw_result_t sw_rtex_axis_clear(sw_rtex_axis_t *axis);
 
 /**
- * The target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the drive's gear and the limits
- * allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the set-point stays then.
+ * Sets the target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the
+ * drive's gear and the limits allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the
+ * set-point then stays.
  */
-sw_result_t sw_rtex_axis_set_position(sw_rtex_axis_t *axis,
-                                      int32_t position);
+sw_result_t sw_rtex_axis_set_position(sw_rtex_axis_t *axis, int32_t position);
 
 /**
- * The speed of CV or the torque of CT, in the units of the drive.
+ * Sets the speed of CV or the torque of CT, in the units of the drive.
  */
 sw_result_t sw_rtex_axis_set_rate(sw_rtex_axis_t *axis, int32_t rate);
 
 /**
- * Control bits beside Servo_On and the stops (sw_rtex_control_t, added), from the next block on.
+ * Sets the control bits other than Servo_On and the stops (sw_rtex_control_t, added), from the next block
+ * onwards.
  */
 sw_result_t sw_rtex_axis_set_control(sw_rtex_axis_t *axis, uint16_t control);
 
@@ -5038,7 +5039,7 @@ sw_result_t sw_rtex_axis_set_control(sw_rtex_axis_t *axis, uint16_t control);
 int32_t sw_rtex_axis_setpoint(const sw_rtex_axis_t *axis);
 
 /**
- * Where the axis stands, and why.
+ * The state of the axis, and the reason.
  */
 sw_result_t sw_rtex_axis_state(const sw_rtex_axis_t *axis, sw_rtex_state_of_t *state);
 
@@ -5115,12 +5116,12 @@ sw_result_t sw_rtex_build_response32(const sw_rtex_response_t *it,
 uint16_t sw_rtex_known_control(uint16_t control);
 
 /**
- * A control in PH_INIT.
+ * Prepares a control in PH_INIT.
  */
 sw_result_t sw_rtex_phases_start(sw_rtex_phases_t *phases);
 
 /**
- * A step of the control: the phase then (sw_rtex_phase_t), or a refusal.
+ * Makes a step of the control; returns the new phase (sw_rtex_phase_t), or a refusal.
  */
 sw_result_t sw_rtex_phases_step(sw_rtex_phases_t *phases, const sw_rtex_inputs_t *inputs);
 
@@ -5153,7 +5154,7 @@ uint64_t sw_rtex_frame_ns(uint32_t axes);
 uint32_t sw_rtex_axes_within(uint32_t com_ns);
 
 /**
- * The reload value of a timer for a period. SW_E_NO_VALUE if it is no whole number of ticks.
+ * The reload value of a timer for a period. SW_E_NO_VALUE if it is not a whole number of ticks.
  */
 sw_result_t sw_rtex_timer_reload(uint32_t timer_hz, uint32_t period_ns, uint32_t *reload);
 
@@ -5163,7 +5164,8 @@ sw_result_t sw_rtex_timer_reload(uint32_t timer_hz, uint32_t period_ns, uint32_t
 int32_t sw_rtex_step(int32_t before, int32_t after);
 
 /**
- * Whether a step in an update period is within 400 million pulses a second behind the electronic gear: 1 or 0, or a refusal.
+ * Whether a step in an update period is within 400 million pulses per second after the electronic gear: 1
+ * or 0, or a refusal.
  */
 sw_result_t sw_rtex_is_within_limit(int32_t step,
                                     uint32_t update_ns,
@@ -5182,12 +5184,13 @@ sw_result_t sw_rtex_conventional(uint8_t noncyclic,
 uint16_t sw_rtex_parameter_index(uint8_t class_, uint8_t number);
 
 /**
- * Switches a drive on: update period 0.5 ms, one communication an update, gear 1/1.
+ * Switches a drive on: update period 0.5 ms, one communication per update, gear 1/1.
  */
 sw_result_t sw_rtex_drive_start(sw_rtex_drive_t *drive, uint8_t mac_id);
 
 /**
- * An exchange: a command of 16 or 32 bytes comes in, a response of the same length goes out. SW_E_NO_VALUE if the drive is silent.
+ * Makes an exchange: takes a command of 16 or 32 bytes, and returns a response of the same length.
+ * SW_E_NO_VALUE if the drive is silent.
  */
 sw_result_t sw_rtex_drive_hear(sw_rtex_drive_t *drive,
                                const uint8_t *bytes,
@@ -5196,7 +5199,7 @@ sw_result_t sw_rtex_drive_hear(sw_rtex_drive_t *drive,
                                size_t size);
 
 /**
- * Where its motor stands, in command units.
+ * The position of its motor, in command units.
  */
 sw_result_t sw_rtex_drive_position(const sw_rtex_drive_t *drive, int32_t *position);
 
@@ -5228,9 +5231,9 @@ sw_result_t sw_rtex_from_words16(const uint16_t *words,
 sw_result_t sw_rtex_from_words32(const uint32_t *words, size_t count, uint8_t *bytes, size_t len);
 
 /**
- * Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer has to come within `limit` update periods.
- * `attributes` 1: of SW_RTEX_ALARM_COMMAND the attributes of the alarm that is being issued. Normal and profile commands are no handshakes:
- * SW_E_ARGUMENT.
+ * Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer must come
+ * within `limit` update periods. `attributes` 1: SW_RTEX_ALARM_COMMAND reads the attributes of the present
+ * alarm. Normal and profile commands are not handshakes: SW_E_ARGUMENT.
  */
 sw_result_t sw_rtex_handshake_start(sw_rtex_handshake_t *handshake,
                                     uint8_t mac_id,
@@ -5242,12 +5245,13 @@ sw_result_t sw_rtex_handshake_start(sw_rtex_handshake_t *handshake,
                                     uint8_t attributes);
 
 /**
- * Bytes 8 to 15 of the command that has to be sent while it is pending.
+ * Bytes 8 to 15 of the command to send while it is pending.
  */
 sw_result_t sw_rtex_handshake_data(const sw_rtex_handshake_t *handshake, uint8_t (*data)[8]);
 
 /**
- * The block of an update period, NULL if there was none; one that is refused counts as none. SW_PENDING; SW_OK with `done`; or SW_E_RTEX_EXECUTION, ..COMMAND_ERROR, ..TIMED_OUT.
+ * Takes the block of an update period, NULL if there was none; a refused block counts as none.
+ * SW_PENDING; SW_OK with `done`; or SW_E_RTEX_EXECUTION, ..COMMAND_ERROR, ..TIMED_OUT.
  */
 sw_result_t sw_rtex_handshake_hear(sw_rtex_handshake_t *handshake,
                                    const uint8_t *bytes,
@@ -5264,7 +5268,7 @@ sw_result_t sw_rtex_sub_start(sw_rtex_sub_handshake_t *handshake,
                               uint32_t limit);
 
 /**
- * The sub block of an update period, 16 bytes, NULL if there was none; as sw_rtex_handshake_hear().
+ * Takes the sub block of an update period, 16 bytes, NULL if there was none; as sw_rtex_handshake_hear().
  */
 sw_result_t sw_rtex_sub_hear(sw_rtex_sub_handshake_t *handshake,
                              const uint8_t *bytes,
@@ -5290,24 +5294,23 @@ sw_result_t sw_rtex_move_start(sw_rtex_move_t *motion,
 sw_result_t sw_rtex_move_data(const sw_rtex_move_t *motion, uint8_t *noncyclic, uint8_t (*data)[8]);
 
 /**
- * The block of an update period, NULL if there was none; as sw_rtex_handshake_hear(), and SW_E_RTEX_NOT_STARTED.
+ * Takes the block of an update period, NULL if there was none; as sw_rtex_handshake_hear(), and
+ * SW_E_RTEX_NOT_STARTED.
  */
-sw_result_t sw_rtex_move_hear(sw_rtex_move_t *motion,
-                              const uint8_t *bytes,
-                              size_t len,
-                              sw_rtex_done_t *done);
+sw_result_t sw_rtex_move_hear(sw_rtex_move_t *motion, const uint8_t *bytes, size_t len, sw_rtex_done_t *done);
 
 /**
- * A ring that sends `invalid` update periods of invalid data before its first commands, in blocks of 16 or 32 bytes.
+ * Prepares a ring that sends `invalid` update periods of invalid data before its first commands, in blocks
+ * of 16 or 32 bytes.
  */
-sw_result_t sw_rtex_ring_start(sw_rtex_ring_t *ring,
-                               uint8_t block_bytes,
-                               uint32_t invalid);
+sw_result_t sw_rtex_ring_start(sw_rtex_ring_t *ring, uint8_t block_bytes, uint32_t invalid);
 
 /**
- * An update period of all axes, which were started and stand in the order of the ring: takes the blocks that came, one after the other, heard
- * until `end_ns`, and writes those of the next period. As soon as one axis fails the others stop in the same call. `rx` NULL: no frame came.
- * SW_E_STATE if one of the axes was not started, SW_E_ARGUMENT if two have the same MAC-ID or the memory has another size: nothing was done.
+ * Makes an update period of all axes, which were started and are in the order of the ring: takes the
+ * blocks received, one after another, heard until `end_ns`, and writes those of the next period. As soon
+ * as one axis fails the others stop in the same call. `rx` NULL: no frame came. SW_E_STATE if one of the
+ * axes was not started, SW_E_ARGUMENT if two have the same MAC-ID or the memory has another size: nothing
+ * was done.
  */
 sw_result_t sw_rtex_ring_update(sw_rtex_ring_t *ring,
                                 sw_rtex_axis_t *axes,
@@ -5324,7 +5327,7 @@ sw_result_t sw_rtex_ring_update(sw_rtex_ring_t *ring,
 sw_result_t sw_rtex_ring_failed(const sw_rtex_ring_t *ring);
 
 /**
- * Forgets the failure: then each axis is cleared by sw_rtex_axis_clear().
+ * Forgets the failure; then clear each axis with sw_rtex_axis_clear().
  */
 sw_result_t sw_rtex_ring_clear(sw_rtex_ring_t *ring);
 
@@ -5339,7 +5342,7 @@ sw_result_t sw_rtex_check_response(uint8_t block_bytes,
                                    size_t len);
 
 /**
- * What a drive with this MAC-ID finds in a command.
+ * Finds the faults that a drive with this MAC-ID reports for a command.
  */
 sw_result_t sw_rtex_check_command(uint8_t block_bytes,
                                   uint8_t mac_id,
@@ -5353,12 +5356,12 @@ sw_result_t sw_rtex_check_command(uint8_t block_bytes,
 sw_result_t sw_rtex_echo_start(sw_rtex_echo_t *echo, uint16_t limit);
 
 /**
- * The echo of a response, 0..3, or 255 for none: 1 if the watch has tripped, 0 if not.
+ * Takes the echo of a response, 0..3, or 255 for none; returns 1 if the watch has tripped, 0 if not.
  */
 sw_result_t sw_rtex_echo_sample(sw_rtex_echo_t *echo, uint8_t update_counter);
 
 /**
- * A counter that begins behind `invalid` update periods of invalid data.
+ * Prepares a counter that begins after `invalid` update periods of invalid data.
  */
 sw_result_t sw_rtex_counter_start(sw_rtex_counter_t *counter, uint32_t invalid);
 
@@ -5368,16 +5371,13 @@ sw_result_t sw_rtex_counter_start(sw_rtex_counter_t *counter, uint32_t invalid);
 sw_result_t sw_rtex_counter_next(sw_rtex_counter_t *counter);
 
 /**
- * The block that switches the servo off behind a command, 16 bytes: counter one on, Servo_On cleared, all else kept. SW_E_NO_VALUE if a drive
- * would not look at Servo_On in it.
+ * The block that switches the servo off after a command, 16 bytes: counter advanced by one, Servo_On
+ * cleared, everything else kept. SW_E_NO_VALUE if a drive would not evaluate Servo_On in it.
  */
-sw_result_t sw_rtex_servo_off_after(const uint8_t *before,
-                                    size_t len,
-                                    uint8_t *bytes,
-                                    size_t size);
+sw_result_t sw_rtex_servo_off_after(const uint8_t *before, size_t len, uint8_t *bytes, size_t size);
 
 /**
- * Whether a block switches the servo off for certain: 1 or 0, or a refusal.
+ * Whether a block certainly switches the servo off: 1 or 0, or a refusal.
  */
 sw_result_t sw_rtex_is_servo_off(const uint8_t *bytes, size_t len);
 
@@ -5451,7 +5451,7 @@ sw_result_t sw_sorte_parse_payload(const uint8_t *bytes, size_t len, uint16_t (*
 sw_result_t sw_sorte_crc8(const uint8_t *bytes, size_t len, uint8_t *crc);
 
 /**
- * Where the frame begins behind its preamble, which ends with D5h.
+ * Where the frame begins after its preamble, which ends with D5h.
  */
 sw_result_t sw_sorte_strip_preamble(const uint8_t *bytes, size_t len, size_t *at);
 
@@ -5486,7 +5486,7 @@ sw_result_t sw_sorte_parse_sync(const uint8_t *bytes, size_t len, sw_sorte_sync_
 sw_result_t sw_sorte_build_sync(const sw_sorte_sync_t *sync, uint8_t *bytes, size_t size);
 
 /**
- * A DISCOVERY frame, whose table lies behind it: sw_sorte_discovered().
+ * Reads a DISCOVERY frame; sw_sorte_discovered() reads its table.
  */
 sw_result_t sw_sorte_parse_discovery(const uint8_t *bytes, size_t len, sw_sorte_discovery_t *discovery);
 
@@ -5500,14 +5500,14 @@ sw_result_t sw_sorte_discovered(const uint8_t *bytes,
                                 uint16_t *output);
 
 /**
- * The DISCOVERY frame that a master sends, SW_SORTE_DISCOVERY bytes; `last` true for the last one of its phase, with which the devices go on.
+ * The DISCOVERY frame that a master sends, SW_SORTE_DISCOVERY bytes; `last` true for the last one of its
+ * phase, which takes the devices to the next phase.
  */
-sw_result_t sw_sorte_build_discovery(bool last,
-                                     uint8_t *bytes,
-                                     size_t size);
+sw_result_t sw_sorte_build_discovery(bool last, uint8_t *bytes, size_t size);
 
 /**
- * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.
+ * Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for any other
+ * index.
  */
 uint32_t sw_step_ramp(uint8_t i);
 
@@ -5532,13 +5532,10 @@ sw_result_t sw_step_next(uint32_t t_step, uint32_t prev, sw_step_time_t *time);
 sw_result_t sw_step_next_as_pru(uint32_t entry, uint32_t speed, uint32_t prev, sw_step_time_t *time);
 
 /**
- * Whether a move with the published ramp is possible: `k` steps an entry, the first step `init_sync` ns into its cycle. `pru_is_exact`
- * (may be NULL) tells whether the PRU computes it without error.
+ * Whether a move with the published ramp is possible: `k` steps per entry, the first step `init_sync` ns
+ * into its cycle. `pru_is_exact` (may be NULL) tells whether the PRU computes it without error.
  */
-sw_result_t sw_step_check(uint32_t speed,
-                          uint32_t k,
-                          uint32_t init_sync,
-                          bool *pru_is_exact);
+sw_result_t sw_step_check(uint32_t speed, uint32_t k, uint32_t init_sync, bool *pru_is_exact);
 
 /**
  * How long a move of `steps` with the published ramp takes, ns.
@@ -5576,7 +5573,8 @@ sw_result_t sw_step_microstep(uint8_t code, sw_step_microstep_t *profile);
 sw_result_t sw_step_tone(uint8_t number, sw_step_tone_t *tone);
 
 /**
- * The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.
+ * The response to a request from UART bytes; anything after it is ignored. Typed calls for IDs 0 to 3 are
+ * faster.
  */
 sw_result_t sw_tformat_parse(const sw_tformat_request_t *asked,
                              const uint8_t *bytes,
@@ -5584,8 +5582,8 @@ sw_result_t sw_tformat_parse(const sw_tformat_request_t *asked,
                              sw_tformat_response_t *response);
 
 /**
- * The response from what a UART received since the request began, with the receiver on all the time: the own request, then the
- * response.
+ * The response from what a UART received since the request began, with the receiver on all the time: the
+ * request itself, then the response.
  */
 sw_result_t sw_tformat_parse_echoed(const sw_tformat_request_t *asked,
                                     const uint8_t *bytes,
@@ -5594,7 +5592,7 @@ sw_result_t sw_tformat_parse_echoed(const sw_tformat_request_t *asked,
 
 /**
  * The response from line bits on a grid of ten bits a field, start bits and delimiters included: `bits` of them in `bytes`, in the
- * order of sw_bit_order_t. What follows the response, and bits after the 128th, are left alone.
+ * order of sw_bit_order_t. Anything after the response, and bits after the 128th, are ignored.
  */
 sw_result_t sw_tformat_parse_line(const sw_tformat_request_t *asked,
                                   const uint8_t *bytes,
@@ -5603,12 +5601,12 @@ sw_result_t sw_tformat_parse_line(const sw_tformat_request_t *asked,
                                   sw_tformat_response_t *response);
 
 /**
- * What an encoder makes of received fields: the request at the front.
+ * Reads received fields as an encoder does: the request at the front.
  */
 sw_result_t sw_tformat_parse_request(const uint8_t *bytes, size_t len, sw_tformat_request_t *asked);
 
 /**
- * Why sw_tformat_parse() refuses these bytes. The result is the same as there.
+ * Returns why sw_tformat_parse() refuses these bytes. The result is the same as there.
  */
 sw_result_t sw_tformat_why(const sw_tformat_request_t *asked,
                            const uint8_t *bytes,
@@ -5663,7 +5661,7 @@ sw_result_t sw_tformat_widths(uint8_t enid,
                               bool *documented);
 
 /**
- * Switches an encoder on: position 0, no alarms. `bits_per_second` is 2500000 or 5000000.
+ * Switches a modelled encoder on: position 0, no alarms. `bits_per_second` is 2500000 or 5000000.
  */
 sw_result_t sw_tformat_device_start(sw_tformat_device_t *device, uint8_t enid, uint32_t bits_per_second);
 
@@ -5673,10 +5671,10 @@ sw_result_t sw_tformat_device_start(sw_tformat_device_t *device, uint8_t enid, u
 sw_result_t sw_tformat_device_set_position(sw_tformat_device_t *device, uint32_t abs, uint32_t abm);
 
 /**
- * The causes of these alarms (sw_tformat_almc_t, added) come, and those of all others go. A latched alarm stays until ID 7 or C.
+ * Sets the causes of these alarms (sw_tformat_almc_t, added), and removes those of all others. A latched
+ * alarm stays until ID 7 or C.
  */
-sw_result_t sw_tformat_device_set_alarms(sw_tformat_device_t *device,
-                                         uint8_t almc);
+sw_result_t sw_tformat_device_set_alarms(sw_tformat_device_t *device, uint8_t almc);
 
 /**
  * The EEPROM page that is selected, 0..5; 255 for a state that was not started.
@@ -5684,7 +5682,8 @@ sw_result_t sw_tformat_device_set_alarms(sw_tformat_device_t *device,
 uint8_t sw_tformat_device_page(const sw_tformat_device_t *device);
 
 /**
- * A sound request that ended at `now_ns`: what it does, and its response. SW_E_NO_VALUE where the encoder is silent.
+ * Takes a sound request that ended at `now_ns`: carries it out, and returns its response. SW_E_NO_VALUE if
+ * the encoder is silent.
  */
 sw_result_t sw_tformat_device_answer(sw_tformat_device_t *device,
                                      const sw_tformat_request_t *asked,
@@ -5692,7 +5691,8 @@ sw_result_t sw_tformat_device_answer(sw_tformat_device_t *device,
                                      sw_tformat_response_t *response);
 
 /**
- * Bytes were received without framing error, the last one ended at `end_ns`. SW_SEND with `answer` filled, or SW_PENDING.
+ * Takes bytes received without a framing error; the last one ended at `end_ns`. SW_SEND with `answer`
+ * filled, or SW_PENDING.
  */
 sw_result_t sw_tformat_device_hear(sw_tformat_device_t *device,
                                    const uint8_t *bytes,
@@ -5701,7 +5701,7 @@ sw_result_t sw_tformat_device_hear(sw_tformat_device_t *device,
                                    sw_tformat_answer_t *answer);
 
 /**
- * A byte that ended at `end_ns` was received with a framing error.
+ * Reports a byte that ended at `end_ns` and was received with a framing error.
  */
 sw_result_t sw_tformat_device_framing_error(sw_tformat_device_t *device,
                                             uint64_t end_ns,
@@ -5742,8 +5742,9 @@ sw_result_t sw_tformat_tolerate(sw_tformat_t *m,
                                 uint8_t almc);
 
 /**
- * Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
- * and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before the time of sw_tformat_until_ns().
+ * Begins a read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later.
+ * The result is SW_SEND, and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before
+ * the time of sw_tformat_until_ns().
  */
 sw_result_t sw_tformat_read(sw_tformat_t *m,
                             uint8_t id,
@@ -5751,8 +5752,8 @@ sw_result_t sw_tformat_read(sw_tformat_t *m,
                             sw_tformat_transmission_t *to_send);
 
 /**
- * Begins one exchange of any kind. IDs 6, 7, 8 and C change the encoder: the procedures do it with the repetitions, waits and
- * checks that belong to it.
+ * Begins one exchange of any kind. IDs 6, 7, 8 and C change the encoder: use the procedures, which make
+ * the necessary repetitions, waits and checks.
  */
 sw_result_t sw_tformat_start(sw_tformat_t *m,
                              const sw_tformat_request_t *asked,
@@ -5761,7 +5762,7 @@ sw_result_t sw_tformat_start(sw_tformat_t *m,
 
 /**
  * Takes bytes that were received back to back; the last one ended at `end_ns`, or was handed over within the latency of the line
- * after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
+ * after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if there was no request.
  */
 sw_result_t sw_tformat_hear(sw_tformat_t *m,
                             const uint8_t *bytes,
@@ -5769,7 +5770,7 @@ sw_result_t sw_tformat_hear(sw_tformat_t *m,
                             uint64_t end_ns);
 
 /**
- * The UART reports a framing error for the byte that ended at `end_ns`.
+ * Reports a framing error of the UART for the byte that ended at `end_ns`.
  */
 sw_result_t sw_tformat_framing_error(sw_tformat_t *m, uint64_t end_ns);
 
@@ -5779,8 +5780,8 @@ sw_result_t sw_tformat_framing_error(sw_tformat_t *m, uint64_t end_ns);
 sw_result_t sw_tformat_poll(sw_tformat_t *m, uint64_t now_ns);
 
 /**
- * While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
- * SW_NO_TIME for a state that was not started.
+ * While an exchange is pending, the time at which to poll it; afterwards, the time from which the line is
+ * free. 0 if nothing was asked, SW_NO_TIME for a state that was not started.
  */
 uint64_t sw_tformat_until_ns(const sw_tformat_t *m);
 
@@ -5792,11 +5793,12 @@ sw_result_t sw_tformat_response(const sw_tformat_t *m,
                                 sw_tformat_response_t *response);
 
 /**
- * The angle of the shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.**
+ * The angle of the shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs
+ * must be switched off.**
  *
  * It is judged now: no older than `max_age_ns` since it was sampled, from a sound response to this master's request, of the right
  * encoder, without alarms that concern the single turn (tolerated are OF, BA, BE, ME and OS, and what sw_tformat_tolerate() names).
- * `angle` is left alone if the result is false.
+ * `angle` is unchanged if the result is false.
  */
 bool sw_tformat_angle(const sw_tformat_t *m,
                       uint64_t now_ns,
@@ -5805,7 +5807,7 @@ bool sw_tformat_angle(const sw_tformat_t *m,
 
 /**
  * The position with its turns, judged now: false if it must not be used. Tolerated are OF and BA, and what sw_tformat_tolerate()
- * names. Turns come with ID 3. `position` is left alone if the result is false.
+ * names. Turns come with ID 3. `position` is unchanged if the result is false.
  */
 bool sw_tformat_position(const sw_tformat_t *m,
                          uint64_t now_ns,
@@ -5818,13 +5820,14 @@ bool sw_tformat_position(const sw_tformat_t *m,
 sw_result_t sw_tformat_doubt(const sw_tformat_t *m, uint64_t now_ns, uint64_t max_age_ns);
 
 /**
- * ID 7: clears all latched errors, ten requests. Position and turns stay. Then sw_tformat_next().
+ * ID 7: clears all latched errors, ten requests. Position and turns stay. Continue with sw_tformat_next().
  */
 sw_result_t sw_tformat_clear_errors(sw_tformat_procedure_t *p, uint64_t now_ns);
 
 /**
- * ID 8: makes this position the zero of the turn, and reads what became of it. **Shifts the commutation angle of the motor.** The
- * shaft stands still; `tolerance` is how far from zero, in counts, it may seem to be afterwards.
+ * ID 8: makes this position the zero of the turn, and reads the result back. **Shifts the commutation
+ * angle of the motor.** The shaft must be at rest; `tolerance` is how far from zero, in counts, it may
+ * appear to be afterwards.
  */
 sw_result_t sw_tformat_zero_single_turn_and_shift_commutation_angle(sw_tformat_procedure_t *p,
                                                                     uint8_t abs_bits,
@@ -5832,8 +5835,8 @@ sw_result_t sw_tformat_zero_single_turn_and_shift_commutation_angle(sw_tformat_p
                                                                     uint64_t now_ns);
 
 /**
- * ID C: clears turns and errors, and reads what became of it. **The machine loses its multi-turn reference.** `tolerance` is how
- * many turns it may seem to be off zero afterwards.
+ * ID C: clears turns and errors, and reads the result back. **The machine loses its multi-turn
+ * reference.** `tolerance` is how many turns it may appear to be off zero afterwards.
  */
 sw_result_t sw_tformat_clear_turns_and_lose_multi_turn_reference(sw_tformat_procedure_t *p,
                                                                  uint8_t abs_bits,
@@ -5847,7 +5850,8 @@ sw_result_t sw_tformat_clear_turns_and_lose_multi_turn_reference(sw_tformat_proc
 sw_result_t sw_tformat_eeprom_read(sw_tformat_procedure_t *p, uint8_t page, uint8_t address, uint64_t now_ns);
 
 /**
- * Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: know what is at the address.
+ * Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: make
+ * sure what is at the address.
  */
 sw_result_t sw_tformat_eeprom_write(sw_tformat_procedure_t *p,
                                     uint8_t page,
@@ -5856,15 +5860,15 @@ sw_result_t sw_tformat_eeprom_write(sw_tformat_procedure_t *p,
                                     uint64_t now_ns);
 
 /**
- * Finds the encoder after power-on: 1.5 s later at 5 Mbit/s, then at 2.5 Mbit/s. The master's line is that of the encoder when it
- * ends with SW_OK; the value is its ENID.
+ * Finds the encoder after power-on: after 1.5 s it tries 5 Mbit/s, then 2.5 Mbit/s. The master's line is
+ * that of the encoder when it ends with SW_OK; the value is its ENID.
  */
-sw_result_t sw_tformat_detect(sw_tformat_procedure_t *p,
-                              uint64_t power_on_ns);
+sw_result_t sw_tformat_detect(sw_tformat_procedure_t *p, uint64_t power_on_ns);
 
 /**
- * What a procedure wants next: SW_SEND with `to_send` filled (the exchange has begun in the master: hear and poll it until it ends,
- * then call this again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
+ * Returns what a procedure needs next: SW_SEND with `to_send` filled (the exchange has begun in the
+ * master: hear and poll it until it ends, then call this again), SW_PENDING while the exchange runs, SW_OK
+ * when the procedure is done, or why it failed.
  *
  * The first call begins. After the end the line and the encoder are free at sw_tformat_value()'s `ready_ns`.
  */
@@ -5874,15 +5878,15 @@ sw_result_t sw_tformat_next(sw_tformat_procedure_t *p,
                             sw_tformat_transmission_t *to_send);
 
 /**
- * What a procedure that has ended with SW_OK was made for: the EEPROM byte, ENID, ABM or ABS. `ready_ns` (may be NULL) is the time from
- * which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+ * Returns the result of a procedure that has ended with SW_OK: the EEPROM byte, ENID, ABM or ABS.
+ * `ready_ns` (may be NULL) is the time from which the encoder accepts requests again; it is also set after
+ * a failure, with the failure as the result.
  */
-sw_result_t sw_tformat_value(const sw_tformat_procedure_t *p,
-                             uint32_t *value,
-                             uint64_t *ready_ns);
+sw_result_t sw_tformat_value(const sw_tformat_procedure_t *p, uint32_t *value, uint64_t *ready_ns);
 
 /**
- * The request in 10-bit SPI words, sent most significant bit first, one a field, at most 4. The idle word 0x3ff follows.
+ * The request in 10-bit SPI words, sent most significant bit first, one per field, at most 4. The idle
+ * word 0x3ff follows.
  */
 sw_result_t sw_tformat_build_spi10(const sw_tformat_request_t *asked,
                                    uint16_t *words,
@@ -5898,7 +5902,8 @@ sw_result_t sw_tformat_parse_spi10(const sw_tformat_request_t *asked,
                                    sw_tformat_response_t *response);
 
 /**
- * What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
+ * The words that a 16-bit SPI sends in a whole transaction, idle while the response comes; at most 10
+ * words.
  */
 sw_result_t sw_tformat_build_spi16(const sw_tformat_request_t *asked,
                                    uint16_t *words,
@@ -5934,8 +5939,9 @@ sw_result_t sw_tformat_parse_encoder_id(const uint8_t *bytes, size_t len, sw_tfo
 sw_result_t sw_tformat_parse_all(const uint8_t *bytes, size_t len, sw_tformat_all_t *data);
 
 /**
- * The release of the library: SERVOWIRE_VERSION, or the header that was compiled in belongs to another one. States and structs may
- * differ then: compare it once, before the first state is started.
+ * The release of the library: SERVOWIRE_VERSION, unless your program was compiled with the header of
+ * another release. States and structs may then differ, so compare it once, before the first state is
+ * started.
  */
 uint32_t sw_version(void);
 

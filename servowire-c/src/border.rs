@@ -98,8 +98,7 @@ pub(crate) fn fill<T: Copy>(to: &mut [MaybeUninit<T>], from: &[T]) -> Result<(),
 
 /// Decodes the caller's bytes: the value is written if there is one.
 ///
-/// # Safety
-/// As for [`read`].
+/// # Safety As for [`read`].
 #[inline(always)]
 pub(crate) unsafe fn parsed<T>(
     bytes: *const u8,

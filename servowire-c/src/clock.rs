@@ -7,11 +7,11 @@ use servowire_core::{TickRate, TimeBase};
 use crate::border::{OK, Refused, border, state};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it with `SW_E_CLOCK`, and all from 2^63 ns
-/// on, so that some time less or more than it is refused too.
+/// No time: what `sw_clock_ns()` gives for a clock that cannot be trusted. Every function refuses it, and
+/// all times from 2^63 ns onwards, with `SW_E_CLOCK`, so that a little less or more than it is refused too.
 pub const SW_NO_TIME: u64 = u64::MAX;
 
-/// Nanoseconds from a free-running 32-bit timer that wraps. One context at a time.
+/// Nanoseconds from a free-running 32-bit timer that wraps. Only one context at a time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_clock_t {
@@ -19,8 +19,8 @@ pub struct sw_clock_t {
 }
 state!(sw_clock_t, TimeBase<32>, 0x81);
 
-/// Tells the rate of the timer, once: at least 1 MHz (a coarser one cannot tell one field from the next: SW_E_ARGUMENT). The time is
-/// 0 ns now, when the timer reads `ticks`.
+/// Sets the rate of the timer, once: at least 1 MHz (a coarser timer cannot tell one field from the next:
+/// SW_E_ARGUMENT). The time is 0 ns now, when the timer reads `ticks`.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_clock_start(
     clock: Option<&mut MaybeUninit<sw_clock_t>>,
@@ -34,11 +34,12 @@ pub extern "C" fn sw_clock_start(
     })
 }
 
-/// The time in ns since the start, from a reading of the timer. It never goes back and wraps after 584 years.
+/// Returns the time in ns since the start, from a reading of the timer. It never goes back and wraps after
+/// 584 years.
 ///
 /// The timer has to be read within half of its range, 12.6 s at 170 MHz. A timer that went back or was not read for too long gives
-/// SW_NO_TIME, once, which all other functions refuse; then time goes on from where it was. Reading the timer and this call belong
-/// into one critical section where several priorities do it.
+/// SW_NO_TIME, once, which all other functions refuse; after that, time continues from where it was.
+/// If several priorities do this, read the timer and make this call within one critical section.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_clock_ns(clock: Option<&mut sw_clock_t>, ticks: u32) -> u64 {
     sw_clock_t::get(clock).ok().and_then(|time| time.now_ns(ticks).ok()).unwrap_or(SW_NO_TIME)

@@ -18,7 +18,7 @@ pub enum sw_motion_error_t {
     SW_E_MOTION_MOVING = -0x601,
     /// Two steps could fall into one tick of the clock.
     SW_E_MOTION_SPEED_ABOVE_CLOCK = -0x602,
-    /// More steps than 31 bits count.
+    /// More steps than 31 bits can count.
     SW_E_MOTION_TOO_MANY_STEPS = -0x603,
     /// No room.
     SW_E_MOTION_QUEUE_FULL = -0x604,
@@ -32,19 +32,20 @@ pub enum sw_motion_error_t {
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_motion_work_t {
-    /// At rest where it is to be.
+    /// At rest at its target.
     SW_MOTION_REST = 0,
     /// Poll again.
     SW_MOTION_MORE = 1,
-    /// Fire the interrupt now: it stands, and there is something for it.
+    /// Fire the interrupt now: it is stopped, and there is motion for it.
     SW_MOTION_START = 2,
-    /// Nothing before the interrupt has gone on.
+    /// Nothing until the interrupt has progressed.
     SW_MOTION_LATER = 3,
     /// The stop needs more slots than the queue has: the axis comes to rest.
     SW_MOTION_TOO_FEW_SLOTS = 4,
 }
 
-/// What lies between the background and the interrupt. It is `static`: both ends hold its address, and it is never moved or copied.
+/// The queue between the background and the interrupt. It is `static`: both ends hold its address, and it
+/// is never moved or copied.
 #[repr(C)]
 #[derive(Debug)]
 pub struct sw_motion_queue_t {
@@ -53,7 +54,7 @@ pub struct sw_motion_queue_t {
 const _: () = assert!(size_of::<Queue<SLOTS>>() <= size_of::<sw_motion_queue_t>());
 const _: () = assert!(align_of::<Queue<SLOTS>>() <= align_of::<sw_motion_queue_t>());
 
-/// The end of the background. It belongs to its queue: it is not copied.
+/// The background end. It belongs to its queue: it is not copied.
 #[repr(C)]
 #[derive(Debug)]
 pub struct sw_motion_axis_t {
@@ -61,7 +62,7 @@ pub struct sw_motion_axis_t {
 }
 state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, 0x61);
 
-/// The end of the interrupt. It belongs to its queue: it is not copied.
+/// The interrupt end. It belongs to its queue: it is not copied.
 #[repr(C)]
 #[derive(Debug)]
 #[expect(missing_copy_implementations, reason = "it belongs to its queue")]
@@ -82,13 +83,14 @@ pub struct sw_motion_limits_t {
     pub acceleration: u32,
 }
 
-/// What the interrupt does.
+/// What the interrupt has to do.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_motion_fired_t {
-    /// Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none, stop the timer.
+    /// Ticks until the next interrupt, at least 1: add them to the compare register. 0: there is none; stop
+    /// the timer.
     pub wait: u32,
-    /// 1: make a step now. DIR has been right for the time that the driver needs.
+    /// 1: make a step now. DIR has been valid for the time that the driver needs.
     pub step: u8,
     /// The level of DIR from now on, 1 for reverse. It never changes together with a step.
     pub reverse: u8,
@@ -104,8 +106,8 @@ fn limits(it: &sw_motion_limits_t) -> Result<Limits, Refused> {
     if it.jerk == 0 { Ok(limits) } else { in_range(limits.with_jerk(it.jerk).ok()) }
 }
 
-/// An axis at rest at position 0: its two ends, and the `static` queue between them. The clock of the timer has 1000 to 2^30 - 1 ticks a
-/// second. While it is called neither end is in use.
+/// Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. The clock of
+/// the timer has 1000 to 2^30 - 1 ticks a second. Neither end may be in use during this call.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_start(
     axis: Option<&mut MaybeUninit<sw_motion_axis_t>>,
@@ -128,7 +130,8 @@ pub extern "C" fn sw_motion_start(
     })
 }
 
-/// The event that is due now: called in the interrupt of the timer, and once when sw_motion_poll() says SW_MOTION_START.
+/// Returns the event that is due now. Call it in the interrupt of the timer, and once when sw_motion_poll()
+/// returns SW_MOTION_START.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_fire(
     timer: Option<&mut sw_motion_timer_t>,

@@ -29,7 +29,7 @@ pub struct sw_nrz_field_t {
     pub delimiter: u8,
 }
 
-/// Prepares a receiver: samples a bit, and data bits a field (8 for a UART).
+/// Prepares a receiver: samples per bit, and data bits per field (8 for a UART).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_nrz_start(
     receiver: Option<&mut MaybeUninit<sw_nrz_t>>,
@@ -43,7 +43,8 @@ pub extern "C" fn sw_nrz_start(
     })
 }
 
-/// `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field, SW_PENDING without.
+/// Takes `samples` samples of one level (0 or 1) at once; a run ends at most one field. SW_OK with a field,
+/// SW_PENDING without.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_nrz_run(
     receiver: Option<&mut sw_nrz_t>,

@@ -4,8 +4,8 @@ use core::ffi::{CStr, c_char};
 
 use crate::rtex::names::sw_rtex_error_t;
 
-/// What a call came to: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the `sw_..._error_t` of the
-/// protocols; `sw_text()` has a text for each.
+/// The result of a call: 0 and above is good, below 0 is refused. The names are in `sw_code_t` and in the
+/// `sw_..._error_t` of the protocols; `sw_text()` has a text for each.
 ///
 /// A refusal of a protocol is `-(256 * protocol + number)`. The numbers never change.
 pub type sw_result_t = i32;
@@ -18,7 +18,7 @@ pub enum sw_code_t {
     SW_OK = 0,
     /// Not finished: wait, hear, poll.
     SW_PENDING = 1,
-    /// Something is to be sent: look at the transmission.
+    /// Something has to be sent: see the transmission.
     SW_SEND = 2,
     /// A pointer is NULL.
     SW_E_NULL = -1,
@@ -28,9 +28,9 @@ pub enum sw_code_t {
     SW_E_STATE = -3,
     /// The buffer of the caller is too short; nothing was written.
     SW_E_SHORT_BUFFER = -4,
-    /// The clock went back or was not read in time, or `SW_NO_TIME` was handed on.
+    /// The clock went back or was not read in time, or `SW_NO_TIME` was passed on.
     SW_E_CLOCK = -5,
-    /// There is no such value now: nothing was exchanged yet, or it was something else.
+    /// There is no such value now: nothing was exchanged yet, or the exchange was of another kind.
     SW_E_NO_VALUE = -6,
     /// An exchange is pending, or the line is not free yet at this time: nothing was begun.
     SW_E_NOT_FREE = -7,

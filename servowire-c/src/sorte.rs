@@ -26,17 +26,17 @@ pub enum sw_sorte_error_t {
     SW_E_SORTE_TRUNCATED = -0x501,
     /// The frame check sequence is wrong.
     SW_E_SORTE_BAD_FCS = -0x502,
-    /// The destination is not that of all.
+    /// The destination is not the one for all devices.
     SW_E_SORTE_WRONG_DESTINATION = -0x503,
-    /// There is no such type, or no layout of it is published.
+    /// The type is not defined, or its layout is not published.
     SW_E_SORTE_UNKNOWN_TYPE = -0x504,
-    /// The type is not the one that is due.
+    /// The type is not the expected one.
     SW_E_SORTE_UNEXPECTED_TYPE = -0x505,
     /// The frame is too long.
     SW_E_SORTE_TOO_LONG = -0x506,
     /// The CRC-8 is wrong.
     SW_E_SORTE_BAD_CRC8 = -0x507,
-    /// Another source than the one that is due.
+    /// The source is not the expected one.
     SW_E_SORTE_WRONG_SOURCE = -0x508,
     /// The preamble is wrong.
     SW_E_SORTE_BAD_PREAMBLE = -0x509,
@@ -50,7 +50,7 @@ pub enum sw_sorte_error_t {
     SW_E_SORTE_RESERVED_PTO_VALUE = -0x50f,
 }
 
-/// What a PTO word says.
+/// The content of a PTO word.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_sorte_pto_kind_t {
@@ -64,7 +64,7 @@ pub enum sw_sorte_pto_kind_t {
     SW_SORTE_RESERVED = 3,
 }
 
-/// A frame from the master: its output lies behind SW_SORTE_DATA_AT.
+/// A frame from the master: its output begins at SW_SORTE_DATA_AT.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_sorte_master_frame_t {
@@ -74,11 +74,11 @@ pub struct sw_sorte_master_frame_t {
     pub status: u8,
 }
 
-/// A frame from a device: its payload lies behind SW_SORTE_DATA_AT.
+/// A frame from a device: its payload begins at SW_SORTE_DATA_AT.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_sorte_device_frame_t {
-    /// Who sends it.
+    /// Address of the sender.
     pub address: u8,
     /// STATUS: LAST and ERROR.
     pub status: u8,
@@ -92,7 +92,7 @@ pub struct sw_sorte_pto_t {
     pub start_ns: u16,
     /// sw_sorte_pto_kind_t.
     pub kind: u8,
-    /// DIR, 0 or 1; 0 where the driver is off.
+    /// DIR, 0 or 1; 0 if the driver is off.
     pub direction: u8,
 }
 

@@ -14,15 +14,15 @@ use crate::result::{Protocol, refused, sw_result_t};
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_step_error_t {
-    /// No steps an entry.
+    /// 0 steps per entry.
     SW_E_STEP_ZERO_SEGMENT_LENGTH = -0x701,
-    /// Too many steps an entry.
+    /// Too many steps per entry.
     SW_E_STEP_SEGMENT_TOO_LONG = -0x702,
     /// Two steps could fall into one cycle.
     SW_E_STEP_STEP_RATE_TOO_HIGH = -0x703,
-    /// The first step takes longer than 32 bits count.
+    /// The first step takes longer than 32 bits can count.
     SW_E_STEP_STEP_TIME_OVERFLOW = -0x704,
-    /// The sync time does not lie in a cycle.
+    /// The sync time is not within a cycle.
     SW_E_STEP_SYNC_TIME_OUT_OF_RANGE = -0x705,
     /// The frequency is too low.
     SW_E_STEP_FREQUENCY_TOO_LOW = -0x708,
@@ -42,7 +42,8 @@ fn error(error: Error) -> Refused {
     refused(Protocol::Step, error.class().number())
 }
 
-/// Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for another.
+/// Entry `i` of the published ramp, 0..31: 1000 / sin² of the step time at full speed; 0 for any other
+/// index.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_step_ramp(i: u8) -> u32 {
     if i < 32 { RampTable::SIN2.entry(i) } else { 0 }
@@ -88,8 +89,8 @@ pub extern "C" fn sw_step_next_as_pru(
     })
 }
 
-/// Whether a move with the published ramp is possible: `k` steps an entry, the first step `init_sync` ns into its cycle. `pru_is_exact`
-/// (may be NULL) tells whether the PRU computes it without error.
+/// Whether a move with the published ramp is possible: `k` steps per entry, the first step `init_sync` ns
+/// into its cycle. `pru_is_exact` (may be NULL) tells whether the PRU computes it without error.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_step_check(
     speed: u32,
@@ -146,7 +147,7 @@ pub struct sw_step_move_t {
     pub steps: u32,
     /// Speed constant: sw_step_speed().
     pub speed: u32,
-    /// Steps an entry.
+    /// Steps per entry.
     pub k: u32,
     /// Where the first step comes in its cycle, ns.
     pub init_sync: u32,
@@ -157,7 +158,7 @@ pub struct sw_step_move_t {
 /// The last step with which sw_step_steps() begins.
 pub const SW_STEP_FIRST: u32 = 1 << 20;
 
-/// How a move goes.
+/// The course of a move.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_step_shape_t {
@@ -175,8 +176,7 @@ pub struct sw_step_shape_t {
 
 /// Acts on a move with a ramp of 32 entries, or with the published one for NULL.
 ///
-/// # Safety
-/// As for [`read`].
+/// # Safety As for [`read`].
 unsafe fn with_profile(
     table: *const u32,
     len: usize,

@@ -4,14 +4,15 @@
 pub const SERVOWIRE_VERSION_MAJOR: u32 = 0;
 /// The release of this header, between the dots.
 pub const SERVOWIRE_VERSION_MINOR: u32 = 1;
-/// The release of this header, behind the second dot.
+/// The release of this header, after the second dot.
 pub const SERVOWIRE_VERSION_PATCH: u32 = 0;
 /// The release of this header as one number, 8 bits each: a later one is greater.
 pub const SERVOWIRE_VERSION: u32 =
     SERVOWIRE_VERSION_MAJOR << 16 | SERVOWIRE_VERSION_MINOR << 8 | SERVOWIRE_VERSION_PATCH;
 
-/// The release of the library: SERVOWIRE_VERSION, or the header that was compiled in belongs to another one. States and structs may
-/// differ then: compare it once, before the first state is started.
+/// The release of the library: SERVOWIRE_VERSION, unless your program was compiled with the header of
+/// another release. States and structs may then differ, so compare it once, before the first state is
+/// started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_version() -> u32 {
     SERVOWIRE_VERSION

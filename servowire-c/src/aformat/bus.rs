@@ -15,7 +15,7 @@ use crate::result::{sw_code_t, sw_result_t};
 use crate::tformat::sw_position_t;
 
 /// A line with up to eight encoders of one kind: one request, the responses, and the newest position of each. Its content is
-/// private; it may be copied. One context at a time.
+/// private; it may be copied. Only one context at a time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_aformat_t {
@@ -28,16 +28,16 @@ pub(crate) struct Master {
     line: Line,
     resolution: Resolution,
     transaction: BusTransaction,
-    /// The transaction is one that was asked for.
+    /// The transaction was requested.
     asked: bool,
     evidence: [Evidence; 8],
 }
 
-/// What is to be sent, and when.
+/// The data to send, and when to send them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_transmission_t {
-    /// When the first start bit is on the line.
+    /// When to start the first start bit.
     pub start_ns: u64,
     /// When the last delimiter ends.
     pub end_ns: u64,
@@ -47,11 +47,11 @@ pub struct sw_aformat_transmission_t {
     pub len: u8,
 }
 
-/// Frames of a block at most.
+/// Maximum number of frames in a block.
 pub(super) const LONGEST: usize = 48;
 
 impl Master {
-    /// The transaction, if one was asked for.
+    /// The transaction, if one was requested.
     #[inline(always)]
     fn told(&mut self) -> Result<&mut BusTransaction, Refused> {
         if self.asked { Ok(&mut self.transaction) } else { Err(sw_code_t::SW_E_NO_VALUE as sw_result_t) }
@@ -90,7 +90,8 @@ impl Master {
     }
 }
 
-/// Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and what its encoders are.
+/// Prepares a line: bits per second (2500000, 4000000, 6666667, 8000000 or 16000000), and the properties of
+/// its encoders.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_init(
     m: Option<&mut MaybeUninit<sw_aformat_t>>,
@@ -112,7 +113,8 @@ pub extern "C" fn sw_aformat_init(
     })
 }
 
-/// From the end of a frame to its hand-over, at most, ns; and the highest address on the line, 0..7.
+/// Sets the longest time from the end of a frame to its hand-over, ns, and the highest address on the line,
+/// 0..7.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_set_hand_over(
     m: Option<&mut sw_aformat_t>,
@@ -127,9 +129,10 @@ pub extern "C" fn sw_aformat_set_hand_over(
     })
 }
 
-/// Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read (0..7, 21..30) are sent this
-/// way, and those with one answer to one encoder. SW_SEND with `to_send` filled; SW_E_NOT_FREE while an exchange is pending,
-/// and before the time of sw_aformat_until_ns().
+/// Begins a request to all encoders whose bit is set in `asked` (bit 0 is EA 0). Only commands that read
+/// (0..7, 21..30) are sent this way; those with a single answer are sent to one encoder. SW_SEND with
+/// `to_send` filled; SW_E_NOT_FREE while an exchange is pending, and before the time of
+/// sw_aformat_until_ns().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_read(
     m: Option<&mut sw_aformat_t>,
@@ -195,9 +198,10 @@ pub(super) unsafe fn block(
     Ok(block)
 }
 
-/// Frames were heard one after the other, the last delimiter at `end_ns`: their contents, the first bit of the line in bit 0. `framed`
-/// has a byte for each, 0 for a frame whose delimiter reads 0; NULL says that all are framed. At most 48 frames at once. SW_OK once all
-/// that were asked have answered; sw_aformat_missing() tells at any time who has not.
+/// Takes frames that were heard one after another, with the last delimiter at `end_ns`: their contents, the
+/// first bit of the line in bit 0. `framed` has a byte for each, 0 for a frame whose delimiter reads 0;
+/// NULL says that all are framed. At most 48 frames at once. SW_OK once all encoders asked have answered;
+/// sw_aformat_missing() says at any time which have not.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_hear(
     m: Option<&mut sw_aformat_t>,
@@ -216,7 +220,8 @@ pub unsafe extern "C" fn sw_aformat_hear(
     })
 }
 
-/// It is `now_ns`: ends an exchange whose time is over, with SW_OK. Hand over what was received first.
+/// Sets the time to `now_ns`: ends an exchange whose time has run out, with SW_OK. Hand over received data
+/// first.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_poll(m: Option<&mut sw_aformat_t>, now_ns: u64) -> sw_result_t {
     border(|| {
@@ -227,21 +232,22 @@ pub extern "C" fn sw_aformat_poll(m: Option<&mut sw_aformat_t>, now_ns: u64) -> 
     })
 }
 
-/// While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
-/// SW_NO_TIME for a state that was not started.
+/// While an exchange is pending, the time at which to poll it; afterwards, the time from which the line is
+/// free. 0 if nothing was asked, SW_NO_TIME for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_until_ns(m: Option<&sw_aformat_t>) -> u64 {
     sw_aformat_t::look(m).map_or(crate::clock::SW_NO_TIME, |m| m.transaction.until_ns())
 }
 
-/// Who was asked and has not answered, a bit each; 0xff for a state that was not started or has not asked.
+/// The encoders that were asked and have not answered, one bit each; 0xff for a state that was not started
+/// or has not asked.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_missing(m: Option<&sw_aformat_t>) -> u8 {
     let asked = sw_aformat_t::look(m).ok().filter(|m| m.asked);
     asked.map_or(0xff, |m| m.transaction.bus().missing().bits())
 }
 
-/// The good response of an encoder to the newest request: raw fields. SW_E_NO_VALUE if there is none.
+/// The good response of an encoder to the newest request, as raw fields. SW_E_NO_VALUE if there is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_response(
     m: Option<&sw_aformat_t>,
@@ -256,8 +262,8 @@ pub extern "C" fn sw_aformat_response(
     })
 }
 
-/// The angle of a shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.** It is
-/// judged now, as by sw_tformat_angle(); the battery is tolerated.
+/// The angle of a shaft for commutation, where a turn is 2^32: **false if it must not be used, and the
+/// outputs must be switched off.** It is judged now, as by sw_tformat_angle(); the battery is tolerated.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_angle(
     m: Option<&sw_aformat_t>,

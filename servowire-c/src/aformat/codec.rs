@@ -11,7 +11,7 @@ use super::names::sw_aformat_option_t;
 use crate::border::{OK, Refused, border, in_range, read, room, there};
 use crate::result::{Protocol, refused, sw_code_t, sw_result_t};
 
-/// What a master sends. Fields that the command does not take are not looked at.
+/// A request of a master. Fields that the command does not take are ignored.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_request_t {
@@ -29,23 +29,23 @@ pub struct sw_aformat_request_t {
     pub bank: u8,
 }
 
-/// Widths of an encoder, and what its factory has set.
+/// Widths of an encoder, and its factory settings.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_encoder_t {
     /// Bits of the single turn.
     pub st_bits: u8,
-    /// Bits of the turns; 40 with those of the single turn at most.
+    /// Bits of the turns; at most 40 together with those of the single turn.
     pub mt_bits: u8,
     /// sw_aformat_option_t, added.
     pub options: u8,
 }
 
-/// What an encoder sends. Fields that the layout does not have are 0.
+/// A response of an encoder. Fields that the layout does not have are 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct sw_aformat_response_t {
-    /// Position bits as received, from bit 0 up; of ABS24H from bit 16 up.
+    /// Position bits as received, from bit 0 upwards; for ABS24H from bit 16 upwards.
     pub abs: u64,
     /// Velocity.
     pub velocity: i32,
@@ -172,8 +172,7 @@ fn written(
 
 /// What is made of the caller's words.
 ///
-/// # Safety
-/// As for [`read`].
+/// # Safety As for [`read`].
 #[inline(always)]
 pub(super) unsafe fn of_words(
     words: *const u16,
@@ -187,8 +186,8 @@ pub(super) unsafe fn of_words(
     })
 }
 
-/// The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15 (sw_bit_order_t), at most 4: start bit and
-/// delimiter are left to the port.
+/// The frames of a request as 16-bit words, the first bit of the line in bit 0 or in bit 15
+/// (sw_bit_order_t), at most 4: the port adds start bit and delimiter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_build(
     asked: Option<&sw_aformat_request_t>,
@@ -211,7 +210,7 @@ pub unsafe extern "C" fn sw_aformat_build(
     })
 }
 
-/// With which layout an encoder answers a request: sw_aformat_layout_t, and how many frames that has.
+/// The layout with which an encoder answers a request, sw_aformat_layout_t, and its number of frames.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_layout(
     asked: Option<&sw_aformat_request_t>,
@@ -228,7 +227,7 @@ pub extern "C" fn sw_aformat_layout(
     })
 }
 
-/// The response to a request from 16-bit words, a frame each, with all checks.
+/// Reads the response to a request from 16-bit words, one frame each, with all checks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_parse(
     asked: Option<&sw_aformat_request_t>,
@@ -256,7 +255,7 @@ pub(super) fn expected(command: u8, layout: u8, ea: u8) -> Result<Expected, Refu
     Ok(if ea == 255 { expected } else { expected.from_address(in_range(EncoderAddress::new(ea))?) })
 }
 
-/// A response of this layout to this command, whose request is not at hand; `ea` 255 is any.
+/// Reads a response of this layout to this command, without its request; `ea` 255 is any.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_parse_as(
     command: u8,
@@ -273,7 +272,8 @@ pub unsafe extern "C" fn sw_aformat_parse_as(
     unsafe { of_words(words, count, order, parse) }
 }
 
-/// The same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after the 128th are left alone.
+/// Does the same from line bits, start bits and delimiters included: `bits` of them in `bytes`. Bits after
+/// the 128th are ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_parse_line(
     command: u8,

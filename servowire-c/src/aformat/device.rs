@@ -19,7 +19,7 @@ pub struct sw_aformat_device_t {
 }
 state!(sw_aformat_device_t, Device<1>, 0x25);
 
-/// What an encoder sends, and when.
+/// The response of an encoder, and when it is sent.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_answer_t {
@@ -33,7 +33,7 @@ pub struct sw_aformat_answer_t {
     pub len: u8,
 }
 
-/// Switches an encoder on: position 0, no alarms, with this address.
+/// Switches a modelled encoder on: position 0, no alarms, with this address.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_device_start(
     device: Option<&mut MaybeUninit<sw_aformat_device_t>>,
@@ -62,7 +62,8 @@ pub extern "C" fn sw_aformat_device_set_position(
     })
 }
 
-/// The causes of these alarms (bits of ALM) come, and those of all others go. A latched alarm stays until a reset.
+/// Sets the causes of these alarms (bits of ALM), and removes those of all others. A latched alarm stays
+/// until a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_device_set_alarms(device: Option<&mut sw_aformat_device_t>, alm: u16) -> sw_result_t {
     border(|| {
@@ -73,7 +74,7 @@ pub extern "C" fn sw_aformat_device_set_alarms(device: Option<&mut sw_aformat_de
     })
 }
 
-/// Puts a word into the EEPROM, as its maker does: any address.
+/// Puts a word into the EEPROM at any address, as the manufacturer does.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_device_set_eeprom(
     device: Option<&mut sw_aformat_device_t>,
@@ -86,8 +87,8 @@ pub extern "C" fn sw_aformat_device_set_eeprom(
     })
 }
 
-/// Frames were heard one after the other, as by sw_aformat_hear(): the own requests and the answers of others. SW_SEND with `answer`
-/// filled, or SW_PENDING.
+/// Takes frames that were heard one after another, as sw_aformat_hear() does: its own requests and the
+/// answers of others. SW_SEND with `answer` filled, or SW_PENDING.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_device_hear(
     device: Option<&mut sw_aformat_device_t>,

@@ -13,7 +13,7 @@ use super::words::{judged, sw_aformat_bus_t};
 use crate::border::{OK, Refused, border, fill, in_range, read, room, state, there};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// A frame of a request, of a command or of a byte of memory: only its place in the request tells which.
+/// A frame of a request, with a command or with a byte of memory: only its place in the request tells which.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_frame_t {
@@ -25,11 +25,11 @@ pub struct sw_aformat_frame_t {
     pub ea: u8,
     /// CC, of a command.
     pub command: u8,
-    /// The byte, of a memory frame. Of a frame that was heard all are filled in.
+    /// The byte, of a memory frame. In a frame that was heard, all fields are filled in.
     pub byte: u8,
 }
 
-/// A receiver of one response after the other from a line. Its content is private; it may be copied.
+/// A receiver of consecutive responses from a line. Its content is private; it may be copied.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_aformat_receiver_t {
@@ -60,7 +60,7 @@ pub extern "C" fn sw_aformat_build_frame(
     })
 }
 
-/// The word of 32 bits that TI's example shifts out: the frame behind idle line.
+/// The word of 32 bits that TI's example shifts out: the frame after idle line.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_build_word32(
     it: Option<&sw_aformat_frame_t>,
@@ -95,7 +95,7 @@ pub extern "C" fn sw_aformat_parse_frame(
     })
 }
 
-/// Whether an encoder takes a request: its version (sw_aformat_option_t), and all arguments.
+/// Whether an encoder accepts a request, by its version (sw_aformat_option_t) and all arguments.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_check(
     asked: Option<&sw_aformat_request_t>,
@@ -147,8 +147,8 @@ pub unsafe extern "C" fn sw_aformat_crc3(
     })
 }
 
-/// Prepares a receiver of responses of this layout (sw_aformat_layout_t): samples a bit, 1 for a line of bits. `idle` 1: frames of a response
-/// may have idle line between them.
+/// Prepares a receiver of responses of this layout (sw_aformat_layout_t); samples per bit, 1 for a line of
+/// bits. `idle` 1: frames of a response may have idle line between them.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_receiver_start(
     receiver: Option<&mut MaybeUninit<sw_aformat_receiver_t>>,
@@ -179,8 +179,9 @@ fn whole(raw: &RawResponse, words: &mut [MaybeUninit<u16>], count: &mut MaybeUni
     Ok(())
 }
 
-/// One sample of the line, 0 or 1. SW_OK with the frames of a response as words, the first bit of the line in bit 15 (SW_MSB_FIRST), at most SW_AFORMAT_FRAMES;
-/// SW_PENDING without; or why there was none.
+/// Takes one sample of the line, 0 or 1. SW_OK with the frames of a response as words, the first bit of the
+/// line in bit 15 (SW_MSB_FIRST), at most SW_AFORMAT_FRAMES; SW_PENDING if there is none yet; or why there
+/// was none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_receiver_push(
     receiver: Option<&mut sw_aformat_receiver_t>,
@@ -204,7 +205,8 @@ pub unsafe extern "C" fn sw_aformat_receiver_push(
     })
 }
 
-/// One sample of a line on which several encoders answer: as sw_aformat_receiver_push(), and what sw_aformat_bus_push() says of the response.
+/// Takes one sample of a line on which several encoders answer: as sw_aformat_receiver_push(), with the
+/// result of sw_aformat_bus_push() for the response.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_sample(
     bus: Option<&mut sw_aformat_bus_t>,
@@ -237,13 +239,13 @@ pub extern "C" fn sw_aformat_bus_line_ends(
     })
 }
 
-/// Who was asked and has not even begun to answer: how many, or a refusal.
+/// The number of encoders that were asked and have not even begun to answer, or a refusal.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_not_started(bus: Option<&sw_aformat_bus_t>) -> sw_result_t {
     border(|| Ok(sw_aformat_bus_t::look(bus)?.not_started().into()))
 }
 
-/// Frames of a response at most.
+/// Maximum number of frames in a response.
 pub const SW_AFORMAT_FRAMES: usize = 6;
 
 const _: () = assert!(SW_AFORMAT_FRAMES == RawResponse::MAX_FRAMES);

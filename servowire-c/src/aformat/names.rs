@@ -50,7 +50,7 @@ pub enum sw_aformat_es_t {
     SW_AFORMAT_ES_ERROR = 8,
 }
 
-/// What version 3.0 leaves to the factory setting of an encoder; may be added.
+/// Factory settings of an encoder that version 3.0 leaves open; may be added.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_aformat_option_t {
@@ -66,7 +66,7 @@ pub enum sw_aformat_option_t {
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_aformat_error_t {
-    /// The response ends too early.
+    /// The response is too short.
     SW_E_AFORMAT_TRUNCATED = -0x201,
     /// A start bit reads 1.
     SW_E_AFORMAT_START_BIT = -0x202,
@@ -84,13 +84,13 @@ pub enum sw_aformat_error_t {
     SW_E_AFORMAT_ADDRESS_MISMATCH = -0x208,
     /// Another command is answered.
     SW_E_AFORMAT_COMMAND_MISMATCH = -0x209,
-    /// There is no such bank.
+    /// The bank does not exist.
     SW_E_AFORMAT_BANK_ERROR = -0x20a,
-    /// An argument comes back as another.
+    /// An argument was returned with a different value.
     SW_E_AFORMAT_ECHO_MISMATCH = -0x20b,
     /// The frame code is wrong.
     SW_E_AFORMAT_FRAME_CODE = -0x20c,
-    /// There is no such command.
+    /// The command does not exist.
     SW_E_AFORMAT_UNKNOWN_COMMAND = -0x20d,
     /// The encoder's version does not have this.
     SW_E_AFORMAT_UNSUPPORTED_IN_VERSION = -0x20e,
@@ -98,13 +98,13 @@ pub enum sw_aformat_error_t {
     SW_E_AFORMAT_ADDRESS_RANGE = -0x20f,
     /// Data is out of its range.
     SW_E_AFORMAT_DATA_RANGE = -0x210,
-    /// No response in time.
+    /// No response came in time.
     SW_E_AFORMAT_NO_RESPONSE = -0x211,
     /// The encoder stayed busy.
     SW_E_AFORMAT_BUSY = -0x212,
     /// Another request came in between.
     SW_E_AFORMAT_INTERRUPTED = -0x213,
-    /// Whether the act was done is not known.
+    /// It is not known whether the act was done.
     SW_E_AFORMAT_EFFECT_UNKNOWN = -0x214,
     /// The act was not done.
     SW_E_AFORMAT_NOT_DONE = -0x215,
@@ -118,7 +118,8 @@ pub enum sw_aformat_error_t {
     SW_E_AFORMAT_LINE = -0x21b,
 }
 
-/// Alarms of ALM, bit by bit as the specification names them; which of them a version has says sw_aformat_known_alarms().
+/// Alarms of ALM, bit by bit as the specification names them; sw_aformat_known_alarms() says which of them
+/// a version has.
 #[repr(u16)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_aformat_alm_t {

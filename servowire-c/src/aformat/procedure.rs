@@ -1,4 +1,4 @@
-//! What takes several exchanges with one encoder.
+//! Procedures of several exchanges with one encoder.
 
 use core::mem::MaybeUninit;
 
@@ -15,7 +15,7 @@ use crate::procedure::{ended, plain};
 use crate::result::{sw_code_t, sw_result_t};
 
 /// A procedure of several exchanges with one encoder: it says what to send, takes what is heard, and decides what to repeat. Its
-/// content is private. While it runs the line is its own.
+/// content is private. While it runs, nothing else may use the line.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_aformat_procedure_t {
@@ -106,9 +106,10 @@ fn begin(
 
 /// A reset: command 8 (clears the status), 9 (the turns), 10 (both), 11 (gives the only encoder on the line the address `ea`) or 12
 /// (**makes this position the zero of the turn and shifts the commutation angle**), eight times, and the status 30 ms later: its ALM is
-/// the value. With `careful` 1 the encoder is made to begin its count anew before, and a failure tells whether it was done
-/// (SW_E_AFORMAT_NOT_DONE, SW_E_AFORMAT_EFFECT_UNKNOWN); with 0 it is the eight requests of the documents. The line and the widths are
-/// those of `m`, which is to be left alone meanwhile. Then sw_aformat_next().
+/// the value. With `careful` 1 the encoder is first made to restart its count, and a failure tells whether
+/// the reset was done (SW_E_AFORMAT_NOT_DONE, SW_E_AFORMAT_EFFECT_UNKNOWN); with 0 only the eight requests
+/// of the documents are sent. The line and the widths are those of `m`, which must not be used meanwhile.
+/// Continue with sw_aformat_next().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_reset(
     p: Option<&mut MaybeUninit<sw_aformat_procedure_t>>,
@@ -137,8 +138,8 @@ fn flag(number: u8) -> Result<bool, Refused> {
     in_range((number < 2).then_some(number == 1))
 }
 
-/// Reads the EEPROM word at `address`, which is the value. With `careful` 1 the first response is never trusted: an access that was
-/// broken off may have left it there; with 0 the caller knows that none was.
+/// Reads the EEPROM word at `address`; the word is the value. With `careful` 1 the first response is never
+/// trusted: it may be left from an interrupted access; use 0 only if you know that there was none.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_eeprom_read(
     p: Option<&mut MaybeUninit<sw_aformat_procedure_t>>,
@@ -223,9 +224,9 @@ pub extern "C" fn sw_aformat_detect(
     })
 }
 
-/// What a procedure wants next: SW_SEND with `to_send` filled (hear and poll by sw_aformat_procedure_hear() and
-/// sw_aformat_procedure_poll() until the exchange ends, then call this again), SW_PENDING while the exchange runs, SW_OK when the
-/// procedure is done, or why it failed.
+/// Returns what a procedure needs next: SW_SEND with `to_send` filled (hear and poll by
+/// sw_aformat_procedure_hear() and sw_aformat_procedure_poll() until the exchange ends, then call this
+/// again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_next(
     p: Option<&mut sw_aformat_procedure_t>,
@@ -253,7 +254,8 @@ pub extern "C" fn sw_aformat_next(
     })
 }
 
-/// Frames were heard one after the other, as by sw_aformat_hear(). SW_PENDING, or the exchange has ended: SW_OK or its refusal.
+/// Takes frames that were heard one after another, as sw_aformat_hear() does. SW_PENDING, or the exchange
+/// has ended: SW_OK or its refusal.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_procedure_hear(
     p: Option<&mut sw_aformat_procedure_t>,
@@ -272,7 +274,7 @@ pub unsafe extern "C" fn sw_aformat_procedure_hear(
     })
 }
 
-/// It is `now_ns`: ends an exchange whose time is over. Hand over what was received first.
+/// Sets the time to `now_ns`: ends an exchange whose time has run out. Hand over received data first.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_procedure_poll(p: Option<&mut sw_aformat_procedure_t>, now_ns: u64) -> sw_result_t {
     border(|| {
@@ -282,15 +284,16 @@ pub extern "C" fn sw_aformat_procedure_poll(p: Option<&mut sw_aformat_procedure_
     })
 }
 
-/// While an exchange of a procedure is pending, when it is to be polled; afterwards, from when on the line is free. SW_NO_TIME for
-/// a state that was not started.
+/// While an exchange of a procedure is pending, the time at which to poll it; afterwards, the time from
+/// which the line is free. SW_NO_TIME for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_procedure_until_ns(p: Option<&sw_aformat_procedure_t>) -> u64 {
     sw_aformat_procedure_t::look(p).map_or(crate::clock::SW_NO_TIME, |p| p.transaction.until_ns())
 }
 
-/// What a procedure that has ended with SW_OK was made for: the EEPROM word, the type word, ALM after a reset, else 0. `ready_ns` (may
-/// be NULL) is the time from which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+/// Returns the result of a procedure that has ended with SW_OK: the EEPROM word, the type word, ALM after a
+/// reset, else 0. `ready_ns` (may be NULL) is the time from which the encoder accepts requests again; it is
+/// also set after a failure, with the failure as the result.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_value(
     p: Option<&sw_aformat_procedure_t>,
@@ -300,8 +303,8 @@ pub extern "C" fn sw_aformat_value(
     border(|| ended(&sw_aformat_procedure_t::look(p)?.next, value, ready_ns, error))
 }
 
-/// After sw_aformat_detect() has ended with SW_OK: the address and the widths of the encoder. SW_E_NO_VALUE before, and for a type word
-/// that is not known.
+/// After sw_aformat_detect() has ended with SW_OK: the address and the widths of the encoder. SW_E_NO_VALUE
+/// before that, and for an unknown type word.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_detected(
     p: Option<&sw_aformat_procedure_t>,

@@ -1,4 +1,4 @@
-//! What raw values mean, and how long things take.
+//! Meaning of raw values, and durations.
 
 use core::mem::MaybeUninit;
 
@@ -8,7 +8,7 @@ use super::codec::{layout_of, resolution, sw_aformat_encoder_t};
 use crate::border::{OK, Refused, border, in_range, there};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// What the type word of the EEPROM says.
+/// The content of the type word of the EEPROM.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_aformat_type_t {
@@ -32,7 +32,7 @@ pub struct sw_aformat_times_t {
     pub response_ns: u32,
     /// A request and one response.
     pub one_ns: u32,
-    /// A request of one frame and the responses of all who are asked.
+    /// A request of one frame and the responses of all encoders asked.
     pub all_ns: u32,
     /// The gap between responses.
     pub gap_ns: u32,
@@ -62,7 +62,7 @@ pub extern "C" fn sw_aformat_milli_celsius(raw: u16, milli_celsius: Option<&mut 
     })
 }
 
-/// The same if the bits are a two's complement, which no document says.
+/// The same if the bits are in two's complement, which no document states.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_signed_milli_celsius(
     raw: u16,
@@ -124,7 +124,8 @@ pub extern "C" fn sw_aformat_compose(
     })
 }
 
-/// The 40 bits of a position from its halves of 24 bits, which overlap by eight (ABS24 and ABS24H). SW_E_NO_VALUE if those differ.
+/// The 40 bits of a position from its halves of 24 bits, which overlap by eight (ABS24 and ABS24H).
+/// SW_E_NO_VALUE if the overlapping bits differ.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_join(low24: u32, high24: u32, abs: Option<&mut MaybeUninit<u64>>) -> sw_result_t {
     border(|| {

@@ -1,4 +1,5 @@
-//! Who has answered, for ports that deliver one response after the other and keep the time themselves.
+//! Keeps track of who has answered, for ports that deliver one response after another and keep the time
+//! themselves.
 
 use core::mem::MaybeUninit;
 
@@ -28,13 +29,14 @@ state!(sw_aformat_bus_t, Bus, 0x23);
 pub struct sw_aformat_abs40_t {
     /// Position bits as received, 40: the single turn in the low ones.
     pub abs: u64,
-    /// EA: who answers.
+    /// EA: the address of the encoder that answers.
     pub ea: u8,
     /// ES: sw_aformat_es_t.
     pub es: u8,
 }
 
-/// The response of layout ABS40 to command 0 or 4 from its four frames, a 16-bit word each, with all checks; `ea` 255 is any.
+/// Reads the response of layout ABS40 to command 0 or 4 from its four frames, one 16-bit word each, with
+/// all checks; `ea` 255 is any.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_parse_abs40(
     command: u8,
@@ -55,7 +57,8 @@ pub unsafe extern "C" fn sw_aformat_parse_abs40(
     unsafe { of_words(words, count, order, parse) }
 }
 
-/// Begins: what was sent, what the encoders are, and whose bit in `asked` (bit 0 is EA 0) is set.
+/// Begins, with the request sent, the widths of the encoders, and the addresses asked: a bit each in
+/// `asked` (bit 0 is EA 0).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_start(
     bus: Option<&mut MaybeUninit<sw_aformat_bus_t>>,
@@ -72,7 +75,8 @@ pub extern "C" fn sw_aformat_bus_start(
     })
 }
 
-/// The same for the whole position of all who are asked: command 4 to the highest of them, for sw_aformat_bus_push_abs40().
+/// Does the same for the whole position of all encoders asked: command 4 to the highest address, for
+/// sw_aformat_bus_push_abs40().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_start_abs40(
     bus: Option<&mut MaybeUninit<sw_aformat_bus_t>>,
@@ -86,8 +90,9 @@ pub extern "C" fn sw_aformat_bus_start_abs40(
     })
 }
 
-/// One response of four frames came, a 16-bit word each. The results are those of sw_aformat_bus_push(), for less flash: nothing but
-/// positions is known. SW_E_ARGUMENT for a bus that was started for another layout.
+/// Takes one response of four frames, one 16-bit word each. The results are those of sw_aformat_bus_push(),
+/// for less flash: it knows only positions. SW_E_ARGUMENT for a bus that was started for another
+/// layout.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_aformat_bus_push_abs40(
     bus: Option<&mut sw_aformat_bus_t>,
@@ -138,7 +143,8 @@ pub unsafe extern "C" fn sw_aformat_bus_push(
     unsafe { of_words(words, count, order, push) }
 }
 
-/// Who was asked and has not given a good response, a bit each; 0xff for a state that was not started.
+/// The encoders that were asked and have not given a good response, one bit each; 0xff for a state that was
+/// not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_aformat_bus_missing(bus: Option<&sw_aformat_bus_t>) -> u8 {
     sw_aformat_bus_t::look(bus).map_or(0xff, |bus| bus.missing().bits())

@@ -15,7 +15,7 @@ pub const SW_HDSL_ANSWER_BITS: u32 = 61;
 /// H-frames of a V-frame.
 pub const SW_HDSL_V_FRAME: usize = 8;
 
-/// An answer: its six words, and what they say.
+/// An answer: its six words, and their content.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_hdsl_answer_t {
@@ -31,7 +31,7 @@ pub struct sw_hdsl_answer_t {
     pub switch_ok: u8,
 }
 
-/// What an answer is made of.
+/// The parts of an answer.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_hdsl_content_t {
@@ -49,7 +49,7 @@ pub struct sw_hdsl_content_t {
     pub secondary: sw_hdsl_character_t,
 }
 
-/// A safe position with what came around it: as received, not yet a position.
+/// A safe position with what came around it: as received, not yet a valid position.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_hdsl_safe_t {
@@ -73,8 +73,9 @@ pub struct sw_hdsl_v_frame_t {
     pub safe2: sw_hdsl_safe_t,
 }
 
-/// What an answer says by the rules of a dialect (sw_hdsl_dialect_t): `len` bits of the line, the first in bit 0. Its channels are judged one
-/// by one; refused is only what is no answer at all, SW_E_HDSL_TRUNCATED.
+/// Reads an answer by the rules of a dialect (sw_hdsl_dialect_t): `len` bits of the line, the first in bit
+/// 0. Its channels are judged one by one; only bits that are no answer at all are refused,
+/// SW_E_HDSL_TRUNCATED.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_parse_answer(
     bits: u64,
@@ -98,7 +99,8 @@ pub extern "C" fn sw_hdsl_parse_answer(
     })
 }
 
-/// The bits of an answer, the first of the line in bit 0, at a running disparity, -1 or 1, which becomes that behind it.
+/// The bits of an answer, the first of the line in bit 0, at a running disparity, -1 or 1, which becomes
+/// the one after it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_build_answer(
     content: Option<&sw_hdsl_content_t>,

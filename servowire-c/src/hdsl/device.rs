@@ -39,7 +39,8 @@ pub extern "C" fn sw_hdsl_device_set_position(device: Option<&mut sw_hdsl_device
     })
 }
 
-/// What it answers to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones where it is silent.
+/// Returns its answer to the head of an H-frame: the 61 bits for sw_hdsl_hear_bits(), all ones if it is
+/// silent.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_device_hear(
     device: Option<&mut sw_hdsl_device_t>,

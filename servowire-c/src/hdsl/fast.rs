@@ -1,5 +1,5 @@
-//! The registers of a receiver that belong to the fast position, and its quality monitor: numbers, right or not. What may be used comes from
-//! `sw_hdsl_position()`.
+//! The registers of a receiver for the fast position, and its quality monitor: plain numbers, valid or not.
+//! Take usable positions from `sw_hdsl_position()`.
 
 use core::mem::MaybeUninit;
 
@@ -41,7 +41,8 @@ pub struct sw_hdsl_position_registers_t {
     pub stage: u8,
 }
 
-/// A tracker for an encoder with this many position bits, 8..40, by the rules of a dialect (sw_hdsl_dialect_t).
+/// Creates a tracker for an encoder with this many position bits, 8..40, by the rules of a dialect
+/// (sw_hdsl_dialect_t).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_tracker_start(
     tracker: Option<&mut MaybeUninit<sw_hdsl_tracker_t>>,
@@ -55,7 +56,7 @@ pub extern "C" fn sw_hdsl_tracker_start(
     })
 }
 
-/// An H-frame with this change of speed, -1024..1023 steps.
+/// Takes an H-frame with this change of speed, -1024..1023 steps.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_tracker_step(tracker: Option<&mut sw_hdsl_tracker_t>, delta_delta: i16) -> sw_result_t {
     border(|| {
@@ -65,7 +66,7 @@ pub extern "C" fn sw_hdsl_tracker_step(tracker: Option<&mut sw_hdsl_tracker_t>, 
     })
 }
 
-/// An H-frame whose acceleration must not be used.
+/// Takes an H-frame whose acceleration must not be used.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_tracker_miss(tracker: Option<&mut sw_hdsl_tracker_t>) -> sw_result_t {
     border(|| {
@@ -74,7 +75,7 @@ pub extern "C" fn sw_hdsl_tracker_miss(tracker: Option<&mut sw_hdsl_tracker_t>) 
     })
 }
 
-/// The safe position at the end of a V-frame.
+/// Takes the safe position at the end of a V-frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_tracker_align(tracker: Option<&mut sw_hdsl_tracker_t>, vpos: u64) -> sw_result_t {
     border(|| {
@@ -83,7 +84,7 @@ pub extern "C" fn sw_hdsl_tracker_align(tracker: Option<&mut sw_hdsl_tracker_t>,
     })
 }
 
-/// A V-frame without a safe position.
+/// Takes a V-frame without a safe position.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_tracker_no_safe_position(tracker: Option<&mut sw_hdsl_tracker_t>) -> sw_result_t {
     border(|| {
@@ -112,7 +113,7 @@ pub extern "C" fn sw_hdsl_tracker_registers(
     })
 }
 
-/// A monitor at its start, 8, with the penalties of a dialect (sw_hdsl_dialect_t).
+/// Creates a monitor at its initial value, 8, with the penalties of a dialect (sw_hdsl_dialect_t).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_quality_start(
     quality: Option<&mut MaybeUninit<sw_hdsl_quality_t>>,

@@ -114,7 +114,7 @@ pub extern "C" fn sw_hdsl_parse_head(
     })
 }
 
-/// The bits that level a line of this disparity, which becomes that behind them.
+/// The bits that level a line of this disparity, which becomes the one after them.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_equalisation(disparity: Option<&mut i8>, bits: Option<&mut MaybeUninit<u8>>) -> sw_result_t {
     border(|| {
@@ -126,7 +126,7 @@ pub extern "C" fn sw_hdsl_equalisation(disparity: Option<&mut i8>, bits: Option<
     })
 }
 
-/// The word of a parameter byte on a line of this disparity, which becomes that behind it.
+/// The word of a parameter byte on a line of this disparity, which becomes the one after it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_build_parameter(
     parameter: u8,

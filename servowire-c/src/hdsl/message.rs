@@ -59,19 +59,19 @@ pub struct sw_hdsl_data_t {
     pub data: [u8; 8],
 }
 
-/// How the messages of the last H-frame ended.
+/// How the messages that ended in the last H-frame ended.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_hdsl_finished_t {
-    /// SW_PENDING: none came to its end; SW_OK, or why it failed.
+    /// SW_PENDING: none ended; SW_OK, or why it failed.
     pub short_result: sw_result_t,
     /// The same for the long message.
     pub long_result: sw_result_t,
-    /// What the long one brought.
+    /// The result of the long message.
     pub data: sw_hdsl_data_t,
-    /// The register of the short one.
+    /// The register of the short message.
     pub register_address: u8,
-    /// What was read of it; 0 after a write.
+    /// The value read; 0 after a write.
     pub value: u8,
 }
 
@@ -265,8 +265,8 @@ pub unsafe extern "C" fn sw_hdsl_parse_long_answer(
     })
 }
 
-/// Starts a short message on a running link; its end is in sw_hdsl_finished(). SW_E_HDSL_BUSY, SW_E_HDSL_NOT_LOCKED. What fails may be
-/// sent again up to the limit of tries.
+/// Starts a short message on a running link; sw_hdsl_finished() reports its end. SW_E_HDSL_BUSY,
+/// SW_E_HDSL_NOT_LOCKED. A failed message may be sent again up to the limit of tries.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_send_short(m: Option<&mut sw_hdsl_t>, it: Option<&sw_hdsl_short_t>) -> sw_result_t {
     border(|| {
@@ -295,7 +295,7 @@ pub extern "C" fn sw_hdsl_reset_messages(m: Option<&mut sw_hdsl_t>) -> sw_result
     })
 }
 
-/// Which messages came to their end in the H-frame that was heard last.
+/// Returns which messages ended in the last H-frame heard.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_finished(
     m: Option<&sw_hdsl_t>,

@@ -10,7 +10,7 @@ use crate::border::{Refused, in_range};
 pub enum sw_hdsl_error_t {
     /// Fewer bits, samples or bytes than the unit has.
     SW_E_HDSL_TRUNCATED = -0x301,
-    /// A 10-bit word stands in neither column of the 8b/10b tables.
+    /// A 10-bit word is in neither column of the 8b/10b tables.
     SW_E_HDSL_INVALID_WORD = -0x302,
     /// A special character where only data may be, or data where a special character must be.
     SW_E_HDSL_WRONG_KIND = -0x303,
@@ -40,7 +40,7 @@ pub enum sw_hdsl_error_t {
     SW_E_HDSL_LONG_MESSAGE_START = -0x30f,
     /// The answer to a long message begins like a short one.
     SW_E_HDSL_SHORT_MESSAGE_START = -0x310,
-    /// A sound message speaks of something else.
+    /// A sound message concerns something else.
     SW_E_HDSL_HEADER = -0x311,
     /// The encoder answered a long message with an error: its code is in the data.
     SW_E_HDSL_RESOURCE = -0x312,
@@ -50,7 +50,7 @@ pub enum sw_hdsl_error_t {
     SW_E_HDSL_NO_ANSWER = -0x314,
     /// The message was dropped by a reset or a restart of the link.
     SW_E_HDSL_DROPPED = -0x315,
-    /// A message of this kind is under way.
+    /// A message of this kind is in progress.
     SW_E_HDSL_BUSY = -0x316,
     /// The link is not up.
     SW_E_HDSL_NOT_LOCKED = -0x317,
@@ -60,13 +60,13 @@ pub enum sw_hdsl_error_t {
     SW_E_HDSL_PERIOD_TOO_SHORT = -0x319,
     /// No pulse period is known.
     SW_E_HDSL_NO_PULSE = -0x31b,
-    /// There is no register at this address.
+    /// No register has this address.
     SW_E_HDSL_NO_REGISTER = -0x31c,
     /// The EXTRA window is outside its range.
     SW_E_HDSL_EXTRA_OUT_OF_RANGE = -0x31d,
 }
 
-/// Whose rules are followed where sources differ.
+/// Whose rules are followed if sources differ.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_hdsl_dialect_t {
@@ -98,13 +98,13 @@ pub enum sw_hdsl_state_t {
     SW_HDSL_RUNNING = 7,
 }
 
-/// Why the link was started anew.
+/// Why the link was restarted.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_hdsl_restart_t {
     /// It was not.
     SW_HDSL_NO_RESTART = 0,
-    /// It was asked for.
+    /// A restart was requested.
     SW_HDSL_RESTART_REQUESTED = 1,
     /// A START frame: no encoder, or the test pattern is not there.
     SW_HDSL_RESTART_LEARN = 2,
@@ -116,7 +116,7 @@ pub enum sw_hdsl_restart_t {
     SW_HDSL_RESTART_NO_VSYNC = 5,
     /// The quality monitor has run out.
     SW_HDSL_RESTART_QUALITY = 6,
-    /// Too many acceleration words in a row could not be used.
+    /// Too many consecutive acceleration words could not be used.
     SW_HDSL_RESTART_ACCELERATION = 7,
     /// A reason that has no name here.
     SW_HDSL_RESTART_OTHER = 255,
@@ -126,11 +126,11 @@ pub enum sw_hdsl_restart_t {
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_hdsl_disparity_t {
-    /// It stands in the column that is due.
+    /// It is in the expected column.
     SW_HDSL_DISPARITY_OK = 0,
-    /// It stands in the other column.
+    /// It is in the other column.
     SW_HDSL_DISPARITY_WRONG = 1,
-    /// It stands in neither.
+    /// It is in neither.
     SW_HDSL_DISPARITY_INVALID = 2,
 }
 

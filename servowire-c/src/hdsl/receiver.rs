@@ -18,7 +18,8 @@ pub const SW_HDSL_WINDOW: usize = 72;
 const NO_VALUE: sw_result_t = sw_code_t::SW_E_NO_VALUE as sw_result_t;
 const _: () = assert!(SW_HDSL_WINDOW == hdsl::sampling::WINDOW);
 
-/// A receiver: start-up, link, newest positions. Its content is private; it may be copied. One context at a time.
+/// A receiver: start-up, link, newest positions. Its content is private; it may be copied. Only one context
+/// at a time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_hdsl_t {
@@ -89,8 +90,8 @@ pub extern "C" fn sw_hdsl_transmission(
     })
 }
 
-/// The H-frame is over: the samples of its window (SW_HDSL_WINDOW bytes where an encoder answers), which ended at `end_ns`. The result is
-/// the state of the receiver, sw_hdsl_state_t.
+/// Ends the H-frame: takes the samples of its window (SW_HDSL_WINDOW bytes if an encoder answers), which
+/// ended at `end_ns`. The result is the state of the receiver, sw_hdsl_state_t.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_hdsl_hear(
     m: Option<&mut sw_hdsl_t>,
@@ -130,8 +131,8 @@ fn state_of(m: &Master) -> sw_result_t {
     }) as sw_result_t
 }
 
-/// The fast position, judged now: **false if it must not be used, and the outputs have to go off**: never heard, no link, estimated, not
-/// aligned with the safe one, too fast, older than `max_age_ns`.
+/// The fast position, judged now: **false if it must not be used, and the outputs must be switched off**:
+/// never heard, no link, estimated, not aligned with the safe one, too fast, older than `max_age_ns`.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_position(
     m: Option<&sw_hdsl_t>,
@@ -164,11 +165,12 @@ pub extern "C" fn sw_hdsl_safe_position(
     true
 }
 
-/// How the H-frame that was heard last goes on, and what it brought beside the positions.
+/// How the last H-frame heard continues, and what it brought besides the positions.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_hdsl_frame_t {
-    /// What is driven behind the answer (TRAILER, then stuffing), the first bit of the line in bit 0 of byte 0.
+    /// What to drive after the answer (TRAILER, then stuffing), the first bit of the line in bit 0 of byte
+    /// 0.
     pub tail: [u8; 24],
     /// Bits of it.
     pub tail_bits: u8,
@@ -182,9 +184,9 @@ pub struct sw_hdsl_frame_t {
     pub quality: u8,
     /// RSSI of this answer, 0..12; 255 if it was not measured.
     pub rssi: u8,
-    /// 1: no short message is under way.
+    /// 1: no short message is in progress.
     pub short_free: u8,
-    /// 1: no long message is under way.
+    /// 1: no long message is in progress.
     pub long_free: u8,
     /// The word of the pipe channel: its byte; -1 for none (K30.7), -2 for a word in no table.
     pub pipe: i16,
@@ -218,7 +220,7 @@ fn pipe_of(frame: &HFrame) -> (i16, u8) {
     }
 }
 
-/// The H-frame that was heard last: what has to be driven behind its answer, and what it brought.
+/// The last H-frame heard: what has to be driven after its answer, and what it brought.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_frame(
     m: Option<&sw_hdsl_t>,
@@ -270,7 +272,7 @@ pub extern "C" fn sw_hdsl_encoder_id(m: Option<&sw_hdsl_t>, id: Option<&mut Mayb
     })
 }
 
-/// Starts the link anew at the end of the present frame (PRST).
+/// Restarts the link at the end of the present frame (PRST).
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_restart(m: Option<&mut sw_hdsl_t>) -> sw_result_t {
     border(|| {
@@ -279,7 +281,8 @@ pub extern "C" fn sw_hdsl_restart(m: Option<&mut sw_hdsl_t>) -> sw_result_t {
     })
 }
 
-/// So many H-frames went over the line whose answers will not be heard, before the one that is heard next.
+/// Reports that this many H-frames, whose answers will not be heard, were on the line before the next one
+/// heard.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_skip(m: Option<&mut sw_hdsl_t>, frames: u8) -> sw_result_t {
     border(|| {
@@ -288,8 +291,9 @@ pub extern "C" fn sw_hdsl_skip(m: Option<&mut sw_hdsl_t>, frames: u8) -> sw_resu
     })
 }
 
-/// A receiver that keeps its frames on an external pulse: `period` eighths of a bit (13.333 ns each) from pulse to pulse, and 1..10 frames
-/// for each. Otherwise as sw_hdsl_start(); SW_E_HDSL_PERIOD_TOO_SHORT, SW_E_HDSL_EXTRA_OUT_OF_RANGE.
+/// Prepares a receiver that keeps its frames on an external pulse: `period` eighths of a bit (13.333 ns
+/// each) from pulse to pulse, and 1..10 frames for each. Otherwise as sw_hdsl_start();
+/// SW_E_HDSL_PERIOD_TOO_SHORT, SW_E_HDSL_EXTRA_OUT_OF_RANGE.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_start_synchronised(
     m: Option<&mut MaybeUninit<sw_hdsl_t>>,
@@ -337,8 +341,8 @@ pub extern "C" fn sw_hdsl_is_in_step(m: Option<&sw_hdsl_t>) -> bool {
     sw_hdsl_t::look(m).is_ok_and(Master::is_in_step)
 }
 
-/// The pulse of the present frame came this many eighths of a bit after its sampling edge (below 0: before it). To be told before the
-/// answer is heard, in frames that are on a pulse.
+/// Reports that the pulse of the present frame came this many eighths of a bit after its sampling edge
+/// (below 0: before it). Call it before the answer is heard, in frames that are on a pulse.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_hear_pulse(m: Option<&mut sw_hdsl_t>, late: i16) -> sw_result_t {
     border(|| {

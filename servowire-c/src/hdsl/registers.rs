@@ -11,7 +11,7 @@ use super::receiver::sw_hdsl_t;
 use crate::border::{OK, border, in_range, state, there};
 use crate::result::sw_result_t;
 
-/// Registers of a receiver. Its content is private; it may be copied. One context at a time.
+/// Registers of a receiver. Its content is private; it may be copied. Only one context at a time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_hdsl_registers_t {
@@ -40,7 +40,7 @@ pub extern "C" fn sw_hdsl_registers_start(
     })
 }
 
-/// Takes over what the receiver heard last: once behind each sw_hdsl_hear().
+/// Takes over what the receiver heard last: call it once after each sw_hdsl_hear().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_registers_apply(map: Option<&mut sw_hdsl_registers_t>, m: Option<&sw_hdsl_t>) -> sw_result_t {
     border(|| {
@@ -64,7 +64,7 @@ pub extern "C" fn sw_hdsl_registers_read(
     })
 }
 
-/// Looks at a register: nothing is taken.
+/// Reads a register without taking an entry.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_registers_look(
     map: Option<&sw_hdsl_registers_t>,
@@ -78,8 +78,8 @@ pub extern "C" fn sw_hdsl_registers_look(
     })
 }
 
-/// Writes a register as an application does, which starts what it stands for in the receiver: messages, resets, synchronisation. What is
-/// refused leaves its value.
+/// Writes a register as an application does, which starts what it stands for in the receiver: messages,
+/// resets, synchronisation. A refused write leaves the value unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_registers_write(
     map: Option<&mut sw_hdsl_registers_t>,

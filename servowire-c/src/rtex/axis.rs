@@ -15,8 +15,8 @@ use crate::border::{OK, border, fill, in_range, read, room, state, there};
 use crate::clock::time;
 use crate::result::{sw_code_t, sw_result_t};
 
-/// One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be copied. One context at a
-/// time.
+/// One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be
+/// copied. Only one context at a time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_axis_t {
@@ -31,13 +31,13 @@ pub(crate) struct Master {
     pub(super) turn: Turn,
 }
 
-/// What an axis is set up with. Limits are counted in update periods.
+/// The configuration of an axis. Limits are counted in update periods.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_config_t {
     /// Update period, ns.
     pub update_ns: u32,
-    /// Update periods of invalid data at the start; 0 if somebody else has sent them.
+    /// Update periods of invalid data at the start; 0 if they were already sent elsewhere.
     pub invalid: u32,
     /// Waits for Servo_Active, for an answer, for a stop.
     pub wait: u32,
@@ -59,11 +59,12 @@ pub struct sw_rtex_config_t {
     pub mode: u8,
 }
 
-/// Where an axis stands.
+/// The state of an axis.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_state_of_t {
-    /// MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, where the reason has one.
+    /// MAC-ID that answered, class of the refusal, place of another axis, or error code of the drive, if
+    /// the reason has one.
     pub detail: u16,
     /// sw_rtex_axis_code_t.
     pub code: u8,
@@ -106,8 +107,8 @@ pub extern "C" fn sw_rtex_axis_start(
     })
 }
 
-/// Takes what an update period brought: the block of this axis, or NULL if there was none, heard until `end_ns`. A block of another
-/// length is a refused one.
+/// Takes the result of an update period: the block of this axis, or NULL if there was none, heard until
+/// `end_ns`. A block of another length is a refused one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_axis_hear(
     axis: Option<&mut sw_rtex_axis_t>,
@@ -128,7 +129,7 @@ pub unsafe extern "C" fn sw_rtex_axis_hear(
     })
 }
 
-/// The block of the next update period, 16 bytes, which counts as sent.
+/// Writes the block of the next update period, 16 bytes, which counts as sent.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_axis_transmit(
     axis: Option<&mut sw_rtex_axis_t>,
@@ -202,20 +203,22 @@ fn setpoint(result: Result<(), SetpointError>) -> Result<sw_result_t, sw_result_
     }
 }
 
-/// The target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the drive's gear and the limits
-/// allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the set-point stays then.
+/// Sets the target of CP in command units. SW_E_RTEX_TOO_FAR if the step from the last one is more than the
+/// drive's gear and the limits allow, SW_E_RTEX_NOT_NOW if the axis is not on or in another mode; the
+/// set-point then stays.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_axis_set_position(axis: Option<&mut sw_rtex_axis_t>, position: i32) -> sw_result_t {
     border(|| setpoint(sw_rtex_axis_t::get(axis)?.axis.set_position(position)))
 }
 
-/// The speed of CV or the torque of CT, in the units of the drive.
+/// Sets the speed of CV or the torque of CT, in the units of the drive.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_axis_set_rate(axis: Option<&mut sw_rtex_axis_t>, rate: i32) -> sw_result_t {
     border(|| setpoint(sw_rtex_axis_t::get(axis)?.axis.set_rate(rate)))
 }
 
-/// Control bits beside Servo_On and the stops (sw_rtex_control_t, added), from the next block on.
+/// Sets the control bits other than Servo_On and the stops (sw_rtex_control_t, added), from the next block
+/// onwards.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_axis_set_control(axis: Option<&mut sw_rtex_axis_t>, control: u16) -> sw_result_t {
     border(|| {
@@ -250,7 +253,7 @@ fn reason(reason: StopReason) -> (sw_rtex_reason_t, u16) {
     }
 }
 
-/// Where the axis stands, and why.
+/// The state of the axis, and the reason.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_axis_state(
     axis: Option<&sw_rtex_axis_t>,

@@ -9,7 +9,7 @@ use rtex_block::{
 use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
-/// What a controller sends.
+/// A command of a controller.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_command_t {
@@ -31,7 +31,7 @@ pub struct sw_rtex_command_t {
     pub noncyclic: u8,
 }
 
-/// What a drive sends: as received, not yet a position.
+/// What a drive sends: as received, not yet a valid position.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_response_t {

@@ -1,4 +1,4 @@
-//! The 32-byte mode: a sub block behind the main one. And responses as a drive makes them.
+//! The 32-byte mode: a sub block after the main one. And responses as a drive makes them.
 
 use core::mem::MaybeUninit;
 

@@ -67,7 +67,7 @@ fn bit(it: u8) -> Result<bool, Refused> {
     in_range((it < 2).then_some(it == 1))
 }
 
-/// A control in PH_INIT.
+/// Prepares a control in PH_INIT.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_phases_start(phases: Option<&mut MaybeUninit<sw_rtex_phases_t>>) -> sw_result_t {
     border(|| {
@@ -76,7 +76,7 @@ pub extern "C" fn sw_rtex_phases_start(phases: Option<&mut MaybeUninit<sw_rtex_p
     })
 }
 
-/// A step of the control: the phase then (sw_rtex_phase_t), or a refusal.
+/// Makes a step of the control; returns the new phase (sw_rtex_phase_t), or a refusal.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_phases_step(
     phases: Option<&mut sw_rtex_phases_t>,
@@ -164,7 +164,7 @@ pub extern "C" fn sw_rtex_axes_within(com_ns: u32) -> u32 {
     FrameTime::GUIDE.axes_within(com_ns)
 }
 
-/// The reload value of a timer for a period. SW_E_NO_VALUE if it is no whole number of ticks.
+/// The reload value of a timer for a period. SW_E_NO_VALUE if it is not a whole number of ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_timer_reload(
     timer_hz: u32,
@@ -184,7 +184,8 @@ pub extern "C" fn sw_rtex_step(before: i32, after: i32) -> i32 {
     step(before, after)
 }
 
-/// Whether a step in an update period is within 400 million pulses a second behind the electronic gear: 1 or 0, or a refusal.
+/// Whether a step in an update period is within 400 million pulses per second after the electronic gear: 1
+/// or 0, or a refusal.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_is_within_limit(
     step: i32,

@@ -17,7 +17,7 @@ pub struct sw_rtex_drive_t {
 }
 state!(sw_rtex_drive_t, Drive, 0x42);
 
-/// Switches a drive on: update period 0.5 ms, one communication an update, gear 1/1.
+/// Switches a drive on: update period 0.5 ms, one communication per update, gear 1/1.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_drive_start(drive: Option<&mut MaybeUninit<sw_rtex_drive_t>>, mac_id: u8) -> sw_result_t {
     border(|| {
@@ -27,7 +27,8 @@ pub extern "C" fn sw_rtex_drive_start(drive: Option<&mut MaybeUninit<sw_rtex_dri
     })
 }
 
-/// An exchange: a command of 16 or 32 bytes comes in, a response of the same length goes out. SW_E_NO_VALUE if the drive is silent.
+/// Makes an exchange: takes a command of 16 or 32 bytes, and returns a response of the same length.
+/// SW_E_NO_VALUE if the drive is silent.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_drive_hear(
     drive: Option<&mut sw_rtex_drive_t>,
@@ -55,7 +56,7 @@ pub unsafe extern "C" fn sw_rtex_drive_hear(
     })
 }
 
-/// Where its motor stands, in command units.
+/// The position of its motor, in command units.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_drive_position(
     drive: Option<&sw_rtex_drive_t>,

@@ -80,7 +80,7 @@ pub enum sw_rtex_status_t {
     SW_RTEX_SI_MON5 = 1 << 15,
 }
 
-/// Where an axis stands.
+/// The states of an axis.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_rtex_axis_code_t {
@@ -88,15 +88,15 @@ pub enum sw_rtex_axis_code_t {
     SW_RTEX_STARTING = 0,
     /// Servo off.
     SW_RTEX_OFF = 1,
-    /// Servo_On is sent, Servo_Active has not come yet.
+    /// Servo_On is 1, and Servo_Active is not 1 yet.
     SW_RTEX_SWITCHING_ON = 2,
     /// Servo on.
     SW_RTEX_ON = 3,
-    /// Slows down; there is a reason.
+    /// Slows down, for a reason.
     SW_RTEX_STOPPING = 4,
-    /// Stands with the servo on; there is a reason.
+    /// At rest with the servo on, for a reason.
     SW_RTEX_HELD = 5,
-    /// Servo_On is 0, Servo_Active has not gone yet.
+    /// Servo_On is 0, and Servo_Active is not 0 yet.
     SW_RTEX_SWITCHING_OFF = 6,
     /// Servo off for a reason.
     SW_RTEX_STOPPED = 7,
@@ -122,25 +122,25 @@ pub enum sw_rtex_reason_t {
     SW_RTEX_NOT_READY = 6,
     /// Servo_Active went to 0.
     SW_RTEX_NOT_ACTIVE = 7,
-    /// Servo_Ready did not come.
+    /// Servo_Ready did not go to 1 in time.
     SW_RTEX_READY_TIMEOUT = 8,
-    /// Servo_Active did not come.
+    /// Servo_Active did not go to 1 in time.
     SW_RTEX_ACTIVE_TIMEOUT = 9,
-    /// Servo_Active did not go.
+    /// Servo_Active did not go to 0 in time.
     SW_RTEX_INACTIVE_TIMEOUT = 10,
     /// The drive does not accept the command; the detail is its error code.
     SW_RTEX_COMMAND_ERROR = 11,
     /// Another axis has failed; the detail is its place.
     SW_RTEX_OTHER_AXIS = 12,
-    /// It was asked to.
+    /// It was requested.
     SW_RTEX_REQUESTED = 13,
     /// Homing did not end in time.
     SW_RTEX_HOMING_TIMEOUT = 14,
-    /// Another reason, of a later release.
+    /// Another reason, added in a later release.
     SW_RTEX_OTHER_REASON = 255,
 }
 
-/// Refusals of RTEX, in the order of their numbers; from -0x4f0 on those of axes and procedures.
+/// Refusals of RTEX, in the order of their numbers; from -0x4f0 onwards, those of axes and procedures.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_rtex_error_t {
@@ -148,19 +148,19 @@ pub enum sw_rtex_error_t {
     SW_E_RTEX_TRUNCATED = -0x401,
     /// The block is too long.
     SW_E_RTEX_TOO_LONG = -0x402,
-    /// A command where a response is due, or the other way round.
+    /// A command in place of a response, or the other way round.
     SW_E_RTEX_DIRECTION = -0x403,
     /// Another MAC-ID.
     SW_E_RTEX_MAC_ID = -0x404,
-    /// There is no such cyclic code.
+    /// The cyclic code is not defined.
     SW_E_RTEX_CYCLIC_CODE = -0x405,
-    /// There is no such non-cyclic code.
+    /// The non-cyclic code is not defined.
     SW_E_RTEX_NON_CYCLIC_CODE = -0x406,
     /// Sub_Chk is wrong.
     SW_E_RTEX_SUB_CHK = -0x407,
-    /// There is no such sub-command.
+    /// The sub-command is not defined.
     SW_E_RTEX_SUB_COMMAND_CODE = -0x408,
-    /// The two codes do not go together.
+    /// The two codes must not be used together.
     SW_E_RTEX_CODE_PAIR = -0x409,
     /// A reserved bit is set.
     SW_E_RTEX_RESERVED = -0x40a,
@@ -168,15 +168,15 @@ pub enum sw_rtex_error_t {
     SW_E_RTEX_NOT_NOW = -0x4f0,
     /// The step or the rate is beyond the limits of the axis; nothing has changed.
     SW_E_RTEX_TOO_FAR = -0x4f1,
-    /// ERR: the command was accepted and failed while it was executed.
+    /// ERR: the command was accepted but failed during execution.
     SW_E_RTEX_EXECUTION = -0x4f2,
-    /// CMD_Error: the drive did not accept the command; its code is told beside.
+    /// CMD_Error: the drive did not accept the command; its code is passed along.
     SW_E_RTEX_COMMAND_ERROR = -0x4f3,
-    /// No answer within the limit. Whether the drive has executed the command is not known.
+    /// No answer within the limit. It is not known whether the drive has executed the command.
     SW_E_RTEX_TIMED_OUT = -0x4f4,
-    /// The motion did not start within the limit. It may start yet.
+    /// The motion did not start within the limit. It may still start.
     SW_E_RTEX_NOT_STARTED = -0x4f5,
-    /// The procedure was broken off by a stop, by servo off, or by another mode.
+    /// The procedure was aborted by a stop, by servo off, or by another mode.
     SW_E_RTEX_BROKEN_OFF = -0x4f6,
 }
 
@@ -210,11 +210,11 @@ pub enum sw_rtex_execution_t {
     SW_RTEX_BUSY = 1 << 4,
     /// Executed with a restriction.
     SW_RTEX_WNG = 1 << 6,
-    /// Accepted, and failed while it was executed.
+    /// Accepted, but failed during execution.
     SW_RTEX_ERR = 1 << 7,
 }
 
-/// How a response answers the command before.
+/// How a response answers the previous command.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_rtex_acknowledgement_t {
@@ -228,7 +228,7 @@ pub enum sw_rtex_acknowledgement_t {
     SW_RTEX_NOT_ACCEPTED = 3,
 }
 
-/// Where the control of a ring stands.
+/// The phases of the control of a ring.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_rtex_phase_t {
@@ -264,7 +264,7 @@ pub enum sw_rtex_asic_t {
 pub enum sw_rtex_fault_t {
     /// It has not.
     SW_RTEX_NO_FAULT = 0,
-    /// The slaves are others than in the table: until the system is reset.
+    /// The slaves differ from the table; this stays until the system is reset.
     SW_RTEX_SLAVE_INFO_MISMATCH = 1,
     /// The communication has timed out.
     SW_RTEX_TIMEOUT = 2,
@@ -290,13 +290,13 @@ pub enum sw_rtex_drive_error_t {
     SW_RTEX_ERROR_MAC_ID = 0x11,
     /// C/R is that of a response.
     SW_RTEX_ERROR_DIRECTION = 0x12,
-    /// There is no such cyclic code.
+    /// The cyclic code is not defined.
     SW_RTEX_ERROR_CYCLIC_CODE = 0x21,
-    /// There is no such non-cyclic code.
+    /// The non-cyclic code is not defined.
     SW_RTEX_ERROR_NON_CYCLIC_CODE = 0x22,
     /// The cyclic mode is not allowed now.
     SW_RTEX_ERROR_CYCLIC_MODE = 0x2e,
-    /// There is no such Type_Code.
+    /// The Type_Code is not defined.
     SW_RTEX_ERROR_TYPE_CODE = 0x31,
     /// An argument is out of range.
     SW_RTEX_ERROR_ARGUMENT = 0x32,

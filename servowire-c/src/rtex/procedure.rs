@@ -1,4 +1,5 @@
-//! Non-cyclic commands and profile motion, response by response: what to send, and what came of it. Time is counted in update periods.
+//! Non-cyclic commands and profile motion, response by response: what to send, and the result. Time is
+//! counted in update periods.
 
 use core::mem::MaybeUninit;
 
@@ -12,7 +13,7 @@ use super::names::sw_rtex_error_t;
 use crate::border::{OK, Refused, border, in_range, read, state, there};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// A non-cyclic command under way. Its content is private; it may be copied.
+/// A non-cyclic command in progress. Its content is private; it may be copied.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_handshake_t {
@@ -20,7 +21,7 @@ pub struct sw_rtex_handshake_t {
 }
 state!(sw_rtex_handshake_t, Handshake, 0x47);
 
-/// A sub-command under way. Its content is private; it may be copied.
+/// A sub-command in progress. Its content is private; it may be copied.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_sub_handshake_t {
@@ -28,7 +29,7 @@ pub struct sw_rtex_sub_handshake_t {
 }
 state!(sw_rtex_sub_handshake_t, SubHandshake, 0x48);
 
-/// A profile motion under way. Its content is private; it may be copied.
+/// A profile motion in progress. Its content is private; it may be copied.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_move_t {
@@ -40,7 +41,7 @@ state!(sw_rtex_move_t, ProfileMove, 0x49);
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_done_t {
-    /// What was read: Monitor_Data, Response_Data3, Sub_Response_Data1; 0 for none.
+    /// The value read: Monitor_Data, Response_Data3 or Sub_Response_Data1; 0 for none.
     pub data: i32,
     /// Index_Echo, of a profile motion 0. With SW_E_RTEX_COMMAND_ERROR the error code of the drive.
     pub index: u16,
@@ -93,8 +94,7 @@ fn executed(value: &NonCyclicResponse) -> sw_rtex_done_t {
 /// Gives a procedure the block of an update period, `None` for a NULL and for a block that is refused: the period passes without an
 /// answer.
 ///
-/// # Safety
-/// As for [`read`].
+/// # Safety As for [`read`].
 unsafe fn hear<T>(
     bytes: *const u8,
     len: usize,
@@ -110,9 +110,9 @@ unsafe fn hear<T>(
     })
 }
 
-/// Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer has to come within `limit` update periods.
-/// `attributes` 1: of SW_RTEX_ALARM_COMMAND the attributes of the alarm that is being issued. Normal and profile commands are no handshakes:
-/// SW_E_ARGUMENT.
+/// Begins a non-cyclic command (sw_rtex_noncyclic_t) whose bytes 8 to 15 are `data`; an answer must come
+/// within `limit` update periods. `attributes` 1: SW_RTEX_ALARM_COMMAND reads the attributes of the present
+/// alarm. Normal and profile commands are not handshakes: SW_E_ARGUMENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_handshake_start(
     handshake: Option<&mut MaybeUninit<sw_rtex_handshake_t>>,
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn sw_rtex_handshake_start(
     })
 }
 
-/// Bytes 8 to 15 of the command that has to be sent while it is pending.
+/// Bytes 8 to 15 of the command to send while it is pending.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_handshake_data(
     handshake: Option<&sw_rtex_handshake_t>,
@@ -152,7 +152,8 @@ pub extern "C" fn sw_rtex_handshake_data(
     })
 }
 
-/// The block of an update period, NULL if there was none; one that is refused counts as none. SW_PENDING; SW_OK with `done`; or SW_E_RTEX_EXECUTION, ..COMMAND_ERROR, ..TIMED_OUT.
+/// Takes the block of an update period, NULL if there was none; a refused block counts as none.
+/// SW_PENDING; SW_OK with `done`; or SW_E_RTEX_EXECUTION, ..COMMAND_ERROR, ..TIMED_OUT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_handshake_hear(
     handshake: Option<&mut sw_rtex_handshake_t>,
@@ -181,7 +182,7 @@ pub extern "C" fn sw_rtex_sub_start(
     })
 }
 
-/// The sub block of an update period, 16 bytes, NULL if there was none; as sw_rtex_handshake_hear().
+/// Takes the sub block of an update period, 16 bytes, NULL if there was none; as sw_rtex_handshake_hear().
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_sub_hear(
     handshake: Option<&mut sw_rtex_sub_handshake_t>,
@@ -244,7 +245,8 @@ pub extern "C" fn sw_rtex_move_data(
     })
 }
 
-/// The block of an update period, NULL if there was none; as sw_rtex_handshake_hear(), and SW_E_RTEX_NOT_STARTED.
+/// Takes the block of an update period, NULL if there was none; as sw_rtex_handshake_hear(), and
+/// SW_E_RTEX_NOT_STARTED.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_move_hear(
     motion: Option<&mut sw_rtex_move_t>,

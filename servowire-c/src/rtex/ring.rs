@@ -13,11 +13,12 @@ use crate::border::{OK, Refused, border, fill, in_range, read, room, state, ther
 use crate::clock::time;
 use crate::result::{sw_code_t, sw_result_t};
 
-/// Axes of a ring at most.
+/// Maximum number of axes in a ring.
 pub const SW_RTEX_AXES: usize = 32;
 const _: () = assert!(SW_RTEX_AXES == MacId::COUNT);
 
-/// What the axes of a ring have in common. Its content is private; it may be copied. One context at a time.
+/// The common state of the axes of a ring. Its content is private; it may be copied. Only one context at a
+/// time may use it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_ring_t {
@@ -49,7 +50,7 @@ pub struct sw_rtex_counter_t {
 }
 state!(sw_rtex_counter_t, CommandCounter, 0x45);
 
-/// What a drive finds in a command.
+/// The faults that a drive finds in a command.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_rtex_verdict_t {
@@ -71,7 +72,8 @@ fn size_of_blocks(bytes: u8) -> Result<BlockSize, Refused> {
     })
 }
 
-/// A ring that sends `invalid` update periods of invalid data before its first commands, in blocks of 16 or 32 bytes.
+/// Prepares a ring that sends `invalid` update periods of invalid data before its first commands, in blocks
+/// of 16 or 32 bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_ring_start(
     ring: Option<&mut MaybeUninit<sw_rtex_ring_t>>,
@@ -86,9 +88,11 @@ pub extern "C" fn sw_rtex_ring_start(
     })
 }
 
-/// An update period of all axes, which were started and stand in the order of the ring: takes the blocks that came, one after the other, heard
-/// until `end_ns`, and writes those of the next period. As soon as one axis fails the others stop in the same call. `rx` NULL: no frame came.
-/// SW_E_STATE if one of the axes was not started, SW_E_ARGUMENT if two have the same MAC-ID or the memory has another size: nothing was done.
+/// Makes an update period of all axes, which were started and are in the order of the ring: takes the
+/// blocks received, one after another, heard until `end_ns`, and writes those of the next period. As soon
+/// as one axis fails the others stop in the same call. `rx` NULL: no frame came. SW_E_STATE if one of the
+/// axes was not started, SW_E_ARGUMENT if two have the same MAC-ID or the memory has another size: nothing
+/// was done.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_ring_update(
     ring: Option<&mut sw_rtex_ring_t>,
@@ -141,7 +145,7 @@ pub unsafe extern "C" fn sw_rtex_ring_update(
     })
 }
 
-/// What one axis has failed of, the others learn.
+/// Tells the others why one axis has failed.
 fn share(it: &mut Ring, axes: &mut [sw_rtex_axis_t]) -> Result<(), Refused> {
     it.fellows.begin();
     for (place, axis) in (0..).zip(&*axes) {
@@ -162,7 +166,7 @@ pub extern "C" fn sw_rtex_ring_failed(ring: Option<&sw_rtex_ring_t>) -> sw_resul
     })
 }
 
-/// Forgets the failure: then each axis is cleared by sw_rtex_axis_clear().
+/// Forgets the failure; then clear each axis with sw_rtex_axis_clear().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_ring_clear(ring: Option<&mut sw_rtex_ring_t>) -> sw_result_t {
     border(|| {
@@ -199,7 +203,7 @@ pub unsafe extern "C" fn sw_rtex_check_response(
     })
 }
 
-/// What a drive with this MAC-ID finds in a command.
+/// Finds the faults that a drive with this MAC-ID reports for a command.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_check_command(
     block_bytes: u8,
@@ -232,7 +236,7 @@ pub extern "C" fn sw_rtex_echo_start(echo: Option<&mut MaybeUninit<sw_rtex_echo_
     })
 }
 
-/// The echo of a response, 0..3, or 255 for none: 1 if the watch has tripped, 0 if not.
+/// Takes the echo of a response, 0..3, or 255 for none; returns 1 if the watch has tripped, 0 if not.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_echo_sample(echo: Option<&mut sw_rtex_echo_t>, update_counter: u8) -> sw_result_t {
     border(|| {
@@ -242,7 +246,7 @@ pub extern "C" fn sw_rtex_echo_sample(echo: Option<&mut sw_rtex_echo_t>, update_
     })
 }
 
-/// A counter that begins behind `invalid` update periods of invalid data.
+/// Prepares a counter that begins after `invalid` update periods of invalid data.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_rtex_counter_start(
     counter: Option<&mut MaybeUninit<sw_rtex_counter_t>>,
@@ -265,8 +269,8 @@ pub extern "C" fn sw_rtex_counter_next(counter: Option<&mut sw_rtex_counter_t>) 
     })
 }
 
-/// The block that switches the servo off behind a command, 16 bytes: counter one on, Servo_On cleared, all else kept. SW_E_NO_VALUE if a drive
-/// would not look at Servo_On in it.
+/// The block that switches the servo off after a command, 16 bytes: counter advanced by one, Servo_On
+/// cleared, everything else kept. SW_E_NO_VALUE if a drive would not evaluate Servo_On in it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_servo_off_after(
     before: *const u8,
@@ -284,7 +288,7 @@ pub unsafe extern "C" fn sw_rtex_servo_off_after(
     })
 }
 
-/// Whether a block switches the servo off for certain: 1 or 0, or a refusal.
+/// Whether a block certainly switches the servo off: 1 or 0, or a refusal.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_rtex_is_servo_off(bytes: *const u8, len: usize) -> sw_result_t {
     border(|| {

@@ -1,4 +1,4 @@
-//! Frames of the start-up: DISCOVERY, PARAM, DELAY_REQ, SYNC, and what stands before a frame.
+//! Frames of the start-up: DISCOVERY, PARAM, DELAY_REQ, SYNC, and the preamble before a frame.
 
 use core::mem::MaybeUninit;
 
@@ -45,7 +45,7 @@ pub struct sw_sorte_header_t {
     pub payload_len: u16,
 }
 
-/// What a PARAM frame tells all devices.
+/// The content of a PARAM frame, for all devices.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_sorte_param_t {
@@ -95,7 +95,7 @@ pub struct sw_sorte_sync_t {
     pub status: u8,
 }
 
-/// A DISCOVERY frame, but for its table.
+/// A DISCOVERY frame, without its table.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_sorte_discovery_t {
@@ -122,7 +122,7 @@ pub unsafe extern "C" fn sw_sorte_crc8(bytes: *const u8, len: usize, crc: Option
     })
 }
 
-/// Where the frame begins behind its preamble, which ends with D5h.
+/// Where the frame begins after its preamble, which ends with D5h.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_sorte_strip_preamble(
     bytes: *const u8,
@@ -275,7 +275,7 @@ pub unsafe extern "C" fn sw_sorte_build_sync(
     })
 }
 
-/// A DISCOVERY frame, whose table lies behind it: sw_sorte_discovered().
+/// Reads a DISCOVERY frame; sw_sorte_discovered() reads its table.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_sorte_parse_discovery(
     bytes: *const u8,
@@ -318,7 +318,8 @@ pub unsafe extern "C" fn sw_sorte_discovered(
     })
 }
 
-/// The DISCOVERY frame that a master sends, SW_SORTE_DISCOVERY bytes; `last` true for the last one of its phase, with which the devices go on.
+/// The DISCOVERY frame that a master sends, SW_SORTE_DISCOVERY bytes; `last` true for the last one of its
+/// phase, which takes the devices to the next phase.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_sorte_build_discovery(last: bool, bytes: *mut u8, size: usize) -> sw_result_t {
     border(|| {

@@ -11,7 +11,7 @@ use tformat::{
 use crate::border::{OK, Refused, border, fill, given, in_range, read, room, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
-/// What a master sends.
+/// A request of a master.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_tformat_request_t {
@@ -23,11 +23,11 @@ pub struct sw_tformat_request_t {
     pub edf: u8,
 }
 
-/// What an encoder sends. Fields that the response to this data ID does not have are 0.
+/// A response of an encoder. Fields that the response to this data ID does not have are 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct sw_tformat_response_t {
-    /// Single-turn data, 24 bits, right-aligned: as received, not yet a position.
+    /// Single-turn data, 24 bits, right-aligned: as received, not yet a valid position.
     pub abs: u32,
     /// Multi-turn data, 24 bits, as received.
     pub abm: u32,
@@ -45,13 +45,13 @@ pub struct sw_tformat_response_t {
     pub edf: u8,
 }
 
-/// Where and how a frame is wrong.
+/// Where a frame is wrong, and in what way.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct sw_detail_t {
-    /// What was received: a byte, a count of fields; 0 where the error has none.
+    /// The value received: a byte, or a count of fields; 0 if the error has none.
     pub got: u32,
-    /// What it should have been, or which of its bits must be 0.
+    /// The value expected, or the bits that must be 0.
     pub want: u32,
     /// The field in which the fault shows, 0 for the control field; 255 if it is not in one field.
     pub field: u8,
@@ -152,8 +152,7 @@ pub(super) fn written<T, U>(
 
 /// What `parse` makes of the caller's bytes or words.
 ///
-/// # Safety
-/// As for [`read`].
+/// # Safety As for [`read`].
 #[inline(always)]
 pub(super) unsafe fn answer<T>(
     asked: Option<&sw_tformat_request_t>,
@@ -169,7 +168,8 @@ pub(super) unsafe fn answer<T>(
     })
 }
 
-/// The response to a request from UART bytes; what follows it is left alone. Typed calls for IDs 0 to 3 are faster.
+/// The response to a request from UART bytes; anything after it is ignored. Typed calls for IDs 0 to 3 are
+/// faster.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_parse(
     asked: Option<&sw_tformat_request_t>,
@@ -181,8 +181,8 @@ pub unsafe extern "C" fn sw_tformat_parse(
     unsafe { answer(asked, bytes, len, response, Response::parse) }
 }
 
-/// The response from what a UART received since the request began, with the receiver on all the time: the own request, then the
-/// response.
+/// The response from what a UART received since the request began, with the receiver on all the time: the
+/// request itself, then the response.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_parse_echoed(
     asked: Option<&sw_tformat_request_t>,
@@ -195,7 +195,7 @@ pub unsafe extern "C" fn sw_tformat_parse_echoed(
 }
 
 /// The response from line bits on a grid of ten bits a field, start bits and delimiters included: `bits` of them in `bytes`, in the
-/// order of sw_bit_order_t. What follows the response, and bits after the 128th, are left alone.
+/// order of sw_bit_order_t. Anything after the response, and bits after the 128th, are ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_parse_line(
     asked: Option<&sw_tformat_request_t>,
@@ -221,7 +221,7 @@ fn bit_order(order: u8) -> Result<BitOrder, Refused> {
     })
 }
 
-/// What an encoder makes of received fields: the request at the front.
+/// Reads received fields as an encoder does: the request at the front.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_parse_request(
     bytes: *const u8,
@@ -242,7 +242,7 @@ pub unsafe extern "C" fn sw_tformat_parse_request(
     })
 }
 
-/// Why sw_tformat_parse() refuses these bytes. The result is the same as there.
+/// Returns why sw_tformat_parse() refuses these bytes. The result is the same as there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_why(
     asked: Option<&sw_tformat_request_t>,

@@ -18,7 +18,7 @@ pub struct sw_tformat_device_t {
 }
 state!(sw_tformat_device_t, Device<6>, 0x13);
 
-/// What an encoder sends, and when.
+/// The response of an encoder, and when it is sent.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_tformat_answer_t {
@@ -32,7 +32,7 @@ pub struct sw_tformat_answer_t {
     pub len: u8,
 }
 
-/// Switches an encoder on: position 0, no alarms. `bits_per_second` is 2500000 or 5000000.
+/// Switches a modelled encoder on: position 0, no alarms. `bits_per_second` is 2500000 or 5000000.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_device_start(
     device: Option<&mut MaybeUninit<sw_tformat_device_t>>,
@@ -60,7 +60,8 @@ pub extern "C" fn sw_tformat_device_set_position(
     })
 }
 
-/// The causes of these alarms (sw_tformat_almc_t, added) come, and those of all others go. A latched alarm stays until ID 7 or C.
+/// Sets the causes of these alarms (sw_tformat_almc_t, added), and removes those of all others. A latched
+/// alarm stays until ID 7 or C.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_device_set_alarms(device: Option<&mut sw_tformat_device_t>, almc: u8) -> sw_result_t {
     border(|| {
@@ -77,7 +78,8 @@ pub extern "C" fn sw_tformat_device_page(device: Option<&sw_tformat_device_t>) -
     sw_tformat_device_t::look(device).map_or(255, Device::page)
 }
 
-/// A sound request that ended at `now_ns`: what it does, and its response. SW_E_NO_VALUE where the encoder is silent.
+/// Takes a sound request that ended at `now_ns`: carries it out, and returns its response. SW_E_NO_VALUE if
+/// the encoder is silent.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_device_answer(
     device: Option<&mut sw_tformat_device_t>,
@@ -93,7 +95,8 @@ pub extern "C" fn sw_tformat_device_answer(
     })
 }
 
-/// Bytes were received without framing error, the last one ended at `end_ns`. SW_SEND with `answer` filled, or SW_PENDING.
+/// Takes bytes received without a framing error; the last one ended at `end_ns`. SW_SEND with `answer`
+/// filled, or SW_PENDING.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_device_hear(
     device: Option<&mut sw_tformat_device_t>,
@@ -110,7 +113,7 @@ pub unsafe extern "C" fn sw_tformat_device_hear(
     })
 }
 
-/// A byte that ended at `end_ns` was received with a framing error.
+/// Reports a byte that ended at `end_ns` and was received with a framing error.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_device_framing_error(
     device: Option<&mut sw_tformat_device_t>,

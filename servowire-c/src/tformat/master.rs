@@ -1,4 +1,4 @@
-//! One request and its answer, and what is known of the position.
+//! One request and its answer, and what is known about the position.
 
 use core::mem::MaybeUninit;
 
@@ -32,39 +32,41 @@ pub(crate) struct Master {
     evidence: Evidence,
 }
 
-/// The times of a line, in ns: sw_tformat_get_line() gives the defaults, change what differs.
+/// The times of a line, in ns: sw_tformat_get_line() returns the defaults; change those that differ.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_tformat_line_t {
     /// 2500000 or 5000000.
     pub bits_per_second: u32,
-    /// From the end of the request to the start bit of the response, at most; default 10 000.
+    /// Longest time from the end of the request to the start bit of the response; default 10 000.
     pub response_timeout_ns: u32,
-    /// From the end of a field to the end of the next, at most; default one and a half field times.
+    /// Longest time from the end of a field to the end of the next; default one and a half field times.
     pub field_timeout_ns: u32,
-    /// From the end of the request to the start bit of the response, at least; default four bits.
+    /// Shortest time from the end of the request to the start bit of the response; default four bits.
     pub turn_around_ns: u32,
-    /// From the end of a byte to its hand-over, at most: interrupt latency, or the time after which an idle line is reported.
+    /// Longest time from the end of a byte to its hand-over: interrupt latency, or the time after which an
+    /// idle line is reported.
     pub hand_over_ns: u32,
     /// The driver is on for this time before the request; default 1000.
     pub driver_lead_ns: u32,
     /// From the end of the request to the instant at which the position is taken; default 480.
     pub sampling_ns: u32,
-    /// 1 if the own request is received: it makes the errors clearer, and nothing depends on it.
+    /// 1 if the request itself is received too: this makes the errors clearer, and nothing else depends on
+    /// it.
     pub echo: u8,
 }
 
-/// What is to be sent, and when.
+/// The data to send, and when to send them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_tformat_transmission_t {
-    /// When the start bit is on the line.
+    /// When to start the start bit.
     pub start_ns: u64,
     /// When the last bit ends.
     pub end_ns: u64,
     /// When the driver is to be switched on.
     pub driver_on_ns: u64,
-    /// When the driver is to be switched off at the latest; at `end_ns` at the earliest.
+    /// When to switch the driver off at the latest; `end_ns` is the earliest.
     pub driver_off_ns: u64,
     /// The fields, one byte each.
     pub bytes: [u8; 4],
@@ -76,7 +78,7 @@ pub struct sw_tformat_transmission_t {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct sw_position_t {
-    /// Turns times the counts of a turn, and the single turn.
+    /// Turns times the counts of a turn, plus the single turn.
     pub counts: i64,
     /// When it was sampled.
     pub sampled_ns: u64,
@@ -87,7 +89,7 @@ pub struct sw_position_t {
 }
 
 impl Master {
-    /// The last exchange is over by then, its late answer too.
+    /// The last exchange has ended by then, including a late answer.
     #[inline(always)]
     pub(super) fn free(&self, start_ns: u64) -> Result<(), Refused> {
         if self.transaction.outcome().is_none() || start_ns < self.transaction.until_ns() {
@@ -267,8 +269,9 @@ pub extern "C" fn sw_tformat_tolerate(m: Option<&mut sw_tformat_t>, almc: u8) ->
     })
 }
 
-/// Begins to read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later. The result is SW_SEND,
-/// and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before the time of sw_tformat_until_ns().
+/// Begins a read: ID 0, 1, 2 or 3. The start bit of the request is on the line at `start_ns`, now or later.
+/// The result is SW_SEND, and `to_send` is filled. SW_E_NOT_FREE while an exchange is pending, and before
+/// the time of sw_tformat_until_ns().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_read(
     m: Option<&mut sw_tformat_t>,
@@ -288,8 +291,8 @@ pub extern "C" fn sw_tformat_read(
     })
 }
 
-/// Begins one exchange of any kind. IDs 6, 7, 8 and C change the encoder: the procedures do it with the repetitions, waits and
-/// checks that belong to it.
+/// Begins one exchange of any kind. IDs 6, 7, 8 and C change the encoder: use the procedures, which make
+/// the necessary repetitions, waits and checks.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_start(
     m: Option<&mut sw_tformat_t>,
@@ -304,7 +307,7 @@ pub extern "C" fn sw_tformat_start(
 }
 
 /// Takes bytes that were received back to back; the last one ended at `end_ns`, or was handed over within the latency of the line
-/// after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if nothing was asked.
+/// after that. SW_PENDING, SW_OK with a response, or a refusal. SW_E_NO_VALUE if there was no request.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_hear(
     m: Option<&mut sw_tformat_t>,
@@ -323,7 +326,7 @@ pub unsafe extern "C" fn sw_tformat_hear(
     })
 }
 
-/// The UART reports a framing error for the byte that ended at `end_ns`.
+/// Reports a framing error of the UART for the byte that ended at `end_ns`.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns: u64) -> sw_result_t {
     border(|| {
@@ -349,8 +352,8 @@ pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> 
     })
 }
 
-/// While an exchange is pending, when it is to be polled; afterwards, from when on the line is free. 0 if nothing was asked,
-/// SW_NO_TIME for a state that was not started.
+/// While an exchange is pending, the time at which to poll it; afterwards, the time from which the line is
+/// free. 0 if nothing was asked, SW_NO_TIME for a state that was not started.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_until_ns(m: Option<&sw_tformat_t>) -> u64 {
     sw_tformat_t::look(m).map_or(crate::clock::SW_NO_TIME, |m| m.transaction.until_ns())
@@ -371,11 +374,12 @@ pub extern "C" fn sw_tformat_response(
     })
 }
 
-/// The angle of the shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs have to go off.**
+/// The angle of the shaft for commutation, a turn is 2^32: **false if it must not be used, and the outputs
+/// must be switched off.**
 ///
 /// It is judged now: no older than `max_age_ns` since it was sampled, from a sound response to this master's request, of the right
 /// encoder, without alarms that concern the single turn (tolerated are OF, BA, BE, ME and OS, and what sw_tformat_tolerate() names).
-/// `angle` is left alone if the result is false.
+/// `angle` is unchanged if the result is false.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_angle(
     m: Option<&sw_tformat_t>,
@@ -394,7 +398,7 @@ pub extern "C" fn sw_tformat_angle(
 }
 
 /// The position with its turns, judged now: false if it must not be used. Tolerated are OF and BA, and what sw_tformat_tolerate()
-/// names. Turns come with ID 3. `position` is left alone if the result is false.
+/// names. Turns come with ID 3. `position` is unchanged if the result is false.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_position(
     m: Option<&sw_tformat_t>,

@@ -12,15 +12,15 @@ pub enum sw_tformat_id_t {
     SW_TFORMAT_READ_ENCODER_ID = 0x2,
     /// ABS, ENID, ABM and ALMC.
     SW_TFORMAT_READ_ALL = 0x3,
-    /// A byte into the EEPROM.
+    /// Writes a byte to the EEPROM.
     SW_TFORMAT_WRITE_EEPROM = 0x6,
-    /// Clears errors; ten times.
+    /// Clears errors; has to be sent ten times.
     SW_TFORMAT_RESET_ERRORS = 0x7,
-    /// Makes this position the zero of the turn; ten times. Shifts the commutation angle.
+    /// Makes this position the zero of the turn; has to be sent ten times. Shifts the commutation angle.
     SW_TFORMAT_SET_SINGLE_TURN_ZERO = 0x8,
-    /// Clears turns and errors; ten times. The machine loses its multi-turn reference.
+    /// Clears turns and errors; has to be sent ten times. The machine loses its multi-turn reference.
     SW_TFORMAT_RESET_TURNS_AND_ERRORS = 0xc,
-    /// A byte of the EEPROM.
+    /// Reads a byte of the EEPROM.
     SW_TFORMAT_READ_EEPROM = 0xd,
 }
 
@@ -70,7 +70,7 @@ pub enum sw_tformat_adf_t {
     SW_TFORMAT_ADF_BUSY = 0x80,
 }
 
-/// What the widths of an encoder leave open, for sw_tformat_set_resolution(); may be added.
+/// Properties that the widths of an encoder leave open, for sw_tformat_set_resolution(); may be added.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_tformat_turns_t {
@@ -80,7 +80,7 @@ pub enum sw_tformat_turns_t {
     SW_TFORMAT_UPPER_BITS_IGNORED = 2,
 }
 
-/// In which bit of a byte the first bit of the line stands.
+/// The bit of a byte that holds the first bit of the line.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum sw_bit_order_t {
@@ -96,7 +96,7 @@ pub enum sw_bit_order_t {
 pub enum sw_tformat_doubt_t {
     /// It may be used.
     SW_TFORMAT_NO_DOUBT = 0,
-    /// Nothing was heard yet.
+    /// Nothing has been heard yet.
     SW_TFORMAT_DOUBT_NEVER = 1,
     /// It is too old.
     SW_TFORMAT_DOUBT_OLD = 2,
@@ -110,11 +110,11 @@ pub enum sw_tformat_doubt_t {
     SW_TFORMAT_DOUBT_OTHER_ENCODER = 6,
     /// Bits above the width are set.
     SW_TFORMAT_DOUBT_UPPER_BITS = 7,
-    /// ALMC reports what is not tolerated.
+    /// ALMC reports something that is not tolerated.
     SW_TFORMAT_DOUBT_ALARMS = 8,
-    /// SF reports what is not tolerated.
+    /// SF reports something that is not tolerated.
     SW_TFORMAT_DOUBT_STATUS = 9,
-    /// Another reason, of a later release.
+    /// Another reason, added in a later release.
     SW_TFORMAT_DOUBT_OTHER = 255,
 }
 
@@ -126,7 +126,7 @@ pub enum sw_tformat_error_t {
     SW_E_TFORMAT_START_BIT = -0x101,
     /// A delimiter reads 0.
     SW_E_TFORMAT_DELIMITER = -0x102,
-    /// The frame ends too early.
+    /// The frame is too short.
     SW_E_TFORMAT_TRUNCATED = -0x103,
     /// The sink code is not 0, 1, 0.
     SW_E_TFORMAT_SINK_CODE = -0x104,
@@ -142,17 +142,17 @@ pub enum sw_tformat_error_t {
     SW_E_TFORMAT_CRC = -0x109,
     /// The response is for another EEPROM address.
     SW_E_TFORMAT_ADDRESS_MISMATCH = -0x10a,
-    /// Another data byte than was written.
+    /// The data byte differs from the one written.
     SW_E_TFORMAT_DATA_MISMATCH = -0x10b,
-    /// The request did not come back as it was sent.
+    /// The request did not come back as sent.
     SW_E_TFORMAT_ECHO_MISMATCH = -0x10c,
-    /// No response in time.
+    /// No response came in time.
     SW_E_TFORMAT_NO_RESPONSE = -0x10d,
     /// The EEPROM stayed busy.
     SW_E_TFORMAT_BUSY = -0x10e,
     /// The act was not done: reading back shows it.
     SW_E_TFORMAT_NOT_DONE = -0x10f,
-    /// Whether the act was done is not known: read back before it is tried again.
+    /// Whether the act was done is not known: read back before trying again.
     SW_E_TFORMAT_EFFECT_UNKNOWN = -0x110,
     /// A data field has bits above the width of the encoder.
     SW_E_TFORMAT_UPPER_BITS = -0x111,

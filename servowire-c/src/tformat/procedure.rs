@@ -1,4 +1,4 @@
-//! What takes several exchanges.
+//! Procedures of several exchanges.
 
 use core::mem::MaybeUninit;
 
@@ -65,7 +65,7 @@ fn begin(p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>, mut kind: Kind, no
     OK
 }
 
-/// ID 7: clears all latched errors, ten requests. Position and turns stay. Then sw_tformat_next().
+/// ID 7: clears all latched errors, ten requests. Position and turns stay. Continue with sw_tformat_next().
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_clear_errors(
     p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
@@ -74,8 +74,9 @@ pub extern "C" fn sw_tformat_clear_errors(
     border(|| begin(p, Kind::Reset(Reset::clear_errors()), now_ns))
 }
 
-/// ID 8: makes this position the zero of the turn, and reads what became of it. **Shifts the commutation angle of the motor.** The
-/// shaft stands still; `tolerance` is how far from zero, in counts, it may seem to be afterwards.
+/// ID 8: makes this position the zero of the turn, and reads the result back. **Shifts the commutation
+/// angle of the motor.** The shaft must be at rest; `tolerance` is how far from zero, in counts, it may
+/// appear to be afterwards.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_zero_single_turn_and_shift_commutation_angle(
     p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
@@ -89,8 +90,8 @@ pub extern "C" fn sw_tformat_zero_single_turn_and_shift_commutation_angle(
     })
 }
 
-/// ID C: clears turns and errors, and reads what became of it. **The machine loses its multi-turn reference.** `tolerance` is how
-/// many turns it may seem to be off zero afterwards.
+/// ID C: clears turns and errors, and reads the result back. **The machine loses its multi-turn
+/// reference.** `tolerance` is how many turns it may appear to be off zero afterwards.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_clear_turns_and_lose_multi_turn_reference(
     p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
@@ -119,7 +120,8 @@ pub extern "C" fn sw_tformat_eeprom_read(
     })
 }
 
-/// Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: know what is at the address.
+/// Writes an EEPROM byte and reads it back. Motor makers keep name plate and commutation data there: make
+/// sure what is at the address.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_eeprom_write(
     p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
@@ -139,8 +141,8 @@ fn cell(page: u8, address: u8) -> Result<(Page, Address), Refused> {
     Ok((in_range(Page::new(page))?, address))
 }
 
-/// Finds the encoder after power-on: 1.5 s later at 5 Mbit/s, then at 2.5 Mbit/s. The master's line is that of the encoder when it
-/// ends with SW_OK; the value is its ENID.
+/// Finds the encoder after power-on: after 1.5 s it tries 5 Mbit/s, then 2.5 Mbit/s. The master's line is
+/// that of the encoder when it ends with SW_OK; the value is its ENID.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_detect(
     p: Option<&mut MaybeUninit<sw_tformat_procedure_t>>,
@@ -149,8 +151,9 @@ pub extern "C" fn sw_tformat_detect(
     border(|| begin(p, Kind::Detection(Detection::new()), power_on_ns))
 }
 
-/// What a procedure wants next: SW_SEND with `to_send` filled (the exchange has begun in the master: hear and poll it until it ends,
-/// then call this again), SW_PENDING while the exchange runs, SW_OK when the procedure is done, or why it failed.
+/// Returns what a procedure needs next: SW_SEND with `to_send` filled (the exchange has begun in the
+/// master: hear and poll it until it ends, then call this again), SW_PENDING while the exchange runs, SW_OK
+/// when the procedure is done, or why it failed.
 ///
 /// The first call begins. After the end the line and the encoder are free at sw_tformat_value()'s `ready_ns`.
 #[unsafe(no_mangle)]
@@ -189,8 +192,9 @@ pub extern "C" fn sw_tformat_next(
     })
 }
 
-/// What a procedure that has ended with SW_OK was made for: the EEPROM byte, ENID, ABM or ABS. `ready_ns` (may be NULL) is the time from
-/// which on the encoder takes requests again; it is also told of a failure, with the failure as result.
+/// Returns the result of a procedure that has ended with SW_OK: the EEPROM byte, ENID, ABM or ABS.
+/// `ready_ns` (may be NULL) is the time from which the encoder accepts requests again; it is also set after
+/// a failure, with the failure as the result.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_value(
     p: Option<&sw_tformat_procedure_t>,

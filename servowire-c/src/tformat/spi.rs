@@ -28,7 +28,8 @@ fn give(
     OK
 }
 
-/// The request in 10-bit SPI words, sent most significant bit first, one a field, at most 4. The idle word 0x3ff follows.
+/// The request in 10-bit SPI words, sent most significant bit first, one per field, at most 4. The idle
+/// word 0x3ff follows.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_build_spi10(
     asked: Option<&sw_tformat_request_t>,
@@ -55,7 +56,8 @@ pub unsafe extern "C" fn sw_tformat_parse_spi10(
     unsafe { answer(asked, words, count, response, parse_spi10) }
 }
 
-/// What a 16-bit SPI sends in a whole transaction, idle while the response comes, at most 10 words.
+/// The words that a 16-bit SPI sends in a whole transaction, idle while the response comes; at most 10
+/// words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_tformat_build_spi16(
     asked: Option<&sw_tformat_request_t>,

@@ -1,4 +1,4 @@
-//! One call a message: no choice at run time, and only the fields that are there.
+//! One call per message: no choice at run time, and only the fields that exist.
 
 use core::mem::MaybeUninit;
 
