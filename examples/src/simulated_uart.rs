@@ -1,4 +1,4 @@
-//! A bench on the host: the encoder model of `tformat` behind a UART whose time runs by the byte.
+//! A bench on the host: the encoder model of `tformat` behind a UART whose time advances with every byte.
 
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;

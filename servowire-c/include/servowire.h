@@ -792,7 +792,7 @@ enum sw_hdsl_stage_t
      */
     SW_HDSL_STAGE_VELOCITY = 1,
     /**
-     * One V-frame with right values has to pass.
+     * One V-frame with correct values has to pass.
      */
     SW_HDSL_STAGE_SETTLE = 2,
     /**
@@ -2702,7 +2702,7 @@ typedef struct {
      */
     uint8_t equalisation;
     /**
-     * Ones minus zeros of the line behind it, without an answer.
+     * Ones minus zeros of the line after it, without an answer.
      */
     int8_t disparity;
 } sw_hdsl_head_t;
@@ -2720,7 +2720,7 @@ typedef struct {
      */
     uint8_t edge;
     /**
-     * NUM_STUFFING: blocks of six bits after the frame before, 0..26.
+     * NUM_STUFFING: blocks of six bits after the previous frame, 0..26.
      */
     uint8_t stuffing;
     /**
@@ -2742,7 +2742,7 @@ typedef struct {
      */
     uint8_t write;
     /**
-     * What is written.
+     * The value to write.
      */
     uint8_t value;
 } sw_hdsl_short_t;
@@ -2772,7 +2772,7 @@ typedef struct {
      */
     uint8_t len;
     /**
-     * What is written.
+     * The value to write.
      */
     uint8_t data[8];
 } sw_hdsl_long_t;
@@ -3656,7 +3656,7 @@ typedef struct {
      */
     uint64_t cycle;
     /**
-     * Time since the step before, ns.
+     * Time since the previous step, ns.
      */
     uint32_t t_step;
     /**
@@ -4687,7 +4687,7 @@ sw_result_t sw_hdsl_start(sw_hdsl_t *m,
                           uint32_t steps_per_turn);
 
 /**
- * Tells what is to be sent in the present H-frame.
+ * Returns the data to send in the present H-frame.
  */
 sw_result_t sw_hdsl_transmission(const sw_hdsl_t *m, sw_hdsl_transmission_t *to_send);
 
@@ -5522,7 +5522,7 @@ sw_result_t sw_step_speed(uint32_t hz, uint32_t *speed);
 uint32_t sw_step_time_ns(uint32_t entry, uint32_t speed);
 
 /**
- * The next step, `t_step` ns after one that came `prev` ns into its cycle.
+ * Computes the next step, `t_step` ns after one that came `prev` ns into its cycle.
  */
 sw_result_t sw_step_next(uint32_t t_step, uint32_t prev, sw_step_time_t *time);
 

@@ -7,7 +7,7 @@ use servowire_core::Step;
 use crate::border::{OK, Refused, there};
 use crate::result::{sw_code_t, sw_result_t};
 
-/// The value of a step as a number: what C asks for.
+/// The value of a step, as a number for C.
 pub(crate) fn plain<Q, T, E>(step: Step<Q, T, E>, number: impl FnOnce(T) -> u32) -> Step<Q, u32, E> {
     step.and_then(|value, ready_ns| Step::Done { value: number(value), ready_ns })
 }

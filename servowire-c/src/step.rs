@@ -64,7 +64,7 @@ pub extern "C" fn sw_step_time_ns(entry: u32, speed: u32) -> u32 {
     step_time_ns(entry, speed)
 }
 
-/// The next step, `t_step` ns after one that came `prev` ns into its cycle.
+/// Computes the next step, `t_step` ns after one that came `prev` ns into its cycle.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_step_next(t_step: u32, prev: u32, time: Option<&mut MaybeUninit<sw_step_time_t>>) -> sw_result_t {
     border(|| {
@@ -131,7 +131,7 @@ pub extern "C" fn sw_step_duration_ns(
 pub struct sw_step_step_t {
     /// Cycle of 4 us in which it comes, from the first of the move.
     pub cycle: u64,
-    /// Time since the step before, ns.
+    /// Time since the previous step, ns.
     pub t_step: u32,
     /// Time in its cycle, ns.
     pub sync_time: u32,

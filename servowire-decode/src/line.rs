@@ -124,7 +124,7 @@ pub(crate) fn samples(
     decode(file, raw, protocol, settings, out)
 }
 
-/// Fewer than four samples a bit.
+/// Fewer than four samples per bit.
 fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
     // A line may be a little faster than its name.
     let need = 4 * u64::from(bit_rate);

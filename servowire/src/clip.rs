@@ -7,16 +7,16 @@ use servowire_decode::time::Time;
 
 /// Bits before and after the frame.
 const AROUND: i64 = 6;
-/// The clock of a speaker is off by this much at most, in parts of a thousand.
+/// Largest error of a speaker's clock, in parts per thousand.
 const OFF: i64 = 60;
-/// More bits are not drawn one by one.
+/// Maximum number of bits drawn one by one.
 const MOST_BITS: i64 = 400;
 
 /// Levels of a channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Trace {
     pub(crate) name: String,
-    /// Its level at the beginning, where it is known, and its edges.
+    /// Its level at the beginning, if known, and its edges.
     pub(crate) edges: Vec<(Time, bool)>,
 }
 
@@ -24,7 +24,7 @@ pub(crate) struct Trace {
 #[derive(Debug, Clone)]
 pub(crate) struct Bits {
     start: Time,
-    /// Picoseconds of a bit, as the edges have it.
+    /// Picoseconds of a bit, measured from the edges.
     width: f64,
     /// Their levels, in the order of the line.
     pub(crate) levels: Vec<bool>,
@@ -130,7 +130,7 @@ impl Clip {
         Some(Bits { start, width, levels })
     }
 
-    /// The bit that broke the frame, where the check tells it.
+    /// The bit that broke the frame, if the check tells it.
     pub(crate) fn broken_bit(&self) -> Option<usize> {
         let refusal = self.refusal()?;
         let first = self.bits()?.at(refusal.time?)?;

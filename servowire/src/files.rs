@@ -10,20 +10,20 @@ use servowire_decode::fault::{At, Fault};
 
 use crate::pipe::Pipe;
 
-/// How long a pipe that nobody asked for may be silent.
+/// How long a pipe that was not requested may be silent.
 const PATIENCE: Duration = Duration::from_millis(400);
 
-/// What the standard input is where nobody asked for it.
+/// The state of the standard input if it was not requested.
 pub(crate) enum Piped {
     /// A terminal, or at its end.
     Nothing,
-    /// A pipe that is open and gives nothing for a moment.
+    /// A pipe that is open but delivers nothing for a moment.
     Silence,
     /// Something to read.
     Content(Input),
 }
 
-/// What the standard input is called.
+/// The name of the standard input.
 const STDIN: &str = "standard input";
 
 /// Opens `path`, or the standard input for `-`. `grows`: its end is waited for.
@@ -44,7 +44,7 @@ pub(crate) fn open(path: &Path, grows: bool) -> Result<Input, Fault> {
     Ok(Input::seeking(&name, BufReader::new(file)))
 }
 
-/// What comes through a pipe or from a redirected file. `wanted`: it is waited for, however long it takes.
+/// What comes through a pipe or from a redirected file. `wanted`: waits for it, however long it takes.
 pub(crate) fn piped(wanted: bool) -> Piped {
     if io::stdin().is_terminal() {
         return Piped::Nothing;
@@ -60,7 +60,7 @@ pub(crate) fn piped(wanted: bool) -> Piped {
     }
 }
 
-/// The system's words without its error number.
+/// Returns the system's message without its error number.
 fn plain(error: &io::Error) -> String {
     let text = error.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_lowercase()

@@ -24,13 +24,13 @@ const MOST_ENCODERS: usize = 32;
 /// Instants later than this are shown from the first frame on, in picoseconds: 1000 s.
 const LATE: i128 = 1_000_000_000_000_000;
 
-/// What a bucket gathers.
+/// The content of a bucket.
 trait Gather: Clone {
     /// The later bucket becomes part of this one.
     fn join(&mut self, later: &Self);
 }
 
-/// Least and most of a curve, first and last.
+/// Minimum, maximum, first and last value of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span {
     first: f64,
@@ -99,7 +99,7 @@ struct Encoder {
     delays: Buckets<u64>,
 }
 
-/// Gathers what is drawn.
+/// Collects the data to draw.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     title: String,
@@ -126,7 +126,7 @@ impl Printer for Picture {
 }
 
 impl Picture {
-    /// An empty one.
+    /// Creates an empty picture.
     pub(crate) fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),

@@ -1,4 +1,4 @@
-//! Takes the changes of the channels as they come, and gives the line around what is asked for.
+//! Takes the changes of the channels as they come, and returns the line around the requested events.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -15,7 +15,7 @@ const KEPT: i64 = 4_000_000_000;
 /// Fewer changes than these are always kept.
 const MOST: usize = 1 << 17;
 
-/// What the line is wanted of.
+/// The events for which the line is wanted.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Wanted {
     /// The first frame of each class of error.
@@ -45,7 +45,7 @@ impl Scope {
         self.clips.values()
     }
 
-    /// How far an event is from what is wanted.
+    /// Distance of an event from the wanted one.
     fn distance(event: &Event, at: Time) -> i64 {
         match event.place {
             Place::Time { start, end } if at < end => (start - at).max(0),

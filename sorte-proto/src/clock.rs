@@ -3,7 +3,7 @@ pub(crate) const WRITE_DELAY_NS: u32 = 135;
 /// Frames averaged for one correction.
 pub(crate) const AVERAGE: u8 = 16;
 
-/// What the device does to its counter. The IEP counter adds 5 per 5 ns tick, so it counts nanoseconds.
+/// The correction of a device's counter. The IEP counter adds 5 per 5 ns tick, so it counts nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Correction {

@@ -45,12 +45,12 @@ pub enum Passed {
 pub struct Rewriter {
     transit: Transit,
     sent: RunningFcs,
-    /// What is rewritten; `None`: nothing.
+    /// The type of frame to rewrite; `None`: nothing is rewritten.
     frame_type: Option<FrameType>,
     /// Where its FCS begins.
     fcs_at: u16,
     add: Status,
-    /// What is added to bytes 4 to 9, which hold numbers of this many bytes, and the carry of the addition that is under way.
+    /// The number added to bytes 4 to 9, which hold numbers of this many bytes, and the carry of the addition in progress.
     addends: [u8; 6],
     width: u16,
     carry: bool,

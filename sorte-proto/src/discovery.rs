@@ -157,7 +157,7 @@ impl serde::Serialize for DiscoveryView<'_> {
     }
 }
 
-/// The values of a discovery frame, all 254 entries with what is in them.
+/// The values of a discovery frame, including the content of all 254 entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]

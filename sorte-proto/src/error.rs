@@ -34,12 +34,12 @@ servowire_core::errors! {
             /// TYPE in the frame.
             got: u8,
         },
-        /// TYPE is known, but not the one asked for.
+        /// TYPE is known, but not the requested one.
         #[error("frame type {got} instead of {want}")]
         UnexpectedType = 5 {
             /// TYPE in the frame.
             got: u8,
-            /// TYPE asked for.
+            /// TYPE requested.
             want: u8,
         },
         /// More bytes than a frame of this kind has.

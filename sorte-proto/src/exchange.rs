@@ -61,7 +61,7 @@ impl<'a> MasterFrameView<'a> {
         self.status
     }
 
-    /// All output bytes.
+    /// Returns all output bytes.
     pub const fn output(self) -> &'a [u8] {
         self.output
     }

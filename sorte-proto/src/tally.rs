@@ -2,7 +2,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tally {
-    /// Cycles in which no frame came at its time.
+    /// Cycles in which no frame came in time.
     pub missed: u32,
     /// Frames that came a second time in their cycle.
     pub doubled: u32,

@@ -239,7 +239,7 @@ impl Timing<'_> {
         send_ns.saturating_add(way_ns as i64).saturating_add(self.device_frame_ns() as i64)
     }
 
-    /// The end times.
+    /// Returns the end times.
     pub fn budget(&self) -> Budget {
         let (slots, sent_ns) = (self.slots(), self.master_sent_ns());
         let (mut last_way, mut back) = (self.line_delay_ns(1), 0);

@@ -30,7 +30,7 @@ enum Aim {
     Rest,
     /// Be at a position.
     At(i64),
-    /// Keep a speed in steps/s.
+    /// Keep a speed, in steps/s.
     Run(Direction, u32),
 }
 

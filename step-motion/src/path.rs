@@ -295,7 +295,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// From a motion at a place on line `at`. With `part` of the requested speeds; without one it brakes at once, and
-    /// may come to rest before the end. `None` if rounding leaves no way.
+    /// may come to rest before the end. `None` if rounding leaves no solution.
     pub(super) fn course(&self, at: usize, start: Motion, place: Real, part: Option<Real>) -> Option<Course> {
         let line = self.line(at)?;
         let left = line.length - place;
@@ -324,7 +324,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         })
     }
 
-    /// From the start of line `at`, at a speed. If rounding leaves no way, it goes on at that.
+    /// From the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
     pub(super) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<Course> {
         let line = self.line(at)?;
         Some(self.course(at, Motion::steady(speed), Real::ZERO, part).unwrap_or_else(|| {
@@ -334,7 +334,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }))
     }
 
-    /// On which line, and where on it, a stop ends that runs at a speed at the start of line `at`.
+    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
     pub(super) fn end_of_stop(&self, at: usize, mut speed: Real) -> (usize, Real) {
         for at in at..self.len {
             let Some(Course { curve, exit, .. }) = self.begin(at, speed, None) else { break };
@@ -347,13 +347,13 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, self.line(last).map_or(Real::ZERO, |line| line.length))
     }
 
-    /// The line that is cut off, and where.
+    /// Returns the line that is cut off, and the place on it.
     pub(super) fn end_of_cut(&self) -> Option<(usize, Real)> {
         (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
     }
 
     /// The position in whole steps at a place on line `at`, if the first line begins at `from`.
-    /// `made`: the steps made on the first line; there is no way back to before them.
+    /// `made`: the steps made on the first line, which cannot be undone.
     pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
         let mut to = from;
         for i in 0..=at {
@@ -468,7 +468,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         speed
     }
 
-    /// How far an axis moves, in units.
+    /// Distance that an axis moves, in units.
     fn way(&self, axis: usize, steps: i32) -> Real {
         let scale = self.axes.get(axis).map_or(1, |axis| axis.steps_per_m);
         Real::new(steps.unsigned_abs().into()) * self.unit / Real::new(scale.into())
@@ -479,7 +479,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         squares.fold(Real::ZERO, |sum, square| sum + square).sqrt()
     }
 
-    /// Along the line, what every axis can take, and the speed that is asked for.
+    /// The limits along the line that every axis permits, and the requested speed.
     fn bounds(&self, steps: &[i32; N], length: Real, feed: u32) -> (Bounds, Real) {
         let second = Real::new(self.clock.moments().into());
         let feed = self.unit * Real::new(feed.into()) / (Real::new(1_000_000) * second);

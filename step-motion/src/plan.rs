@@ -88,7 +88,7 @@ impl Plan {
         steps(self.phases.last())
     }
 
-    /// The ticks of the steps, the first one first.
+    /// The ticks of the steps, in order.
     pub fn pulses(&self) -> Pulses<'_> {
         Pulses { plan: self, stepper: Stepper::new() }
     }

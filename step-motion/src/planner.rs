@@ -41,7 +41,7 @@ pub(super) const SLACK: Real = Real::fixed(1, 16);
 /// The speed at which an endless curve ends is cruised for this many moments.
 pub(super) const ENDLESS: Real = Real::fixed(1, -60);
 
-/// The curve; or the least distance that is needed, if there is not as much.
+/// Returns the curve, or the smallest sufficient distance if there is too little.
 pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
     let mut curve = Curve::new();
     match plan_into(&mut curve, start, goal, bounds) {
@@ -50,7 +50,7 @@ pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, 
     }
 }
 
-/// The same in its place, an empty curve: it is large.
+/// Does the same into an empty curve, which is large.
 pub(super) fn plan_into(curve: &mut Curve, start: Motion, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     match bounds.jerk {
         Some(jerk) if !start.a.is_zero() => {
@@ -65,7 +65,7 @@ pub(super) fn plan_into(curve: &mut Curve, start: Motion, goal: Goal, bounds: &B
     }
 }
 
-/// What an acceleration under way means.
+/// The slope to which the present acceleration belongs.
 struct Bent {
     jerk: Jerk,
     /// Time since the virtual start, and time until the acceleration is back at 0.
@@ -111,7 +111,7 @@ fn rising(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bo
     coast(curve, start, bent, goal, bounds)
 }
 
-/// The acceleration is brought to 0 first.
+/// Brings the acceleration to 0 first.
 fn coast(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let rest = match goal {
         Goal::At(n, _) if n + SLACK < bent.coast.1 => {
@@ -165,7 +165,7 @@ fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Option<Real>, boun
     curve.slope(&down);
 }
 
-/// From a speed at acceleration 0.
+/// Plans from a speed at acceleration 0.
 fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     match goal {
         Goal::At(n, exit) => {

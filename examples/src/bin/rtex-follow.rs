@@ -1,7 +1,7 @@
-//! Two RTEX axes that follow the curves of `step-motion`: its plan says where an axis is to be at an instant, and each update
-//! period sends that. A jerk-limited move forth, one back, and one that a stop ends half way.
+//! Two RTEX axes that follow the curves of `step-motion`: the plan says where an axis has to be at an instant, and each
+//! update period sends that position. It makes a jerk-limited move forth, one back, and one that a stop ends half-way.
 //!
-//! `cargo run -p servowire-examples --bin rtex-follow` prints what each move has put on the wire.
+//! `cargo run -p servowire-examples --bin rtex-follow` prints what each move puts on the wire.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,

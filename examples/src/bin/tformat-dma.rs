@@ -1,7 +1,7 @@
 //! Firmware with interrupts and DMA, without a driver crate: `cargo run -p servowire-examples --bin tformat-dma`.
 //!
-//! The master of `tformat` takes whole blocks, so three short handlers are all. Whoever copies this replaces the simulated encoder
-//! in `main` by a UART: DMA to it, DMA from it into a buffer, its idle interrupt, and a timer.
+//! The master of `tformat` takes whole blocks, so three short handlers are enough. To copy this, replace the simulated
+//! encoder in `main` by a UART: DMA to it, DMA from it into a buffer, its idle interrupt, and a timer.
 
 use tformat::device::Device;
 use tformat::master::{Exchange, Line, Progress, Transaction, Transmission};

@@ -1,7 +1,7 @@
 //! A T-Format encoder at standard input and output, for an emulator or a test bench: bytes of requests in, bytes of answers out.
 //!
-//! `cargo run -p servowire-examples --bin tformat-encoder`. Its shaft turns on by a thousand counts with every answer. Here bytes have
-//! no bit time: those that come within 100 ms belong to the same request.
+//! `cargo run -p servowire-examples --bin tformat-encoder`. Its shaft advances by a thousand counts with every answer. Here
+//! bytes have no bit time: those that come within 100 ms belong to the same request.
 
 use core::time::Duration;
 use std::io::{self, Read, Write};

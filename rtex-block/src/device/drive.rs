@@ -256,7 +256,7 @@ impl Drive {
         self.warning = warning;
     }
 
-    /// Sets the inputs that byte 3 of a response shows.
+    /// Sets the inputs shown in byte 3 of a response.
     pub const fn set_inputs(&mut self, byte3: u8) {
         self.inputs = byte3;
     }

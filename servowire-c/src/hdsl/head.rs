@@ -23,7 +23,7 @@ pub struct sw_hdsl_head_t {
     pub len: u8,
     /// The four bits that level the line.
     pub equalisation: u8,
-    /// Ones minus zeros of the line behind it, without an answer.
+    /// Ones minus zeros of the line after it, without an answer.
     pub disparity: i8,
 }
 
@@ -35,7 +35,7 @@ pub struct sw_hdsl_extra_t {
     pub window: i16,
     /// Where the sampling edge stands in the window, 24..72 eighths.
     pub edge: u8,
-    /// NUM_STUFFING: blocks of six bits after the frame before, 0..26.
+    /// NUM_STUFFING: blocks of six bits after the previous frame, 0..26.
     pub stuffing: u8,
     /// EXTRA_EDGE, the register: ones as the edge has them.
     pub edge_register: u8,

@@ -27,7 +27,7 @@ pub struct sw_hdsl_short_t {
     pub register_address: u8,
     /// 1: write, 0: read.
     pub write: u8,
-    /// What is written.
+    /// The value to write.
     pub value: u8,
 }
 
@@ -45,7 +45,7 @@ pub struct sw_hdsl_long_t {
     pub indirect: u8,
     /// Bytes to be read or written: 0, 2, 4 or 8.
     pub len: u8,
-    /// What is written.
+    /// The value to write.
     pub data: [u8; 8],
 }
 

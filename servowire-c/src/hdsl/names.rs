@@ -170,7 +170,7 @@ pub enum sw_hdsl_stage_t {
     SW_HDSL_STAGE_POSITION = 0,
     /// The next safe position gives the error of the velocity.
     SW_HDSL_STAGE_VELOCITY = 1,
-    /// One V-frame with right values has to pass.
+    /// One V-frame with correct values has to pass.
     SW_HDSL_STAGE_SETTLE = 2,
     /// Aligned; every safe position is compared.
     SW_HDSL_STAGE_CHECK = 3,

@@ -71,7 +71,7 @@ pub extern "C" fn sw_hdsl_start(
     })
 }
 
-/// Tells what is to be sent in the present H-frame.
+/// Returns the data to send in the present H-frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_transmission(
     m: Option<&sw_hdsl_t>,

@@ -2,7 +2,7 @@
 
 use crate::time::Time;
 
-/// Shorter runs are spikes, in bits: above a sample at four samples a bit, below a bit with jitter at both ends.
+/// Shorter runs are spikes, in bits: above a sample at four samples per bit, below a bit with jitter at both ends.
 const SHORTEST_RUN: f64 = 0.375;
 
 /// A cluster between equal levels that spends this long at the other level is a bit in pieces; in bits.

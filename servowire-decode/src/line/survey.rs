@@ -347,7 +347,7 @@ fn level_of_rest(edges: &Edges, bit: i64) -> Option<bool> {
     (high != low).then_some(high > low)
 }
 
-/// The rate that the runs of a channel look like, in bits a second: the shortest length that is too frequent to be a
+/// The rate that the runs of a channel look like, in bits per second: the shortest length that is too frequent to be a
 /// spike. `None` if there are hardly any runs.
 pub(super) fn seen_rate(edges: &Edges) -> Option<f64> {
     let mut lengths: Vec<f64> = edges

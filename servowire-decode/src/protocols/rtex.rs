@@ -57,11 +57,11 @@ const MOTION: [&str; 3] = ["IN_POSITION", "IN_PROGRESS", "TORQUE_LIMITED"];
 struct Decoder {
     settings: settings::Rtex,
     blocks: Blocks,
-    /// What was read before the shape was known.
+    /// The data read before the shape was known.
     held: Vec<Burst>,
     /// Whether blocks are being decoded, in any shape.
     began: bool,
-    /// Why the log is not what it was written as.
+    /// Why the log is not as written.
     misread: Option<String>,
     analysis: LogAnalysis,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
@@ -96,7 +96,7 @@ impl Decoder {
         self.misread = self.blocks.shape().0.and_then(misread);
     }
 
-    /// Decodes what was held back.
+    /// Decodes the data held back.
     fn let_go(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let held = std::mem::take(&mut self.held);
         self.began = true;
@@ -263,7 +263,7 @@ impl LogDecoder for Decoder {
         Some(format!("the log looks like {}{other}", said(shape)))
     }
 
-    /// What is wrong with the log as a whole, and what somebody has to look after.
+    /// What is wrong with the log as a whole, and what needs attention.
     fn found(&self) -> Found {
         let said = |it: DriveTrouble| format!("drive {} {}", it.mac_id, it.trouble.name());
         let troubles: Vec<String> = self.analysis.troubles().map(said).collect();
@@ -284,7 +284,7 @@ impl LogDecoder for Decoder {
         if waits { Ok(()) } else { self.let_go(out) }
     }
 
-    /// A line that is not bytes: with it is lost what it holds of a block.
+    /// Takes a line that is not bytes; its part of a block is lost.
     fn spoilt(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         if !self.held.is_empty() {
             self.let_go(out)?;

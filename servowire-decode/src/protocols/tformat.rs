@@ -87,7 +87,7 @@ pub struct Decoder {
     pending: Option<Pending>,
     /// Until when a frame may answer a request that was before the capture, as long as none was sound.
     early: Option<Time>,
-    /// A frame that may be a request or such an answer: what follows tells.
+    /// A frame that may be a request or such an answer: the next frame decides.
     unclear: Option<Frame>,
 }
 

@@ -1,4 +1,4 @@
-//! One axis: SYNC0 generator, DIR, motor, and what became of each step.
+//! One axis: SYNC0 generator, DIR, motor, and the fate of each step.
 
 use std::collections::VecDeque;
 
@@ -14,24 +14,24 @@ use super::periods::{Change, Generator, PERIOD};
 /// Maximum number of steps in progress; older ones are lost.
 const UNDER_WAY: usize = 8;
 
-/// What became of the steps of an axis.
+/// Counts of the steps of an axis, by outcome.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Tally {
-    /// Steps that the motion asked for.
+    /// Steps requested by the motion.
     pub(super) asked: u64,
-    /// Steps that the device ordered from its generator, those that it caught up with among them.
+    /// Steps that the device ordered from its generator, including those caught up.
     pub(super) ordered: u64,
-    /// Pulses at their time.
+    /// Pulses in time.
     pub(super) on_time: u64,
     /// Pulses at the wrong time.
     pub(super) late: u64,
-    /// Pulses without a step: the published device makes its last step again when a frame is lost.
+    /// Pulses without a step: the published device repeats its last step when a frame is lost.
     pub(super) extra: u64,
     /// Steps without a pulse.
     pub(super) lost: u64,
     /// Steps that the motor made: pulses with the driver on.
     pub(super) moved: u64,
-    /// Steps made in a cycle of their own because their frame was lost.
+    /// Steps made later, in a cycle without a step of its own, because their frame was lost.
     pub(super) caught_up: u64,
     /// DIR too close to a rising STEP.
     pub(super) dir_faults: u64,
@@ -52,23 +52,23 @@ pub(super) enum Seen {
     Position(i64),
 }
 
-/// A word that a frame has brought.
+/// A word received in a frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Incoming {
-    /// When the device has it, in ns since the start of its generator.
+    /// When the device has received it, in ns since the start of its generator.
     pub(super) at: u64,
     pub(super) word: Pto,
     /// The master's time of its step.
     pub(super) expected: f64,
 }
 
-/// How the generators are made, and what a late pulse is.
+/// Settings of the generators, and the threshold for a late pulse.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Build {
     pub(super) variant: Variant,
     pub(super) latency_ns: u16,
     pub(super) write_ns: u16,
-    /// A pulse further from its time is late.
+    /// A pulse further than this from its time is late.
     pub(super) tolerance_ns: f64,
 }
 
@@ -81,7 +81,7 @@ impl Build {
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     build: Build,
-    /// The master's time of the steps that are under way.
+    /// The master's time of the steps in progress.
     expected: VecDeque<f64>,
     rise: f64,
     fall: f64,
@@ -111,13 +111,13 @@ impl Axis {
         }
     }
 
-    /// Restarts the generator. Pulses of a run before are over.
+    /// Restarts the generator. Pulses of an earlier run have ended.
     pub(super) fn start(&mut self) {
         self.tally.lost += self.expected.len() as u64;
         self.expected.clear();
     }
 
-    /// Something has happened; `word`: the one that has been under way. Changes are given to `seen`, if anybody wants them.
+    /// Handles an activity; `word`: the word in progress. Changes are passed to `seen`, if it is wanted.
     pub(super) fn take(
         &mut self,
         change: Change,
@@ -133,7 +133,7 @@ impl Axis {
         }
     }
 
-    /// The word is in the buffer: its step will come.
+    /// Notes that the word is in the buffer, so its step will come.
     fn order(&mut self, Incoming { word, expected, .. }: Incoming) {
         if word.start().is_some() {
             self.tally.ordered += 1;

@@ -7,7 +7,7 @@ const WRITE_NS: f64 = 135.0;
 /// A tick of the counter in ns.
 const TICK: f64 = 5.0;
 
-/// A counter that adds 5 each tick of a crystal that is not quite right, and 4 or 6 while it is corrected.
+/// A counter that adds 5 per tick of a slightly inaccurate crystal, and 4 or 6 while it is corrected.
 ///
 /// Times are ns of the simulation, which are those of the master's crystal.
 #[derive(Debug, Clone, Copy)]
@@ -20,22 +20,22 @@ pub(super) struct Clock {
     /// Until then a correction runs, which adds `slew` to the rate.
     slew: f64,
     slew_until: f64,
-    /// The crystal warms up: what `rate` gains in a second.
+    /// The crystal warms up: the gain of `rate` in a second.
     drift: f64,
 }
 
 impl Clock {
-    /// `ppm`: how fast the crystal is; `drift_ppm`: what it gains in a second.
+    /// `ppm`: error of the crystal; `drift_ppm`: its gain in a second.
     pub(super) fn new(value: f64, ppm: f64, drift_ppm: f64) -> Self {
         Self { at: 0.0, value, rate: 1.0 + ppm * 1e-6, slew: 0.0, slew_until: 0.0, drift: drift_ppm * 1e-6 }
     }
 
-    /// The counter at a time. A correction that has begun is not seen before its time.
+    /// Returns the counter at a time. A correction that has begun is not seen before its time.
     pub(super) fn at(&self, ns: f64) -> f64 {
         self.value + (ns - self.at) * self.rate + (ns.min(self.slew_until) - self.at).max(0.0) * self.slew
     }
 
-    /// What the register reads: whole ticks.
+    /// The reading of the register: whole ticks.
     pub(super) fn read(&self, ns: f64) -> u32 {
         let value = self.at(ns);
         // Rounded down, also below 0.

@@ -1,7 +1,8 @@
-//! Feed override: a program slowed down, stopped and started again on its path.
+//! Feed override: a program is slowed down, stopped and restarted on its path.
 //!
 //! The words of the program are steps at times. Here time runs at a rate of 0 to 1, so all axes slow down together and stay on
-//! their path, whatever the program is; steps only move apart, so 4 us between two of an axis stay 4 us at least.
+//! their path, whatever the program is; steps only move apart, so two steps of an axis that are 4 us apart stay at least 4
+//! us apart.
 
 use sorte_proto::{Pto, StartTime};
 
@@ -15,7 +16,7 @@ const PERIOD: f64 = 4000.0;
 pub(super) struct Feed {
     rate: f64,
     target: f64,
-    /// Ns of the program's cycle that are over.
+    /// Ns of the program's cycle that have passed.
     done: f64,
     /// The program's cycle.
     words: Vec<Pto>,
@@ -35,7 +36,7 @@ impl Feed {
         self.rate == 0.0 && self.target == 0.0
     }
 
-    /// Whether all that was taken from the program has been given on.
+    /// Whether everything taken from the program has been passed on.
     pub(super) fn is_empty(&self) -> bool {
         self.done == 0.0
             || self.words.iter().all(|word| word.start().is_none_or(|start| f64::from(start.ns()) < self.done))

@@ -6,13 +6,13 @@ use super::feed::Feed;
 use super::node::Node;
 use super::power::Power;
 
-/// Steps behind at which the host slows down, so that the axis finds cycles to catch up in.
+/// Number of missing steps at which the host slows down, so that the axis finds cycles in which to catch up.
 const SLOW_LAG: u16 = 32;
 /// The rate then: 12 us and more between two steps, so two cycles in a row without one.
 const SLOW: f64 = 0.3;
 /// Cycles from the last word until all pulses have ended.
 const DRAIN: u32 = 6;
-/// Cycles after which the host waits no longer for an axis that does not catch up.
+/// Cycles after which the host stops waiting for an axis that does not catch up.
 const PATIENCE: u32 = 20_000;
 
 pub(super) struct Host {
@@ -20,12 +20,12 @@ pub(super) struct Host {
     feed: Feed,
     words: Vec<Pto>,
     max_lag: u16,
-    /// Cycles of motion; `None`: until the program is over.
+    /// Cycles of motion; `None`: until the program ends.
     cycles: Option<u64>,
     cycle: u64,
     /// Why the motion was ended early.
     pub(super) ended: Option<String>,
-    /// The master has started again: nothing moves until the axes are where they should be.
+    /// The master has restarted: nothing moves until the axes are where they should be.
     resuming: bool,
     catching_up: bool,
     /// Cycles since there was nothing more to do; since the resumption began.
@@ -55,7 +55,7 @@ impl Host {
         (self.resuming, self.waited) = (true, 0);
     }
 
-    /// Makes the words of the next cycle. `stop`: the master is about to start again.
+    /// Makes the words of the next cycle. `stop`: the master is about to restart.
     pub(super) fn plan(&mut self, stop: bool, nodes: &[Node]) {
         self.cycle += 1;
         let worst = nodes.iter().map(|node| node.lag.unsigned_abs()).max().unwrap_or(0);
@@ -124,12 +124,12 @@ impl Host {
         &self.words
     }
 
-    /// Whether the axes stand still.
+    /// Whether the axes are at rest.
     pub(super) fn is_still(&self) -> bool {
         self.feed.is_still()
     }
 
-    /// Whether the motion is over, and every pulse of it.
+    /// Whether the motion and all its pulses have ended.
     pub(super) fn is_done(&self) -> bool {
         self.idle >= PATIENCE
     }

@@ -1,5 +1,5 @@
-//! The whole machine at its landing: lines of 4 to 254 devices with loss, duplicates, jitter and drift. What the ends say is held
-//! against what has really happened on the wires.
+//! Test of the whole machine: lines of 4 to 254 devices with loss, duplicates, jitter and drift. The reports of both ends
+//! are compared with what really happened on the wires.
 
 use sorte_proto::Tally;
 use sorte_proto::sync0::Variant;

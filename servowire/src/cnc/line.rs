@@ -37,7 +37,7 @@ pub(super) struct Line {
     pub(super) wires: Wires,
     queue: Queue,
     now: f64,
-    /// When the master wants to be asked.
+    /// When the master needs to be polled.
     asked: f64,
     /// Devices that a cable leads to.
     plugged: usize,
@@ -48,7 +48,7 @@ pub(super) struct Line {
     /// Shortest gap between two device frames at the master, in ns; and where the last one ended.
     pub(super) gap_ns: f64,
     free: f64,
-    /// Why the master has started again last; which device has left the line because its measurement of it cannot be.
+    /// The reason of the master's last restart, and the device that has left the line because its line delay is implausible.
     pub(super) why: Option<String>,
     unmeasured: Option<String>,
     /// Lines for the user: what went wrong, and when; and how many there were.
@@ -57,7 +57,7 @@ pub(super) struct Line {
     output: Vec<u8>,
 }
 
-/// What a call of [`Line::step`] has done.
+/// The result of a call of [`Line::step`].
 pub(super) enum Progress {
     StartUp,
     Cycle,
@@ -129,7 +129,7 @@ impl Line {
         }
     }
 
-    /// Goes on until the master has sent something; `None`: it waits for ever.
+    /// Continues until the master has sent something; `None`: it waits for ever.
     pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
         while let Some((at, event)) = self.queue.pop() {
             self.now = at;
@@ -196,7 +196,7 @@ impl Line {
         Ok(None)
     }
 
-    /// Does what a device wants now, and plans when to ask it again.
+    /// Does what a device needs now, and plans when to poll it again.
     fn ask(&mut self, k: usize, mut record: Option<&mut Recorder>) {
         let now = self.now;
         loop {
@@ -228,7 +228,7 @@ impl Line {
         }
     }
 
-    /// The master sends a start-up frame.
+    /// Sends a start-up frame of the master.
     fn start_up(&mut self, frame: Outgoing, at_ns: u64, record: &mut Recorder) {
         let kind = match frame {
             Outgoing::Discovery { .. } => 0,
@@ -251,7 +251,7 @@ impl Line {
         }
     }
 
-    /// A start-up frame passes a device.
+    /// Passes a start-up frame through a device.
     fn passes(&mut self, k: usize, port: PortId, mut frame: Vec<u8>, preamble: usize, hit: Hit, record: &mut Recorder) {
         let sof = self.now;
         if k >= self.plugged {
@@ -293,7 +293,7 @@ impl Line {
         self.queue.push(at, Event::StartUp { at: place, port: PortId::B, frame, preamble, hit });
     }
 
-    /// A start-up frame is back at the master.
+    /// Hands a start-up frame that has come back to the master.
     fn returned(&mut self, mut frame: Vec<u8>, sof: f64, preamble: usize, hit: &Hit, record: &mut Recorder) {
         self.wires.noise.pass(&mut frame);
         if hit.get() {
@@ -332,7 +332,7 @@ impl Line {
         }
     }
 
-    /// A cycle begins: the master sends its frame to all devices.
+    /// Begins a cycle: the master sends its frame to all devices.
     fn cycle(&mut self, at_ns: u64, time_stamp: u16, cycle: u64, host: &Host, record: &mut Recorder) {
         self.incidents(cycle);
         let mut output = core::mem::take(&mut self.output);
@@ -375,7 +375,7 @@ impl Line {
         self.ask(k, Some(record));
     }
 
-    /// A device's frame leaves, and goes through all devices before it.
+    /// Sends a device's frame through all devices before it.
     fn leaves(&mut self, k: usize, record: &mut Recorder) {
         let now = self.now;
         if k >= self.plugged {
@@ -453,7 +453,7 @@ impl Line {
 /// The master waits for ever.
 struct Stopped;
 
-/// What comes out of two frames on one wire is neither.
+/// Two frames on one wire destroy each other.
 fn garble(frame: &mut [u8]) {
     for byte in frame {
         *byte ^= 0x55;

@@ -19,7 +19,7 @@ const APART: i32 = 26;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chart {
     pub(crate) title: String,
-    /// What goes along, with its unit.
+    /// The quantity along the axis, with its unit.
     pub(crate) along: String,
     pub(crate) x: Range<f64>,
     /// Otherwise what the curves and bars need.
@@ -39,7 +39,7 @@ impl Chart {
         Self { title: title.into(), along: along.into(), x, ..Self::default() }
     }
 
-    /// With a further curve.
+    /// Adds a curve.
     #[must_use]
     pub(crate) fn with(mut self, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
         self.curves.push((stroke, points));
@@ -159,7 +159,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }
 }
 
-/// A number of any size.
+/// Formats a number of any size.
 fn any(value: f64, _: usize) -> String {
     if value >= 1.0 { format!("{value:.0}") } else { format!("{value:.3}") }
 }

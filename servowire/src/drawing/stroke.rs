@@ -1,11 +1,11 @@
-//! How a curve is drawn.
+//! The stroke of a curve.
 
 use plotters::coord::CoordTranslate;
 use plotters::prelude::*;
 
 use super::{Area, Drawn, INK, SMALL, ink};
 
-/// A colour, a width, and pixels drawn and left out; nothing left out is a solid line.
+/// A colour, a width, and pixels drawn and omitted; none omitted is a solid line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stroke {
     colour: RGBColor,

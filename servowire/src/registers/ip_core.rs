@@ -1,4 +1,4 @@
-//! The registers of the SICK IP core. What its online status says is not among them.
+//! The registers of the SICK IP core. The content of its online status is not among them.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use super::{byte, check, data, events, identity, line, number, refused, safe_2};
 
 /// MIR_SUM at the interface of the drive: SUMMARY.
 const MIR_SUM: u8 = 0x18;
-/// ERR in PC_ADD_H. All its other bits can be written only.
+/// ERR in PC_ADD_H. All its other bits are write-only.
 const ERR: u8 = 0x20;
 
 pub(super) fn write(mut map: Registers, bank: bool, out: &mut String) -> fmt::Result {

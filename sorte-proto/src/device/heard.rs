@@ -63,7 +63,7 @@ pub struct Reaction {
     pub result: Result<(), Error>,
     /// Delay request to send on the reverse port; the last device sends none.
     pub trigger: Trigger,
-    /// What to do to the counter.
+    /// The correction of the counter.
     pub correction: Correction,
 }
 
@@ -79,7 +79,7 @@ pub struct Output<'a> {
     pub trigger_ns: u32,
     /// The sum of the frame's time stamp and the delay from the master, as the published device adds them, in ns.
     pub reference_ns: u32,
-    /// What to do to the counter.
+    /// The correction of the counter.
     pub correction: Correction,
 }
 

@@ -122,7 +122,7 @@ impl Device {
         self.assignment
     }
 
-    /// What the master told all devices.
+    /// The parameters that the master sent to all devices.
     pub fn parameters(&self) -> Option<Parameters> {
         self.parameters.as_ref().map(Parameters::parse)
     }

@@ -1,4 +1,4 @@
-//! A simulated ASIC with three drives, in place of the chip's bus. Time goes on with every access.
+//! A simulated ASIC with three drives, in place of the chip's bus. Time advances with every access.
 
 use std::sync::{Mutex, PoisonError};
 

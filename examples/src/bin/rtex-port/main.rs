@@ -1,8 +1,8 @@
 //! A worked port: an RTEX master on a chip with the communication ASIC on its bus, in the internal-timer system.
 //!
-//! `cargo run -p servowire-examples --bin rtex-port` runs it against a simulated ASIC with three drives. Whoever copies this keeps
-//! `main.rs` and `port.rs`, writes `map.rs` from the data sheet of the ASIC, which is not public, and puts the one volatile access of
-//! the chip in the place of `asic.rs`. Two interrupts and the main loop share the driver:
+//! `cargo run -p servowire-examples --bin rtex-port` runs it against a simulated ASIC with three drives. To copy this, keep
+//! `main.rs` and `port.rs`, write `map.rs` from the data sheet of the ASIC, which is not public, and replace `asic.rs` by
+//! the one volatile access of your chip. Two interrupts and the main loop share the driver:
 //!
 //! ```text
 //! XSYNC    highest priority   exchange, then the set-points of the next period
@@ -10,7 +10,7 @@
 //! main     no priority        control(), LED, what the machine is to do; takes the driver in a critical section, for one call
 //! ```
 //! Positions leave the interrupt through an [`EvidenceCell`] and targets enter it through atomics, so the main loop needs no critical
-//! section for either. What has to stop the motors when this program does not is hardware: see the README of `rtex-block`.
+//! section for either. If this program fails to stop the motors, hardware has to: see the README of `rtex-block`.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,

@@ -1,5 +1,5 @@
-//! What the user writes from the data sheet of the ASIC, which is not public: addresses, codes, layouts. **All of these numbers are
-//! invented**, for the simulated ASIC of this example.
+//! The part that you write from the data sheet of the ASIC, which is not public: addresses, codes, layouts. **All of these
+//! numbers are invented**, for the simulated ASIC of this example.
 
 use rtex_block::MacId;
 use rtex_block::master::{Asic, Slave};

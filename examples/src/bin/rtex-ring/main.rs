@@ -1,4 +1,4 @@
-//! An RTEX ring of 32 axes from power-up to a coordinated motion; half way one drive goes silent, the master notices by
+//! An RTEX ring of 32 axes from power-up to a coordinated motion; half-way one drive goes silent; the master notices it by
 //! the counter echo and stops all axes.
 //!
 //! `cargo run -p servowire-examples --bin rtex-ring -- [--swapped] [OUT.svg]` prints what happens when, a table of the axes,

@@ -101,7 +101,8 @@ pub struct Home {
     limit: u32,
     left: u32,
     accepted: bool,
-    /// Homing_Complete was 0, or In_Progress 1: so its present value is not left from an earlier homing.
+    /// Homing_Complete was 0 or In_Progress was 1, so the present value of Homing_Complete is not left from an earlier
+    /// homing.
     fresh: bool,
     /// Number of blocks on time that show standstill before it begins, and that show its end.
     blocks: u8,

@@ -12,7 +12,7 @@ const MOVES: f64 = 8.0;
 const FLAT: f64 = 0.2;
 const SWINGS: (f64, f64) = (0.75, 1.6);
 
-/// Makes levels of voltages.
+/// Converts voltages to levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Threshold {
     middle: f64,

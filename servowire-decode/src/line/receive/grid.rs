@@ -10,8 +10,9 @@ const STEPS: i32 = 26;
 const GOOD_FIT: f64 = 0.02;
 /// Mean square distance up to which the bit length heard last is taken without looking at the others.
 const PERFECT_FIT: f64 = 2e-4;
-/// What a bit length far from the nominal one has against it, per edge, as a part of its square in nominal ones: clocks are
-/// off by 2 %, and edges of a coarse or shaky recording by 0.07 of a bit. Three edges fit many grids.
+/// Penalty per edge for a bit length far from the nominal one, as a fraction of the squared deviation in nominal bits:
+/// clocks are off by 2 %, and edges of a coarse or shaky recording by 0.07 of a bit. This matters because three edges fit
+/// many grids.
 const UNLIKELY: f64 = (0.07 * 0.07) / (0.02 * 0.02);
 /// Speakers whose bit lengths are remembered.
 const SPEAKERS: usize = 4;

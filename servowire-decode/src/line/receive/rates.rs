@@ -15,13 +15,13 @@ pub struct Rates {
     pub edges: u64,
     /// Spikes that were dropped near a rising edge, and near a falling one.
     pub spikes_at: [u64; 2],
-    /// How long these were together, in bits.
+    /// Their total length, in bits.
     pub spike_bits: f64,
-    /// Dips when a driver let go of the line, behind which a frame was found by a second try.
+    /// Dips when a driver released the line, after which a second attempt found a frame.
     pub dips: u64,
-    /// How long these were together, in bits.
+    /// Their total length, in bits.
     pub dip_bits: f64,
-    /// Whether the line floats low where nobody drives it.
+    /// Whether the line floats low while nobody drives it.
     pub floats_low: bool,
 }
 
@@ -44,12 +44,12 @@ impl Default for Rates {
 }
 
 impl Rates {
-    /// The mean rate as a share of the nominal one; none before a field was measured.
+    /// Returns the mean rate relative to the nominal one; `None` until a field was measured.
     pub(crate) fn mean(&self) -> Option<f64> {
         (self.weight > 0.0).then(|| self.sum / self.weight)
     }
 
-    /// Of a line with this many edges and spikes.
+    /// Creates the measurements of a line with this many edges and spikes.
     pub(crate) fn of(edges: u64, spikes: u64) -> Self {
         Self { spikes, edges, ..Self::default() }
     }
@@ -61,7 +61,7 @@ impl Rates {
         self.edges += 1;
     }
 
-    /// The rate was measured once more, as a share of the nominal one.
+    /// Adds one measurement of the rate, relative to the nominal one.
     pub(crate) fn measured(&mut self, rate: f64) {
         self.least = self.least.min(rate);
         self.most = self.most.max(rate);

@@ -65,7 +65,7 @@ struct Placed {
     elsewhere: bool,
 }
 
-/// An answer beside another: what its words say of the running disparity, its number, and whether it is good by itself.
+/// An answer to compare with the next: the running disparity of its words, its number, and whether it is good by itself.
 #[derive(Debug, Clone, Copy)]
 struct Neighbour {
     chain: Chain,
@@ -73,7 +73,7 @@ struct Neighbour {
     sound: bool,
 }
 
-/// What is known of the link so far.
+/// What is known about the link so far.
 pub(super) struct Decoder {
     /// The bit at which to go on.
     next: u64,
@@ -265,7 +265,7 @@ impl Decoder {
         self.lose_v_frame();
     }
 
-    /// Nobody knows where in a V-frame the next frame is.
+    /// Forgets where in a V-frame the next frame is.
     fn lose_v_frame(&mut self) {
         (self.at, self.failed, self.begun, self.strays) = (None, None, None, 0);
         if let Some(fast) = &mut self.fast {

@@ -1,4 +1,4 @@
-//! Events of the link, and why one is refused.
+//! Events of the link, and the reasons for a refusal.
 
 use hdsl::{EncoderId, Error, PositionBits};
 

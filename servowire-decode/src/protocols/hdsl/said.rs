@@ -1,4 +1,4 @@
-//! Events that the frames after them may still refuse.
+//! Events that later frames may still refuse.
 
 use std::collections::VecDeque;
 use std::io;
@@ -25,7 +25,7 @@ impl Said {
         self.events.push_back(event);
     }
 
-    /// An event that seemed good is not.
+    /// Refuses an event that seemed good.
     pub(super) fn refuse(&mut self, number: u64, (class, reason): Refused) {
         let at = number.checked_sub(self.first).and_then(|at| usize::try_from(at).ok());
         if let Some(event) = at.and_then(|at| self.events.get_mut(at)).filter(|event| event.verdict.is_ok()) {
@@ -42,7 +42,7 @@ impl Said {
         }
     }
 
-    /// Gives all events before number `until`.
+    /// Returns all events before number `until`.
     pub(super) fn give(&mut self, until: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.first < until {
             let Some(event) = self.events.pop_front() else { break };

@@ -124,7 +124,7 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
     fields.extend(command.effect().map(effect));
 }
 
-/// What is known of the encoder.
+/// What is known about the encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
     widths: Widths,

@@ -12,7 +12,7 @@ const WINDOW: usize = 64;
 /// Bytes by which size and byte order are recognised.
 const SAMPLE: usize = WINDOW * LEN32;
 
-/// A log's bytes on their way to blocks.
+/// Collects the bytes of a log into blocks.
 pub(super) struct Blocks {
     /// The size that the user has said.
     said: Option<usize>,
@@ -22,13 +22,13 @@ pub(super) struct Blocks {
     line: usize,
     /// Blocks go on from one line to the next, as the lines do not hold whole ones.
     flow: bool,
-    /// Bytes that are still to be left out before the first block.
+    /// Bytes still to be skipped before the first block.
     skip: usize,
-    /// What was read and not cut yet, from `at` on, and where the block begins that is under way.
+    /// The bytes read but not cut yet, from `at` onwards, and the beginning of the present block.
     rest: Vec<u8>,
     at: usize,
     began: Burst,
-    /// Of the block under way a part is lost.
+    /// Part of the present block is lost.
     lost: bool,
     /// The last blocks as they were read, and how many of them are what no encoder writes, or NOPs.
     window: Vec<u8>,
@@ -114,7 +114,7 @@ impl Blocks {
         None
     }
 
-    /// A line is lost, and with it the block that it is part of.
+    /// Drops a line, and with it the block of which it is part.
     pub(super) fn lose(&mut self) {
         if !self.flow {
             return;

@@ -33,7 +33,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
     located(event(frame, Direction::Request, id, fields, verdict(frame, names, result.err())), frame, names)
 }
 
-/// What is known of the encoder.
+/// What is known about the encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
     widths: Widths,

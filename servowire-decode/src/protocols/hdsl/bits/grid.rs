@@ -1,6 +1,6 @@
 //! Bits of packed samples, eight at once: the same bits that its edges one by one would give.
 //!
-//! A controller that samples by its own clock, or a dump of its logic, has eight samples a bit, and the edges of a speaker
+//! A controller that samples by its own clock, or a dump of its logic, has eight samples per bit, and the edges of a speaker
 //! all lie at the same one of them. As long as that holds, the edges lie on the grid, nothing follows them, and 64 samples
 //! are eight bits.
 
@@ -40,7 +40,7 @@ fn are_near(edges: u64, longest: u64) -> bool {
 }
 
 impl Bits {
-    /// Whether `samples` has about eight samples a bit.
+    /// Whether `samples` has about eight samples per bit.
     pub(in super::super) fn may_be_on_grid(&self, samples: &Samples<'_>) -> bool {
         let period = 1_000_000_000_000 * SAMPLES as i64 / samples.clock().rate() as i64;
         (period - self.nominal).abs() * 100 <= self.nominal

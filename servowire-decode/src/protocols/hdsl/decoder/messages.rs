@@ -1,4 +1,4 @@
-//! Messages of the parameters channel, symbol by symbol.
+//! Messages of the parameter channel, symbol by symbol.
 //!
 //! A short message may be sent while a long one waits for its answer; an answer says itself which of the two it is.
 
