@@ -1,6 +1,6 @@
 //! For tools: decodes everything that can be decoded, lists every finding and guesses the cause.
 //!
-//! A block has no check sum, so nothing here proves that it arrived undamaged. This module can only tell whether an encoder
+//! A block has no checksum, so nothing here proves that it arrived undamaged. This module can only tell whether an encoder
 //! may write such a block: length, C/R, defined codes, a permitted pair of codes, reserved bits 0.
 //!
 //! ```

@@ -38,7 +38,7 @@ impl Time {
         self.0 as f64 / 1e6
     }
 
-    /// The way from `earlier` to here in picoseconds, where it is known to be shorter than 106 days.
+    /// Returns the time since `earlier` in picoseconds, if it is known to be shorter than 106 days.
     #[inline]
     pub(crate) const fn after(self, earlier: Self) -> i64 {
         (self.0 as i64).wrapping_sub(earlier.0 as i64)

@@ -18,7 +18,7 @@ const MOST_BARS: usize = 160;
 /// Width of the first buckets, in picoseconds: of times, of delays.
 const FIRST: i128 = 1_000_000;
 const FIRST_BAR: i128 = 10_000;
-/// Classes of errors that have a row of their own, and encoders that have a panel.
+/// Maximum number of error classes with their own row, and of encoders with a panel.
 const MOST_CLASSES: usize = 24;
 const MOST_ENCODERS: usize = 32;
 /// Instants later than this are shown from the first frame on, in picoseconds: 1000 s.
@@ -92,7 +92,7 @@ struct Curve {
     values: Buckets<Span>,
 }
 
-/// What an encoder said: its positions, by name and by the counts after which the value begins again, and its delays.
+/// The data of an encoder: its positions, by name and by the counts after which the value wraps, and its delays.
 #[derive(Debug, Clone)]
 struct Encoder {
     curves: BTreeMap<(&'static str, Option<u64>), Curve>,
@@ -108,7 +108,7 @@ pub(crate) struct Picture {
     errors: BTreeMap<(Speaker, &'static str), Buckets<u64>>,
     /// First and last time.
     extent: Option<(Time, Time)>,
-    /// The names of those who spoke, once all lines are known.
+    /// The names of the speakers, once all lines are known.
     names: BTreeMap<Speaker, String>,
 }
 

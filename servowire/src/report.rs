@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     reading: Reading,
 }
 
-/// What a report says.
+/// The content of a report.
 struct Report {
     file: String,
     bytes: u64,
@@ -50,7 +50,7 @@ struct Report {
     /// How the program was called.
     call: String,
     read: Read,
-    /// Who spoke, and their figures.
+    /// The speakers and their figures.
     tables: Vec<Table>,
     lines: Vec<(&'static str, String)>,
     picture: String,
@@ -66,7 +66,7 @@ struct Listed {
     event: Event,
 }
 
-/// Gathers what no other printer does.
+/// Collects what no other printer does.
 struct Gatherer {
     figures: Gathered,
     tables: Vec<Table>,
@@ -119,7 +119,7 @@ impl Arguments {
         }
     }
 
-    /// Whether all frames hold.
+    /// Whether all frames are good.
     fn report(&self) -> Result<bool, Box<dyn Error>> {
         let file = self.file.display().to_string();
         let mut gatherer = Gatherer {

@@ -61,7 +61,7 @@ servowire_core::one_line!(Checked { Self { response, acknowledgement } => "{}: {
 impl Expected {
     /// Makes the checks that a master can make, in this order: length, C/R, MAC-ID; then counter, code, CMD_Error.
     ///
-    /// There is no check sum in a block. A flipped bit outside of these fields is not noticed: 112 of the 128 bits of a
+    /// There is no checksum in a block. A flipped bit outside of these fields is not noticed: 112 of the 128 bits of a
     /// 16-byte response.
     ///
     /// # Errors

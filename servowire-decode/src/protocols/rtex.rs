@@ -201,8 +201,8 @@ fn position(report: &Report) -> Option<Position> {
     }
 }
 
-/// What belongs in a list of events: flags that have changed, but for those of every motion; another cyclic mode; an alarm that was
-/// asked for.
+/// Returns what belongs in a list of events: changed flags, except those of every motion; a change of the cyclic mode; an
+/// alarm that was requested.
 fn events(report: &Report, before: Option<&Report>) -> Vec<String> {
     let is_event = |field: &inspect::Field| match field.value {
         inspect::Value::Bit(_) => matches!(field.first, 2 | 3) && !MOTION.contains(&field.name),

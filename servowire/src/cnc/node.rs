@@ -47,11 +47,11 @@ pub(super) struct Node {
     pub(super) undetected: u64,
     /// Frames accepted with a wrong time stamp, which nothing covers.
     pub(super) bad_stamps: u64,
-    /// Calls that were planned before this one are of no interest.
+    /// Calls planned before this one are ignored.
     pub(super) call: u64,
 }
 
-/// What has really happened to the frames of the exchange between the master and a device.
+/// What really happened to the frames of the exchange between the master and a device.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Truth {
     /// Master frames that never reached the device, and those that came again.
@@ -121,7 +121,7 @@ impl Node {
         value + f64::from(counter_ns.wrapping_sub(value.rem_euclid(WRAP) as u32) as i32)
     }
 
-    /// What the device wants at this time.
+    /// What the device needs at this time.
     pub(super) fn poll(&mut self, now: f64) -> Action {
         let action = self.device.poll(self.counter(now), now as u64);
         if let (Action::CycleStart { cycle, start_ns }, None) = (action, self.zero) {
@@ -283,7 +283,7 @@ impl Node {
     }
 }
 
-/// What a cycle has brought for the axis.
+/// The result of a cycle for the axis.
 pub(super) struct Axle {
     cycle: u64,
     incoming: Option<Incoming>,

@@ -30,7 +30,7 @@ impl Power {
         Self { program, after, wake, waking: 0, idle: vec![0; axes], held: vec![Pto::default(); axes], off: 0 }
     }
 
-    /// The axis has something to do that the program does not know of.
+    /// The axis has work that the program does not know about.
     pub(super) fn keep(&mut self, axis: usize) {
         if let (Some(idle), Some(after)) = (self.idle.get_mut(axis), self.after) {
             // A driver that is off stays off until it has been woken.

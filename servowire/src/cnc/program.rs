@@ -1,7 +1,7 @@
-//! What the axes are to do: a source of words, one for each axis in each cycle.
+//! The program of the axes: a source of words, one for each axis in each cycle.
 //!
-//! A new kind of program is a variant of [`Program`] with its arm in [`Program::next`] and [`Program::is_over`]; nothing else
-//! in the machine knows what a program is.
+//! A new kind of program is a variant of [`Program`] with its arm in [`Program::next`] and [`Program::is_over`]; nothing
+//! else in the machine depends on the kind of program.
 
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ const SONG: [Note; 16] = [
     Note::p250(Tone::Cis, 2500),
 ];
 
-/// One cycle after the other.
+/// One cycle after another.
 pub(super) enum Program {
     /// All axes together: moves of the same length, each in the other direction.
     Turns { group: Group<'static>, profiles: Vec<Profile<'static>>, steps: u32, done: u64, moves: u64 },

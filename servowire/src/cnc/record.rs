@@ -1,4 +1,4 @@
-//! What a logic analyser and a network tap would have seen: VCD and pcapng.
+//! Records what a logic analyser and a network tap would have seen, as VCD and pcapng.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -27,7 +27,7 @@ const SETTLED_NS: u64 = 20_000;
 const ETHERNET: u32 = 0;
 const EXCHANGE: u32 = 1;
 
-/// Takes what happens, as far as anybody wants it.
+/// Takes events, if they are wanted.
 #[derive(Default)]
 pub(super) struct Recorder {
     vcd: Option<Trace>,
@@ -116,7 +116,7 @@ impl Recorder {
         trace.axis(device, &seen);
     }
 
-    /// Everything is written.
+    /// Writes everything.
     pub(super) fn finish(mut self) -> io::Result<()> {
         if let Some(trace) = &mut self.vcd {
             let result = trace.flush(u64::MAX).and_then(|()| trace.writer.flush());

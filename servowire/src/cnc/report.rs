@@ -1,4 +1,4 @@
-//! What the machine has done, in words.
+//! Describes in words what the machine has done.
 
 use std::io::{self, Write};
 
@@ -180,7 +180,7 @@ fn sum(line: &Line, of: fn(&Node) -> u64) -> u64 {
     line.nodes.iter().map(of).sum()
 }
 
-/// What was not as it should be, the gravest first; `None` if every step was made at its time.
+/// Returns the faults, the gravest first; `None` if every step was made on time.
 pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
     if line.master.state() == State::Error || line.first_cycle_ns.is_none() {
         let last = line.why.as_deref().unwrap_or("no device answers");

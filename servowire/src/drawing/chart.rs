@@ -12,24 +12,24 @@ const BELOW: i32 = 36;
 const LEFT: i32 = 6;
 const RIGHT: i32 = 34;
 const TOP: i32 = 6;
-/// Pixels from one label to the next at least.
+/// Minimum distance of labels in pixels.
 const APART: i32 = 26;
 
-/// Curves and bars; the title, which says what goes up, stands above it.
+/// Curves and bars; the title above it names the vertical quantity.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chart {
     pub(crate) title: String,
     /// The quantity along the axis, with its unit.
     pub(crate) along: String,
     pub(crate) x: Range<f64>,
-    /// Otherwise what the curves and bars need.
+    /// If unset, the range of the curves and bars.
     pub(crate) y: Option<Range<f64>>,
     /// Goes up by factors.
     pub(crate) logarithmic: bool,
     /// A unit is as long along as it is up: it is a plane.
     pub(crate) equal: bool,
     pub(crate) curves: Vec<(Stroke, Vec<(f64, f64)>)>,
-    /// From, to, and how high.
+    /// From, to, and the height.
     pub(crate) bars: Vec<(Range<f64>, f64)>,
 }
 
@@ -141,7 +141,7 @@ impl Panel for Chart {
     }
 }
 
-/// Digits behind the point that tell `labels` labels of a range apart.
+/// Digits after the point needed to tell `labels` labels of a range apart.
 pub(super) fn decimals(range: &Range<f64>, labels: i32) -> usize {
     let step = (range.end - range.start).abs() / f64::from(labels) / 2.0;
     (-step.max(1e-9).log10()).ceil().clamp(0.0, 9.0) as usize

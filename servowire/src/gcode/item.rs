@@ -1,4 +1,4 @@
-//! What a part program is made of.
+//! The items of a part program.
 
 use super::AXES;
 
@@ -11,7 +11,7 @@ pub(crate) struct Line {
     pub(super) feed: Option<u32>,
 }
 
-/// What a machine is to do next.
+/// What a machine has to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Item {
     Line(Line),

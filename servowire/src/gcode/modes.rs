@@ -1,4 +1,4 @@
-//! What a line of a part program does, by what the lines before it have set.
+//! The effect of a line of a part program, given the modes set by earlier lines.
 
 use std::collections::VecDeque;
 
@@ -9,15 +9,15 @@ use super::item::{Item, Line};
 use super::numbers::Numbers;
 use super::words::Word;
 
-/// Farther than this from 0 no axis goes, in mm.
+/// Largest distance of an axis from 0, in mm.
 const FAR: f64 = 50_000.0;
 
 const NAMES: [char; AXES] = ['X', 'Y', 'Z'];
 
-/// What a line with X, Y or Z means.
+/// The meaning of a line with X, Y or Z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Motion {
-    /// Nothing has been said yet.
+    /// No mode has been set yet.
     None,
     Straight {
         rapid: bool,
@@ -27,7 +27,7 @@ enum Motion {
     Cancelled,
 }
 
-/// What a word without mode does, in its line alone.
+/// The effect of a word without a mode, limited to its line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Once {
     Dwell,
@@ -39,11 +39,11 @@ enum Once {
     Unshift,
 }
 
-/// What stays as it is until a line says something else.
+/// The modes that stay until a line changes them.
 pub(super) struct State {
     /// In mm, of the machine.
     pub(super) at: [f64; AXES],
-    /// What G92 has added to what the program says.
+    /// The offset that G92 adds to the program's coordinates.
     shift: [f64; AXES],
     /// Of G28 and G30.
     references: [[f64; AXES]; 2],

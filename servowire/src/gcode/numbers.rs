@@ -1,4 +1,4 @@
-//! The numbers of a line that are no codes.
+//! The numbers of a line that are not codes.
 
 use super::AXES;
 use super::words::Word;

@@ -1,4 +1,4 @@
-//! What a part program says, as straight lines and rests, a line of it after the other.
+//! The content of a part program as straight lines and rests, read line by line.
 
 use std::collections::VecDeque;
 use std::io::BufRead;
@@ -14,7 +14,7 @@ pub(super) struct Program<R> {
     name: String,
     text: R,
     number: u64,
-    /// Lines that begin with a slash are left out.
+    /// Lines that begin with a slash are skipped.
     block_delete: bool,
     over: bool,
     state: State,
@@ -27,7 +27,7 @@ impl<R: BufRead> Program<R> {
         Self { name: name.to_owned(), text, number: 0, block_delete, over: false, state, items }
     }
 
-    /// What has been read and not been taken.
+    /// Items read but not yet taken.
     #[cfg(test)]
     pub(super) fn waiting(&self) -> usize {
         self.items.len()

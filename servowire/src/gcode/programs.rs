@@ -1,4 +1,4 @@
-//! What part programs say, in the words of five posts, and what is refused.
+//! Tests of part programs in the dialects of five post-processors, and of refusals.
 
 use super::AXES;
 use super::item::{Item, Line};
@@ -54,7 +54,7 @@ fn arcs_end_where_they_say() {
     assert!((low + 10.0).abs() < 1e-3 && turn.last() == Some(&[10.0, 0.0, -2.0]));
 }
 
-/// However the arc is cut into chords, Z is where its angle has it.
+/// However the arc is cut into chords, Z follows its angle.
 #[test]
 fn a_helix_rises_with_the_angle() {
     for (text, whole) in [

@@ -1,4 +1,4 @@
-//! An axis of a machine, as the command line has it.
+//! An axis of a machine, as given on the command line.
 
 use std::str::FromStr;
 

@@ -38,7 +38,7 @@ impl Steps {
         Ok(Self { program, path, per_mm, deviation, line: None, rest: None, end: 0, fault: None })
     }
 
-    /// When the motion that has been planned is over, in ns.
+    /// When the planned motion ends, in ns.
     pub(crate) const fn end(&self) -> u64 {
         self.end
     }

@@ -23,7 +23,7 @@ const PULSE_NS: u64 = 1000;
 /// From DIR to STEP, in ns, unless the axis turns faster than that.
 const LEAD_NS: u64 = 1000;
 
-/// What an axis has done.
+/// Totals of an axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Axis {
     steps: u64,
@@ -151,7 +151,7 @@ impl Wires {
         Ok(Self { to, axes, changes: BinaryHeap::new() })
     }
 
-    /// Lets pulses end that are over before a time.
+    /// Ends the pulses that are over before a time.
     fn until(&mut self, time: u64) -> io::Result<()> {
         while let Some(wire) = self.axes.iter_mut().min_by_key(|wire| wire.falls.unwrap_or(u64::MAX)) {
             let Some(falls) = wire.falls.filter(|falls| *falls <= time) else { break };

@@ -54,7 +54,7 @@ pub(super) fn page(report: &Report) -> Drawn<String> {
     Ok(out)
 }
 
-/// What somebody reads who reads nothing else.
+/// The summary for a reader who reads nothing else.
 fn verdict(report: &Report, out: &mut String) {
     let sentences: Vec<&String> = report.read.fault.iter().chain(&report.read.refusals).collect();
     if sentences.is_empty() {
@@ -118,7 +118,7 @@ fn figures(report: &Report, out: &mut String) {
     }
 }
 
-/// Each kind of damage once, as it is on the line.
+/// Each kind of damage once, as it looks on the line.
 fn damage(report: &Report, out: &mut String) -> Drawn {
     if report.refused == 0 {
         return Ok(());
@@ -173,7 +173,7 @@ fn events(report: &Report, out: &mut String) {
     }
 }
 
-/// Text as HTML wants it.
+/// Escapes text for HTML.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
