@@ -1,8 +1,6 @@
 //! step-motion: plans, their steps, an axis that is told something new, lines of two axes.
 
-use step_motion::{
-    AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint,
-};
+use step_motion::{AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint};
 
 use super::kernels;
 
