@@ -130,7 +130,7 @@ pub(crate) struct LineArgs {
     /// Channel of the answers.
     #[arg(long, value_name = "NAME", requires = "tx", conflicts_with = "channel")]
     rx: Option<String>,
-    /// Bits a second, such as 2500000 or 2.5M; by default found from the lengths of the runs.
+    /// Bits per second, such as 2500000 or 2.5M; by default found from the lengths of the runs.
     #[arg(long, value_name = "HZ", value_parser = bit_rate)]
     bit_rate: Option<u32>,
     /// Whether the line idles high (normal) or low; by default the one that decodes best.

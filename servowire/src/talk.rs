@@ -32,7 +32,7 @@ pub struct Arguments {
     /// The serial port, such as /dev/ttyUSB0 or COM3.
     #[arg(long)]
     port: String,
-    /// Bits a second, 2.5M or 5M.
+    /// Bits per second, 2.5M or 5M.
     #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
     /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.

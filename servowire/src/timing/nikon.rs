@@ -18,7 +18,7 @@ use crate::units::one_of;
 /// Nikon A-format encoders, one or several on a bus.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Bits a second, 2.5M, 4M, 6.67M, 8M or 16M.
+    /// Bits per second, 2.5M, 4M, 6.67M, 8M or 16M.
     #[arg(long, value_name = "HZ", default_value = "4M", value_parser = rate)]
     rate: BitRate,
     /// What to ask for, by name (ABS24_LOW) or code; ABS40 by default, ABS40_MT for several encoders.
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// The addresses of the encoders.
     #[arg(long, value_name = "LIST", default_value = "0", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=7))]
     addresses: Vec<u8>,
-    /// Responses close up where an address is missing; by default each keeps the place of its address. No document says which.
+    /// Responses follow each other without a gap where an address is missing; by default each keeps the place of its address. No document says which.
     #[arg(long)]
     closed_up: bool,
     /// Length of the cable in metres, 5 ns a metre each way.

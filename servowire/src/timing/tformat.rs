@@ -10,7 +10,7 @@ use crate::units::tformat_rate;
 /// One Tamagawa T-Format encoder.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Bits a second, 2.5M or 5M.
+    /// Bits per second, 2.5M or 5M.
     #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
     /// What to ask for, one hex digit: 0 position, 1 turns, 2 encoder ID, 3 all, 6 and D EEPROM, 7, 8 and C reset.
