@@ -364,6 +364,43 @@ fn a_log_from_power_up() {
 
 /// An alarm at any time, an echo that stood still, or commands without an answer: none is over with the next block, and each is said
 /// of its drive.
+/// NOPs of a master, and what a drive says to them: its position, speed and torque are whatever they are.
+#[test]
+fn nops_from_before_the_start_are_no_log_that_begins_inside_a_block() {
+    let mut random = 1_u64;
+    let mut next = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 32).to_le_bytes()
+    };
+    for log in 0..2000 {
+        let mut bytes = Vec::new();
+        let place = next();
+        for _ in 0..8 {
+            let ([a, b, c, d, ..], [e, f, g, h, ..]) = (next(), next());
+            bytes.extend([1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+            bytes.extend([
+                0x81,
+                0,
+                0x40 | a & 3,
+                b & 7,
+                place[0],
+                place[1],
+                place[2],
+                place[3],
+                a,
+                b,
+                c,
+                d,
+                e,
+                f,
+                g,
+                h,
+            ]);
+        }
+        assert_eq!(LogShape::guess(&bytes), None, "{log}");
+    }
+}
+
 #[test]
 fn what_somebody_has_to_look_after() {
     let response = |echo: u8, status: u8| {

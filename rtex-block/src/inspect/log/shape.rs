@@ -33,8 +33,15 @@ impl LogShape {
         if aligned.is_some() {
             return aligned;
         }
+        // NOPs alone do not tell the shape, and their data may look like blocks of another shape. But in their own shape all of
+        // them are sound, and in the other one the counters do not advance.
+        let aligned = shapes().map(|shape| shape.sound(bytes)).max();
+        let explains_more = |shape: &Self| {
+            let sound = Some(shape.sound(bytes));
+            sound > aligned || sound == aligned && shape.counts(bytes)
+        };
         let shifted = shapes().flat_map(|shape| (1..shape.size.bytes()).map(move |skip| Self { skip, ..shape }));
-        Self::best(shifted, bytes, 900)
+        Self::best(shifted.filter(explains_more), bytes, 900)
     }
 
     /// Returns the first of those that score best, with a score of at least `least`; a larger size only if it explains more.
@@ -58,6 +65,29 @@ impl LogShape {
             good = good.saturating_add(usize::from(self.is_sound(block) && !self.is_nop(block)));
         }
         good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
+    }
+
+    /// Returns the sound blocks, including NOPs, in thousandths of all.
+    fn sound(self, bytes: &[u8]) -> usize {
+        let blocks = || bytes.get(self.skip..).unwrap_or_default().chunks_exact(self.size.bytes());
+        let good = blocks().filter(|block| self.is_sound(block)).count();
+        good.saturating_mul(1_000).checked_div(blocks().len()).unwrap_or(0)
+    }
+
+    /// Whether the counters of blocks that follow each other in a direction advance; each may be sent twice.
+    fn counts(self, bytes: &[u8]) -> bool {
+        let mut last = [None; 256];
+        let (mut went_on, mut all) = (0_usize, 0_usize);
+        for block in bytes.get(self.skip..).unwrap_or_default().chunks_exact(self.size.bytes()) {
+            let [byte0, ..] = self.turned(block);
+            let counter = byte0 >> 5 & 3;
+            let Some(before) = last.get_mut(usize::from(byte0 & 0x9f)) else { continue };
+            if let Some(before) = before.replace(counter) {
+                all = all.saturating_add(1);
+                went_on = went_on.saturating_add(usize::from(counter == before.wrapping_add(1) & 3));
+            }
+        }
+        went_on >= 4 && went_on.saturating_mul(5) >= all.saturating_mul(2)
     }
 
     /// Returns a block with its bytes in order.

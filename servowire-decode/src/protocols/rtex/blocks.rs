@@ -158,6 +158,8 @@ impl Blocks {
     /// of another shape, the log goes on in that.
     pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Option<LogShape> {
         self.window.extend_from_slice(read);
+        // A block that was cut short does not move the ones behind it.
+        self.window.resize(self.window.len().next_multiple_of(self.size), 0);
         self.seen += 1;
         self.unsound += usize::from(!sound);
         if self.seen < WINDOW {

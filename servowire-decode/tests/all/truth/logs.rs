@@ -9,7 +9,7 @@ use servowire_decode::settings::{Rtex, Settings};
 
 use super::ring::{Block, Ring, build};
 use super::rng::Rng;
-use super::{Outcome, Said, Shown, hold, judge, read, start};
+use super::{Outcome, Said, Shown, hold, hold_these, judge, read, start};
 use crate::protocol;
 
 /// How a log is written down.
@@ -180,4 +180,11 @@ fn run(name: &str, condition: Condition, seed: u64) -> Outcome {
 #[test]
 fn every_value_of_a_log_of_blocks_is_true() {
     hold(CONDITIONS, run);
+}
+
+#[test]
+fn the_shape_of_a_log_is_told_by_sound_blocks() {
+    // Random bytes of NOPs have looked like blocks of 32 bytes, and what was cut off has moved the blocks behind it.
+    let seeds = [("NOPs before the start", 59), ("blocks are cut short", 43), ("blocks are cut short", 53)];
+    hold_these(CONDITIONS, &seeds, run);
 }
