@@ -11,7 +11,7 @@ use super::start_stop::StartStop;
 use super::trial::is_failed;
 use crate::capture::Hole;
 use crate::capture::samples::Samples;
-use crate::event::{Event, Place, Verdict};
+use crate::event::{Direction, Event, Place, Verdict};
 use crate::sink::Sink;
 use crate::time::Time;
 
@@ -40,7 +40,7 @@ struct Told<P> {
     before: P,
     /// Where the frames begin that were passed on.
     passed: Vec<Time>,
-    /// Events from the first failed frame onwards.
+    /// Events from the first one onwards that failed or is in doubt.
     failed: Vec<Event>,
     /// Remaining second attempts, as long as none helps.
     luck: u32,
@@ -63,7 +63,14 @@ impl<P> Told<P> {
     }
 }
 
-/// Passes events on up to the first that failed.
+/// Whether an event is held back until the line rests. If a frame after it fails, an answer that seems to be missing may have come,
+/// and one that seems to have no request may be its request and a piece of it.
+fn is_doubtful(event: &Event) -> bool {
+    let alone = event.direction == Some(Direction::Answer) && event.delay.is_none() && event.verdict.is_ok();
+    alone || event.verdict.is_silence()
+}
+
+/// Passes events on up to the first that failed or is in doubt.
 struct Watch<'a> {
     out: &'a mut dyn Sink,
     passed: &'a mut Vec<Time>,
@@ -72,7 +79,7 @@ struct Watch<'a> {
 
 impl Sink for Watch<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        if !self.failed.is_empty() || is_failed(event) {
+        if !self.failed.is_empty() || is_failed(event) || is_doubtful(event) {
             self.failed.push(event.clone());
             return Ok(());
         }
@@ -149,6 +156,9 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     #[cold]
     fn again(&mut self, now: Option<Time>, far: bool, out: &mut dyn Sink) -> io::Result<()> {
         let failed = std::mem::take(&mut self.told.failed);
+        if !failed.iter().any(is_failed) {
+            return failed.iter().try_for_each(|event| out.event(event));
+        }
         let edges = self.receiver.past();
         let now = now.or(edges.last().map(|last| last.time)).unwrap_or_default();
         let bit = self.receiver.bit_heard();
@@ -278,7 +288,8 @@ impl<P: StartStop + Clone> StartStopLine<P> {
             }
         }
         let mut floats = false;
-        if most < CERTAIN && self.rests_low() {
+        // Without a bias the requests are good too if their drivers are on before the start bits.
+        if self.rests_low() {
             let mut evidence = Evidence::new(self.weights);
             let floating = Some(Floating::new(self.bit as f64));
             self.trial(Self { floating, ..self.fresh(0, 0) }, &mut evidence)?;

@@ -116,7 +116,11 @@ impl Floating {
                     continue;
                 }
                 let perfect = trial.heard.is_perfect();
-                let score = |trial: &Trial<P>| trial.heard.evidence.score;
+                // The low of a change of direction may look like a field of zeros, and a request with that like an answer.
+                let score = |trial: &Trial<P>| {
+                    let evidence = &trial.heard.evidence;
+                    (evidence.score - weights.alone * i64::from(evidence.alone), evidence.score)
+                };
                 if best.as_ref().is_none_or(|(best, _)| score(&trial) > score(best)) {
                     best = Some((trial, *way));
                 }

@@ -43,14 +43,17 @@ impl Heard {
         sound.filter(|event| event.verdict.is_ok()).count()
     }
 
-    /// Whether more of it is good: more answers, more frames before the first that failed, or all of them. A request alone
-    /// proves little, and part of an answer may look like a request, which then has no answer.
+    /// Whether more of it is good: more answers, more frames before the first that failed, or fewer that failed. What failed as one
+    /// frame may then be two: an answer, and what follows it. A request alone proves little, and part of an answer may look like
+    /// a request, which then has no answer.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let more = self.evidence.answers > other.evidence.answers && self.failed <= other.failed;
-        let whole = self.failed == 0 && other.failed > 0;
+        let no_more_asked = self.evidence.requests <= other.evidence.requests;
+        let as_many = self.evidence.answers >= other.evidence.answers && no_more_asked;
+        let fewer = self.failed < other.failed && (self.failed == 0 || as_many);
         let missing = self.evidence.tally.missing > other.evidence.tally.missing;
-        let further = self.sound() > other.sound() && self.failed <= other.failed;
-        (more || whole || further) && self.evidence.score > other.evidence.score && !missing
+        let further = self.sound() > other.sound() && self.failed <= other.failed + 1;
+        (more || fewer || further) && self.evidence.score > other.evidence.score && !missing
     }
 }
 

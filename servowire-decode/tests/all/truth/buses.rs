@@ -3,7 +3,7 @@
 use super::bus::{Bias, Bus, Kind, build};
 use super::line::{Recording, record};
 use super::rng::Rng;
-use super::{Outcome, decode, hold, judge};
+use super::{Outcome, decode, hold, hold_these, judge};
 
 /// Draws a line and how it is recorded, as bits a sample.
 type Condition = fn(&mut Rng, Bus) -> (Bus, Option<f64>, Recording);
@@ -87,4 +87,47 @@ fn every_value_of_t_format_is_true() {
 #[test]
 fn every_value_of_a_format_is_true() {
     hold(CONDITIONS, |name, condition, seed| run(name, condition, Kind::Aformat, seed));
+}
+
+#[test]
+fn what_was_once_wrong_in_a_format_is_right() {
+    let wrong_once = [
+        // Requests alone were certain enough on a line whose drivers are on before them, and its polarity was doubted.
+        ("floats low, answers missing and bits flipped", 52),
+        // The edges of an answer behind a dip looked like a request to which the answer was missing, and that was told.
+        ("dips when a driver lets go", 54),
+    ];
+    hold_these(CONDITIONS, &wrong_once, |name, condition, seed| run(name, condition, Kind::Aformat, seed));
+}
+
+#[test]
+fn what_was_once_wrong_in_t_format_is_right() {
+    let floats = "floats low, answers missing and bits flipped";
+    let dips = "dips, sampled, answers missing and bits flipped";
+    let wrong_once = [
+        // A request and the low of the change of direction, a field of zeros, passed for an answer: the check field does not see zeros.
+        (floats, 23),
+        (floats, 25),
+        (floats, 34),
+        (floats, 59),
+        // And at the beginning, where it is not known how frames begin.
+        (floats, 63),
+        // The dip behind a damaged answer was taken for a damaged request, and the next request for its answer.
+        (dips, 8),
+        (dips, 21),
+        (dips, 50),
+        // A piece of a damaged answer looked like a request.
+        (dips, 3),
+        (dips, 9),
+        // A request, a dip and the beginning of the answer passed for an answer: the check field was that by chance.
+        (dips, 16),
+        // A request, a dip and a damaged answer were one frame: without the dip, two frames do not hold.
+        (dips, 14),
+        (dips, 20),
+        (dips, 25),
+        (dips, 31),
+        (dips, 42),
+        (dips, 57),
+    ];
+    hold_these(CONDITIONS, &wrong_once, |name, condition, seed| run(name, condition, Kind::Tformat, seed));
 }

@@ -53,7 +53,7 @@ impl Recording {
 
 /// The level at the beginning, and all changes.
 pub(crate) fn record(wire: &Wire, how: Recording, rng: &mut Rng) -> Vec<(i64, bool)> {
-    let mut out = vec![(how.from as i64, wire.begins)];
+    let mut out = vec![(how.from.round() as i64, wire.begins)];
     let phase = rng.between(0.0, how.period.unwrap_or(0.0));
     for (time, level) in &wire.edges {
         let time = time + rng.between(-how.jitter, how.jitter);
