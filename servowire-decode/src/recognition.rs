@@ -82,11 +82,11 @@ impl fmt::Display for Recognition {
         if self.rates.spikes * SPIKY > self.rates.edges {
             write!(f, "; {} spikes", self.rates.spikes)?;
             let [rising, falling] = self.rates.spikes_at;
-            let most = rising.max(falling);
-            if 4 * most > 3 * self.rates.spikes {
+            let (most, near) = (rising.max(falling), rising + falling);
+            if 4 * near > 3 * self.rates.spikes {
                 let edges = if falling > rising { "falling" } else { "rising" };
-                let bits = self.rates.spike_bits / (rising + falling) as f64;
-                let edges = if 4 * most > 3 * (rising + falling) { edges } else { "all" };
+                let bits = self.rates.spike_bits / near as f64;
+                let edges = if 4 * most > 3 * near { edges } else { "all" };
                 write!(f, " of {bits:.1} bit on {edges} edges")?;
             }
             write!(f, " beside {} edges: check termination", self.rates.edges)?;

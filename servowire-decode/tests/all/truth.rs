@@ -5,6 +5,7 @@
 
 mod bus;
 mod buses;
+mod causes;
 mod dsl;
 mod exports;
 mod line;
