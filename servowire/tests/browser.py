@@ -16,7 +16,8 @@ import tempfile
 import zlib
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from tool import ROOT, built
+
 CAPTURES = ROOT / "servowire-decode/captures"
 BROWSER = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--disable-dev-shm-usage"]
 # Of the elements that a picture has.
@@ -77,15 +78,6 @@ out.textContent = JSON.stringify(told);
 document.body.append(out);
 </script>
 """
-
-
-def built() -> str:
-    """The path of the program."""
-    lines = subprocess.run(
-        ["cargo", "build", "-p", "servowire", "--message-format", "json"], cwd=ROOT, stdout=subprocess.PIPE, check=True
-    ).stdout.splitlines()
-    messages = [json.loads(line) for line in lines]
-    return next(m["executable"] for m in messages if m.get("target", {}).get("name") == "servowire" and m.get("executable"))
 
 
 def browse(options: list[str], page: Path) -> str:

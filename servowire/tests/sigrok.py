@@ -8,20 +8,11 @@ device nobody speaks a protocol, so nothing may be found in them.
 import json
 import subprocess
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from tool import ROOT, built
+
 CAPTURE = ROOT / "servowire-decode/captures/hpm-uart-readme.vcd"
 FORMS = ["vcd", "bits", "hex", "ascii", "ols", "binary"]
-
-
-def built() -> str:
-    """The path of the program."""
-    lines = subprocess.run(
-        ["cargo", "build", "-p", "servowire", "--message-format", "json"], cwd=ROOT, stdout=subprocess.PIPE, check=True
-    ).stdout.splitlines()
-    messages = [json.loads(line) for line in lines]
-    return next(m["executable"] for m in messages if m.get("target", {}).get("name") == "servowire" and m.get("executable"))
 
 
 def decoded(tool: str, source: list[str], options: list[str]) -> tuple[int, list[dict], str]:

@@ -93,18 +93,23 @@ fn late_or_stale_by_the_stamp() {
     assert_eq!([stamped(251), stamped(-251)], [(0, 1); 2]);
 }
 
-/// With cycles of 10 ms a device waits for six frames and two more, not for the 20 ms of the start-up.
-#[test]
-fn long_cycles_are_waited_for() {
-    let mut device = Device::new(Config::new().with_cycle_ns(Some(10_000_000)));
-    device.set_links(Link::Up, Link::Down);
-    for mut frame in [
+/// The frames of a start-up, as the last device hears them.
+fn start_up() -> [Vec<u8>; 5] {
+    [
         Discovery::request(Place::Inner).emit().to_vec(),
         Discovery::request(Place::Last).emit().to_vec(),
         sorte_proto::Param::request(Parameters::CNC, Place::Last).emit().to_vec(),
         sorte_proto::DelayReq::of_master(Place::Last).emit().to_vec(),
         Sync::of_master(30_500, 76, Place::Last).emit().to_vec(),
-    ] {
+    ]
+}
+
+/// With cycles of 10 ms a device waits for six frames and two more, not for the 20 ms of the start-up.
+#[test]
+fn long_cycles_are_waited_for() {
+    let mut device = Device::new(Config::new().with_cycle_ns(Some(10_000_000)));
+    device.set_links(Link::Up, Link::Down);
+    for mut frame in start_up() {
         assert_eq!(device.hear(PortId::A, &mut frame, captured(0, 0)).result, Ok(()));
     }
     let now_ns = captured(0, 0).now_ns;
@@ -285,13 +290,7 @@ fn a_slot_before_the_cycle_is_not_used() {
         let mut other = Device::new(Config::new().with_slots(slots));
         other.set_links(Link::Up, Link::Down);
         core::mem::swap(&mut device, &mut other);
-        for mut frame in [
-            Discovery::request(Place::Inner).emit().to_vec(),
-            Discovery::request(Place::Last).emit().to_vec(),
-            sorte_proto::Param::request(Parameters::CNC, Place::Last).emit().to_vec(),
-            sorte_proto::DelayReq::of_master(Place::Last).emit().to_vec(),
-            Sync::of_master(30_500, 76, Place::Last).emit().to_vec(),
-        ] {
+        for mut frame in start_up() {
             let times = FrameTimes { sof_ns: 30_856, counter_ns: 30_856, now_ns: 0 };
             assert_eq!(device.hear(PortId::A, &mut frame, times).result, Ok(()));
         }
