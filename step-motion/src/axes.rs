@@ -1,11 +1,13 @@
 //! The background half of a path: it plans along the lines, and hands segments for all axes to the interrupt.
 
+mod braking;
+
 use core::sync::atomic::Ordering;
 
 use servowire_core::Direction;
 
 use crate::axes_timer::{AxesQueue, AxesTimer, TURN, TURNS};
-use crate::axis::{COARSE, COARSEST, Work};
+use crate::axis::{COARSE, Work};
 use crate::cutter::Demand;
 use crate::error::Error;
 use crate::limits::Limits;
@@ -471,64 +473,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             writer.put_joint((queue, self.block), i128::from(at) << 32, joint);
         }
         at
-    }
-
-    /// Plans the stop from there.
-    fn brake(&mut self) -> Work {
-        if let Some(stop) = self.stops.get_mut(self.block) {
-            stop.clone_from(&self.work);
-            stop.hold(self.until);
-        }
-        self.writers = self.joint;
-        (self.stage, self.axis, self.quiet) = (Stage::Stop, 0, 0);
-        Work::More
-    }
-
-    /// A segment of the stop behind the block.
-    fn cut_stop(&mut self) -> Work {
-        let (Some(writer), Some(queue), Some(stop)) =
-            (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis), self.stops.get_mut(self.block))
-        else {
-            return Work::Later;
-        };
-        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
-        if let Some((stretch, direction)) = stop.cut(self.axis, &demand, u64::MAX) {
-            writer.put_steps((queue, self.block), &stretch, direction);
-            self.quiet = 0;
-        } else if self.is_through() {
-            let over = self.stops.get(self.block).map_or(0, PathMover::over);
-            let end = self.put_joint(over, Joint::Rest);
-            if self.fits() {
-                self.publish(end);
-                return Work::More;
-            }
-        }
-        if self.fits() {
-            return Work::More;
-        }
-        if self.coarse > COARSEST {
-            // Once more with fewer segments.
-            (self.coarse, self.stage) = (self.coarse.saturating_sub(1), Stage::Brake);
-            return Work::More;
-        }
-        self.give_up()
-    }
-
-    fn fits(&self) -> bool {
-        self.writers.iter().all(|writer| writer.len <= Queue::<S>::BLOCK)
-    }
-
-    /// A block cannot be run: the path is left, and the machine comes to rest where the interrupt does.
-    fn give_up(&mut self) -> Work {
-        self.stage = Stage::Idle;
-        self.shorter = 0;
-        if self.standing {
-            self.path.halt_at(self.commanded(), self.end, false);
-        } else {
-            self.stop();
-            self.lost = true;
-        }
-        Work::TooFewSlots
     }
 
     /// Lets the interrupt in, after the block before it or from rest.
