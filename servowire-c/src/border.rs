@@ -114,6 +114,25 @@ pub(crate) unsafe fn parsed<T>(
     })
 }
 
+/// The first `N` bytes of a caller's buffer, to be written whole.
+///
+/// # Safety
+/// As for [`room`].
+#[inline(always)]
+pub(crate) unsafe fn block<'a, const N: usize>(
+    bytes: *mut u8,
+    size: usize,
+) -> Result<&'a mut MaybeUninit<[u8; N]>, Refused> {
+    if bytes.is_null() {
+        return Err(sw_code_t::SW_E_NULL as sw_result_t);
+    }
+    if size < N {
+        return Err(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t);
+    }
+    // SAFETY: not NULL and long enough; bytes have no alignment, and what is not initialised is not read.
+    Ok(unsafe { &mut *bytes.cast() })
+}
+
 /// Encodes a block of constant length into the caller's buffer.
 ///
 /// # Safety
@@ -126,8 +145,8 @@ pub(crate) unsafe fn filled<const N: usize>(
 ) -> sw_result_t {
     border(|| {
         // SAFETY: the caller vouches for it.
-        let bytes = unsafe { room(bytes, size)? };
-        fill(bytes, &make()?)?;
+        let bytes = unsafe { block(bytes, size)? };
+        bytes.write(make()?);
         OK
     })
 }

@@ -11,9 +11,9 @@ use rtex_block::position::Gear;
 use rtex_block::{ControlBits, ErrorCode, MacId, Policy, Response, UpdateCounter};
 
 use super::names::{sw_rtex_axis_code_t, sw_rtex_error_t, sw_rtex_reason_t};
-use crate::border::{OK, border, fill, in_range, read, room, state, there};
+use crate::border::{OK, block, border, in_range, read, state, there};
 use crate::clock::time;
-use crate::result::{sw_code_t, sw_result_t};
+use crate::result::sw_result_t;
 
 /// One axis of the ring: its drive's state, echo, limits and set-point. Its content is private; it may be
 /// copied. Only one context at a time may use it.
@@ -137,15 +137,12 @@ pub unsafe extern "C" fn sw_rtex_axis_transmit(
     size: usize,
 ) -> sw_result_t {
     border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { room(bytes, size)? };
         let it = sw_rtex_axis_t::get(axis)?;
         // A period that cannot be written down is not begun.
-        if bytes.len() < rtex_block::LEN {
-            return Err(sw_code_t::SW_E_SHORT_BUFFER as sw_result_t);
-        }
+        // SAFETY: the caller of the C function vouches for his memory.
+        let bytes = unsafe { block(bytes, size)? };
         it.turn = it.counter.next();
-        fill(bytes, &it.axis.transmission(it.turn).main.emit())?;
+        bytes.write(it.axis.transmission(it.turn).main.emit());
         OK
     })
 }

@@ -3,10 +3,10 @@
 use core::mem::MaybeUninit;
 
 use rtex_block::{
-    Command, ControlBits, CyclicCode, Error, LEN, MacId, NonCyclicCode, NonCyclicCommand, Response, UpdateCounter,
+    Command, ControlBits, CyclicCode, Error, MacId, NonCyclicCode, NonCyclicCommand, Response, UpdateCounter,
 };
 
-use crate::border::{OK, Refused, border, fill, in_range, read, room, there};
+use crate::border::{OK, Refused, border, filled, in_range, read, there};
 use crate::result::{Protocol, refused, sw_result_t};
 
 /// A command of a controller.
@@ -141,11 +141,6 @@ pub unsafe extern "C" fn sw_rtex_build_command(
     bytes: *mut u8,
     size: usize,
 ) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { room(bytes, size)? };
-        let block: [u8; LEN] = command(there(it)?)?.emit();
-        fill(bytes, &block)?;
-        OK
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, || Ok(command(there(it)?)?.emit())) }
 }

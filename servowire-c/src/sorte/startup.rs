@@ -8,7 +8,7 @@ use sorte_proto::{
 };
 
 use super::error;
-use crate::border::{OK, border, cleared, fill, in_range, read, room, there};
+use crate::border::{OK, block, border, cleared, filled, in_range, read, there};
 use crate::result::{sw_code_t, sw_result_t};
 
 /// Bytes of a DISCOVERY frame, from its destination to its check sequence.
@@ -200,7 +200,7 @@ pub unsafe extern "C" fn sw_sorte_build_param(
 ) -> sw_result_t {
     border(|| {
         // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes) = (there(param)?, unsafe { room(bytes, size)? });
+        let (it, bytes) = (there(param)?, unsafe { block(bytes, size)? });
         let parameters = Parameters {
             cycle_time_ns: it.cycle_time_ns,
             sync_cycle: it.sync_cycle,
@@ -217,7 +217,7 @@ pub unsafe extern "C" fn sw_sorte_build_param(
             crc_mode: CrcMode::from_byte(it.crc_mode),
         };
         let frame = Param { source: it.source, status: Status::from_bits_retain(it.status), parameters };
-        fill(bytes, &frame.emit())?;
+        bytes.write(frame.emit());
         OK
     })
 }
@@ -225,12 +225,8 @@ pub unsafe extern "C" fn sw_sorte_build_param(
 /// A DELAY_REQ frame has nothing but its header: this makes its 8 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sw_sorte_build_delay_req(source: u8, status: u8, bytes: *mut u8, size: usize) -> sw_result_t {
-    border(|| {
-        // SAFETY: the caller of the C function vouches for his memory.
-        let bytes = unsafe { room(bytes, size)? };
-        fill(bytes, &DelayReq { source, status: Status::from_bits_retain(status) }.emit())?;
-        OK
-    })
+    // SAFETY: the caller of the C function vouches for his memory.
+    unsafe { filled(bytes, size, || Ok(DelayReq { source, status: Status::from_bits_retain(status) }.emit())) }
 }
 
 /// A SYNC frame.
@@ -263,14 +259,14 @@ pub unsafe extern "C" fn sw_sorte_build_sync(
 ) -> sw_result_t {
     border(|| {
         // SAFETY: the caller of the C function vouches for his memory.
-        let (it, bytes) = (there(sync)?, unsafe { room(bytes, size)? });
+        let (it, bytes) = (there(sync)?, unsafe { block(bytes, size)? });
         let frame = Sync {
             source: it.source,
             status: Status::from_bits_retain(it.status),
             time_stamp_ns: it.time_stamp_ns,
             delay_ns: it.delay_ns,
         };
-        fill(bytes, &frame.emit())?;
+        bytes.write(frame.emit());
         OK
     })
 }

@@ -132,29 +132,19 @@ impl Master {
         self.transaction.transmission().frame.fields() > 0
     }
 
-    /// What became of it, and the position that came of it if it was pending until now.
-    #[inline]
+    /// What became of it, and the position that came of it if it was pending until now. Out of line: three functions need it.
+    #[inline(never)]
     fn result(&mut self, pending: bool) -> Result<sw_result_t, Refused> {
         match self.transaction.outcome() {
             None => Ok(sw_code_t::SW_PENDING as sw_result_t),
             // A transaction that nobody has asked for counts as one that failed.
             Some(Err(_)) if !self.asked() => Err(sw_code_t::SW_E_NO_VALUE as sw_result_t),
             Some(Err(refusal)) => Err(error(*refusal)),
-            Some(Ok(_)) => {
-                if pending {
-                    self.take();
+            Some(Ok(value)) => {
+                if pending && of_position(&value.response) {
+                    self.evidence = value.evidence(self.resolution);
                 }
                 OK
-            }
-        }
-    }
-
-    /// Takes the position of an exchange that has just ended. Out of line: three functions need it.
-    #[inline(never)]
-    fn take(&mut self) {
-        if let Some(Ok(value)) = self.transaction.outcome() {
-            if matches!(value.response, Response::ReadSingleTurn(_) | Response::ReadAll(_)) {
-                self.evidence = value.evidence(self.resolution);
             }
         }
     }
@@ -162,6 +152,12 @@ impl Master {
     fn commutation(&self, max_age_ns: u64) -> Policy {
         Policy::new(max_age_ns).tolerating(self.commutating)
     }
+}
+
+/// The answers from which an angle can be made.
+#[inline(always)]
+fn of_position(response: &Response) -> bool {
+    matches!(response, Response::ReadSingleTurn(_) | Response::ReadAll(_))
 }
 
 fn rate(bits_per_second: u32) -> Result<BitRate, Refused> {
@@ -178,8 +174,9 @@ pub extern "C" fn sw_tformat_init(
     abm_bits: u8,
 ) -> sw_result_t {
     border(|| {
-        let line = Line::new(rate(bits_per_second)?);
+        let m = there(m)?;
         let resolution = in_range(Resolution::new(abs_bits, abm_bits).ok())?;
+        let line = Line::new(rate(bits_per_second)?);
         let state = Master {
             line,
             resolution,
@@ -188,7 +185,7 @@ pub extern "C" fn sw_tformat_init(
             transaction: Transaction::idle(),
             evidence: Evidence::NEVER,
         };
-        sw_tformat_t::start(m, state)?;
+        sw_tformat_t::start(Some(m), state)?;
         OK
     })
 }
@@ -280,6 +277,7 @@ pub extern "C" fn sw_tformat_read(
     to_send: Option<&mut MaybeUninit<sw_tformat_transmission_t>>,
 ) -> sw_result_t {
     border(|| {
+        let m = sw_tformat_t::get(m)?;
         let request = in_range(match DataId::from_code(id) {
             Some(DataId::ReadSingleTurn) => Some(Request::ReadSingleTurn),
             Some(DataId::ReadMultiTurn) => Some(Request::ReadMultiTurn),
@@ -287,7 +285,7 @@ pub extern "C" fn sw_tformat_read(
             Some(DataId::ReadAll) => Some(Request::ReadAll),
             _ => None,
         })?;
-        sw_tformat_t::get(m)?.begin(request, time(start_ns)?, there(to_send)?)
+        m.begin(request, time(start_ns)?, there(to_send)?)
     })
 }
 
@@ -316,13 +314,21 @@ pub unsafe extern "C" fn sw_tformat_hear(
     end_ns: u64,
 ) -> sw_result_t {
     border(|| {
+        let m = sw_tformat_t::get(m)?;
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { read(bytes, len)? };
         let end_ns = time(end_ns)?;
-        let m = sw_tformat_t::get(m)?;
         let pending = m.transaction.outcome().is_none();
-        m.transaction.push(bytes, end_ns);
-        m.result(pending)
+        match m.transaction.push(bytes, end_ns) {
+            // The usual case, without a look at the state again.
+            Some(Ok(value)) => {
+                if pending && of_position(&value.response) {
+                    m.evidence = value.evidence(m.resolution);
+                }
+                OK
+            }
+            _ => m.result(pending),
+        }
     })
 }
 
@@ -342,13 +348,16 @@ pub extern "C" fn sw_tformat_framing_error(m: Option<&mut sw_tformat_t>, end_ns:
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_tformat_poll(m: Option<&mut sw_tformat_t>, now_ns: u64) -> sw_result_t {
     border(|| {
-        let now_ns = time(now_ns)?;
         let m = sw_tformat_t::get(m)?;
-        if m.transaction.outcome().is_some() {
-            return m.result(false);
+        let now_ns = time(now_ns)?;
+        match m.transaction.outcome() {
+            Some(Ok(_)) => OK,
+            Some(Err(_)) => m.result(false),
+            None => {
+                let _ = m.transaction.poll(now_ns);
+                m.result(true)
+            }
         }
-        let _ = m.transaction.poll(now_ns);
-        m.result(true)
     })
 }
 
