@@ -309,3 +309,48 @@ fn what_was_dropped_does_not_come_back() {
     assert_eq!(sw_tformat_poll(Some(&mut m), 53_000), 0);
     assert!(!angle(&m));
 }
+
+/// What every encoder of a block writes lies in the caller's block, of every length: a short one is refused and left alone.
+#[test]
+fn encoders_of_blocks_write_all_or_nothing() {
+    use crate::{rtex::*, sorte::*};
+    // SAFETY: structures of integers, and 0 is a value of each.
+    let (command, sub, response, sub_response, param, sync, device) = unsafe {
+        (
+            MaybeUninit::zeroed().assume_init(),
+            MaybeUninit::zeroed().assume_init(),
+            MaybeUninit::zeroed().assume_init(),
+            MaybeUninit::zeroed().assume_init(),
+            MaybeUninit::zeroed().assume_init(),
+            MaybeUninit::zeroed().assume_init(),
+            sw_sorte_device_frame_t { address: 1, status: 0 },
+        )
+    };
+    let (words, payload) = ([0_u16; 4], [0_u8; 3]);
+    let mut len = MaybeUninit::uninit();
+    for size in 0..=40_usize {
+        let write = |want: usize, call: &mut dyn FnMut(*mut u8) -> i32| {
+            let mut block = vec![0xa5_u8; size].into_boxed_slice();
+            let result = call(block.as_mut_ptr());
+            assert_eq!(result, if size < want { -4 } else { 0 }, "{want} into {size}");
+            assert!(
+                block.iter().skip(if result == 0 { want } else { 0 }).all(|byte| *byte == 0xa5),
+                "{want} into {size}"
+            );
+            assert_eq!(call(null_mut()), -1);
+        };
+        // SAFETY: the blocks with their sizes, or NULL.
+        unsafe {
+            write(16, &mut |to| sw_rtex_build_command(Some(&command), to, size));
+            write(32, &mut |to| sw_rtex_build_command32(Some(&command), Some(&sub), to, size));
+            write(16, &mut |to| sw_rtex_build_response(Some(&response), to, size));
+            write(32, &mut |to| sw_rtex_build_response32(Some(&response), Some(&sub_response), to, size));
+            write(40, &mut |to| sw_sorte_build_param(Some(&param), to, size));
+            write(14, &mut |to| sw_sorte_build_sync(Some(&sync), to, size));
+            write(8, &mut |to| sw_sorte_build_delay_req(0, 0, to, size));
+            write(16, &mut |to| sw_sorte_build_payload(words.as_ptr(), words.len(), to, size));
+            write(6, &mut |to| sw_sorte_build_device_frame(Some(&device), payload.as_ptr(), to, size));
+            write(8, &mut |to| sw_sorte_build_master_frame(payload.as_ptr(), 3, 7, to, size, Some(&mut len)));
+        }
+    }
+}
