@@ -11,6 +11,7 @@ class TFormat:
     """All data (ID 3) of an encoder with 23 bits a turn: CF, SF, ABS0 to ABS2, ENID 17h, ABM0 to ABM2, ALMC, CRC (x^8 + 1)."""
 
     bits, turn_us = 8, 3.0
+    enid, almc = 0x17, 0
 
     def __init__(self):
         self.counts = 0x12_3456
@@ -19,8 +20,8 @@ class TFormat:
         """Units of the answer and what a master has to print of it; None: the request is not for this encoder."""
         if request != [0x1A]:
             return None
-        self.counts += 0x1_2345
-        units = [0x1A, 0, *self.counts.to_bytes(3, "little"), 0x17, 7, 0, 0, 0]
+        self.counts = (self.counts + 0x1_2345) % (1 << 23)
+        units = [0x1A, 0, *self.counts.to_bytes(3, "little"), self.enid, 7, 0, 0, self.almc]
         check = 0
         for unit in units:
             check ^= unit
@@ -39,7 +40,7 @@ class AFormat:
         # Sync code 0, 1, 0; frame code, address, command and their CRC-3 are 0.
         if request != [0b010]:
             return None
-        self.counts += 0x1235
+        self.counts = (self.counts + 0x1235) % (1 << 20)
         position = 7 << 20 | self.counts
         # Sync code 0, 0, 1; address, command, the fixed bit and the status are 0. All fields begin with their lowest bit.
         line = [0, 0, 1] + [0] * 13 + [position >> k & 1 for k in range(40)]
