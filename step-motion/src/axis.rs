@@ -73,6 +73,8 @@ pub struct Axis<'q, const N: usize> {
     /// What the interrupt told when there was nothing to do for a slice, and what that said.
     seen: u32,
     waits: Work,
+    /// What it told when notice of it was taken last.
+    looked: u32,
     /// The position when the interrupt had counted so many steps.
     position: i64,
     made: u32,
@@ -178,6 +180,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             reach: 0,
             seen: UNSEEN,
             waits: Work::More,
+            looked: UNSEEN,
             position: 0,
             made: 0,
             mover,

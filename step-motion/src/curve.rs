@@ -82,7 +82,7 @@ impl Curve {
 
     /// Without pieces.
     pub(super) const fn clear(&mut self) {
-        (self.len, self.time, self.p) = (0, Real::ZERO, Real::ZERO);
+        (self.len, self.time, self.p, self.skipped) = (0, Real::ZERO, Real::ZERO, (Real::ZERO, Real::ZERO));
     }
 
     pub(super) fn pieces(&self) -> &[Piece] {

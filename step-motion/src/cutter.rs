@@ -18,15 +18,17 @@
 //! seen from
 //! the end at which it is slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
 
+mod near_rest;
 mod part;
+mod segment;
 mod stretch;
 
-use part::{LONGEST, Part};
+use part::{LONGEST, Part, Spot};
 pub(crate) use stretch::Stretch;
 
 use crate::curve::Curve;
 use crate::phases::Frame;
-use crate::real::{Inverse, Real};
+use crate::real::Real;
 
 /// Steps of an axis on a curve as segments, one after another.
 #[derive(Debug, Clone, Copy)]
@@ -34,14 +36,26 @@ use crate::real::{Inverse, Real};
 pub(crate) struct Cutter {
     /// Steps made, counted from the origin of the positions.
     count: u32,
+    /// Nothing has been made of the piece yet.
+    fresh: bool,
     /// The piece after the one under way, and the steps made where that ends.
     next: u8,
     until: u32,
     piece: Part,
-    /// Time from the slower end of the piece to the last step, and the speed then; none before the first one of the piece.
-    last: Option<(u64, Inverse)>,
+    /// Where the next segment may begin.
+    last: Last,
     /// Steps that have been counted, and are not a stretch yet.
     few: Option<Few>,
+}
+
+/// At the last step, or between two of them.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Last {
+    /// The time from the slower end of the piece.
+    At(u64),
+    /// With the time that the next segment may take, about.
+    There(Spot, u64),
 }
 
 /// What a part of the work gives.
@@ -57,8 +71,9 @@ pub(crate) enum Slice {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Few {
     stretch: Stretch,
-    /// The last time, and the differences there.
-    time: i128,
+    /// When the first one is made in the piece, and how much later the last one, with the differences there.
+    begin: u64,
+    since: u64,
     interval: i64,
     add: i64,
 }
@@ -78,7 +93,7 @@ pub(crate) struct Demand {
 const FEW: u16 = 4;
 impl Cutter {
     pub(crate) const fn new() -> Self {
-        Self { count: 0, next: 0, until: 0, piece: Part::NONE, last: None, few: None }
+        Self { count: 0, fresh: false, next: 0, until: 0, piece: Part::NONE, last: Last::At(0), few: None }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -105,14 +120,22 @@ impl Cutter {
         if self.count >= self.until {
             return if self.take_piece(curve, frame, demand) { Slice::More } else { Slice::End };
         }
+        if core::mem::take(&mut self.fresh) && self.piece.looks_for_rest() {
+            return Slice::More;
+        }
         let left = self.left();
         if self.piece.even {
             let stretch = self.piece.cruise(self.count, left, demand.time);
             self.count = self.count.saturating_add(stretch.count.into());
             return Slice::Steps(stretch);
         }
-        if let Some((stretch, last)) = self.last.and_then(|last| self.piece.many(self.count, left, last, demand)) {
-            (self.last, self.count) = (Some(last), self.count.saturating_add(stretch.count.into()));
+        let steps = (self.count, left);
+        let many = match &self.last {
+            Last::At(time) => self.piece.spot(*time).and_then(|last| self.piece.many(steps, &last, None, demand)),
+            Last::There(spot, long) => self.piece.many(steps, spot, Some(*long), demand),
+        };
+        if let Some((stretch, end, long)) = many {
+            (self.last, self.count) = (Last::There(end, long), self.count.saturating_add(stretch.count.into()));
             return Slice::Steps(stretch);
         }
         self.search(Few::NONE, demand)
@@ -130,7 +153,7 @@ impl Cutter {
             self.next = self.next.saturating_add(1);
             if until > self.count {
                 self.piece = Part::new(curve, frame, (piece, end), demand.off);
-                (self.until, self.last) = (until, None);
+                (self.until, self.last, self.fresh) = (until, Last::At(self.piece.entry()), true);
             }
         }
         true
@@ -138,19 +161,28 @@ impl Cutter {
 
     /// The next two steps of some that are searched one by one.
     fn search(&mut self, mut few: Few, demand: &Demand) -> Slice {
+        let mut coarse = 0;
+        let mut last = match self.last {
+            Last::At(time) => time,
+            Last::There(spot, _) => spot.time,
+        };
+        if let Some((by, spot)) = demand.coarse.and_then(|by| Some((by, self.piece.spot(last)?))) {
+            coarse = spot.v.of(self.piece.step) >> by;
+        }
+        let near = self.piece.off.max(coarse) >> 4;
         for _ in 0..self.left().min(2) {
-            let coarse = demand.coarse.zip(self.last).map_or(0, |(by, (_, v))| v.of(self.piece.step) >> by);
-            let near = self.piece.off.max(coarse) >> 4;
-            let (time, speed) = self.piece.search(self.count, self.last, near);
-            if !few.add(self.piece.tick(time), demand.time.min(LONGEST)) {
+            let time = self.piece.search(self.count, Some(last), near);
+            if !few.add(&self.piece, time, demand.time.min(LONGEST)) {
                 return Slice::Steps(few.stretch);
             }
+            self.count = self.count.saturating_add(1);
             // A step that was due before the piece began is made there, and has not its place: no segment begins at it.
-            let since = if self.piece.back { !time } else { time };
-            (self.last, self.count) = ((since > near).then_some((time, speed)), self.count.saturating_add(1));
-            if self.last.is_none() {
+            if time.abs_diff(self.piece.entry()) <= near {
+                self.last = Last::At(self.piece.entry());
                 return Slice::Steps(few.stretch);
             }
+            last = time;
+            self.last = Last::At(time);
         }
         if self.left() > 0 && few.stretch.count < FEW {
             self.few = Some(few);
@@ -164,34 +196,34 @@ impl Cutter {
         if self.piece.even {
             return self.piece.cruise(count, 1, 0).first;
         }
-        let (time, _) = self.piece.search(count, None, 0);
-        self.piece.tick(time)
+        self.piece.tick(self.piece.search(count, None, 0))
     }
 }
 
 impl Few {
     const NONE: Self =
-        Self { stretch: Stretch { count: 0, first: 0, differences: [0; 3] }, time: 0, interval: 0, add: 0 };
+        Self { stretch: Stretch { count: 0, first: 0, differences: [0; 3] }, begin: 0, since: 0, interval: 0, add: 0 };
 
-    /// Adds a step at a time, if that is within `longest` of the first one.
-    fn add(&mut self, time: i128, longest: u64) -> bool {
+    /// Adds a step at a time of the piece, if that is within `longest` of the first one.
+    fn add(&mut self, piece: &Part, time: u64, longest: u64) -> bool {
         let Stretch { count, first, differences } = &mut self.stretch;
         if *count == 0 {
-            *first = time;
+            (*first, self.begin) = (piece.tick(time), time);
         } else {
-            if time.saturating_sub(*first) > i128::from(longest) {
+            let since = piece.ticks(time.abs_diff(self.begin));
+            if since > longest {
                 return false;
             }
-            let interval = i64::try_from(time.saturating_sub(self.time)).unwrap_or(0);
+            let interval = i64::try_from(since.saturating_sub(self.since)).unwrap_or(0);
             let add = interval.wrapping_sub(self.interval);
             match *count {
                 1 => differences[0] = interval,
                 2 => differences[1] = add,
                 _ => differences[2] = add.wrapping_sub(self.add),
             }
-            (self.interval, self.add) = (interval, add);
+            (self.since, self.interval, self.add) = (since, interval, add);
         }
-        (*count, self.time) = (count.saturating_add(1), time);
+        *count = count.saturating_add(1);
         true
     }
 }

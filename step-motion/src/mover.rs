@@ -78,6 +78,8 @@ pub struct Mover {
     cuts: bool,
     /// The stretch that comes next, if that is known.
     left: Option<Stretch>,
+    /// Steps of the plan; the greatest number of one without end.
+    all: u32,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
@@ -114,6 +116,7 @@ impl Mover {
             stepper: Stepper::new(),
             cuts: false,
             left: None,
+            all: 0,
             direction: Direction::Forward,
             origin: 0,
             commanded: 0,

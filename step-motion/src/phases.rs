@@ -92,11 +92,18 @@ impl Frame {
 
     /// The state at a moment; at rest after the end.
     pub(super) fn at(&self, curve: &Curve, moment: u64) -> State {
-        let rest = State { p: self.last(curve), v: Real::ZERO, a: (Real::ZERO, true), j: (Real::ZERO, true) };
-        if !self.endless && moment >= self.end(curve) {
-            return rest;
-        }
-        let Some(Piece { p, v, a, j, up, bend, .. }) = curve.at(self.time(curve, moment)) else { return rest };
+        if !self.endless && moment >= self.end(curve) { self.rests(curve) } else { self.within(curve, moment) }
+    }
+
+    fn rests(&self, curve: &Curve) -> State {
+        State { p: self.last(curve), v: Real::ZERO, a: (Real::ZERO, true), j: (Real::ZERO, true) }
+    }
+
+    /// The state at a moment before the end.
+    pub(super) fn within(&self, curve: &Curve, moment: u64) -> State {
+        let Some(Piece { p, v, a, j, up, bend, .. }) = curve.at(self.time(curve, moment)) else {
+            return self.rests(curve);
+        };
         State {
             p: self.position(curve, p),
             v: v * self.scale,
@@ -118,6 +125,13 @@ impl Phases {
     /// At rest.
     pub(super) const fn rest(shift: u32, moment: u64, at: i64) -> Self {
         Self { curve: Curve::new(), frame: Frame::rest(shift, moment, at) }
+    }
+
+    /// Without pieces, in another frame.
+    pub(super) const fn anew(&mut self, frame: Frame) -> &mut Self {
+        self.frame = frame;
+        self.curve.clear();
+        self
     }
 
     pub(super) fn end(&self) -> u64 {

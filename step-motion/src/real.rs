@@ -108,6 +108,19 @@ impl Real {
         }
     }
 
+    /// Times a part in 2^-64, truncated; the largest number if it does not fit.
+    pub(super) const fn part(self, x: u64) -> u64 {
+        let whole = high(self.m(), x);
+        let by = self.e().unsigned_abs();
+        if self.e() <= 0 {
+            if by < 64 { whole >> by } else { 0 }
+        } else if by <= whole.leading_zeros() && by < 64 {
+            whole << by
+        } else {
+            u64::MAX
+        }
+    }
+
     /// Over a number in units of 2^-62, truncated; the largest number if it does not fit.
     pub(super) const fn over(self, by: Inverse) -> u64 {
         let quotient = high(self.m(), by.per);
@@ -281,6 +294,17 @@ impl Inverse {
         if zeros == 64 { Self { per: u64::MAX, zeros } } else { Self { per: reciprocal(x << zeros), zeros } }
     }
 
+    /// As [`of`](Self::of) in units of 2^-32, at most a few of them too much, and of a number in units of 2^32 of its own.
+    pub(super) fn rough(self, x: u32) -> u32 {
+        let quotient = upper(x, (self.per >> 32) as u32);
+        if quotient.leading_zeros() > self.zeros { quotient << self.zeros << 1 } else { u32::MAX }
+    }
+
+    /// The part of it that 2^`bits` is, as its first digits over 2^64 and a power of 2; `None` if it is less than that.
+    pub(super) fn part(self, bits: u32) -> Option<(u64, u32)> {
+        Some((self.per, 63_u32.checked_sub(bits)?.checked_sub(self.zeros)?))
+    }
+
     /// `x` over it in units of 2^-64; the largest number from 1 on.
     pub(super) const fn of(self, x: u64) -> u64 {
         let quotient = high(x, self.per);
@@ -292,6 +316,18 @@ impl Inverse {
             u64::MAX
         }
     }
+}
+
+/// A product over 2^`down`, 1 to 63, modulo 2^64.
+#[inline]
+pub(super) const fn middle(a: u64, b: u64, down: u32) -> u64 {
+    let (high, low) = product(a, b);
+    high << (64_u32.wrapping_sub(down) & 63) | low >> (down & 63)
+}
+
+/// The upper half of a product of 64 bits, rounded up.
+pub(super) const fn upper(a: u32, b: u32) -> u32 {
+    ((a as u64).wrapping_mul(b as u64) >> 32).saturating_add(1) as u32
 }
 
 /// The upper half of a product.

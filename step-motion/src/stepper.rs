@@ -59,5 +59,5 @@ impl Stepper {
 
 /// The tick into which a time in 2^-32 ticks falls.
 pub(super) fn tick(time: i128) -> u64 {
-    u64::try_from(time.saturating_add(TICK / 2) >> 32).unwrap_or(0)
+    u64::try_from(time.wrapping_add(TICK / 2) >> 32).unwrap_or(0)
 }

@@ -33,20 +33,20 @@ impl Writer {
         stretch: &Stretch,
         direction: Direction,
     ) {
-        let first = stretch.first.saturating_add(TICK / 2).max(self.end.saturating_add(TICK));
+        let first = stretch.first.wrapping_add(TICK / 2).max(self.end.wrapping_add(TICK));
         if self.dir != Some(direction) {
             self.dir = Some(direction);
             let half = (first.saturating_sub(self.end) / 2).max(TICK);
             self.put_wait(to, self.end.saturating_add(half));
         }
-        let first = first.max(self.end.saturating_add(TICK));
-        if first.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
+        let first = first.max(self.end.wrapping_add(TICK));
+        if first.wrapping_sub(self.end) > i128::from(LONGEST) << 32 {
             self.put_wait(to, first.saturating_sub(TICK));
         }
         let kind = Kind { step: true, reverse: direction.dir(), joint: Joint::No };
-        let late = first.saturating_sub(stretch.first);
+        let late = first.wrapping_sub(stretch.first);
         self.put(to, (stretch.count, kind), first, stretch.differences);
-        self.end = stretch.last().saturating_add(late);
+        self.end = stretch.last().wrapping_add(late);
     }
 
     /// Nothing until a time.
@@ -90,7 +90,7 @@ impl Writer {
         first: i128,
         [interval, add, bend]: [i64; 3],
     ) {
-        let first = i64::try_from(first.saturating_sub(self.end)).unwrap_or(0);
+        let first = i64::try_from(first.wrapping_sub(self.end)).unwrap_or(0);
         let add = add.wrapping_sub(bend);
         let interval = interval.wrapping_sub(add);
         let segment = Segment { count, kind, first, interval, add, bend };

@@ -32,6 +32,11 @@ impl<const N: usize> Axis<'_, N> {
         if current == self.seen {
             return self.waits;
         }
+        if self.stage == Stage::Block && current == self.looked {
+            // The interrupt is where it was.
+            return self.cut();
+        }
+        self.looked = current;
         let work = self.slice();
         let waits = matches!(work, Work::Start | Work::Later | Work::Rest);
         (self.seen, self.waits) = (if waits { current } else { UNSEEN }, work);

@@ -1,7 +1,7 @@
 //! A piece of a curve in parts of itself, and the segments that fit into it.
 
+use super::near_rest::FromRest;
 use super::stretch::Stretch;
-use super::{Demand, FEW};
 use crate::curve::{Bend, Curve};
 use crate::phases::{Frame, P};
 use crate::real::{Inverse, Real, THIRD, high};
@@ -13,7 +13,7 @@ pub(super) struct Part {
     /// The speed, half the acceleration and a sixth of the jerk at the slower end, which is the end of the piece.
     speed: u64,
     half: u64,
-    sixth: u64,
+    pub(super) sixth: u64,
     /// The jerk adds to the acceleration.
     grows: bool,
     pub(super) back: bool,
@@ -22,26 +22,51 @@ pub(super) struct Part {
     /// When and where the slower end is: in 2^-32 ticks of the clock, and 2^-64 steps from where the positions are 0.
     begin: i128,
     origin: i128,
-    /// What the piece takes, and what a step takes at its mean speed, in 2^-32 ticks.
+    /// What the piece takes, also as a number to divide by, and what a step takes at its mean speed, in 2^-32 ticks.
     lasts: Real,
+    per: Inverse,
     pace: Real,
-    /// Its way, with the power of 2 of its unit, and a step of it.
+    /// Its way, in twice the unit of places, of which a step has 2^`bits`, and as a number to divide by with the power of 2 of its unit; and a step as a part of it.
+    steps: Real,
+    pub(super) bits: u32,
+    /// From where step 0 is made to the slower end, in the unit of places, modulo 2^64.
+    first: i64,
     way: (Inverse, i32),
     pub(super) step: u64,
     /// How far off a step may be.
     pub(super) off: u64,
+    /// It begins or ends at rest, at a step and without an acceleration or with a constant one.
+    rest: Option<FromRest>,
 }
 
 /// Fraction bits of a position here.
 const P2: i32 = 2 * P;
+/// And of one that is to be as exact as a step is.
+const FINEST: i32 = 44;
 /// Intervals within a segment are below 2^28 ticks, so that three of them are no overflow.
 pub(super) const LONGEST: u64 = 1 << 60;
+/// And all of a segment.
+pub(super) const ALL: u64 = 1 << 62;
 
 /// A position, the speed and half the acceleration there.
 struct Place {
     p: u64,
     v: u64,
     half: u64,
+}
+
+/// Where a segment may begin.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Spot {
+    pub(super) time: u64,
+    pub(super) p: u64,
+    pub(super) half: u64,
+    /// The speed, to divide by.
+    pub(super) v: Inverse,
+    /// How far it is from the slower end, in parts of a step, and 2^-32 ticks a step.
+    pub(super) way: u64,
+    pub(super) pace: u64,
 }
 
 impl Part {
@@ -55,10 +80,15 @@ impl Part {
         begin: 0,
         origin: 0,
         lasts: Real::ZERO,
+        per: Inverse::ONE,
         pace: Real::ZERO,
+        steps: Real::ZERO,
+        bits: 32,
+        first: 0,
         way: (Inverse::ONE, 0),
         step: 0,
         off: 0,
+        rest: None,
     };
 
     /// Of a piece with its end, or of what is left of it where the curve was joined.
@@ -88,19 +118,91 @@ impl Part {
         let (v, a, j) =
             (slow.v * time, slow.a * time.squared().half(), slow.j * (time.squared() * time) * (THIRD.half()));
         let all = (v + a).along(j, own.grows);
-        let per = Real::ONE / all;
-        let part = |x: Real| (x * per).to_fixed(62);
         let way = all * scale;
+        let step = Real::ONE / way;
+        let per = step * scale;
+        let part = |x: Real| (x * per).to_fixed(62);
+        let lasts = ticks(time);
+        // Up to 2^63 for all of it.
+        let bits = 62_i32.saturating_sub(way.exponent()).clamp(P, FINEST);
         Self {
             speed: part(v),
             half: part(a),
             sixth: part(j),
-            lasts: ticks(time),
-            pace: ticks(time) / way,
+            lasts,
+            per: lasts.inverse().0,
+            pace: lasts * step,
+            steps: way.scaled(bits.saturating_add(1)),
+            bits: bits.unsigned_abs(),
+            first: own.first_of(bits.unsigned_abs()),
             way: way.inverse(),
-            step: (Real::ONE / way).to_fixed(62),
+            step: step.to_fixed(62),
             off: (off / time).to_fixed(64),
             ..own
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "modulo 2^64, of which a piece has no more than half")]
+    const fn first_of(&self, bits: u32) -> i64 {
+        let origin = (self.origin >> (64_u32.wrapping_sub(bits) & 63)) as i64;
+        origin.wrapping_sub(1 << (bits.wrapping_sub(1) & 63))
+    }
+
+    /// Takes notice of it if the slower end is a rest at a step; false if it is none.
+    pub(super) fn looks_for_rest(&mut self) -> bool {
+        self.rest = self.beside_rest();
+        self.rest.is_some()
+    }
+
+    fn beside_rest(&self) -> Option<FromRest> {
+        let (whole, part) = (self.origin >> P2, self.origin & ((1 << P2) - 1));
+        let whole = if part >> (P2 - 1) == 0 { whole } else { whole.saturating_add(1) };
+        let off = self.origin.saturating_sub(whole << P2).unsigned_abs();
+        if self.speed != 0 || off >> (P2 - 20) != 0 || self.half != 0 && self.sixth != 0 {
+            return None;
+        }
+        let at = u32::try_from(whole).ok()?;
+        let first = if self.back { at.checked_sub(1)? } else { at };
+        Some(FromRest::new(at, self.search(first, None, 0), self.half == 0))
+    }
+
+    /// When the piece begins.
+    pub(super) const fn entry(&self) -> u64 {
+        if self.back { u64::MAX } else { 0 }
+    }
+
+    /// The place at a time; `None` at rest.
+    pub(super) fn spot(&self, time: u64) -> Option<Spot> {
+        let Place { p, v, half } = self.at(time);
+        if v == 0 {
+            return None;
+        }
+        let v = Inverse::new(v);
+        Some(Spot { time, p, half, v, way: self.steps.part(p << 1), pace: self.pace.over(v) })
+    }
+
+    /// Parts of a step from the slower end to where step `count` is made.
+    pub(super) const fn place(&self, count: u32) -> i64 {
+        let at = ((count as i64) << (self.bits & 63)).wrapping_sub(self.first);
+        if self.back { at.wrapping_neg() } else { at }
+    }
+
+    /// A part of the piece in 2^-32 ticks.
+    pub(super) const fn ticks(&self, part: u64) -> u64 {
+        self.lasts.part(part)
+    }
+
+    /// 2^-32 ticks as a part of the piece; the greatest number from all of it on.
+    pub(super) fn part_of(&self, ticks: u64) -> u64 {
+        let part = self.per.of(ticks);
+        let up = self.lasts.exponent().saturating_sub(63);
+        let by = up.unsigned_abs();
+        if up >= 0 {
+            part.checked_shr(by).unwrap_or(0)
+        } else if by < part.leading_zeros() {
+            part << by
+        } else {
+            u64::MAX
         }
     }
 
@@ -122,8 +224,19 @@ impl Part {
 
     /// A time on the clock, in 2^-32 ticks.
     pub(super) fn tick(&self, time: u64) -> i128 {
-        let since = self.lasts.times(time, -64);
+        let since = if self.lasts.exponent() < 64 { self.ticks(time).into() } else { self.lasts.times(time, -64) };
         if self.back { self.begin.saturating_sub(since) } else { self.begin.saturating_add(since) }
+    }
+
+    /// The fourth derivative has the same sign from end to end, that of the acceleration.
+    pub(super) const fn is_bent_one_way(&self) -> bool {
+        !self.grows || self.sixth == 0 || self.speed == 0
+    }
+
+    /// w² and y of a segment, as far as they add up in its fourth derivative.
+    pub(super) fn bend(&self, w: u64, y: u64) -> u64 {
+        let square = high(w, w);
+        if self.grows { square.max(y) } else { square.saturating_add(y) }
     }
 
     /// Up to `left` steps at constant speed.
@@ -133,8 +246,11 @@ impl Part {
         let (far, wide) = (away.max(0).unsigned_abs(), 64_u32.saturating_sub(away.max(0).leading_zeros()));
         let far = u64::try_from(far >> wide).unwrap_or(u64::MAX);
         let first = self.begin.saturating_add(self.pace.times(far, P2.saturating_neg().saturating_add_unsigned(wide)));
-        let room =
-            if away < 0 || interval >= LONGEST { 0 } else { time.checked_div(interval).unwrap_or(0).min(0xffff) };
+        let room = if away < 0 || interval >= LONGEST {
+            0
+        } else {
+            time.min(ALL).checked_div(interval).unwrap_or(0).min(0xffff)
+        };
         let count = u64::from(left).min(room.max(1));
         let interval = i64::try_from(interval).unwrap_or(0);
         Stretch { count: u16::try_from(count).unwrap_or(1), first, differences: [interval, 0, 0] }
@@ -151,107 +267,33 @@ impl Part {
         }
     }
 
-    /// Two steps or more from the last one on: what the last of them leaves, too.
-    pub(super) fn many(
-        &self,
-        count: u32,
-        left: u32,
-        (time, v): (u64, Inverse),
-        demand: &Demand,
-    ) -> Option<(Stretch, (u64, Inverse))> {
-        let pace = self.pace.over(v);
-        if pace >= LONGEST {
-            return None;
+    /// The time from the slower end to a step, by Newton's method from the `last` one, unless it is known.
+    pub(super) fn search(&self, count: u32, last: Option<u64>, near: u64) -> u64 {
+        if let Some(time) = self.rest.filter(|_| near > 0).and_then(|rest| rest.step(count)) {
+            return time;
         }
-        let step = v.of(self.step);
-        // Of one step: w / 2. Five steps are not to be more than half of the way to rest.
-        let half = self.at(time).half;
-        let w = v.of(high(half, step));
-        if left >= FEW.into() && w > u64::MAX / 20 {
-            return None;
-        }
-        let y = v.of(high(high(self.sixth, step), step));
-        // How far the first three terms may miss.
-        let most = demand.coarse.map_or(self.off, |by| self.off.max(step >> by)).saturating_mul(6);
-        let long = if demand.coarse.is_some() { 2048 } else { 512 };
-        let mut n = about(step, w, y, most).min(left).min(long);
-        if pace.saturating_mul(n.into()) > demand.time {
-            n = u32::try_from(demand.time.checked_div(pace).unwrap_or(0)).unwrap_or(n);
-        }
-        let least = left.clamp(2, u32::from(FEW).saturating_add(1));
-        while n >= least {
-            let x = step.saturating_mul(n.into());
-            let (w, y) = (w.saturating_mul(n.into()), y.saturating_mul(u64::from(n).wrapping_mul(n.into())));
-            // Half of the way to rest, or as far again as from there, by the greater speed at either end: beyond it the derivative is too far from the same everywhere.
-            if w.saturating_add(y.saturating_mul(3)) > u64::MAX >> if self.back { 3 } else { 2 } {
-                n = n.saturating_sub((n >> 2).max(1));
-                continue;
-            }
-            let ahead = along(x, high(x, w), self.back).saturating_add(high(x, high(w, w)) << 1);
-            let ahead = along(ahead, high(x, y), !self.grows);
-            let there = along(time, ahead, !self.back);
-            // The end of the piece is as far as a place can be; where they lead beyond it, that is missed, too.
-            let beyond = ahead.saturating_sub(if self.back { time } else { !time });
-            let Place { p, v, half } = self.at(there);
-            let way = self.target(count.saturating_add(n).saturating_sub(1));
-            let miss = Inverse::new(v).of(p.abs_diff(way));
-            if miss.saturating_add(beyond) <= most {
-                let there = along(there, miss, p < way);
-                let v_there = Inverse::new(along(v, high(half, miss) << 1, p < way));
-                let mean = self.lasts.times(time.abs_diff(there), -64);
-                let stretch =
-                    self.join(n, time, [pace, u64::try_from(mean).unwrap_or(u64::MAX), self.pace.over(v_there)])?;
-                return Some((stretch, (there, v_there)));
-            }
-            n = n.saturating_sub((n >> 2).max(1));
-        }
-        None
-    }
-
-    /// The segment between two steps from the paces at both, and the time between.
-    fn join(&self, count: u32, time: u64, [first, all, last]: [u64; 3]) -> Option<Stretch> {
-        if first.max(last) >= LONGEST || all == u64::MAX {
-            return None;
-        }
-        let per = part(count);
-        let [first, mean, last] = [first, high(all, per), last].map(|pace| i64::try_from(pace).unwrap_or(0));
-        let n = i64::from(count);
-        // first u + b u² + c u³; what rounding takes from c is given to b, so that the end is met.
-        let bow = first.wrapping_add(last).wrapping_sub(mean << 1);
-        let c6 = times(times(bow.wrapping_mul(6), per), per);
-        let sixth = |x: i64| times(x, SIXTH);
-        let slant = mean.wrapping_sub(first).wrapping_sub(sixth(c6.wrapping_mul(n).wrapping_mul(n)));
-        let (b2, c) = (times(slant << 1, per), sixth(c6));
-        let start = first.wrapping_add(b2 >> 1).wrapping_add(c);
-        Some(Stretch {
-            count: u16::try_from(count).ok()?,
-            first: self.tick(time).saturating_add(start.into()),
-            differences: [start.wrapping_add(b2).wrapping_add(c6), b2.wrapping_add(c6 << 1), c6],
-        })
-    }
-
-    /// The time from the slower end to a step, and the speed then, by Newton's method.
-    pub(super) fn search(&self, count: u32, last: Option<(u64, Inverse)>, near: u64) -> (u64, Inverse) {
         let way = self.target(count);
-        let mut time = last.map_or(0, |(last, v)| {
+        let mut time = last.map_or(0, |last| {
             // By the speed, and the change of it.
-            let step = v.of(self.step);
-            let w = v.of(high(self.at(last).half, step));
-            along(last, along(step, high(step, w), self.back), !self.back)
+            let Place { p, v, half } = self.at(last);
+            let v = Inverse::new(v);
+            let ahead = v.of(p.abs_diff(way));
+            let w = v.of(high(half, ahead));
+            along(last, along(ahead, high(ahead, w), self.back), p < way)
         });
         if time == 0 || time == u64::MAX {
             time = self.guess(way);
         }
         for _ in 0..32 {
-            let Place { p, v, half } = self.at(time);
+            let Place { p, v, .. } = self.at(time);
             let by = Inverse::new(v).of(p.abs_diff(way));
             let next = along(time, by, p < way);
             if by <= near.max(2) || next == time {
-                return (next, Inverse::new(along(v, high(half, by) << 1, p < way)));
+                return next;
             }
             time = next;
         }
-        (time, Inverse::new(self.at(time).v))
+        time
     }
 
     /// At least the time for a way.
@@ -275,46 +317,7 @@ impl Part {
     }
 }
 
-/// 2^64 / 6.
-const SIXTH: u64 = u64::MAX / 6 + 1;
-
-/// A number times a part.
-fn times(x: i64, part: u64) -> i64 {
-    let size = i64::try_from(high(x.unsigned_abs(), part)).unwrap_or(0);
-    if x < 0 { size.wrapping_neg() } else { size }
-}
-
-/// 2^64 / n of up to 16 bits, in divisions that a 32-bit core has.
-fn part(n: u32) -> u64 {
-    let digit = |left: u32| (left.checked_div(n).unwrap_or(0), left.checked_rem(n).unwrap_or(0) << 16 | 0xffff);
-    let (first, left) = digit(u32::MAX);
-    let (second, left) = digit(left);
-    let (third, _) = digit(left);
-    u64::from(first) << 32 | u64::from(second) << 16 | u64::from(third)
-}
-
 /// A sum that ends at the greatest number, or a difference that ends at 0.
-fn along(x: u64, by: u64, up: bool) -> u64 {
+pub(super) fn along(x: u64, by: u64, up: bool) -> u64 {
     if up { x.saturating_add(by) } else { x.saturating_sub(by) }
-}
-
-/// About as many steps as the two terms left out allow to be off by `most`, from those of one step.
-fn about(step: u64, w: u64, y: u64, most: u64) -> u32 {
-    // Of 16 steps, lest they are too small; of one where those are too large.
-    let many = if step >> 60 | w >> 58 | y >> 52 == 0 { 4 } else { 0 };
-    let (x, w, y) = (step << many, w << many, y << (many << 1));
-    let square = high(w, w);
-    // In the middle a segment is off by a sixteenth of the one and by 5/32 of the other: half of the one counts, and twice the other.
-    let fourth = high(high(x, w), square.saturating_mul(5).saturating_add(y.saturating_mul(15) >> 1)) >> 1;
-    let both = square.saturating_mul(4).saturating_add(y.saturating_mul(3));
-    let fifth = high(x, high(both, both)).saturating_mul(2);
-    let root = |term: u64, degree: u32| {
-        // From 2^-60 of those steps on.
-        let octaves = term.leading_zeros().saturating_add(60).saturating_sub(most.leading_zeros());
-        let (whole, part) = (octaves.checked_div(degree).unwrap_or(0), octaves.checked_rem(degree).unwrap_or(0));
-        let steps = u64::from(degree.saturating_add(part)) << whole.min(40);
-        let down = 60_u32.checked_div(degree).unwrap_or(0).saturating_sub(many);
-        u32::try_from((steps >> down).checked_div(degree.into()).unwrap_or(0)).unwrap_or(u32::MAX)
-    };
-    root(fourth, 4).min(root(fifth, 5))
 }

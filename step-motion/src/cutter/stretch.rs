@@ -11,23 +11,27 @@ pub(crate) struct Stretch {
     pub(crate) differences: [i64; 3],
 }
 
+/// What is divided by 3 without a rest is multiplied by this, modulo 2^64.
+const THIRD: u64 = 0xaaaa_aaaa_aaaa_aaab;
+
 impl Stretch {
     /// When its last step is made, each interval added as the interrupt does.
     pub(crate) fn last(&self) -> i128 {
         self.time(self.count.saturating_sub(1))
     }
 
-    /// When a step is made, from 0.
+    /// When a step is made, from 0. All of it takes less than 2^63, however great the parts of the sum are.
+    #[expect(clippy::cast_possible_wrap, reason = "modulo 2^64")]
     fn time(&self, n: u16) -> i128 {
-        let [interval, add, bend] = self.differences.map(i128::from);
+        let [interval, add, bend] = self.differences;
         let n = u64::from(n);
         // n, n (n - 1) / 2, n (n - 1) (n - 2) / 6 times: 2^48 at most.
         let pairs = n.wrapping_mul(n.saturating_sub(1)) >> 1;
-        let triples = pairs.wrapping_mul(n.saturating_sub(2)).checked_div(3).unwrap_or(0);
-        let [n, pairs, triples] = [n, pairs, triples].map(i128::from);
+        let triples = pairs.wrapping_mul(n.saturating_sub(2)).wrapping_mul(THIRD);
+        let [n, pairs, triples] = [n, pairs, triples].map(|n| n as i64);
         let more =
             interval.wrapping_mul(n).wrapping_add(add.wrapping_mul(pairs)).wrapping_add(bend.wrapping_mul(triples));
-        self.first.saturating_add(more)
+        self.first.wrapping_add(more.into())
     }
 
     /// The steps before a time, of which the first one is one, and those that are left.

@@ -1,7 +1,7 @@
 //! Steps of an axis as stretches, for [`Axis`](crate::Axis): what has been asked for is planned when it says so.
 
 use crate::cutter::{Demand, Slice, Stretch};
-use crate::phases::{Phases, steps};
+use crate::phases::Phases;
 use crate::stepper::tick;
 use servowire_core::Direction;
 
@@ -59,13 +59,12 @@ impl Mover {
             (self.due, self.left) = (Some(first.max(self.free)), Some(stretch));
             return Cut::Later;
         }
-        let all = steps(frame.last(curve));
         let (direction, count) = (self.direction, i64::from(stretch.count));
         self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
         let last = tick(stretch.last()).max(self.free);
         self.free = last.saturating_add(1);
         (self.turn, self.dir) = (None, Some(direction));
-        self.due = (frame.endless || cutter.count() < all).then_some(self.free);
+        self.due = (cutter.count() < self.all).then_some(self.free);
         Cut::Steps(stretch, direction)
     }
 

@@ -96,7 +96,8 @@ impl Mover {
         let begin = frame.begin.div_ceil(self.clock.moment(1));
         let due = if self.cuts {
             // Not after the next step is enough.
-            (frame.endless || steps(frame.last(curve)) > 0).then_some(begin)
+            self.all = if frame.endless { u32::MAX } else { steps(frame.last(curve)) };
+            (self.all > 0).then_some(begin)
         } else {
             self.stepper.next(curve, frame)
         };
@@ -110,7 +111,8 @@ impl Mover {
 
     /// Plans on from the motion that there is. Positions count from the steps made.
     fn onward(&mut self, moment: u64, bounds: &Bounds) {
-        let (state, last) = (self.phases.at(moment), self.phases.last());
+        let Phases { curve, frame } = &self.phases;
+        let (state, last) = (frame.within(curve, moment), if self.braking { frame.last(curve) } else { 0 });
         let made = i64::try_from(self.commanded.abs_diff(self.origin)).unwrap_or(0) << 32;
         let p = state.p.wrapping_sub(made);
         let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
@@ -119,8 +121,7 @@ impl Mover {
         let again = self.braking;
         self.braking = !self.plan(self.direction, start, frame, bounds);
         if self.braking {
-            self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
-            let Phases { curve, frame } = &mut self.phases;
+            let Phases { curve, frame } = self.phases.anew(frame);
             // A stop has always room.
             let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
             if again {
@@ -167,8 +168,7 @@ impl Mover {
     /// Puts a plan to the aim in the place of the one that there is; false if that is a stop, or cannot be reached any more.
     fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
         let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
-        self.phases = Phases { frame, ..Phases::rest(0, 0, 0) };
-        let Phases { curve, frame } = &mut self.phases;
+        let Phases { curve, frame } = self.phases.anew(frame);
         let goal = match want {
             Want::At(target) => {
                 let Some(left) = ahead(self.commanded, target, direction) else { return false };

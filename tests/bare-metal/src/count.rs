@@ -36,7 +36,17 @@ pub(crate) fn tenths<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I]) ->
 /// The same of a kernel that works on a state.
 #[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
 pub(crate) fn tenths_on<S, I, O>(state: &mut S, kernel: fn(&mut S, &'static I) -> O, inputs: &'static [I]) -> u32 {
-    let rounds = CALLS.div_ceil(inputs.len());
+    tenths_of(CALLS.div_ceil(inputs.len()), state, kernel, inputs)
+}
+
+/// The same of so many rounds.
+#[cfg(any(feature = "servowire-core", feature = "servowire-drivers", feature = "step-motion"))]
+pub(crate) fn tenths_of<S, I, O>(
+    rounds: usize,
+    state: &mut S,
+    kernel: fn(&mut S, &'static I) -> O,
+    inputs: &'static [I],
+) -> u32 {
     let (kernel, empty) = black_box((kernel, nothing_on::<S, I, O> as fn(&mut S, &'static I) -> _));
     let with = ticks(|input| kernel(state, input), inputs, rounds);
     let without = ticks(|input| empty(state, input), inputs, rounds);

@@ -5,7 +5,7 @@ use step_motion::{
 };
 
 use super::kernels_on_states;
-use crate::count::{most_tenths, tenths_on};
+use crate::count::{most_tenths, tenths_of, tenths_on};
 
 /// Segments long enough that none ends, and segments of a step: every call goes on to the next one. The lengths tell the kernels
 /// apart.
@@ -49,6 +49,15 @@ impl Shuttle {
     fn event(&mut self) -> Fired {
         while matches!(self.slice(), Work::More | Work::Rest) {}
         self.timer.fire()
+    }
+
+    /// At one end of its way, from which it goes all of it.
+    fn at_its_end(mut self) -> Self {
+        let end = -self.way;
+        while self.axis.commanded() != end {
+            self.event();
+        }
+        self
     }
 }
 
@@ -140,18 +149,20 @@ kernels_on_states! {
         Square::new().map_or(0, |mut own| tenths_on(&mut own, step_motion_axes_lines, &[()]))
     }
 
-    /// A step with all of its background, on ramps of 2500 steps of an S-curve.
+    /// A step with all of its background, on ramps of 2500 steps of an S-curve: up and down twice.
     fn step_motion_axis_long(shuttle: &mut Shuttle, _input: &()) -> Fired {
         shuttle.event()
     } as {
-        Shuttle::new(&LONG, 2500, 1_000_000).map_or(0, |mut own| tenths_on(&mut own, step_motion_axis_long, &[()]))
+        let Some(own) = Shuttle::new(&LONG, 2500, 1_000_000) else { return 0 };
+        tenths_of(2 * 5000, &mut own.at_its_end(), step_motion_axis_long, &[()])
     }
 
-    /// The same on ramps of 100 steps.
+    /// The same on ramps of 100 steps, ten times.
     fn step_motion_axis_short(shuttle: &mut Shuttle, input: &u8) -> (Fired, u8) {
         (shuttle.event(), *input)
     } as {
-        Shuttle::new(&SHORT, 100, 5_000_000).map_or(0, |mut own| tenths_on(&mut own, step_motion_axis_short, &[0]))
+        let Some(own) = Shuttle::new(&SHORT, 100, 5_000_000) else { return 0 };
+        tenths_of(10 * 200, &mut own.at_its_end(), step_motion_axis_short, &[0])
     }
 
     /// The worst slice of the background, to 40 instructions.

@@ -1,0 +1,73 @@
+//! Steps near a rest, from the first one of them: roots of odd numbers.
+
+use crate::real::high;
+
+/// How many steps behind a rest are known by a root.
+const KNOWN: usize = 64;
+
+/// Roots of 1, 3, 5 and so on, in 2^-60.
+type Roots = [u64; KNOWN];
+
+/// The `degree`th root of a number, in 2^-60.
+#[expect(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, reason = "the compiler evaluates it")]
+const fn root(n: u64, degree: u32) -> u64 {
+    let (mut root, mut bit) = (0_u64, 1_u64 << 31);
+    // 28 bits below the point as whole numbers: a root of 31 bits, to the power of 3, has 93 bits.
+    while bit > 0 {
+        let with = (root | bit) as u128;
+        let power = if degree == 2 { with * with } else { with * with * with };
+        if power <= (n as u128) << (28 * degree) {
+            root |= bit;
+        }
+        bit >>= 1;
+    }
+    // One of Newton's steps doubles them: r + (n - r^d) / (d r^(d - 1)).
+    let wide = root as u128;
+    let power = if degree == 2 { wide } else { wide * wide };
+    let rest = ((n as u128) << (28 * degree)) - power * wide;
+    let more = (rest << 32) / (degree as u128 * power);
+    (root << 32) + more as u64
+}
+
+#[expect(clippy::arithmetic_side_effects, clippy::indexing_slicing, reason = "the compiler evaluates it")]
+const fn roots(degree: u32) -> Roots {
+    let mut all = [0; KNOWN];
+    let mut at = 0;
+    while at < KNOWN {
+        all[at] = root(2 * at as u64 + 1, degree);
+        at += 1;
+    }
+    all
+}
+
+static SQUARE: Roots = roots(2);
+static CUBE: Roots = roots(3);
+
+/// Where a piece is at rest at its slower end, with the position half of an acceleration times t² or a sixth of a jerk times t³: so
+/// all its steps follow from the first one.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct FromRest {
+    /// The step behind the rest.
+    at: u32,
+    /// The time of the first step on either side.
+    first: u64,
+    cubic: bool,
+}
+
+impl FromRest {
+    pub(super) const fn new(at: u32, first: u64, cubic: bool) -> Self {
+        Self { at, first, cubic }
+    }
+
+    /// The time of a step, if it is near.
+    pub(super) fn step(&self, count: u32) -> Option<u64> {
+        // Steps behind a rest are counted from it, and those before it backwards.
+        let far =
+            if count >= self.at { count.wrapping_sub(self.at) } else { self.at.wrapping_sub(count).wrapping_sub(1) };
+        let root = if self.cubic { &CUBE } else { &SQUARE }.get(usize::try_from(far).ok()?)?;
+        // A root of 127 is below 2^4.
+        let time = high(self.first, *root);
+        (time.leading_zeros() >= 4).then_some(time << 4)
+    }
+}

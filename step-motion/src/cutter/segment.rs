@@ -1,0 +1,199 @@
+//! The segments that fit into a piece.
+
+use super::Demand;
+use super::part::{ALL, LONGEST, Part, Spot, along};
+use super::stretch::Stretch;
+use crate::real::{Inverse, high, middle, upper};
+
+/// A segment has so many steps at most; one of a stop that is only a precaution has more.
+const MOST: u32 = 512;
+const MOST_COARSE: u32 = 2048;
+/// As few are no better than steps that are searched.
+const FEW: u32 = 4;
+/// How often another end is tried.
+const TRIES: u8 = 6;
+
+impl Part {
+    /// The steps from a place on, as many as a segment may have: where it ends, too. `count` steps have been made, and `left` are left of
+    /// the piece.
+    pub(super) fn many(
+        &self,
+        (count, left): (u32, u32),
+        begin: &Spot,
+        next: Option<u64>,
+        demand: &Demand,
+    ) -> Option<(Stretch, Spot, u64)> {
+        if begin.pace >= LONGEST {
+            return None;
+        }
+        let first = self.ahead(begin.way, self.place(count))?;
+        let step = begin.v.of(self.step);
+        // Off to either side by half of it, if it may be.
+        let even = demand.coarse.is_none() && self.is_bent_one_way();
+        let (most, cap) = match demand.coarse {
+            Some(by) => (self.off.max(step >> by), MOST_COARSE),
+            None => (self.off << u32::from(even), MOST),
+        };
+        let limit = if self.back { begin.time } else { !begin.time };
+        let longest = self.part_of(demand.time.min(ALL - 1)).max(1);
+        let mut long = match next {
+            Some(long) => long,
+            None => self.about(step, begin, most)?,
+        };
+        long = long.min(longest);
+        for _ in 0..TRIES {
+            let whole = long >= limit;
+            // Two of about the same length, not a long one and a short one.
+            long = if whole { limit } else { long.min((limit >> 1).saturating_add(1)) };
+            let end = self.spot(along(begin.time, long, !self.back))?;
+            let off = self.off_by(begin, &end);
+            if off > most {
+                let by = (log(most).saturating_sub(log(off)) >> 2).clamp(-1024, -32);
+                long = power(long, by);
+                continue;
+            }
+            let way = end.way.abs_diff(begin.way);
+            let mut steps = way.checked_sub(first).map_or(0, |rest| (rest >> self.bits).saturating_add(1));
+            if whole && u64::from(left) <= steps.saturating_add(1) {
+                // The last one is there but for rounding.
+                steps = left.into();
+            }
+            let steps = u32::try_from(steps).unwrap_or(u32::MAX).min(left);
+            if steps > cap {
+                long = long.checked_div(steps.into()).unwrap_or(0).saturating_mul(cap.saturating_sub(1).into());
+                continue;
+            }
+            if steps == 0 || steps <= FEW && steps < left && long < longest {
+                return None;
+            }
+            let mut stretch = self.join([begin, &end], way, first)?;
+            if even {
+                let half = i128::from(self.ticks(off) >> 1);
+                stretch.first = stretch.first.wrapping_add(if self.back { half } else { half.wrapping_neg() });
+            }
+            // It grows with the fourth power of the time, and by itself while the axis slows down.
+            let by = log(most).saturating_sub(log(off)).saturating_sub(if self.back { 256 } else { 0 }) >> 2;
+            return Some((
+                Stretch { count: u16::try_from(steps).ok()?, ..stretch },
+                end,
+                power(long, by.clamp(-256, 256)),
+            ));
+        }
+        None
+    }
+
+    /// The way from one position to another in the direction of motion; `None` if that is behind.
+    fn ahead(&self, from: u64, to: i64) -> Option<u64> {
+        let to = u64::try_from(to);
+        if self.back { from.checked_sub(to.unwrap_or(0)) } else { to.ok()?.checked_sub(from) }
+    }
+
+    /// About the time that a segment may take; `None` for a few steps. From one step of that speed: the time that it takes, and half of
+    /// the change of speed.
+    fn about(&self, step: u64, begin: &Spot, most: u64) -> Option<u64> {
+        let w = begin.v.of(high(begin.half, step));
+        let y = if self.sixth == 0 { 0 } else { begin.v.of(high(high(self.sixth, step), step)) };
+        // It grows with the fourth power.
+        let one =
+            log(step).saturating_add(log(w)).saturating_add(log(self.bend(w, y))).saturating_sub(2 * 64 * 256 + 430);
+        let steps = log(most).saturating_sub(one) >> 2;
+        if steps < 512 {
+            return None;
+        }
+        let w = power(w, steps.min(32 * 256));
+        let d = power(step, steps.min(40 * 256));
+        // Faster at its end, or slower.
+        let by = if self.back { w.saturating_mul(4) } else { w };
+        Some(along(d, high(d, by), false).max(d >> 2))
+    }
+
+    /// How far off a segment is at most: way⁴ / 384 of the greatest fourth derivative.
+    ///
+    /// That is (10 a j v - 15 a³) / v⁷. With d the time of the way at the lower speed, w = a d / v and y = j d² / v it is d (15 w³ + 10 w y) / 384,
+    /// or with the greater of both terms where they have different signs. Here w is half of that, and y a sixth.
+    ///
+    /// In words of 32 bits, rounded up.
+    fn off_by(&self, from: &Spot, to: &Spot) -> u64 {
+        let word = |x: u64| word(x).saturating_add(1);
+        let slow = if self.back { to.v } else { from.v };
+        let d = word(slow.of(from.p.abs_diff(to.p)));
+        let w = slow.rough(upper(word(from.half.max(to.half)), d));
+        let y = if self.sixth == 0 { 0 } else { slow.rough(upper(upper(word(self.sixth), d), d)) };
+        if d == u32::MAX || w >> 30 != 0 {
+            return u64::MAX;
+        }
+        let off = high(u64::from(d).wrapping_mul(w.into()), self.bend(u64::from(w) << 32, u64::from(y) << 32));
+        (off >> 2).saturating_add(off >> 4)
+    }
+
+    /// A segment of the way between two places and its first step, in 2^-`bits` steps; from the paces at both, and the time.
+    fn join(&self, [from, to]: [&Spot; 2], way: u64, first: u64) -> Option<Stretch> {
+        if to.pace >= LONGEST {
+            return None;
+        }
+        let (per, down) = Inverse::new(way).part(self.bits)?;
+        let mean = high(self.ticks(from.time.abs_diff(to.time)), per) >> (down & 63);
+        let [begin, mean, end] = [from.pace, mean, to.pace].map(|pace| i64::try_from(pace).unwrap_or(0));
+        let x = if first >> self.bits == 0 { first << (64_u32.wrapping_sub(self.bits) & 63) } else { u64::MAX };
+        // begin u + b u² + c u³; what rounding takes from c is given to b, so that the end is met.
+        let over = |x: i64| times(x, word(per)) >> (down & 63);
+        let bow = begin.wrapping_add(end).wrapping_sub(mean << 1);
+        let c6 = over(over(bow.wrapping_mul(6)));
+        let bend = i64::try_from(middle(c6.unsigned_abs(), way, self.bits)).unwrap_or(0);
+        let bend = times(if c6 < 0 { bend.wrapping_neg() } else { bend }, THIRD);
+        let b2 = over(mean.wrapping_sub(begin) << 1).wrapping_sub(bend);
+        let part = word(x);
+        let c = times(c6, SIXTH);
+        let slope = begin.wrapping_add(times((b2 >> 1).wrapping_add(times(c, part)), part));
+        let start = high(u64::try_from(slope).unwrap_or(0), x);
+        let add = b2.wrapping_add(times(c6, part)).wrapping_add(c6);
+        let interval = begin.wrapping_add(b2 >> 1).wrapping_add(c).wrapping_add(times(b2.wrapping_add(add) >> 1, part));
+        Some(Stretch {
+            count: 0,
+            first: self.tick(from.time).wrapping_add(start.into()),
+            differences: [interval, add, c6],
+        })
+    }
+}
+
+/// 2^32 / 6, and 2^32 / 3.
+const SIXTH: u32 = u32::MAX / 6 + 1;
+const THIRD: u32 = u32::MAX / 3 + 1;
+
+/// The upper half of a number.
+const fn word(x: u64) -> u32 {
+    (x >> 32) as u32
+}
+
+/// A number times a part.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
+    reason = "halves of a number"
+)]
+const fn times(x: i64, part: u32) -> i64 {
+    let low = (x as u32 as u64).wrapping_mul(part as u64) >> 32;
+    (x >> 32).wrapping_mul(part as i64).wrapping_add(low as i64)
+}
+
+/// The logarithm of base 2, in 256ths: straight between the powers of 2, at most 22 too small.
+fn log(x: u64) -> i32 {
+    let zeros = x.leading_zeros();
+    let part = x.checked_shl(zeros).unwrap_or(0) << 1 >> 56;
+    i32::try_from(u64::from(63_u32.saturating_sub(zeros)) << 8 | part).unwrap_or(0)
+}
+
+/// A number times a power of 2, which is in 256ths: straight between the whole ones, at most 6 per cent too much.
+fn power(x: u64, by: i32) -> u64 {
+    let part = u64::from(by.rem_euclid(256).unsigned_abs());
+    let x = x.saturating_add(high(x, part << 56));
+    let whole = by >> 8;
+    if whole < 0 {
+        x.checked_shr(whole.unsigned_abs()).unwrap_or(0)
+    } else if whole.unsigned_abs() < x.leading_zeros() {
+        x << whole
+    } else {
+        u64::MAX
+    }
+}
