@@ -3,7 +3,7 @@
 use crate::real::high;
 
 /// How many steps behind a rest are known by a root.
-const KNOWN: usize = 64;
+const KNOWN: usize = 32;
 
 /// Roots of 1, 3, 5 and so on, in 2^-60.
 type Roots = [u64; KNOWN];
@@ -66,7 +66,7 @@ impl FromRest {
         let far =
             if count >= self.at { count.wrapping_sub(self.at) } else { self.at.wrapping_sub(count).wrapping_sub(1) };
         let root = if self.cubic { &CUBE } else { &SQUARE }.get(usize::try_from(far).ok()?)?;
-        // A root of 127 is below 2^4.
+        // A root of 63 is below 2^4.
         let time = high(self.first, *root);
         (time.leading_zeros() >= 4).then_some(time << 4)
     }
