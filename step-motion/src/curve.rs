@@ -96,6 +96,19 @@ impl Curve {
         Some(piece.after(time - piece.time))
     }
 
+    /// The state at which it has made a distance from where it was joined.
+    pub(super) fn after(&self, way: Real) -> Option<Piece> {
+        let p = self.skipped.1 + way;
+        let piece = self.pieces().iter().rev().find(|piece| piece.p <= p).or(self.pieces().first())?;
+        let (mut low, mut high) = (Real::ZERO, self.time - piece.time);
+        // By halves: it is needed once a line, by a caller that goes from line to line.
+        for _ in 0..64 {
+            let middle = (low + high).half();
+            if piece.way(middle).0 < p { low = middle } else { high = middle }
+        }
+        Some(piece.after(high))
+    }
+
     /// The distance that is planned: from where the curve was joined to its end.
     pub(super) fn way(&self) -> Real {
         self.p - self.skipped.1

@@ -1,22 +1,11 @@
 //! From curves to segments: stretches of steps whose times are, closely enough, a cubic of their number.
 //!
-//! A segment joins two steps, and has the time and the pace of both. With r = 1 / v, w = a r² and y = j r³ at its start, the time
-//! at which the position is u steps further is
-//!
-//! ```text
-//!  t(u) = r (u - w/2 u² + (3w² - y)/6 u³ - (15w³ - 10wy)/24 u⁴ + (105w⁴ - 105w²y + 10y²)/120 u⁵ - ...)
-//! ```
-//!
-//! The next two terms say about how many steps the segment may have. The first three say about when its last step is made, the position there says
-//! exactly when. What they miss by there is 24 / 384, a sixteenth, of what the segment is off in its middle, if the fourth derivative is the
-//! same everywhere. A sixth is taken.
+//! A segment leads from one time to another. It has the time and the pace of both ends, and how far it is off at most follows from both, too
+//! (`segment`). Near rest, where it would hold few steps, up to four of them are found one by one and make a segment (`near_rest`, `part`).
 //!
 //! Within a piece all is in parts of it: times in parts of its time, positions in parts of its way, in words of 64 bits. With t from 0 to 1
-//! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2.
-//!
-//! A step that is a segment of its own, near rest and at the start of a piece, is searched by Newton's method. Each piece is
-//! seen from
-//! the end at which it is slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
+//! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2. Each piece is seen from the end at which it is
+//! slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
 
 mod near_rest;
 mod part;
@@ -336,9 +325,9 @@ mod tests {
         let third = Real::ONE / Real::new(3);
         let fine = Real::fixed(20, 0) / Real::new(1000);
         for (steps, speed, jerk, wants) in [
-            (64, 20_000, 5_000_000, [1.9, 1.2]),
-            (500, 20_000, 5_000_000, [7.9, 4.0]),
-            (5000, 50_000, 1_000_000, [30.0, 15.0]),
+            (64, 20_000, 5_000_000, [4.0, 3.5]),
+            (500, 20_000, 5_000_000, [13.5, 9.0]),
+            (5000, 50_000, 1_000_000, [71.0, 42.0]),
         ] {
             for (off, want) in [third, fine].into_iter().zip(wants) {
                 let got = cut(steps, speed, jerk, off);

@@ -76,8 +76,9 @@ pub struct AxisPulse {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Start<const N: usize> {
-    /// In units from the start of the line.
+    /// In units from the start of the line, or before that.
     pub(super) place: Real,
+    pub(super) before: Real,
     /// Steps of the line that have been made.
     pub(super) made: [u32; N],
     pub(super) moment: u64,
@@ -97,7 +98,9 @@ pub struct LinePulses<const N: usize> {
     pub(super) due: [Option<u64>; N],
     pub(super) directions: [Direction; N],
     pub(super) start: Start<N>,
+    /// Moments at which the curve is over, and the line.
     end: u64,
+    pub(super) left: u64,
 }
 
 /// How the steps of a line are taken.
@@ -116,7 +119,7 @@ impl<const N: usize> LinePulses<N> {
         let rest = Frame::rest(clock.shift(), moment, 0);
         let mut axes = line.steps.map(|steps| {
             let scale = Real::new(steps.unsigned_abs().into()) / line.whole;
-            let from = line.place(steps, start.place);
+            let from = line.place(steps, start.place).saturating_sub(line.place(steps, start.before));
             (Frame { from, offset, scale, ..rest }, Stepper::new())
         });
         for (((frame, _), made), end) in axes.iter_mut().zip(start.made).zip(line.ends) {
@@ -125,7 +128,7 @@ impl<const N: usize> LinePulses<N> {
         }
         let end = axes.first().map_or(moment, |(frame, _)| frame.end(curve));
         let directions = line.steps.map(|steps| Direction::of(steps.into()));
-        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end };
+        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end, left: end };
         for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
             *due = match steps {
                 Steps::Single => stepper.next(&new.curve, frame),
@@ -138,7 +141,7 @@ impl<const N: usize> LinePulses<N> {
 
     /// Tick at which the line ends.
     pub const fn end(&self) -> u64 {
-        self.clock.tick(self.end)
+        self.clock.tick(self.left)
     }
 
     /// Moment at which its curve is over.
@@ -146,11 +149,13 @@ impl<const N: usize> LinePulses<N> {
         self.end
     }
 
-    /// Speed and acceleration along the line at a moment, and the place on it.
-    pub(super) fn motion(&self, moment: u64) -> (Motion, Real) {
+    /// Speed and acceleration along the line at a moment, the place on it, and how far it is before the line.
+    pub(super) fn motion(&self, moment: u64) -> (Motion, Real, Real) {
+        let Start { place, before, .. } = self.start;
         let piece = self.axes.first().and_then(|(frame, _)| self.curve.at(frame.time(&self.curve, moment)));
-        let Some(Piece { p, v, a, up, .. }) = piece else { return (Motion::steady(Real::ZERO), self.start.place) };
-        (Motion { v, a, up }, self.start.place + (p - self.curve.skipped.1))
+        let Some(Piece { p, v, a, up, .. }) = piece else { return (Motion::steady(Real::ZERO), place, before) };
+        let at = place + (p - self.curve.skipped.1);
+        (Motion { v, a, up }, at - before, before - at)
     }
 
     /// The next step: which axis, and when.

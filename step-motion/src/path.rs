@@ -1,13 +1,14 @@
 //! Straight lines in several axes, one after another.
 
 mod corner;
+mod run;
 
-use crate::curve::Curve;
+use crate::curve::{Curve, Piece};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::line::{Line, LinePulses, Start, Steps};
 use crate::plan::{checked, clamp};
-use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
+use crate::planner::Motion;
 use crate::real::Real;
 use servowire_core::Direction;
 
@@ -44,14 +45,28 @@ impl AxisSetup {
     }
 }
 
-/// How it continues along a line.
+/// How it continues along a line, and lines that follow.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Course {
     pub(super) curve: Curve,
-    /// The speed at its end.
+    /// The speed at its end, and at which it was to be as far as later lines know.
     pub(super) exit: Real,
-    /// It ends with the line, not at a rest before that.
+    pub(super) wish: Real,
+    /// It ends with a line, not at a rest before that.
     pub(super) whole: bool,
+    /// Lines that it goes along after the first one.
+    pub(super) more: usize,
+}
+
+/// How a stop leaves the lines of its first curve.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leaving {
+    /// Lines after the first one.
+    pub(super) more: usize,
+    pub(super) exit: Real,
+    /// The limits of the run that they belong to, if that has been planned anew.
+    pub(super) bounds: Option<Bounds>,
 }
 
 /// A queue of up to `M` straight lines in `N` axes.
@@ -103,6 +118,9 @@ pub struct Path<const N: usize, const M: usize> {
     moment: u64,
     /// What it begins later than that, less than half a tick.
     offset: Real,
+    /// On which curve the first line continues, and where that has begun, if there is one; and whether it knows all lines that there are.
+    on: Option<(Course, Start<N>)>,
+    knows_all: bool,
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {
@@ -135,6 +153,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
             speed: Real::ZERO,
             moment: 0,
             offset: Real::ZERO,
+            on: None,
+            knows_all: false,
         };
         new.set_deviation(deviation);
         Ok(new)
@@ -193,6 +213,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             self.len = self.len.saturating_add(1);
             self.before = Some((steps, length));
             self.target = target;
+            self.knows_all = false;
             gone_along(&mut self.ways, &steps);
         }
         Ok(())
@@ -202,11 +223,43 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// earlier than [`not_before`](Self::not_before).
     pub fn next_line(&mut self) -> Option<LinePulses<N>> {
         let line = self.line(0)?;
-        self.not_before_turning();
-        let Course { curve, exit, .. } = self.begin(0, self.speed, Some(Real::ONE))?;
-        let start = self.start();
-        self.finish(&curve, start.moment, start.offset, exit);
-        Some(LinePulses::new(self.clock, &curve, &line, start, Steps::Single))
+        let (course, start) = match self.on.take() {
+            Some((course, start)) if self.knows_all => (course, start),
+            Some((old, start)) => self.anew(&old, &start).unwrap_or((old, start)),
+            None => {
+                self.not_before_turning();
+                (self.begin(0, self.speed, Some(Real::ONE))?.0, self.start())
+            }
+        };
+        self.knows_all = true;
+        let whole = course.more > 0 || course.whole;
+        let mut pulses = LinePulses::new(self.clock, &course.curve, &line, Start { whole, ..start }, Steps::Single);
+        if course.more > 0 {
+            let before = start.before + line.length;
+            if let (Some(Piece { time, .. }), Some((frame, _))) = (course.curve.after(before), pulses.axes.first()) {
+                pulses.left = frame.begin.saturating_add(frame.since(&course.curve, time).to_fixed(0));
+            }
+            self.pass();
+            self.on = Some((Course { more: course.more.saturating_sub(1), ..course }, Start { before, ..start }));
+        } else {
+            self.finish(&course.curve, start.moment, start.offset, course.exit);
+        }
+        Some(pulses)
+    }
+
+    /// From the motion on a curve at the start of the first line, along more lines than it knew.
+    fn anew(&self, old: &Course, start: &Start<N>) -> Option<(Course, Start<N>)> {
+        let Piece { time, v, a, up, .. } = old.curve.after(start.before)?;
+        let (course, _) = self.course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), (Some(Real::ONE), None))?;
+        let time = start.offset + (time - old.curve.skipped.0);
+        let whole = self.whole(time);
+        let offset = time - Real::new(whole);
+        Some((course, Start { before: Real::ZERO, moment: start.moment.saturating_add(whole), offset, ..*start }))
+    }
+
+    /// A time in whole units of the grid.
+    fn whole(&self, time: Real) -> u64 {
+        time.to_fixed(0) & u64::from(self.clock.grid()).wrapping_neg()
     }
 
     /// Refuses a target outside the soft limits of an axis.
@@ -268,22 +321,28 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Where and when the first line begins.
     pub(super) const fn start(&self) -> Start<N> {
-        Start { place: Real::ZERO, made: [0; N], moment: self.moment, offset: self.offset, whole: true }
+        let (place, before) = (Real::ZERO, Real::ZERO);
+        Start { place, before, made: [0; N], moment: self.moment, offset: self.offset, whole: true }
     }
 
     /// Takes the first line out, whose last curve has begun at a moment and an offset, and ends with a speed.
     pub(super) fn finish(&mut self, curve: &Curve, moment: u64, offset: Real, exit: Real) {
         // Between lines in motion the time goes on exactly; after a rest with half a tick.
-        let grid = u64::from(self.clock.grid());
         let time = offset + (curve.time - curve.skipped.0);
-        let whole = time.to_fixed(0) & grid.wrapping_neg();
+        let whole = self.whole(time);
         self.moment = moment.saturating_add(whole);
         self.offset = time - Real::new(whole);
         if exit.is_zero() && !self.offset.is_zero() {
-            (self.moment, self.offset) = (self.moment.saturating_add(grid), Real::ZERO);
+            let grid = self.clock.grid();
+            (self.moment, self.offset) = (self.moment.saturating_add(grid.into()), Real::ZERO);
         }
         self.speed = exit;
         self.over = self.moment;
+        self.pass();
+    }
+
+    /// Takes the first line out.
+    pub(super) fn pass(&mut self) {
         if let Some(place) = self.lines.get_mut(self.first) {
             if let Some(line) = place.take() {
                 gone_along(&mut self.gone, &line.steps);
@@ -294,59 +353,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if self.len == 0 {
             self.before = None;
         }
-    }
-
-    /// From a motion at a place on line `at`. With `part` of the requested speeds; without one it brakes at once, and
-    /// may come to rest before the end. `None` if rounding leaves no solution.
-    pub(super) fn course(&self, at: usize, start: Motion, place: Real, part: Option<Real>) -> Option<Course> {
-        let line = self.line(at)?;
-        let left = line.length - place;
-        let (bounds, wish) = if let Some(part) = part {
-            let bounds = line.bounds(part);
-            (bounds, self.exit(at, part).min(fastest_exit(start, left, &bounds)))
-        } else {
-            let stop = plan(start, Goal::Speed(Real::ZERO), &line.bounds).ok();
-            if let Some(curve) = stop.filter(|curve| curve.way() <= left + SLACK) {
-                let whole = line.cut || left <= curve.way() + SLACK;
-                return Some(Course { curve, exit: Real::ZERO, whole });
-            }
-            (line.bounds.slower(start.v), Real::ZERO)
-        };
-        let to = |exit| {
-            let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
-            Some(Course { curve, exit, whole: true })
-        };
-        if line.leave.is_some() {
-            return line.leave.and_then(to);
-        }
-        to(wish).or_else(|| {
-            let most = self.most(at);
-            let slowest = slowest_exit(start, left, wish, &bounds).min(most);
-            [slowest, most, Real::ZERO].into_iter().find_map(to)
-        })
-    }
-
-    /// From the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
-    pub(super) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<Course> {
-        let line = self.line(at)?;
-        Some(self.course(at, Motion::steady(speed), Real::ZERO, part).unwrap_or_else(|| {
-            let mut curve = Curve::new();
-            curve.cruise(speed, line.length);
-            Course { curve, exit: speed, whole: true }
-        }))
-    }
-
-    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
-    pub(super) fn end_of_stop(&self, at: usize, mut speed: Real) -> (usize, Real) {
-        for at in at..self.len {
-            let Some(Course { curve, exit, .. }) = self.begin(at, speed, None) else { break };
-            if exit.is_zero() {
-                return (at, curve.way());
-            }
-            speed = exit;
-        }
-        let last = self.len.saturating_sub(1);
-        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
     }
 
     /// Returns the line that is cut off, and the place on it.
@@ -373,15 +379,24 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// The queue as far as a place on line `at`, if the first line begins at `from` and a stop leaves it at `exit`.
-    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], exit: Real) {
+    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], first: Leaving) {
         self.target = self.place((at, place), from, made);
-        let mut speed = exit;
+        let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
         for i in 0..self.len {
-            let exit =
-                if i == 0 || i >= at { speed } else { self.begin(i, speed, None).map_or(speed, |course| course.exit) };
-            let entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            if i > end && i <= at {
+                let course = self.begin(i, speed, None);
+                (end, speed, bounds) = course.map_or((i, speed, None), |(course, bounds)| {
+                    (i.saturating_add(course.more), course.exit, Some(bounds))
+                });
+            }
+            let mut entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            if let (Some(Some(line)), Some(bounds)) = (&mut entry, bounds.filter(|_| i <= end)) {
+                // The stop is the same one when its run is shorter.
+                line.bounds = bounds;
+            }
             match entry {
-                Some(Some(line)) if i < at => line.leave = line.leave.or(Some(exit)),
+                Some(Some(line)) if i < at && i == end => line.leave = line.leave.or(Some(speed)),
+                Some(Some(_)) if i < at => {}
                 Some(Some(line)) if i == at => {
                     line.ends = line.steps_at(place);
                     if i == 0 {
@@ -392,7 +407,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 Some(entry) => *entry = None,
                 None => {}
             }
-            speed = exit;
         }
         (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
     }
@@ -400,7 +414,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Empty, at rest at a position from a moment on.
     pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
         (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
-        (self.speed, self.moment, self.offset) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO);
+        (self.speed, self.moment, self.offset, self.on) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO, None);
         (self.over, self.gone) = (self.moment, [None; N]);
     }
 
@@ -444,30 +458,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         let place = self.first.wrapping_add(at).checked_rem(M)?;
         self.lines.get(place).copied().flatten()
-    }
-
-    /// The speed at which line `at` is to end so that all that follow can slow down in time: from the last one back.
-    pub(super) fn exit(&self, at: usize, part: Real) -> Real {
-        self.slow_down(at, part, greatest)
-    }
-
-    /// The greatest speed at which line `at` may end, whatever was asked for: one from which each line that follows can be
-    /// left at its corner's speed or, which takes less way than some speeds between, come to rest at its end.
-    fn most(&self, at: usize) -> Real {
-        let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
-        self.slow_down(at, Real::HUGE, fastest)
-    }
-
-    fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
-        let mut speed = Real::ZERO;
-        for at in (at.saturating_add(1)..self.len).rev() {
-            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(at)) {
-                let bounds = line.bounds(part);
-                let most = line.corner.min(before.bounds(part).v).min(bounds.v);
-                speed = fastest(speed, line.length, &bounds).min(most);
-            }
-        }
-        speed
     }
 }
 

@@ -1,12 +1,13 @@
 //! A path that can be held, slowed down and abandoned at any time.
 
+mod planning;
+
 use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
-use crate::limits::{Clock, Limits};
-use crate::line::{AxisPulse, LinePulses, Start, Steps};
-use crate::path::{Course, Path};
+use crate::limits::{Bounds, Clock, Limits};
+use crate::line::{AxisPulse, LinePulses, Steps};
+use crate::path::Path;
 use crate::plan::Setpoint;
-use crate::planner::Motion;
 use crate::real::Real;
 use crate::stepper::tick;
 use servowire_core::Direction;
@@ -48,8 +49,13 @@ pub struct PathMover<const N: usize, const M: usize> {
     path: Path<N, M>,
     /// The first line, once it has begun.
     line: Option<LinePulses<N>>,
-    /// Speed at its end.
+    /// The speed at the end of its curve and what it was to be, how many lines that goes along after it, and whether it ends with one of them.
     exit: Real,
+    wish: Real,
+    more: usize,
+    whole: bool,
+    /// The limits that it keeps to.
+    bounds: Option<Bounds>,
     /// Steps of it that have been made.
     made: [u32; N],
     commanded: [i64; N],
@@ -82,6 +88,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             path,
             line: None,
             exit: Real::ZERO,
+            wish: Real::ZERO,
+            more: 0,
+            whole: true,
+            bounds: None,
             made: [0; N],
             commanded: position,
             origin: position,
@@ -157,7 +167,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if let Some(line) = &self.line {
             let own = line.axes.iter().zip(line.directions).zip(self.origin);
             for (state, (((frame, _), direction), origin)) in states.iter_mut().zip(own) {
-                let there = Setpoint::new(self.clock(), frame.at(&line.curve, moment));
+                let mut there = frame.at(&line.curve, moment);
+                if !line.start.before.is_zero() {
+                    // Before the line it is on the one before, at whose end it is told to be.
+                    there.p = there.p.max(0);
+                }
+                let there = Setpoint::new(self.clock(), there);
                 *state = there.on_axis(origin, direction);
             }
         }
@@ -227,7 +242,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         (self.stopping, self.quick) = (false, true);
         self.path.hurry(&limits);
         match (self.end_of_stop(now), before) {
-            (Some((end, _)), Some(before)) if before < end => self.leave_at((before, self.exit), now),
+            (Some((end, _)), Some(before)) if before < end => {
+                self.leave_at((before, self.leaving()), now);
+            }
             (Some(end), _) => self.leave_at(end, now),
             (None, _) => self.leave(self.tick(now)),
         }
@@ -322,7 +339,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
-        let other = |part| self.path.exit(0, part) != self.exit;
+        let other = |part| self.path.exit(self.more, part) != self.wish;
         if self.line.is_none() || self.part().is_some_and(other) {
             self.replan(now);
         }
@@ -380,120 +397,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn leave(&mut self, now: u64) {
         let moment = self.clock().moment(now).max(self.path.start().moment);
         self.path.clear(self.commanded, moment);
-        (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
-    }
-
-    /// The motion from which a new plan starts; `None` if the plan that there is ends before it, at the end of the line.
-    fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
-        let line = self.line.as_ref()?;
-        let moment = self.clock().moment(self.tick(now));
-        let start = Start { made: self.made, ..line.start };
-        if moment >= line.over() {
-            let place = start.place + line.curve.way();
-            let rest = Start { place, moment: self.clock().aligned(moment), offset: Real::ZERO, ..start };
-            return (!line.start.whole).then(|| (Motion::steady(Real::ZERO), rest));
-        }
-        let begin = line.start.moment;
-        let (motion, place) = line.motion(moment.max(begin));
-        Some((motion, if moment <= begin { start } else { Start { place, moment, offset: Real::ZERO, ..start } }))
-    }
-
-    /// On which line and where on it a stop ends, and the speed at which it leaves the first one; `None` at rest.
-    fn end_of_stop(&self, now: u64) -> Option<((usize, Real), Real)> {
-        self.line.as_ref()?;
-        if self.stopping {
-            return self.path.end_of_cut().map(|end| (end, self.exit));
-        }
-        let first = self.path.line(0)?;
-        let here = self.here(now);
-        // Without speed there is no way to rest: a step that is due, as its tick is the nearest one, is not made any more.
-        if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
-            return None;
-        }
-        let course =
-            here.and_then(|(motion, start)| Some((start.place, self.path.course(0, motion, start.place, None)?)));
-        let (place, exit) = match course {
-            Some((place, Course { curve, exit, .. })) => (place + curve.way(), exit),
-            None => (first.length, self.exit),
-        };
-        Some((if exit.is_zero() { (0, place) } else { self.path.end_of_stop(1, exit) }, exit))
-    }
-
-    /// Leaves the path at a place, and the first line at a speed.
-    fn leave_at(&mut self, (end, exit): ((usize, Real), Real), now: u64) {
-        self.path.cut(end, self.begun(), self.made, exit);
-        if !self.stopping {
-            self.stopping = true;
-            self.plan(now);
-        }
-        self.settle();
-    }
-
-    /// The way on after a request.
-    fn replan(&mut self, now: u64) {
-        // A stop that is under way is the same one whoever asks for it.
-        if self.stopping || self.line.is_some() && self.braking && self.part().is_none() {
-            return;
-        }
-        if self.line.is_none() {
-            self.path.not_before(now);
-            self.begin();
-        } else {
-            self.plan(now);
-        }
-        self.settle();
-    }
-
-    /// Plans the rest of the line that runs.
-    fn plan(&mut self, now: u64) {
-        let Some((motion, start)) = self.here(now) else { return };
-        let part = self.part();
-        if let Some(course) = self.path.course(0, motion, start.place, part) {
-            self.adopt(&course, start);
-        }
-    }
-
-    /// Begins the first line.
-    fn begin(&mut self) {
-        (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
-        let part = self.part();
-        if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
-            return;
-        }
-        self.path.not_before_steps(self.free);
-        self.path.not_before_turning();
-        if let Some(course) = self.path.begin(0, self.path.speed(), part) {
-            self.adopt(&course, self.path.start());
-        }
-    }
-
-    /// Puts a curve in the place of the one that runs, unless rounding has left it without the steps that are left.
-    fn adopt(&mut self, course: &Course, start: Start<N>) {
-        let Some(first) = self.path.line(0) else { return };
-        let start = Start { whole: course.whole, ..start };
-        let mut line = LinePulses::new(self.clock(), &course.curve, &first, start, self.steps);
-        if course.whole && line.first().is_none() && self.made != first.ends {
-            return;
-        }
-        let begin = start.moment.div_ceil(self.clock().moment(1));
-        for (due, free) in line.due.iter_mut().zip(self.free) {
-            *due = due.map(|due| due.max(free).max(begin));
-        }
-        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
-        self.braking = self.part().is_none();
-        self.left = [None; N];
-    }
-
-    /// Takes lines out that are over, and begins the next one.
-    fn settle(&mut self) {
-        for _ in 0..=M {
-            let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };
-            if line.first().is_some() || self.made != first.ends {
-                return;
-            }
-            self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
-            self.stopping &= !first.cut;
-            self.begin();
-        }
+        (self.line, self.made, self.exit, self.more) = (None, [0; N], Real::ZERO, 0);
     }
 }

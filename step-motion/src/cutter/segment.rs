@@ -27,6 +27,10 @@ impl Part {
             return None;
         }
         let first = self.ahead(begin.way, self.place(count))?;
+        if first.saturating_sub(1 << (self.bits & 63)) >> (self.bits.wrapping_sub(16) & 63) != 0 {
+            // The line begins later than the piece.
+            return None;
+        }
         let step = begin.v.of(self.step);
         // Off to either side by half of it, if it may be.
         let even = demand.coarse.is_none() && self.is_bent_one_way();

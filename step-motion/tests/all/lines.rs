@@ -256,3 +256,31 @@ fn on_chords_of_a_circle_the_axes_keep_their_acceleration() {
         assert!((least..most).contains(&acceleration), "{acceleration} m/s² of {most} at {radius} um, {error} um");
     }
 }
+
+/// Chords of a millimetre that bend a little, with a limit of jerk: as fast as one line of their length, and with the steps of each.
+#[test]
+fn short_lines_carry_their_acceleration_over_the_joints() {
+    for (jerk, lines) in [(1_000_000, 40), (200_000, 40), (1_000_000, 200)] {
+        let axis = AxisSetup::new(Limits::new(20_000, 100_000).unwrap().with_jerk(jerk).unwrap(), 80_000);
+        let run = |ends: &[[i64; 2]]| {
+            let mut path = Path::<2, 256>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+            for end in ends {
+                path.push(*end, 100_000).unwrap();
+            }
+            let (mut end, mut steps) = (0, [0_i64; 2]);
+            while let Some(line) = path.next_line() {
+                assert!(line.end() >= end);
+                end = line.end();
+                for pulse in line {
+                    steps[usize::from(pulse.axis)] += 1;
+                }
+            }
+            assert_eq!(steps, ends[ends.len() - 1]);
+            end as f64
+        };
+        let chords: Vec<[i64; 2]> = (1..=lines).map(|n| [80 * n, n * n / 16]).collect();
+        let last = chords[chords.len() - 1];
+        let (chords, whole) = (run(&chords), run(&[last]));
+        assert!(chords <= whole * 1.05, "{jerk}, {lines}: {chords} us in short lines, {whole} in one");
+    }
+}

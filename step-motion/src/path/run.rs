@@ -1,0 +1,172 @@
+//! Lines that are run through in one curve, and what is planned along them.
+//!
+//! A curve with a limit of jerk has the acceleration 0 at both ends. So that it need not be 0 at every joint, lines that nearly allow the
+//! same, and whose corners need no lower speed, are a run: one curve leads along all of them.
+
+use super::{Course, Path};
+use crate::curve::Curve;
+use crate::limits::Bounds;
+use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
+use crate::real::Real;
+
+/// Lines from one of the queue on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run {
+    /// Lines after the first one.
+    more: usize,
+    length: Real,
+    /// What all of them allow.
+    bounds: Bounds,
+}
+
+/// How much more of an acceleration or jerk a line may allow than another one of the same run.
+const ALIKE: Real = Real::fixed(3, 1);
+/// And of a speed.
+const EQUAL: Real = Real::fixed(129, 7);
+
+impl<const N: usize, const M: usize> Path<N, M> {
+    /// What a line allows with a part of the requested speeds; without one, all that its axes do.
+    fn allowed(&self, at: usize, part: Option<Real>) -> Option<Bounds> {
+        let line = self.line(at)?;
+        Some(part.map_or(line.bounds, |part| line.bounds(part)))
+    }
+
+    /// The run that begins at line `at`, where the speed is no more than `speed` or than its lines allow.
+    fn run(&self, at: usize, part: Option<Real>, speed: Real) -> Option<Run> {
+        let mut last = self.line(at)?;
+        let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
+        while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
+            let next = at.saturating_add(run.more).saturating_add(1);
+            let (Some(line), Some(own)) = (self.line(next), self.allowed(next, part)) else { break };
+            let Some(other) = own.jerk else { break };
+            let most = if part.is_some() { run.bounds.v.max(speed) } else { speed };
+            let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
+            let fits = line.corner >= most && own.v * EQUAL >= most;
+            let v = part.is_none() || alike(own.v, run.bounds.v, EQUAL);
+            if !fits || !v || !alike(own.a, run.bounds.a, ALIKE) || !alike(other.j, jerk.j, ALIKE) {
+                break;
+            }
+            let bounds = Bounds::new(run.bounds.v.min(own.v), run.bounds.a.min(own.a), Some(jerk.j.min(other.j)));
+            run = Run { more: run.more.saturating_add(1), length: run.length + line.length, bounds };
+            last = line;
+        }
+        Some(run)
+    }
+
+    /// From a motion at a place on line `at`, or so far before it. With `part` of the requested speeds; without one it brakes at once, and
+    /// may come to rest before the end. `None` if rounding leaves no solution.
+    ///
+    /// Also the limits of the run; those of a brake under way are `least`, which it keeps if lines have come that allow less.
+    pub(crate) fn course(
+        &self,
+        at: usize,
+        start: Motion,
+        (place, before): (Real, Real),
+        (part, least): (Option<Real>, Option<Bounds>),
+    ) -> Option<(Course, Bounds)> {
+        let first = self.line(at)?;
+        let fastest = match first.bounds.jerk {
+            // When the acceleration is back at 0.
+            Some(jerk) if start.up => start.v + (start.a.squared() * jerk.per_j).half(),
+            _ => start.v,
+        };
+        let Run { more, length, bounds: own } = self.run(at, part, fastest)?;
+        let own = least.map_or(own, |least| own.or_higher(&least));
+        let bounds = own;
+        let left = (length + before) - place;
+        let last = at.saturating_add(more);
+        let line = self.line(last)?;
+        let most = part.map_or(Real::ZERO, |part| self.exit(last, part));
+        let (bounds, wish) = if part.is_some() {
+            (bounds, most.min(fastest_exit(start, left, &bounds)))
+        } else {
+            let stop = plan(start, Goal::Speed(Real::ZERO), &bounds).ok();
+            if let Some(curve) = stop.filter(|curve| curve.way() <= left + SLACK) {
+                let (end, rest) = self.locate(at, (place + curve.way()) - before);
+                let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
+                return Some((
+                    Course { curve, exit: Real::ZERO, wish: most, whole, more: end.saturating_sub(at) },
+                    own,
+                ));
+            }
+            (bounds.slower(start.v), Real::ZERO)
+        };
+        let to = |exit| {
+            let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
+            Some((Course { curve, exit, wish: most, whole: true, more }, own))
+        };
+        if line.leave.is_some() {
+            return line.leave.and_then(to);
+        }
+        to(wish).or_else(|| {
+            let most = self.most(last);
+            let slowest = slowest_exit(start, left, wish, &bounds).min(most);
+            [slowest, most, Real::ZERO].into_iter().find_map(to)
+        })
+    }
+
+    /// Which line is a distance behind the start of line `at`, and how far it goes on from there.
+    pub(crate) fn locate(&self, at: usize, mut way: Real) -> (usize, Real) {
+        let last = self.len.saturating_sub(1);
+        for i in at..last {
+            let Some(line) = self.line(i) else { break };
+            if way <= line.length {
+                return (i, way);
+            }
+            way = way - line.length;
+        }
+        (last, way)
+    }
+
+    /// From the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
+    pub(crate) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<(Course, Bounds)> {
+        let line = self.line(at)?;
+        Some(self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None)).unwrap_or_else(|| {
+            let mut curve = Curve::new();
+            curve.cruise(speed, line.length);
+            (Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds)
+        }))
+    }
+
+    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
+    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> (usize, Real) {
+        while let Some((Course { curve, exit, more, .. }, _)) = self.begin(at, speed, None) {
+            if exit.is_zero() {
+                return self.locate(at, curve.way());
+            }
+            (at, speed) = (at.saturating_add(more).saturating_add(1), exit);
+        }
+        let last = self.len.saturating_sub(1);
+        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
+    }
+
+    /// The speed at which line `at` is to end so that all that follow can slow down in time: from the last one back.
+    pub(crate) fn exit(&self, at: usize, part: Real) -> Real {
+        self.slow_down(at, part, greatest)
+    }
+
+    /// The greatest speed at which line `at` may end, whatever was asked for: one from which each run that follows can be
+    /// left at its corner's speed or, which takes less way than some speeds between, come to rest at its end.
+    fn most(&self, at: usize) -> Real {
+        let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
+        self.slow_down(at, Real::HUGE, fastest)
+    }
+
+    fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
+        let mut runs = [None; M];
+        let mut next = at.saturating_add(1);
+        for place in &mut runs {
+            let Some(run) = self.run(next, Some(part), Real::ZERO) else { break };
+            *place = Some((next, run));
+            next = next.saturating_add(run.more).saturating_add(1);
+        }
+        let mut speed = Real::ZERO;
+        for (at, run) in runs.into_iter().rev().flatten() {
+            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(at)) {
+                let most = line.corner.min(before.bounds(part).v).min(run.bounds.v);
+                speed = fastest(speed, run.length, &run.bounds).min(most);
+            }
+        }
+        speed
+    }
+}

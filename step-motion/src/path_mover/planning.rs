@@ -1,0 +1,167 @@
+//! Plans of a path mover, from the present motion along its lines.
+
+use crate::limits::Bounds;
+use crate::line::{LinePulses, Start};
+use crate::path::{Course, Leaving};
+use crate::planner::Motion;
+use crate::real::Real;
+
+use super::PathMover;
+
+impl<const N: usize, const M: usize> PathMover<N, M> {
+    /// The motion from which a new plan starts; `None` if the plan that there is ends before it, at the end of the line.
+    pub(super) fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
+        let line = self.line.as_ref()?;
+        let moment = self.clock().moment(self.tick(now));
+        let start = Start { made: self.made, ..line.start };
+        if moment >= line.over() {
+            let place = (start.place + line.curve.way()) - start.before;
+            let (moment, before) = (self.clock().aligned(moment), Real::ZERO);
+            let rest = Start { place, before, moment, offset: Real::ZERO, ..start };
+            return (!line.start.whole).then(|| (Motion::steady(Real::ZERO), rest));
+        }
+        let begin = line.start.moment;
+        if moment <= begin {
+            return Some((line.motion(begin).0, start));
+        }
+        let (motion, place, before) = line.motion(moment);
+        Some((motion, Start { place, before, moment, offset: Real::ZERO, ..start }))
+    }
+
+    /// The limits of a brake under way.
+    pub(super) fn least(&self) -> Option<Bounds> {
+        self.bounds.filter(|_| self.braking && self.line.is_some())
+    }
+
+    /// How what runs leaves its lines.
+    pub(super) const fn leaving(&self) -> Leaving {
+        Leaving { more: self.more, exit: self.exit, bounds: None }
+    }
+
+    /// On which line and where on it a stop ends, and how it leaves the lines of its first curve; `None` at rest.
+    pub(super) fn end_of_stop(&self, now: u64) -> Option<((usize, Real), Leaving)> {
+        self.line.as_ref()?;
+        if self.stopping {
+            return self.path.end_of_cut().map(|end| (end, self.leaving()));
+        }
+        let here = self.here(now);
+        // Without speed there is no way to rest: a step that is due, as its tick is the nearest one, is not made any more.
+        if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
+            return None;
+        }
+        let course = here.and_then(|(motion, start)| {
+            let Start { place, before, .. } = start;
+            Some((place, before, self.path.course(0, motion, (place, before), (None, self.least()))?))
+        });
+        let (end, left) = match course {
+            Some((place, before, (Course { curve, exit, more, .. }, bounds))) => {
+                let end = self.path.locate(0, (place + curve.way()) - before);
+                (end, Leaving { more, exit, bounds: Some(bounds) })
+            }
+            None => ((self.more, self.path.line(self.more)?.length), self.leaving()),
+        };
+        let rest = |exit| self.path.end_of_stop(left.more.saturating_add(1), exit);
+        Some((if left.exit.is_zero() { end } else { rest(left.exit) }, left))
+    }
+
+    /// Leaves the path at a place, and the lines up to one at a speed.
+    pub(super) fn leave_at(&mut self, (end, left): ((usize, Real), Leaving), now: u64) {
+        self.path.cut(end, self.begun(), self.made, left);
+        if !self.stopping {
+            self.stopping = true;
+            self.plan(now);
+        }
+        self.settle();
+    }
+
+    /// The way on after a request.
+    pub(super) fn replan(&mut self, now: u64) {
+        // A stop that is under way is the same one whoever asks for it.
+        if self.stopping || self.line.is_some() && self.braking && self.part().is_none() {
+            return;
+        }
+        if self.line.is_none() {
+            self.path.not_before(now);
+            self.begin();
+        } else {
+            self.plan(now);
+        }
+        self.settle();
+    }
+
+    /// Plans the rest of the line that runs.
+    pub(super) fn plan(&mut self, now: u64) {
+        let Some((motion, start)) = self.here(now) else { return };
+        let part = self.part();
+        let within = (part, self.least().filter(|_| part.is_none()));
+        if let Some((course, bounds)) = self.path.course(0, motion, (start.place, start.before), within) {
+            self.adopt(&course, start, bounds);
+        }
+    }
+
+    /// Begins the first line.
+    pub(super) fn begin(&mut self) {
+        (self.line, self.made, self.exit, self.more) = (None, [0; N], Real::ZERO, 0);
+        let part = self.part();
+        if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
+            return;
+        }
+        self.path.not_before_steps(self.free);
+        self.path.not_before_turning();
+        if let Some((course, bounds)) = self.path.begin(0, self.path.speed(), part) {
+            self.adopt(&course, self.path.start(), bounds);
+        }
+    }
+
+    /// Puts a curve in the place of the one that runs, unless rounding has left it without the steps that are left.
+    pub(super) fn adopt(&mut self, course: &Course, start: Start<N>, bounds: Bounds) {
+        let Some(first) = self.path.line(0) else { return };
+        let whole = course.more > 0 || course.whole;
+        let mut line = LinePulses::new(self.clock(), &course.curve, &first, Start { whole, ..start }, self.steps);
+        if whole && line.first().is_none() && self.made != first.ends {
+            return;
+        }
+        let begin = start.moment.div_ceil(self.clock().moment(1));
+        for (due, free) in line.due.iter_mut().zip(self.free) {
+            *due = due.map(|due| due.max(free).max(begin));
+        }
+        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
+        (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
+        self.braking = self.part().is_none();
+        self.left = [None; N];
+    }
+
+    /// Continues with the next line on the same curve.
+    pub(super) fn go_on(&mut self) {
+        let (Some(line), Some(first), Some(next)) = (self.line.take(), self.path.line(0), self.path.line(1)) else {
+            return;
+        };
+        let before = (line.start.before + first.length) - line.start.place;
+        self.path.pass();
+        self.more = self.more.saturating_sub(1);
+        let (place, whole) = (Real::ZERO, self.more > 0 || self.whole);
+        let start = Start { place, before, made: [0; N], whole, ..line.start };
+        let mut line = LinePulses::new(self.clock(), &line.curve, &next, start, self.steps);
+        for (due, free) in line.due.iter_mut().zip(self.free) {
+            *due = due.map(|due| due.max(free));
+        }
+        (self.line, self.origin, self.made, self.left) = (Some(line), self.commanded, [0; N], [None; N]);
+    }
+
+    /// Takes lines out that are over, and begins the next one.
+    pub(super) fn settle(&mut self) {
+        for _ in 0..=M {
+            let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };
+            if line.first().is_some() || self.made != first.ends {
+                return;
+            }
+            if self.more > 0 {
+                self.go_on();
+                continue;
+            }
+            self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
+            self.stopping &= !first.cut;
+            self.begin();
+        }
+    }
+}
