@@ -1,6 +1,8 @@
 //! What can be checked in safe channel 2 without knowing the encoder's scaling.
 
 use crate::error::Error;
+use crate::frame::V_FRAME;
+use crate::master::HFrame;
 use crate::registers::Status2;
 use crate::vframe::VFrame;
 
@@ -30,41 +32,76 @@ bitflags::bitflags! {
 
 servowire_core::show_flags!(Channel2Findings);
 
-/// Watches safe channel 2, V-frame by V-frame.
+/// Watches safe channel 2.
 ///
 /// It checks only what the documents say about the channel. The application has to compare the two safe positions, because
 /// scaling and complement of the second one depend on the encoder.
 ///
 /// ```
-/// use hdsl::{Channel2Findings, Channel2Monitor, VFrame};
+/// use hdsl::device::{Device, Fault};
+/// use hdsl::master::Master;
+/// use hdsl::{Channel2Findings, Channel2Monitor, Dialect, EncoderId};
+///
+/// let (mut master, mut encoder) = (Master::new(Dialect::SICK), Device::new(EncoderId::try_from(0x00153)?));
 /// let mut monitor = Channel2Monitor::new();
-/// // with every H-frame that has one: monitor.v_frame(&h_frame.v_frame)
-/// assert_eq!(monitor.v_frame(&VFrame::default()), Channel2Findings::STALE);
-/// assert_eq!(monitor.age(), 1);
+/// let mut findings = Channel2Findings::empty();
+/// for frame in 0..200_u64 {
+///     if frame == 150 {
+///         encoder.set_fault(Fault::StuckToggle);
+///     }
+///     let answer = encoder.set_position(0).hear(master.transmission().head.bits());
+///     let h_frame = master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 11_520 * frame);
+///     findings |= monitor.h_frame(h_frame).unwrap_or_default();
+/// }
+/// assert_eq!((findings, monitor.age()), (Channel2Findings::TOG2, 0));
+/// # Ok::<(), hdsl::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Channel2Monitor {
     /// TOG2 of the V-frame before, if its block was sound.
     toggle: Option<bool>,
-    age: u32,
+    /// Number of the H-frame before.
+    number: Option<u32>,
+    /// H-frames since the last sound block.
+    frames: u32,
 }
 
 impl Channel2Monitor {
-    /// Creates the state at the beginning of a link; use it again after a restart.
+    /// Creates the state before the first H-frame.
     pub const fn new() -> Self {
-        Self { toggle: None, age: 0 }
+        Self { toggle: None, number: None, frames: 0 }
     }
 
-    /// Takes the blocks of the next V-frame.
+    /// Takes every H-frame; returns what a V-frame shows that has ended with it. Lost frames and restarts of the link are taken
+    /// into account: TOG2 is compared in neighbouring V-frames only.
+    pub fn h_frame(&mut self, frame: &HFrame) -> Option<Channel2Findings> {
+        let passed = self.number.map_or(1, |before| frame.number.wrapping_sub(before));
+        self.number = Some(frame.number);
+        self.frames = self.frames.saturating_add(passed);
+        if frame.gap {
+            self.toggle = None;
+        }
+        let findings = frame.v_frame.as_ref().map(|blocks| self.judge(blocks));
+        if frame.restarted.is_some() {
+            self.toggle = None;
+        }
+        findings
+    }
+
+    /// Takes the blocks of the next V-frame, if there are no H-frames to take; none may be left out.
     pub fn v_frame(&mut self, frame: &VFrame) -> Channel2Findings {
+        self.frames = self.frames.saturating_add(V_FRAME.into());
+        self.judge(frame)
+    }
+
+    fn judge(&mut self, frame: &VFrame) -> Channel2Findings {
         let block = frame.safe2;
         let before = self.toggle.take();
         if !block.is_sound() {
-            self.age = self.age.saturating_add(1);
             return Channel2Findings::STALE;
         }
-        self.age = 0;
+        self.frames = 0;
         let status = Status2::from_bits_retain(block.status());
         let toggle = status.contains(Status2::TOG2);
         self.toggle = Some(toggle);
@@ -77,8 +114,9 @@ impl Channel2Monitor {
         findings
     }
 
-    /// Number of V-frames since the last sound block.
+    /// Number of whole V-frames, of eight H-frames each, since the last sound block; since the first H-frame if there was none.
+    /// Lost frames count if they were [reported](crate::master::Master::skip).
     pub const fn age(&self) -> u32 {
-        self.age
+        self.frames / 8
     }
 }

@@ -438,7 +438,11 @@ mod tests {
         let at = |position| Sample { steps_per_turn: 1000, bound: 2, ..sample(position, 0) };
         assert_eq!([250, -750, 7250].map(|position| at(position).angle().millidegrees()), [90_000; 3]);
         assert_eq!(at(0).angle_bound().millidegrees(), 720);
-        assert_eq!(Sample { bound: 500, ..at(0) }.angle_bound(), Angle::HALF);
+        for bound in [500, 700, 1999, 5000] {
+            assert_eq!(Sample { bound, ..at(0) }.angle_bound(), Angle::HALF);
+        }
+        let shaft = Evidence::shaft(&Sample { sampled_ns: 77, ..at(250) });
+        assert_eq!((shaft.0.millidegrees(), shaft.1), (90_000, 77));
         let unknown = Sample { steps_per_turn: 0, ..at(7) };
         assert_eq!((unknown.angle(), unknown.angle_bound()), (Angle::ZERO, Angle::HALF));
     }

@@ -196,9 +196,8 @@ impl FastPosition {
         } else {
             // Not compared for a while: what it knows has to be confirmed again.
             self.known = if self.known >= Known::Speed { Known::Speed } else { Known::Nothing };
-            self.missing_before = self.missing.words != 0;
         }
-        self.missing_before |= self.missing_here.words != 0;
+        self.missing_before = self.missing_here.words != 0;
         self.missing_here = Missing::NONE;
         self.begin = self.position;
     }
@@ -207,7 +206,6 @@ impl FastPosition {
         // How far the position was off eight frames ago.
         let error = self.signed(safe.wrapping_sub(self.begin));
         let (all, here) = (self.missing.words, self.missing_here.words);
-        let before = core::mem::take(&mut self.missing_before);
         if self.known >= Known::Speed && all == here {
             // No word was missing by then.
             if error != 0 {
@@ -223,7 +221,7 @@ impl FastPosition {
         // Since how many frames, at the sampling edge before this V-frame, the speed was off by what it is off now.
         let frames = match self.known {
             Known::Nothing => None,
-            Known::Position => (here == 0 && !before).then_some(V_FRAME),
+            Known::Position => (here == 0 && !self.missing_before).then_some(V_FRAME),
             Known::Speed | Known::Confirmed => {
                 (all == 1).then_some(self.missing.frames.saturating_sub(V_FRAME)).filter(|n| *n <= V_FRAME)
             }
@@ -232,7 +230,7 @@ impl FastPosition {
             // The position is known from here on.
             self.position = self.position.wrapping_add_signed(error);
             self.missing.position_known(&self.missing_here);
-            (self.known, self.missing_before) = (Known::Position, false);
+            self.known = Known::Position;
             return;
         };
         let Some(velocity) = self.speed(error, frames) else { return self.lose(error) };

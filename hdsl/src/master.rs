@@ -367,12 +367,18 @@ impl Master {
 
     /// Ends a frame in the usual way: what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
     fn go_on(&mut self) -> &HFrame {
-        self.counters.frames = self.counters.frames.wrapping_add(1);
+        self.count_frame();
         self.h_frame.restarted = None;
         self.h_frame.state = State::Running;
         self.h_frame.long_free = self.requester.is_long_free();
         self.h_frame.short_free = self.requester.is_short_free();
         &self.h_frame
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "modulo 2^32")]
+    const fn count_frame(&mut self) {
+        self.h_frame.number = self.counters.frames as u32;
+        self.counters.frames = self.counters.frames.wrapping_add(1);
     }
 
     fn end_with(&mut self, outcome: Result<(), RestartReason>) -> &HFrame {
@@ -391,7 +397,7 @@ impl Master {
             self.usual();
             return self.go_on();
         }
-        self.counters.frames = self.counters.frames.wrapping_add(1);
+        self.count_frame();
         let was = self.h_frame.was;
         if restarted.is_some() {
             self.begin_again();

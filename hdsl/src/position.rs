@@ -373,6 +373,52 @@ mod tests {
         }
     }
 
+    /// Off by an eighth of the range a V-frame brings it to the same place, so every check agrees. It does not stay so.
+    #[test]
+    fn a_speed_that_is_off_by_an_eighth_of_the_range() {
+        for bits in 11..=40 {
+            let bits = PositionBits::new(bits).unwrap();
+            let eighth = 1_i64 << (bits.get() - 3);
+            for rule in [PositionRule::Sick, PositionRule::Ti] {
+                // 24 bits hold all speeds of a wider range.
+                for off in [-1, 1, 3].map(|off| off * eighth).into_iter().filter(|_| bits.get() < 27) {
+                    let mut tracker = PositionTracker::with_rule(bits, rule);
+                    let mut position = follow(&mut tracker, 77, &[0; 40], 3, |_| false);
+                    assert!(!tracker.registers().pos_flag && tracker.registers().vel == 3);
+                    tracker.velocity = tracker.velocity.wrapping_add(off as u32) & VELOCITY;
+                    // A lost word begins the alignment anew.
+                    position = follow(&mut tracker, position, &[0; 48], 3, |k| k == 0);
+                    let (shown, right) = (tracker.registers(), position as u64 & bits.mask());
+                    // (The firmware sees a range of 40 bits, and with it every speed.)
+                    assert_eq!((shown.pos_flag, shown.pos == right, shown.vel), (false, true, 3), "{bits:?} {off}");
+                }
+                // A speed that the range allows is not touched.
+                for speed in [-(1 << 23), (1 << 23) - 1, 5, -5] {
+                    let sixteenth = 1_i64 << (bits.get() - 4);
+                    let speed = i64::clamp(speed, -sixteenth, sixteenth - 1);
+                    let mut tracker = PositionTracker::with_rule(bits, rule);
+                    let position = follow(&mut tracker, 0, &[0; 40], speed, |_| false);
+                    let shown = tracker.registers();
+                    assert!(!shown.pos_flag);
+                    if rule == PositionRule::Sick {
+                        assert_eq!((i64::from(shown.vel), shown.pos), (speed, position as u64 & bits.mask()));
+                    }
+                }
+            }
+        }
+    }
+
+    /// An estimate of 1100 has bit 10: the firmware takes it for -948.
+    #[test]
+    fn an_estimate_outside_eleven_bits() {
+        for (rule, want) in [(PositionRule::Sick, 1023), (PositionRule::Ti, 1100 - 2048)] {
+            let mut tracker = PositionTracker::with_rule(PositionBits::MAX, rule);
+            (tracker.last, tracker.history) = (1000, [200, 0, 0, 0, 0]);
+            tracker.step(None);
+            assert_eq!(tracker.registers().vel, want);
+        }
+    }
+
     #[test]
     fn standstill_stays_exact() {
         let mut tracker = PositionTracker::new(PositionBits::new(24).unwrap());

@@ -292,3 +292,38 @@ fn off_by_an_eighth_of_the_range() {
         }
     }
 }
+
+/// A V-frame without a safe position: what two of them have told stays told and wants another one that agrees; what one has told is
+/// forgotten.
+#[test]
+fn a_v_frame_without_a_safe_position() {
+    for bits in 11..=40 {
+        // The first V-frame without one, and when the position comes.
+        for (without, first) in [(0, 32), (1, 40), (2, 32), (9, 24)] {
+            let mut follow = Follow::new(bits, 5, 1 << 29);
+            let came = (0..80_u32).find(|frame| {
+                let event = if frame / 8 == without { Event::NoBlock } else { Event::Good };
+                follow.frame(0, event).is_ok()
+            });
+            assert_eq!(came, Some(first - 1), "{bits} {without}");
+        }
+    }
+}
+
+/// Two words are missing, and the next safe position tells where the shaft was eight frames ago: the bound is that of these eight.
+#[test]
+fn a_safe_position_makes_the_bound_smaller() {
+    let mut follow = Follow::new(32, 0, 1 << 28);
+    for frame in 0..48 {
+        let _ = follow.frame(0, if matches!(frame, 32 | 33) { Event::NoWord } else { Event::Good });
+        let sample = follow.at(Tolerated::missing_words(2, 10));
+        // Each word counts from its own frame on.
+        let frames = match frame {
+            32 => 1,
+            33..=46 => 2 * (frame - 33) + 3,
+            47 => 16,
+            _ => 0,
+        };
+        assert!(frame < 24 || sample.unwrap().bound() == 10 * frames, "{frame} {sample:?}");
+    }
+}

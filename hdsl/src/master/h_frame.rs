@@ -34,6 +34,9 @@ pub struct SignalQuality {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct HFrame {
+    /// Number of the frame since the machine was created, from 0 on, modulo 2^32; it includes those reported by
+    /// [`Master::skip`](super::Master::skip).
+    pub number: u32,
     /// What to send after the answer.
     pub tail: Tail,
     /// State in which the frame was sent.
@@ -78,6 +81,7 @@ servowire_core::one_line!(HFrame {
 impl HFrame {
     /// Creates the value before the first frame.
     pub(super) const START: Self = Self {
+        number: 0,
         tail: Tail { trailer: Trailer::Whole, stuffing: Stuffing::MIN },
         was: State::Reset,
         state: State::Reset,

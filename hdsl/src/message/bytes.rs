@@ -27,6 +27,10 @@ impl MessageBytes {
         }
     }
 
+    pub(super) const fn clear(&mut self) {
+        self.len = 0;
+    }
+
     /// Appends the CRC to the message.
     pub(super) fn sealed(mut self) -> Self {
         let crc = crc16(self.as_bytes());

@@ -38,25 +38,7 @@ impl Sender {
     }
 }
 
-/// A complete message.
-pub(super) struct Gathered {
-    pub(super) bytes: MessageBytes,
-    sound: bool,
-}
-
-impl Gathered {
-    /// The bytes before the CRC, if it is correct.
-    pub(super) fn covered(&self) -> Option<&[u8]> {
-        let (covered, _) = self.bytes.as_bytes().split_last_chunk::<2>()?;
-        self.sound.then_some(covered)
-    }
-
-    pub(super) fn is_long(&self) -> bool {
-        self.bytes.as_bytes().first().is_some_and(|first| first & 0x80 != 0)
-    }
-}
-
-/// Collects the nibbles of one message; the length follows from the first byte.
+/// Collects the nibbles of one message; the length follows from the first byte. A complete message stays until the next IDLE.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Collector {
@@ -72,37 +54,51 @@ impl Collector {
         Self { bytes: MessageBytes::EMPTY, crc: RunningCrc16::new(), high: None, ready: true }
     }
 
+    /// The bytes with the CRC.
+    pub(super) fn as_bytes(&self) -> &[u8] {
+        self.bytes.as_bytes()
+    }
+
+    /// The bytes before the CRC, if it is correct.
+    pub(super) fn covered(&self) -> Option<&[u8]> {
+        let (covered, _) = self.as_bytes().split_last_chunk::<2>()?;
+        self.crc.is_residue().then_some(covered)
+    }
+
+    pub(super) fn is_long(&self) -> bool {
+        self.as_bytes().first().is_some_and(|first| first & 0x80 != 0)
+    }
+
     /// Takes a symbol that is not a nibble, which ends what was being collected.
     #[inline]
     pub(super) const fn idle(&mut self) {
         if !self.ready || self.high.is_some() || self.bytes.len() != 0 {
-            *self = Self::new();
+            self.bytes.clear();
+            (self.crc, self.high, self.ready) = (RunningCrc16::new(), None, true);
         }
     }
 
-    /// Ends a complete message; the next one begins after an IDLE.
-    pub(super) const fn finish(&mut self) -> Gathered {
-        let gathered = Gathered { bytes: self.bytes, sound: self.crc.is_residue() };
-        *self = Self { ready: false, ..Self::new() };
-        gathered
+    /// Drops what was being collected; the next message begins after an IDLE.
+    pub(super) const fn drop_message(&mut self) {
+        self.ready = false;
     }
 
-    /// Takes a nibble. Returns the message when it is complete according to `length`, which is given the first byte.
-    pub(super) fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> Option<Gathered> {
+    /// Takes a nibble. Returns whether the message is complete according to `length`, which is given the first byte.
+    pub(super) fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> bool {
         if !self.ready {
-            return None;
+            return false;
         }
-        match self.high.take() {
-            None => self.high = Some(nibble),
-            Some(high) => {
-                let byte = high.get() << 4 | nibble.get();
-                self.crc.update(byte);
-                self.bytes.push(&[byte]);
-            }
-        }
-        let first = self.bytes.as_bytes().first()?;
-        let complete = self.high.is_none() && usize::from(self.bytes.len()) >= length(*first).min(MessageBytes::MAX);
-        complete.then(|| self.finish())
+        let Some(high) = self.high.take() else {
+            self.high = Some(nibble);
+            return false;
+        };
+        let byte = high.get() << 4 | nibble.get();
+        self.crc.update(byte);
+        self.bytes.push(&[byte]);
+        let first = self.as_bytes().first().copied().unwrap_or(byte);
+        let complete = usize::from(self.bytes.len()) >= length(first).min(MessageBytes::MAX);
+        self.ready = !complete;
+        complete
     }
 }
 

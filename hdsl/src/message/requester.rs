@@ -1,7 +1,7 @@
 use super::bytes::MessageBytes;
 use super::limits::Limits;
 use super::long::{LongAnswer, LongRequest};
-use super::nibbles::{Collector, Gathered, Sender, answer_len};
+use super::nibbles::{Collector, Sender, answer_len};
 use super::short::{ShortAnswer, ShortRequest};
 use crate::error::Error;
 use crate::parameter::{EncoderSymbol, MasterSymbol};
@@ -64,8 +64,8 @@ pub struct Finished {
 
 /// Returns whether a message began after the request had been sent, in the H-frame of its last nibble at the earliest. `frames`
 /// counts from the IDLE after it. A message that began earlier answers an earlier request.
-fn is_answer(message: &Gathered, frames: u32) -> bool {
-    let nibbles = message.bytes.as_bytes().len().saturating_mul(2);
+fn is_answer(message: &Collector, frames: u32) -> bool {
+    let nibbles = message.as_bytes().len().saturating_mul(2);
     usize::try_from(frames).is_ok_and(|frames| frames.saturating_add(2) >= nibbles)
 }
 
@@ -212,8 +212,8 @@ impl Requester {
     pub(crate) fn take(&mut self, symbol: Option<EncoderSymbol>, finished: &mut Finished) {
         match symbol {
             Some(EncoderSymbol::Data(nibble)) => {
-                if let Some(message) = self.collector.nibble(nibble, answer_len) {
-                    self.complete(&message, finished);
+                if self.collector.nibble(nibble, answer_len) {
+                    self.complete(finished);
                 }
             }
             Some(EncoderSymbol::Idle | EncoderSymbol::Init) => self.collector.idle(),
@@ -232,7 +232,7 @@ impl Requester {
             }
             // A hole in a message: what follows it is no message.
             None => {
-                self.collector.finish();
+                self.collector.drop_message();
             }
         }
         self.count(finished);
@@ -241,20 +241,21 @@ impl Requester {
     /// Handles a complete message, which is rare; kept separate so that the frames without one take little code.
     #[cold]
     #[inline(never)]
-    fn complete(&mut self, message: &Gathered, finished: &mut Finished) {
-        if let (true, Slot::Waiting { request, frames, .. }) = (message.is_long(), self.long) {
-            if !is_answer(message, frames) {
+    fn complete(&mut self, finished: &mut Finished) {
+        let message = &self.collector;
+        if message.is_long() {
+            let Slot::Waiting { request, frames, .. } = &self.long else { return };
+            if !is_answer(message, *frames) {
                 return;
             }
-            self.long = Slot::Free;
             finished.long = Some(match message.covered() {
                 Some(covered) => {
                     LongAnswer::of_covered(covered).and_then(|answer| request.check_answer(answer).map(|()| answer))
                 }
-                None => LongAnswer::parse(message.bytes.as_bytes()),
+                None => LongAnswer::parse(message.as_bytes()),
             });
-        }
-        if let (false, Slot::Waiting { request, frames, .. }) = (message.is_long(), self.short) {
+            self.long = Slot::Free;
+        } else if let Slot::Waiting { request, frames, .. } = self.short {
             if !is_answer(message, frames) {
                 return;
             }

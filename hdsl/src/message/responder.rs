@@ -91,7 +91,10 @@ impl Responder {
                 return None;
             }
         };
-        let message = self.collector.nibble(nibble, request_len)?;
+        if !self.collector.nibble(nibble, request_len) {
+            return None;
+        }
+        let message = &self.collector;
         if message.is_long() {
             if let Some(Ok(request)) = message.covered().map(LongRequest::of_covered) {
                 return Some(Request::Long(request));
@@ -108,7 +111,7 @@ impl Responder {
 
     /// Takes an unreadable symbol of the master: a message being received is lost.
     pub const fn receive_nothing(&mut self) {
-        self.collector.finish();
+        self.collector.drop_message();
     }
 
     /// Sends the answer to a short message as soon as the channel is free.

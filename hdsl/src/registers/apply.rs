@@ -170,6 +170,7 @@ impl Registers {
     fn status(&mut self, h_frame: &HFrame) {
         let (before, mut d) = (self.online_d(), self.online_d());
         let [mut one, mut two] = [self.online_1().bits(), self.online_2().bits()];
+        let was_free = one & Online1::FRES.bits() != 0;
         let low = h_frame.quality < crate::quality::QualityMonitor::LOW;
         for (flag, on) in [
             (OnlineD::PRST, h_frame.state <= State::Check),
@@ -206,10 +207,8 @@ impl Registers {
         let mut safe = EventS::empty();
         safe.set(EventS::QMLW, arisen.contains(OnlineD::QMLW));
         safe.set(EventS::MIN, h_frame.init);
-        safe.set(
-            EventS::FRES,
-            h_frame.state == State::Running && h_frame.was != State::Running || h_frame.finished.short.is_some(),
-        );
+        // A message reset frees the channel too.
+        safe.set(EventS::FRES, h_frame.short_free && !was_free || h_frame.finished.short.is_some());
         if !events.is_empty() {
             self.raise(events);
         }

@@ -27,6 +27,11 @@ pub trait RegisterBus {
 
 /// The end of a long message in EVENT_L.
 const END_OF_LONG: u8 = (Event::FREL.bits() | Event::ANS.bits()).to_le_bytes()[0];
+/// The link was restarted, in EVENT_H, and the encoder sends INIT, in EVENT_L.
+const RESTARTED: u8 = Event::PRST.bits().to_be_bytes()[0];
+const INIT: u8 = Event::MIN.bits().to_le_bytes()[0];
+/// Message reset in SYS_CTRL.
+const MRST: u8 = 0x40;
 
 /// Why an access to a receiver failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +69,8 @@ impl<E: core::error::Error> core::error::Error for BusError<E> {}
 /// rely on the online status.
 ///
 /// Messages are started with `start_...` and polled with `poll_...` until there is a result; their ends are recognised by the
-/// events FRES and FREL, which are then cleared.
+/// events FRES and FREL, which are then cleared. A restart of the link ends them too. A message to an encoder that does not
+/// answer has no end of its own (the core repeats it for ever, p. 72): [`reset_messages`](RemoteReceiver::reset_messages) drops it.
 ///
 /// ```
 /// use hdsl::Dialect;
@@ -123,12 +129,28 @@ pub struct RemoteReceiver<B> {
     under_way: [bool; 2],
     /// Their ends, if they were taken along with other events: FRES; FREL and ANS.
     ended: [u8; 2],
+    /// Whether the link was restarted since.
+    dropped: [bool; 2],
+    /// The messages were reset, and INIT was not seen to come and go.
+    reset: Reset,
+    /// Events that were cleared in the receiver and not handed out.
+    kept: [u8; 3],
+}
+
+/// How far a reset of the messages is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Reset {
+    Done,
+    Asked,
+    /// The encoder sends INIT.
+    Answered,
 }
 
 impl<B: RegisterBus> RemoteReceiver<B> {
     /// Creates the access over a bus; the dialect determines the order of error codes.
     pub const fn new(dialect: Dialect, bus: B) -> Self {
-        Self { bus, dialect, under_way: [false; 2], ended: [0; 2] }
+        let (under_way, ended) = ([false; 2], [0; 2]);
+        Self { bus, dialect, under_way, ended, dropped: [false; 2], reset: Reset::Done, kept: [0; 3] }
     }
 
     /// The bus.
@@ -183,39 +205,102 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     }
 
     /// Takes the events that happened: reads them and clears those that were read. The end of a message is among them, and it is still
-    /// found by `poll_...`.
+    /// found by `poll_...`. If the bus fails, they come with the next call.
     ///
     /// # Errors
     /// The errors of the bus.
     pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
-        let [short, long] = self.under_way;
-        let [short_ended, long_ended] = &mut self.ended;
+        self.note([high, low, safe]);
+        let [kept_high, kept_low, kept_safe] = &mut self.kept;
+        (*kept_high, *kept_low, *kept_safe) = (*kept_high | high, *kept_low | low, *kept_safe | safe);
+        self.clear(Register::EventH, [high, low], [high, low])?;
+        self.clear(Register::EventS, [safe], [safe])?;
+        let [high, low, safe] = core::mem::take(&mut self.kept);
+        let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
+        Ok(Events { drive, safe: EventS::from_bits_retain(safe) })
+    }
+
+    /// Notes what EVENT_H, EVENT_L and EVENT_S say about the messages.
+    fn note(&mut self, [high, low, safe]: [u8; 3]) {
+        let ([short, long], [short_ended, long_ended]) = (self.under_way, &mut self.ended);
         if short {
             *short_ended |= safe & EventS::FRES.bits();
         }
         if long {
             *long_ended |= low & END_OF_LONG;
         }
-        self.clear(Register::EventH, [high, low], [high, low])?;
-        self.clear(Register::EventS, [safe], [safe])?;
-        let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
-        Ok(Events { drive, safe: EventS::from_bits_retain(safe) })
+        if high & RESTARTED != 0 || safe & EventS::PRST.bits() != 0 {
+            self.dropped = self.under_way;
+            self.reset = Reset::Done;
+        } else if low & INIT != 0 && self.reset == Reset::Asked {
+            self.reset = Reset::Answered;
+        }
+    }
+
+    /// Clears what a message looks for, before it is started: its end, and a restart of the link. An event of the latter is kept
+    /// for [`take_events`](Self::take_events).
+    fn prepare(&mut self, message: usize, end: [u8; 3]) -> Result<(), BusError<B::Error>> {
+        let [high, low] = self.get(Register::EventH)?;
+        let [safe] = self.get(Register::EventS)?;
+        self.note([high, low, safe]);
+        let (high_taken, safe_taken) = (high & RESTARTED, safe & EventS::PRST.bits());
+        let [kept_high, kept_low, kept_safe] = &mut self.kept;
+        (*kept_high, *kept_safe) = (*kept_high | high_taken, *kept_safe | safe_taken);
+        let [_, end_low, end_safe] = end;
+        // INIT is raised again while it lasts.
+        let low_taken = end_low | if self.reset == Reset::Done { 0 } else { low & INIT };
+        *kept_low |= low_taken & INIT;
+        if high_taken != 0 {
+            self.clear(Register::EventH, [high], [high_taken])?;
+        }
+        if low_taken != 0 {
+            self.clear(Register::EventL, [low], [low_taken])?;
+        }
+        if end_safe | safe_taken != 0 {
+            self.clear(Register::EventS, [safe], [end_safe | safe_taken])?;
+        }
+        if self.reset == Reset::Answered && low & INIT == 0 {
+            self.reset = Reset::Done;
+        }
+        if self.reset != Reset::Done {
+            return Err(BusError::Link(Error::Busy));
+        }
+        if let (Some(ended), Some(dropped)) = (self.ended.get_mut(message), self.dropped.get_mut(message)) {
+            (*ended, *dropped) = (0, false);
+        }
+        Ok(())
+    }
+
+    /// Drops the messages under way (MRST), for an encoder that does not answer. Until the encoder has answered INIT, or the
+    /// link has restarted, no other can be started.
+    ///
+    /// # Errors
+    /// The errors of the bus.
+    pub fn reset_messages(&mut self) -> Result<(), BusError<B::Error>> {
+        let [low] = self.get(Register::EventL)?;
+        if low & INIT != 0 {
+            self.kept[1] |= INIT;
+            self.clear(Register::EventL, [low], [INIT])?;
+        }
+        let [control] = self.get(Register::SysCtrl)?;
+        self.put(Register::SysCtrl, &[control | MRST])?;
+        (self.under_way, self.ended, self.dropped) = ([false; 2], [0; 2], [false; 2]);
+        self.reset = Reset::Asked;
+        Ok(())
     }
 
     /// Starts a short message.
     ///
     /// # Errors
-    /// [`Error::Busy`] while one is under way; the errors of the bus.
+    /// [`Error::Busy`] while one is under way or the messages are being reset; the errors of the bus.
     pub fn start_short(&mut self, request: ShortRequest) -> Result<(), BusError<B::Error>> {
         let [short, _] = self.under_way;
         if if self.is_core() { short } else { self.get::<2>(Register::OnlineStatus1)?[1] & 1 == 0 } {
             return Err(BusError::Link(Error::Busy));
         }
-        let events = self.get(Register::EventS)?;
-        self.clear(Register::EventS, events, [EventS::FRES.bits()])?;
-        self.ended[0] = 0;
+        self.prepare(0, [0, 0, EventS::FRES.bits()])?;
         match (request, self.is_core()) {
             // What this reading returns means nothing.
             (ShortRequest::Read(register), true) => {
@@ -238,31 +323,34 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// Returns whether the short message has ended, and its data if it was a read.
     ///
     /// # Errors
-    /// The errors of the bus.
+    /// [`Error::Dropped`] if the link was restarted meanwhile: whether the encoder has seen the message is not known; the errors of
+    /// the bus.
     pub fn poll_short(&mut self) -> Result<Option<u8>, BusError<B::Error>> {
-        let [events] = self.get(Register::EventS)?;
-        if (events | self.ended[0]) & EventS::FRES.bits() == 0 {
+        let [safe] = self.get(Register::EventS)?;
+        self.note([0, 0, safe]);
+        if core::mem::take(&mut self.dropped[0]) {
+            self.under_way[0] = false;
+            return Err(BusError::Link(Error::Dropped));
+        }
+        if (safe | self.ended[0]) & EventS::FRES.bits() == 0 {
             return Ok(None);
         }
-        self.clear(Register::EventS, [events], [EventS::FRES.bits()])?;
-        self.ended[0] = 0;
+        self.clear(Register::EventS, [safe], [EventS::FRES.bits()])?;
         let [data] = self.get(if self.is_core() { Register::PcData } else { Register::SPcData })?;
-        self.under_way[0] = false;
+        (self.under_way[0], self.ended[0]) = (false, 0);
         Ok(Some(data))
     }
 
     /// Starts a long message.
     ///
     /// # Errors
-    /// [`Error::Busy`] while one is under way; the errors of the bus.
+    /// [`Error::Busy`] while one is under way or the messages are being reset; the errors of the bus.
     pub fn start_long(&mut self, request: &LongRequest) -> Result<(), BusError<B::Error>> {
         let [_, long] = self.under_way;
         if if self.is_core() { long } else { self.get::<2>(Register::OnlineStatusD)?[1] & 2 == 0 } {
             return Err(BusError::Link(Error::Busy));
         }
-        let events = self.get(Register::EventL)?;
-        self.clear(Register::EventL, events, [END_OF_LONG])?;
-        self.ended[1] = 0;
+        self.prepare(1, [0, END_OF_LONG, 0])?;
         if let Access::Write(data) = &request.access {
             self.put(Register::PcBuffer, data.as_bytes())?;
         }
@@ -278,20 +366,27 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// Returns whether the long message has ended, and its data: none after a write.
     ///
     /// # Errors
-    /// [`Error::NotAccepted`] if the answer failed (ANS), [`Error::Resource`] if the encoder refused; the errors of the bus.
+    /// [`Error::Dropped`] if the link was restarted meanwhile, [`Error::NotAccepted`] if the answer failed (ANS),
+    /// [`Error::Resource`] if the encoder refused; the errors of the bus.
     pub fn poll_long(&mut self) -> Result<Option<Data>, BusError<B::Error>> {
-        let [events] = self.get(Register::EventL)?;
-        let ended = Event::from_bits_retain((events | self.ended[1]).into());
+        let [high, low] = self.get(Register::EventH)?;
+        self.note([high, low, 0]);
+        if core::mem::take(&mut self.dropped[1]) {
+            self.under_way[1] = false;
+            return Err(BusError::Link(Error::Dropped));
+        }
+        let ended = Event::from_bits_retain((low | self.ended[1]).into());
         if !ended.contains(Event::FREL) {
             return Ok(None);
         }
-        self.clear(Register::EventL, [events], [END_OF_LONG])?;
-        (self.under_way[1], self.ended[1]) = (false, 0);
+        self.clear(Register::EventL, [low], [END_OF_LONG])?;
         if ended.contains(Event::ANS) {
+            (self.under_way[1], self.ended[1]) = (false, 0);
             return Err(BusError::Link(Error::NotAccepted { tries: 1 }));
         }
         let [header, _] = self.get(Register::PcAdd)?;
         let buffer: [u8; 8] = self.get(Register::PcBuffer)?;
+        (self.under_way[1], self.ended[1]) = (false, 0);
         if header & 0x20 != 0 {
             let [first, second, ..] = buffer;
             let error = match self.dialect.registers {

@@ -37,7 +37,7 @@ flags! {
         ANS = 4,
         /// The quality monitor is below 14.
         QMLW = 2,
-        /// A long message is done; also at lock.
+        /// A long message is done or was dropped; also at lock.
         FREL = 1,
     }
 }
@@ -57,7 +57,7 @@ flags! {
         PRST = 2,
         /// The encoder answered INIT.
         MIN = 1,
-        /// A short message is done; also at lock.
+        /// A short message is done or was dropped; also at lock.
         FRES = 0,
     }
 }

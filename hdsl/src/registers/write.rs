@@ -42,7 +42,8 @@ impl Registers {
 
     /// Writes a register as an application does over the bus.
     ///
-    /// Writing 0 to a bit of an event register clears it. PRST and MRST in SYS_CTRL or SAFE_CTRL, SYNC_CTRL, SLAVE_REG_CTRL
+    /// Writing 0 to a bit of an event register clears it; 1 changes nothing with [`RegisterRule::Sick`], and sets the event in the
+    /// memory of the SDK. PRST and MRST in SYS_CTRL or SAFE_CTRL, SYNC_CTRL, SLAVE_REG_CTRL
     /// and LSTA in PC_CTRL start what they stand for. With [`RegisterRule::Sick`], registers that the receiver writes cannot be
     /// written; all other registers take the value.
     ///
@@ -57,7 +58,9 @@ impl Registers {
         }
         match address {
             SYS_CTRL | SAFE_CTRL => self.control(master, address, value),
-            EVENT_H | EVENT_L | EVENT_S => self.set_byte(address, present & value),
+            EVENT_H | EVENT_L | EVENT_S if self.dialect.registers == RegisterRule::Sick => {
+                self.set_byte(address, present & value);
+            }
             SYNC_CTRL => {
                 let es = Es::new(value);
                 if value != 0 && es.is_none() {

@@ -149,6 +149,29 @@ fn a_bad_vertical_word_and_the_safe_flag() {
     }
 }
 
+/// TEST2 costs 8 in the SDK, a frame after the V-frame and only if channel 1 was good; by the manual nothing.
+#[test]
+fn a_test_of_channel_2() {
+    for (dialect, bad, then, after) in [
+        (Dialect::TI, false, 15, 7),
+        (Dialect::TI, true, 10, 10),
+        (Dialect::SICK, false, 15, 15),
+        (Dialect::SICK, true, 9, 9),
+    ] {
+        let mut desk = Desk::new(dialect);
+        for at in 0..8 {
+            let [vertical, parameter, pipe, high, low, _] = desk.characters();
+            let second = sealed([0x5c, 0, 0, 0, 0, 0])[at];
+            let second = if at == 0 { Character::control(Control::K28_2) } else { second };
+            let bits = answer([vertical, parameter, pipe, high, low, second]);
+            let _ = desk.feed(if bad && at == 1 { bits & !0x3ff } else { bits });
+        }
+        assert_eq!(desk.quality(), then, "{dialect:?} {bad}");
+        let _ = desk.good();
+        assert_eq!(desk.quality(), after, "{dialect:?} {bad}");
+    }
+}
+
 /// A bad secondary word costs 8 at once; SCE2 stays as it was in the SDK, and is set by the manual.
 #[test]
 fn a_bad_secondary_word() {

@@ -151,6 +151,73 @@ fn toggles_over_a_gap() {
     assert_eq!(monitor.v_frame(&second), Channel2Findings::TOG2);
 }
 
+/// Frames that were not heard, told or not: TOG2 of V-frames that are not neighbours says nothing, and the age is that of the last
+/// sound block whatever was heard since. (A stranger's bus found both: a lost RX7 made a TOG2 of nothing.)
+#[test]
+fn a_monitor_over_lost_frames() {
+    for told in [true, false] {
+        for (place, lost) in [(7, 1), (0, 8), (1, 7), (0, 16), (4, 4), (4, 12), (7, 9), (3, 2), (0, 24)] {
+            // Not told, the phase of the V-frames is lost too, unless they are whole ones.
+            if !told && lost % 8 != 0 {
+                continue;
+            }
+            let mut desk = Desk::new(Dialect::SICK, 0x00153);
+            let mut monitor = Channel2Monitor::new();
+            let (mut number, mut sound) = (0_u32, 0);
+            let mut compared = 0;
+            for round in 0..120_u32 {
+                if round >= 40 && round % 40 == 0 {
+                    while desk.master.frame() != place {
+                        let report = desk.frame();
+                        number += 1;
+                        if monitor.h_frame(&report) == Some(Channel2Findings::empty()) {
+                            sound = number;
+                        }
+                    }
+                    for _ in 0..lost {
+                        let head = desk.master.transmission().head.bits();
+                        let _ = desk.device.set_position(0x8765_4321).hear(head);
+                    }
+                    number += u32::from(lost);
+                    desk.now_ns += u64::from(lost) * 11_520;
+                    if told {
+                        desk.master.skip(lost);
+                    } else {
+                        // The number does not tell them then.
+                        number -= u32::from(lost);
+                    }
+                }
+                let report = desk.frame();
+                number += 1;
+                match monitor.h_frame(&report) {
+                    Some(Channel2Findings::STALE) | None => {}
+                    Some(findings) => {
+                        assert_eq!(findings, Channel2Findings::empty(), "{told} {place} {lost}");
+                        (sound, compared) = (number, compared + 1);
+                    }
+                }
+                assert!(sound == 0 || monitor.age() == (number - sound) / 8, "{told} {place} {lost} {round}");
+            }
+            assert!(compared > 6);
+        }
+    }
+}
+
+/// After a restart of the link the first TOG2 is compared with nothing.
+#[test]
+fn a_monitor_over_a_restart() {
+    let mut desk = Desk::new(Dialect::SICK, 0x00153);
+    let mut monitor = Channel2Monitor::new();
+    for round in 0..6 {
+        desk.master.request_restart();
+        // One V-frame more each time, so that either TOG2 is the last one.
+        for _ in 0..61 + 24 + 8 * round {
+            let findings = monitor.h_frame(&desk.frame());
+            assert!(findings.is_none_or(|it| it.is_empty() || it == Channel2Findings::STALE), "{findings:?}");
+        }
+    }
+}
+
 /// The ones of the EXTRA window count in the disparity (the firmware counts its nominal size): equalisation and the first block of
 /// PARA by the table of the firmware, from frame to frame where no encoder answers.
 #[test]

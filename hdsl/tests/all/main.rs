@@ -21,7 +21,9 @@ mod position_laws;
 mod receiver;
 mod register_map;
 mod remote;
+mod remote_resets;
 #[cfg(feature = "serde")]
 mod serde;
+mod settings;
 mod small_print;
 mod world;

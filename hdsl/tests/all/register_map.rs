@@ -18,14 +18,16 @@ pub(crate) struct Desk {
     pub(crate) map: Registers,
     pub(crate) device: Device,
     lines: Interrupts,
+    /// The end of the last window.
+    pub(crate) now_ns: u64,
 }
 
 impl Desk {
     /// With a link that runs and events that were read.
     pub(crate) fn new(dialect: Dialect, id: u32) -> Self {
         let device = Device::new(EncoderId::new(id).unwrap());
-        let mut desk =
-            Self { master: Master::new(dialect), map: Registers::new(&dialect), device, lines: Interrupts::empty() };
+        let (master, map, lines) = (Master::new(dialect), Registers::new(&dialect), Interrupts::empty());
+        let mut desk = Self { master, map, device, lines, now_ns: 0 };
         desk.frames(61 + 48);
         let _ = desk.map.take_events();
         assert_eq!((desk.master.state(), desk.map.quality(), desk.map.link()), (State::Running, 15, true));
@@ -34,7 +36,8 @@ impl Desk {
 
     pub(crate) fn frame(&mut self) -> HFrame {
         let answer = self.device.set_position(0x8765_4321).hear(self.master.transmission().head.bits());
-        let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 0);
+        self.now_ns += 11_520;
+        let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, self.now_ns);
         self.lines = self.map.apply(&report);
         report
     }
@@ -100,7 +103,6 @@ fn write_protection() {
     }
 }
 
-/// Events are cleared by writing 0; writing 1 sets nothing (p. 36).
 /// By TI's rule any register takes what is written; LINK and the quality are those of the receiver from the next frame on, in
 /// the start-up too.
 #[test]
@@ -117,6 +119,8 @@ fn no_link_by_a_write() {
     }
 }
 
+/// Events are cleared by writing 0. Writing 1 sets nothing in the core (p. 36); the SDK has memory there, which holds what is
+/// written.
 #[test]
 fn events_are_cleared_by_zeros() {
     for dialect in DIALECTS {
@@ -128,8 +132,27 @@ fn events_are_cleared_by_zeros() {
             [(0x04, 0xfd, 0x48), (0x04, 0x0f, 0x08), (0x05, 0xcf, 0x06), (0x3d, 0x80, 0x00), (0x3d, 0xff, 0x00)]
         {
             map.write(&mut master, address, value).unwrap();
-            assert_eq!(map.byte(address), Some(want));
+            assert_eq!(map.byte(address), Some(if dialect == Dialect::SICK { want } else { value }));
         }
+    }
+}
+
+/// Either channel becomes free by a message reset, and its event says so; a message that was dropped has no bad answer.
+#[test]
+fn a_reset_frees_both_channels() {
+    for dialect in DIALECTS {
+        let mut desk = Desk::new(dialect, 0x00153);
+        desk.write(0x40, 0xfc);
+        desk.write(0x28, 0xcc);
+        desk.write(0x2c, 0x01);
+        desk.frames(3);
+        let _ = desk.map.take_events();
+        desk.write(0x00, 0x40);
+        let _ = desk.frame();
+        assert!(desk.map.online_d().contains(OnlineD::FREL) && desk.map.online_1().contains(Online1::FRES));
+        let events = desk.map.take_events();
+        assert!(events.drive.contains(Event::FREL) && events.safe.contains(EventS::FRES), "{events:?}");
+        assert!(!events.drive.contains(Event::ANS) && !desk.map.online_d().contains(OnlineD::ANS));
     }
 }
 

@@ -8,30 +8,57 @@ use hdsl::registers::{BusError, Event, EventS, Events, RegisterBus, Registers, R
 use hdsl::{Dialect, Error};
 
 /// Memory; the firmware reads and writes it too, a frame after the host.
-struct Firmware {
-    memory: [u8; 0x56],
+pub(crate) struct Firmware {
+    pub(crate) memory: [u8; 0x56],
     /// Events that come between a reading and a writing of the host.
     meanwhile: Option<(usize, u8)>,
+    /// The encoder answers no messages.
+    pub(crate) mute: bool,
+    /// Frames until the encoder answers INIT.
+    init: u8,
 }
 
 impl Firmware {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut memory = [0; 0x56];
         (memory[0x40], memory[0x51], memory[0x53]) = (0x3f, 0x02, 0x01);
-        Self { memory, meanwhile: None }
+        Self { memory, meanwhile: None, mute: false, init: 0 }
+    }
+
+    /// The link restarts and locks again: messages are dropped, FREL and FRES are events of the lock.
+    pub(crate) fn restart(&mut self) {
+        self.memory[0x04] |= 0x01;
+        self.memory[0x05] |= 0x02;
+        self.memory[0x3d] |= 0x05;
+        (self.memory[0x40], self.memory[0x2c], self.memory[0x51], self.memory[0x53]) = (0x3f, 0, 0x02, 0x01);
     }
 
     /// What the firmware does in its next frame.
-    fn frame(&mut self) {
+    pub(crate) fn frame(&mut self) {
+        if self.init > 0 {
+            self.init -= 1;
+            self.memory[0x05] |= if self.init == 0 { 0x20 } else { 0 };
+        }
+        if self.memory[0x00] & 0x40 != 0 {
+            (self.memory[0x00], self.memory[0x40], self.memory[0x2c]) = (0, 0x3f, 0);
+            (self.memory[0x51], self.memory[0x53], self.init) = (0x02, 0x01, 3);
+            self.memory[0x05] |= 0x02;
+            self.memory[0x3d] |= 0x01;
+        }
+        self.memory[0x53] = u8::from(self.memory[0x40] == 0x3f);
+        self.memory[0x51] = if self.memory[0x2c] & 1 == 0 { 0x02 } else { 0 };
+        if self.mute {
+            return;
+        }
         if self.memory[0x40] != 0x3f {
             if self.memory[0x40] & 0x80 != 0 {
                 self.memory[0x37] = 0x5a;
             }
-            self.memory[0x40] = 0x3f;
+            (self.memory[0x40], self.memory[0x53]) = (0x3f, 0x01);
             self.memory[0x3d] |= 0x01;
         }
         if self.memory[0x2c] & 1 != 0 {
-            self.memory[0x2c] = 0;
+            (self.memory[0x2c], self.memory[0x51]) = (0, 0x02);
             self.memory[0x20..0x28].copy_from_slice(b"RESOLUTN");
             self.memory[0x05] |= 0x02;
         }
@@ -59,21 +86,52 @@ impl RegisterBus for Firmware {
 
 /// The core: events are cleared by zeros and set by nothing that is written; what it shows cannot be written; the registers from
 /// 40h on are the encoder's.
-struct Core {
-    registers: [u8; 0x40],
+pub(crate) struct Core {
+    pub(crate) registers: [u8; 0x40],
     encoder: [u8; 0x40],
     reading: Option<u8>,
+    writing: bool,
     accesses: u32,
+    /// The encoder answers no messages, and the core repeats them.
+    pub(crate) mute: bool,
+    /// Frames until the encoder answers INIT.
+    init: u8,
 }
 
 impl Core {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut registers = [0; 0x40];
         (registers[0x39], registers[0x3a], registers[0x3b]) = (0xff, 0xff, 0xff);
-        Self { registers, encoder: core::array::from_fn(|at| at as u8), reading: None, accesses: 0 }
+        let encoder = core::array::from_fn(|at| at as u8);
+        Self { registers, encoder, reading: None, writing: false, accesses: 0, mute: false, init: 0 }
     }
 
-    fn frame(&mut self) {
+    /// The link restarts and locks again: messages are dropped, FREL and FRES are events of the lock.
+    pub(crate) fn restart(&mut self) {
+        self.registers[0x04] |= 0x01;
+        self.registers[0x05] |= 0x02;
+        self.registers[0x3d] |= 0x05;
+        (self.reading, self.writing, self.registers[0x2c]) = (None, false, 0);
+    }
+
+    pub(crate) fn frame(&mut self) {
+        if self.init > 0 {
+            self.init -= 1;
+            self.registers[0x05] |= if self.init == 0 { 0x20 } else { 0 };
+        }
+        if self.registers[0x00] & 0x40 != 0 {
+            (self.registers[0x00], self.reading, self.writing, self.registers[0x2c]) =
+                (self.registers[0x00] & 0x3f, None, false, 0);
+            self.registers[0x05] |= 0x02;
+            self.registers[0x3d] |= 0x01;
+            self.init = 3;
+        }
+        if self.mute {
+            return;
+        }
+        if core::mem::take(&mut self.writing) {
+            self.registers[0x3d] |= 0x01;
+        }
         if let Some(register) = self.reading.take() {
             self.registers[0x2f] = self.encoder[usize::from(register & 0x3f)];
             self.registers[0x3d] |= 0x01;
@@ -109,7 +167,7 @@ impl RegisterBus for Core {
                 0x00..=0x3f => self.registers[usize::from(address)] = *byte,
                 _ => {
                     self.encoder[usize::from(address & 0x3f)] = *byte;
-                    self.registers[0x3d] |= 0x01;
+                    self.writing = true;
                 }
             }
         }
@@ -166,7 +224,8 @@ fn messages_of_the_core() {
     remote.bus().frame();
     assert_eq!((remote.poll_short(), remote.bus().accesses), (Ok(Some(0x3c)), 1));
     remote.start_short(ShortRequest::Write(RemoteRegister::PING, 0xa5)).unwrap();
-    assert_eq!(remote.bus().encoder[0x3f], 0xa5);
+    assert_eq!((remote.bus().encoder[0x3f], remote.poll_short()), (0xa5, Ok(None)));
+    remote.bus().frame();
     assert!(remote.poll_short().unwrap().is_some());
     remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
     assert!(matches!(
@@ -203,10 +262,23 @@ fn what_only_the_manual_has() {
         let mut map = Registers::new(&dialect);
         assert_eq!([0x39, 0x3a, 0x3b].map(|at| map.byte(at).unwrap()), max);
         let mut master = hdsl::master::Master::new(dialect);
-        map.write(&mut master, 0x08, 0x10).unwrap();
-        assert_eq!(map.byte(0x06), Some(msum));
+        for mask in [0x10, 0x01, 0x80] {
+            map.write(&mut master, 0x08, mask).unwrap();
+            assert_eq!(map.byte(0x06), Some(msum));
+        }
+        // MSUM is the OR of MASK_SUM, whatever is written to it; in the SDK it is a bit of its own.
+        for value in [0x4b, 0x0b, 0xff] {
+            map.write(&mut master, 0x06, value).unwrap();
+            assert_eq!(map.byte(0x06), Some(value & 0xbf | if msum == 0 { value & 0x40 } else { 0x40 }));
+        }
+        map.write(&mut master, 0x06, 0x00).unwrap();
         map.write(&mut master, 0x08, 0x00).unwrap();
         assert_eq!(map.byte(0x06), Some(0));
+        map.write(&mut master, 0x06, 0x48).unwrap();
+        assert_eq!(map.byte(0x06), Some(0x48 ^ msum));
+        let mut bytes = [0; Registers::LEN];
+        bytes[0x46] = 0x9c;
+        assert_eq!(Registers::from_bytes(&dialect, bytes).status_2().bits(), 0x9c);
     }
 }
 

@@ -4,7 +4,7 @@ use hdsl::device::Device;
 use hdsl::frame::{Extra, Head, ParsedHead};
 use hdsl::master::{Counters, Master};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
-use hdsl::registers::{Event, EventS, Events, Register, Registers};
+use hdsl::registers::Registers;
 use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, SampledAnswer, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Reading, RunningDisparity, Word};
 use hdsl::sync::{Es, Next, Synchroniser};
@@ -267,17 +267,6 @@ kernels! {
         }
         Ok((master.counters(), map.vpos()))
     } over LINKS;
-
-    /// What an application does with registers.
-    fn hdsl_registers(word: &u64) -> (Event, EventS, Option<u8>) {
-        let mut master = Master::new(Dialect::TI);
-        let mut map = Registers::new(&Dialect::TI);
-        let [address, value, ..] = word.to_le_bytes();
-        let _ = map.write(&mut master, address, value);
-        let _ = map.write(&mut master, Register::SysCtrl as u8, 0xc0);
-        let Events { drive: event, safe: event_s } = map.take_events();
-        (event, event_s, map.read(address))
-    } over SYMBOLS;
 
     /// Symbols of both directions.
     fn hdsl_parameter(word: &u64) -> (Result<MasterSymbol, Error>, Result<EncoderSymbol, Error>) {
