@@ -127,6 +127,10 @@ mod tests {
         }
         assert_eq!((DeltaDelta::new(1024), DeltaDelta::new(-1025)), (None, None));
         assert_eq!((DeltaDelta::clamp(5000), DeltaDelta::clamp(-5000)), (DeltaDelta::MAX, DeltaDelta::MIN));
+        assert_eq!(DeltaDelta::try_from(1024), Err(OutOfRange { got: 1024, max: 1023 }));
+        assert_eq!(DeltaDelta::try_from(-1025), Err(OutOfRange { got: -1025, max: -1024 }));
+        // FF61h is -5.
+        assert_eq!(DeltaDelta::from_word(0xff66), Err(Error::AccelerationCrc { got: 0x06, want: 0x01 }));
     }
 
     /// One and two wrong bits are always seen; 19 of the 560 triples are not.

@@ -393,6 +393,45 @@ pub(crate) mod tests {
         }
     }
 
+    /// Silent is an answer of which no word can be read; a mark is two K29.7, and one of them is a special character like any other.
+    #[test]
+    fn silence_and_marks() {
+        let content = Content {
+            vertical: Character::data(0x42),
+            parameter: EncoderByte::of(EncoderSymbol::Idle),
+            pipe: Character::control(Control::K30_7),
+            acceleration: None,
+            secondary: Character::data(0x17),
+        };
+        let bits = content.emit(RunningDisparity::Minus).bits;
+        assert!(Answer::from_bits(Rule::Strict, u64::MAX).is_silence());
+        for word in [0, 10, 20, 51] {
+            // Ten ones are no word; all others are there, or all others are missing.
+            let one = Answer::from_bits(Rule::Strict, bits | 0x3ff << word);
+            let others = Answer::from_bits(Rule::Strict, bits & 0x3ff << word | !(0x3ff << word));
+            assert!(!one.is_silence() && !others.is_silence(), "{word}");
+        }
+        let characters = |high, low| {
+            let words = [Character::data(0), Character::data(0x10), Character::data(0), high, low, Character::data(0)];
+            emit(words, RunningDisparity::Minus).bits
+        };
+        let [mark, k28] = [Control::K29_7, Control::K28_0].map(Character::control);
+        for (high, low, strict) in [
+            (mark, mark, Error::EncoderError),
+            (mark, Character::data(3), Error::WrongKind { byte: 0xfd }),
+            (Character::data(3), mark, Error::WrongKind { byte: 0xfd }),
+            (k28, Character::data(3), Error::WrongKind { byte: 0x1c }),
+            (k28, k28, Error::WrongKind { byte: 0x1c }),
+        ] {
+            let bits = characters(high, low);
+            assert_eq!(Answer::from_bits(Rule::Strict, bits).delta_delta(), Err(strict));
+            // By value in the firmware, whatever kind they are: the check bits are wrong here.
+            let reduced = Answer::from_bits(Rule::Reduced, bits).delta_delta();
+            let told = matches!(reduced, Err(Error::AccelerationCrc { .. }));
+            assert!(told || strict == Error::EncoderError && reduced == Err(Error::EncoderError), "{reduced:?}");
+        }
+    }
+
     /// All second differences in both columns with every flip of a line bit: data characters let none through that the
     /// check bits do not see; taken by their values 240 pass, 64 with a wrong value.
     #[test]

@@ -151,6 +151,8 @@ mod tests {
         for low in 0..16 {
             assert_eq!(EncoderId::new(low).unwrap().acceleration_bits(), 8 + low as u8);
         }
+        let indexed = EncoderId::new(0x0b153).unwrap();
+        assert_eq!((indexed.user_index(), indexed.check()), (11, Ok(PositionBits::new(32).unwrap())));
         for refused in [0x00150, 0x80153, 0x001e3] {
             assert_eq!(EncoderId::new(refused).unwrap().check(), Err(Error::UnsupportedEncoder { id: refused }));
         }

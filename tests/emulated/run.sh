@@ -58,6 +58,7 @@ done
 hdsl=$(built "$firmware/rp2350-hdsl")/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
 .venv/bin/python rp2350/compare.py "$hdsl"
 .venv/bin/python rp2350/hdsl.py "$hdsl"
+.venv/bin/python rp2350/hdsl_mistakes.py "$hdsl"
 pico2=$(built "$firmware/pico2")/thumbv8m.main-none-eabihf/release
 .venv/bin/python rp2350/masters.py "$pico2"
 .venv/bin/python rp2350/mistakes.py "$pico2"

@@ -149,6 +149,21 @@ fn a_bad_vertical_word_and_the_safe_flag() {
     }
 }
 
+/// A special character that means nothing costs 2 in the vertical and in the parameter word, by either rule.
+#[test]
+fn special_characters_without_a_meaning() {
+    for dialect in [Dialect::SICK, Dialect::TI] {
+        for word in [0, 1] {
+            let mut desk = Desk::new(dialect);
+            desk.to(2);
+            let mut characters = desk.characters();
+            characters[word] = Character::control(Control::K28_0);
+            let _ = desk.feed(answer(characters));
+            assert_eq!(desk.quality(), 13, "{dialect:?} {word}");
+        }
+    }
+}
+
 /// TEST2 costs 8 in the SDK, a frame after the V-frame and only if channel 1 was good; by the manual nothing.
 #[test]
 fn a_test_of_channel_2() {

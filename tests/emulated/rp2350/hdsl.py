@@ -179,4 +179,5 @@ def main():
     assert b"\nposition" not in chip.console
 
 
-main()
+if __name__ == "__main__":
+    main()
