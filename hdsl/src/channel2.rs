@@ -54,7 +54,7 @@ servowire_core::show_flags!(Channel2Findings);
 ///     findings |= monitor.h_frame(h_frame).unwrap_or_default();
 /// }
 /// assert_eq!((findings, monitor.age()), (Channel2Findings::TOG2, 0));
-/// # Ok::<(), hdsl::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
