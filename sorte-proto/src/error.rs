@@ -228,6 +228,15 @@ servowire_core::errors! {
         /// A frame of the IO exchange belongs to a cycle that has ended.
         #[error("the frame belongs to a cycle that is over")]
         CycleOver = 35,
+        /// The last SYNC frame has gained less time than the devices of the line add to it: one of them has let it pass,
+        /// because it could not measure its cable or has started again. Its clock and those behind it are wrong.
+        #[error("SYNC has passed {got} devices at most, DISCOVERY found {want}")]
+        NotInSync = 36 {
+            /// The most devices that can have added their time.
+            got: u8,
+            /// Devices that DISCOVERY found.
+            want: u8,
+        },
     }
 }
 

@@ -2,6 +2,8 @@ use crate::error::Error;
 
 /// Round trips in one measurement.
 pub(crate) const SAMPLES: u8 = 16;
+/// A tick of the counter that captures both ends of a round trip, in ns. The mean of sixteen is that exact at best.
+const TICK_NS: u32 = 5;
 
 /// How round trips become a line delay. The vendor's master and device do it differently, and so do those of this crate.
 ///
@@ -44,7 +46,9 @@ pub struct RoundTrips {
 pub struct LineDelay {
     model: DelayModel,
     count: u8,
+    /// As the model has it, and of the round trips as they were.
     sum: u32,
+    whole: u32,
     min: u32,
     max: u32,
 }
@@ -52,7 +56,7 @@ pub struct LineDelay {
 impl LineDelay {
     /// Creates a measurement without round trips.
     pub const fn new(model: DelayModel) -> Self {
-        Self { model, count: 0, sum: 0, min: u32::MAX, max: 0 }
+        Self { model, count: 0, sum: 0, whole: 0, min: u32::MAX, max: 0 }
     }
 
     /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips beyond the
@@ -64,6 +68,7 @@ impl LineDelay {
         }
         let term = if self.model.shift_samples { rtt_ns >> 4 } else { rtt_ns };
         self.sum = self.sum.saturating_add(term);
+        self.whole = self.whole.saturating_add(rtt_ns);
         self.count = self.count.saturating_add(1);
         // Compared here: at opt-level s `min` and `max` are calls or not, as it pleases the compiler.
         if rtt_ns < self.min {
@@ -107,20 +112,23 @@ impl LineDelay {
         u16::from_le_bytes([low, high])
     }
 
-    /// The line delay in ns.
+    /// The line delay in ns: as [`published`](Self::published), and 0 for a cable so short that the cutting of the round trips, or
+    /// a tick of the counter, makes it negative.
     ///
     /// # Errors
     /// [`Error::ImplausibleRoundTrip`] with the longest if that is 4096 ns or more: sixteen of them do not fit the published
-    /// 16 bits (some 350 m of cable); with the mean if that is shorter than the forwarding time.
+    /// 16 bits (some 350 m of cable); with the mean if that is more than 5 ns shorter than the forwarding time.
     pub const fn checked(&self) -> Result<u16, Error> {
         if self.max >= 4096 {
             return Err(Error::ImplausibleRoundTrip { rtt_ns: self.max });
         }
         let mean = if self.model.shift_samples { self.sum } else { self.sum >> 4 };
-        match mean.checked_sub(self.model.forward_ns as u32) {
+        let (whole, forward) = (self.whole >> 4, self.model.forward_ns as u32);
+        match mean.checked_sub(forward) {
             #[expect(clippy::cast_possible_truncation, reason = "sixteen below 4096 at most, and their mean is")]
             Some(twice) => Ok((twice >> 1) as u16),
-            None => Err(Error::ImplausibleRoundTrip { rtt_ns: mean }),
+            None if whole.saturating_add(TICK_NS) >= forward => Ok(0),
+            None => Err(Error::ImplausibleRoundTrip { rtt_ns: whole }),
         }
     }
 }
@@ -144,9 +152,17 @@ mod tests {
         assert_eq!(of(DelayModel::MASTER, [320; 16]).checked(), Ok(0));
         // 360 / 16 is cut to 22 sixteen times: 352 is less than the forwarding time, and the published result wraps.
         let device = of(DelayModel::DEVICE, [360; 16]);
-        assert_eq!(device.checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 352 }));
-        assert_eq!(device.published(), 65532);
+        assert_eq!((device.checked(), device.published()), (Ok(0), 65532));
         assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
+        // From one to the next there may be a tick less, and not more.
+        for (model, forward) in [(DelayModel::MASTER, 320), (DelayModel::DEVICE, 360)] {
+            let mut uneven = [forward + 5; 16];
+            uneven[..8].fill(forward - 10);
+            assert_eq!(of(model, uneven).checked(), Ok(0));
+            assert_eq!(of(model, [forward - 5; 16]).checked(), Ok(0));
+            let error = Error::ImplausibleRoundTrip { rtt_ns: forward - 6 };
+            assert_eq!(of(model, [forward - 6; 16]).checked(), Err(error));
+        }
     }
 
     /// Sixteen round trips of 4096 ns do not fit the published 16 bits, sixteen of 4095 do.
@@ -171,18 +187,22 @@ mod tests {
 
     proptest! {
         #[test]
-        fn checked_and_published_agree_in_the_range_of_the_registers(rtt in proptest::array::uniform16(300u32..5000)) {
+        fn checked_and_published_agree_in_the_range_of_the_registers(rtt in prop_oneof![
+            proptest::array::uniform16(300u32..5000),
+            proptest::array::uniform16(300u32..400),
+        ]) {
             for model in [DelayModel::MASTER, DelayModel::DEVICE] {
                 let delay = of(model, rtt);
                 let mean = rtt.iter().sum::<u32>() / 16;
                 match delay.checked() {
                     Ok(ns) => {
-                        prop_assert_eq!(ns, delay.published());
+                        let negative = delay.published() >= 0x7f00;
+                        prop_assert_eq!(ns, if negative { 0 } else { delay.published() });
                         // The device's rounding: up to 15 ns of round trip.
                         let exact = mean.saturating_sub(model.forward_ns.into()) / 2;
                         prop_assert!(u32::from(ns) <= exact && exact <= u32::from(ns) + 8);
                     }
-                    Err(_) => prop_assert!(rtt.iter().any(|ns| *ns >= 4096) || mean < u32::from(model.forward_ns) + 16),
+                    Err(_) => prop_assert!(rtt.iter().any(|ns| *ns >= 4096) || mean + 5 < u32::from(model.forward_ns)),
                 }
             }
         }

@@ -306,7 +306,8 @@ impl Timing<'_> {
                 return None;
             };
             let needs_ns = u32::try_from(needs).unwrap_or(u32::MAX);
-            let has_ns = i32::try_from(has).unwrap_or(if has < 0 { i32::MIN } else { i32::MAX });
+            // A gap below 0 is as long as a frame at most.
+            let has_ns = i32::try_from(has).unwrap_or(i32::MAX);
             Some(Misfit { device: address.get(), limit, needs_ns, has_ns })
         })
     }
@@ -397,6 +398,24 @@ mod tests {
         let misfit = cnc(254, &[600]).misfit(1_000_000).unwrap();
         assert_eq!((misfit.device, misfit.limit, misfit.needs_ns), (8, Limit::SendTime, 25));
         assert_eq!(misfit.to_string(), "device 8 would have to send 25 ns before the cycle");
+        // 500 - 100 (a - 1) ns: the sixth sends at 0.
+        assert_eq!(cnc(6, &[625]).misfit(1_000_000), None);
+        let misfit = cnc(7, &[625]).misfit(1_000_000);
+        assert_eq!(misfit, Some(Misfit { device: 7, limit: Limit::SendTime, needs_ns: 100, has_ns: 0 }));
+    }
+
+    /// 3405 ns and four cables on the way out, 3780 and one on the way back: at 125 ns both are 3905 ns. Numbers that no
+    /// line has stay what they are, as far as there is room for them.
+    #[test]
+    fn the_way_back_is_named_where_both_are_too_long() {
+        let line = cnc(4, &[125]);
+        assert_eq!((line.budget().limit(), line.misfit(3905)), (Limit::DeviceFrames, None));
+        let want = Misfit { device: 4, limit: Limit::DeviceFrames, needs_ns: 3905, has_ns: 3904 };
+        assert_eq!(line.misfit(3904), Some(want));
+        let slots = Slots::Raster { first_ns: u32::MAX, slot_ns: u32::MAX };
+        let misfit = cnc(1, &[0]).with_slots(Some(slots)).misfit(u32::MAX);
+        let want = Misfit { device: 1, limit: Limit::DeviceFrames, needs_ns: u32::MAX, has_ns: i32::MAX };
+        assert_eq!(misfit, Some(want));
     }
 
     /// 240 ns are six sigma of 16 ns a port for 4 devices, of 7.3 for 16, of 3.6 for 64 and of 1.8 for 254.

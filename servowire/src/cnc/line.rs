@@ -50,7 +50,7 @@ pub(super) struct Line {
     free: f64,
     /// The reason of the master's last restart, and the device that has left the line because its line delay is implausible.
     pub(super) why: Option<String>,
-    unmeasured: Option<String>,
+    pub(super) unmeasured: Option<String>,
     /// Lines for the user: what went wrong, and when; and how many there were.
     pub(super) events: Vec<String>,
     pub(super) event_count: u64,
@@ -218,7 +218,7 @@ impl Line {
                         node.run(&axle, k, &mut self.periods, record);
                     }
                 }
-                Wish::Restart if node.is_running() => {
+                Wish::Restart if node.is_heard() => {
                     let missed = node.device.counters().master;
                     self.event(format!("device {} starts again; master frames: {missed}", k + 1));
                 }
@@ -266,7 +266,7 @@ impl Line {
         let reaction = node.start_up(port, &mut frame, sof + capture_ns(preamble), jitter);
         let unmeasured = matches!(reaction.result, Err(sorte_proto::Error::ImplausibleRoundTrip { .. }));
         if let (true, Err(error)) = (unmeasured, reaction.result) {
-            self.unmeasured = Some(format!("device {}: {error}", k + 1));
+            self.unmeasured.get_or_insert_with(|| format!("device {}: {error}", k + 1));
         }
         self.measure(k, reaction.trigger, sof);
         self.ask(k, Some(record));

@@ -186,6 +186,9 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
         let last = line.why.as_deref().unwrap_or("no device answers");
         return Some(format!("the machine did not run: {last}"));
     }
+    if let Some(why) = &line.unmeasured {
+        return Some(format!("not all devices take part: {why}"));
+    }
     if let Some(why) = &host.ended {
         return Some(format!("the motion was stopped: {why}"));
     }

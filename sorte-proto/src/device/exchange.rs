@@ -112,8 +112,8 @@ impl Device {
     ///
     /// # Errors
     /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::OutsideWindow`], [`Error::CycleOver`],
-    /// [`Error::ImplausibleTimeStamp`] and [`Error::Doubled`], which [`Counters::master`](super::Counters::master) counts
-    /// and the device's next frame reports with ERROR; [`Error::WrongState`] if the device is not in IO exchange.
+    /// [`Error::ImplausibleTimeStamp`] and [`Error::Doubled`], which [`Counters::master`](super::Counters::master) counts.
+    /// The device's next frame reports each of these with ERROR. [`Error::WrongState`] if the device is not in IO exchange.
     pub fn hear_exchange<'a>(&mut self, frame: &'a [u8], times: FrameTimes) -> Result<Output<'a>, Error> {
         let (State::Exchange, Some(place), Some(delay_ns), Some(_)) =
             (self.state(), self.assignment, self.way_ns, self.raster)
@@ -124,6 +124,8 @@ impl Device {
             .and_then(|view| Ok((view, view.slice(place.out_offset, self.config.lengths.output)?)));
         let port = self.reverse_port().other();
         self.count(port, taken.map(|_| ()));
+        // Whatever is wrong with it, its data are lost.
+        self.error |= taken.is_err();
         let in_time = self.arrive(times, taken.ok().map(|(view, _)| view));
         let (view, data) = taken?;
         if let Err(error) = in_time {

@@ -73,7 +73,8 @@ pub struct Reaction {
 pub struct Output<'a> {
     /// Its output bytes.
     pub data: &'a [u8],
-    /// The cycle that they belong to, from 0 with the first of the exchange.
+    /// The cycle that they belong to: 0 begins 10 us after the last SYNC frame. A long line's master sends its first frame
+    /// in a later one, and it numbers the cycles that it sends.
     pub cycle: u64,
     /// The common time at which the master began to send them, in ns modulo 2^32.
     pub trigger_ns: u32,

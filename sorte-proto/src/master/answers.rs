@@ -31,8 +31,9 @@ impl Master {
     /// # Errors
     /// The reason for the refusal: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
     /// began before the frame that it would answer; [`Error::OutsideWindow`], [`Error::CycleOver`] and [`Error::Doubled`], which
-    /// [`tally`](Master::tally) counts for each device; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer and
-    /// [`Error::TopologyChanged`] take the master back to IDLE; any other refused frame is ignored.
+    /// [`tally`](Master::tally) counts for each device; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer,
+    /// [`Error::TopologyChanged`], and an answer to the last SYNC that tells that the line does not fit or that a device is
+    /// not in step take the master back to IDLE; any other refused frame is ignored.
     pub fn hear<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<Heard<'a>, Error> {
         let result = match self.state {
             State::Idle | State::Error => return Err(Error::WrongState),
@@ -183,12 +184,18 @@ impl Master {
         }
         self.is_fresh(sof_ns)?;
         let first = self.line.checked().unwrap_or_default();
-        let hops = answer.time_stamp_ns.wrapping_sub(self.sync_stamp_ns).saturating_sub(TRANSIT_NS.into());
+        let gained = answer.time_stamp_ns.wrapping_sub(self.sync_stamp_ns);
+        let devices = self.network.devices();
+        // Each adds its transit and the cable behind it; the last one has none.
+        let took_part = gained.checked_div(TRANSIT_NS.into()).unwrap_or_default();
+        if let (Ok(got), true) = (u8::try_from(took_part), took_part < devices.into()) {
+            return Err(Error::NotInSync { got, want: devices });
+        }
+        let hops = gained.saturating_sub(TRANSIT_NS.into());
         let delay_ns = hops.saturating_add(first.into());
         if delay_ns > u16::MAX.into() && !self.config.long_line {
             return Err(Error::LineTooLong { delay_ns });
         }
-        let devices = self.network.devices();
         let hop = hops.checked_div(u32::from(devices).saturating_sub(1)).unwrap_or_default();
         let cable = u16::try_from(hop.saturating_sub(TRANSIT_NS.into())).unwrap_or(u16::MAX);
         let line_delays_ns = [first, cable];
@@ -228,6 +235,7 @@ const fn is_misfit(error: Error) -> bool {
     matches!(
         error,
         Error::LineTooLong { .. }
+            | Error::NotInSync { .. }
             | Error::CycleTooShort { .. }
             | Error::GapTooShort { .. }
             | Error::SendBeforeCycle { .. }

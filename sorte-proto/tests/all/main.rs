@@ -20,6 +20,8 @@ mod hostile;
 mod master_bench;
 mod master_rules;
 mod one_check;
+mod patient_discovery;
 #[cfg(feature = "serde")]
 mod serde;
 mod times;
+mod values;

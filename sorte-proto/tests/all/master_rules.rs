@@ -177,7 +177,7 @@ fn a_delay_request_has_a_millisecond_to_come_back() {
 fn a_round_trip_that_cannot_be_ends_it() {
     let mut bench = Bench::new(Config::new());
     let fast = |master: &mut Master, at_ns: u64, frame| {
-        master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 319).map(|_| ())
+        master.hear(&answer(frame, 2), at_ns + capture_ns(&frame) + 314).map(|_| ())
     };
     let error = loop {
         match bench.master.poll(bench.now_ns) {
@@ -189,7 +189,8 @@ fn a_round_trip_that_cannot_be_ends_it() {
             Action::Exchange { .. } => panic!("it runs"),
         }
     };
-    assert_eq!(error, Error::ImplausibleRoundTrip { rtt_ns: 319 });
+    // 320 ns in the first device, and 5 ns less for a tick of the counter.
+    assert_eq!(error, Error::ImplausibleRoundTrip { rtt_ns: 314 });
 }
 
 #[test]
@@ -217,6 +218,24 @@ fn the_longest_line_is_the_one_that_the_delay_field_holds() {
     assert!(run(Config::new(), 65_535 - 76).is_ok());
     assert_eq!(run(Config::new(), 65_536 - 76), Err(Some(Error::LineTooLong { delay_ns: 65_536 })));
     assert!(run(Config::new().with_long_line(true), 65_536 - 76).is_ok());
+}
+
+/// A device that lets SYNC pass adds nothing to it: three devices add 1065 ns and their cables, whichever.
+#[test]
+fn a_line_of_which_a_device_is_not_in_step_does_not_run() {
+    let run = |passed: &[u16]| {
+        let mut bench = Bench::new(Config::new().with_sync_frames(2));
+        let end = bench.run(|_, frame| match frame {
+            Outgoing::Sync(frame) => Some(sync(frame, passed).emit().to_vec()),
+            frame => Some(answer(frame, 3)),
+        });
+        (end.map(|_| ()), bench.master.state())
+    };
+    assert_eq!(run(&[0, 0, 0]), (Ok(()), State::Exchange));
+    let not_in_sync = |got| (Err(Some(Error::NotInSync { got, want: 3 })), State::Idle);
+    assert_eq!((run(&[0, 0]), run(&[40, 40]), run(&[0])), (not_in_sync(2), not_in_sync(2), not_in_sync(1)));
+    // 1064 ns are not enough.
+    assert_eq!(run(&[354, 0]), not_in_sync(2));
 }
 
 /// The cable between two devices is the hop less 355 ns: with 1000 ns the master frame ends at the second device after

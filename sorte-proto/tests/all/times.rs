@@ -137,7 +137,7 @@ fn the_last_sync_needs_last_and_state_change() {
             match master.poll(now_ns) {
                 Action::Wait { until_ns } => now_ns = until_ns,
                 Action::Send { at_ns, frame: Outgoing::Sync(mut frame) } => {
-                    frame = sync(frame, &[0]);
+                    frame = sync(frame, &[0, 0]);
                     frame.status = Status::from_bits_retain(status);
                     let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 280 + 472);
                 }
