@@ -95,14 +95,15 @@ def flipped(folder):
 
 
 def write_pcapng(path, packets):
-    """(link type, bytes) of each packet, a microsecond apart."""
+    """(link type, bytes) of each packet, or (link type, bytes, length before the capture cut it), a microsecond apart."""
     block = lambda kind, body: struct.pack("<II", kind, len(body) + 12) + body + struct.pack("<I", len(body) + 12)
     out = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
     for link in (1, 147):
         out += block(1, struct.pack("<HHI", link, 0, 0) + struct.pack("<HHB3xHH", 9, 1, 9, 0, 0))
-    for number, (link, data) in enumerate(packets):
+    for number, (link, data, *whole) in enumerate(packets):
         padded = data + bytes(-len(data) % 4)
-        out += block(6, struct.pack("<IIIII", link != 1, 0, 1000 * number, len(data), len(data)) + padded)
+        lengths = len(data), whole[0] if whole else len(data)
+        out += block(6, struct.pack("<IIIII", link != 1, 0, 1000 * number, *lengths) + padded)
     path.write_bytes(out)
 
 
@@ -157,11 +158,16 @@ def contents(folder):
 
 
 def damaged(folder, packets, seed, count=4000):
-    """Packets cut, lengthened, flipped and made up at random: the script never fails."""
+    """Packets cut, lengthened, flipped and made up at random, among other traffic: the script never fails."""
     chance, out = random.Random(seed), []
+    other = bytes([2] * 6 + [3] * 6 + [8, 0, 0x45, 0, 0, 60, 0, 0, 0, 0, 64, 17]) + bytes(40)
     for _ in range(count):
-        link, _, data, _ = chance.choice(packets)
+        link, _, data, _ = chance.choice(packets) if chance.randrange(4) else (1, 0, other, 0)
         data = bytearray(data)
+        if chance.randrange(3) == 0:
+            # As `tcpdump -s` does.
+            out.append((link, bytes(data[: chance.randrange(len(data))]), len(data)))
+            continue
         for _ in range(chance.randrange(4)):
             what = chance.randrange(5)
             if what == 0:

@@ -402,8 +402,16 @@ function start.dissector(tvb, pinfo, root)
     if is_start_up(tvb) then
         return start_up(tvb, pinfo, root)
     end
+    -- Of a frame that the capture has cut, what there is: if a dissector runs into the cut, Wireshark leaves this script without
+    -- Lua's knowledge, and after two hundred times Lua has no calls left.
+    local there = tvb
+    if tvb:reported_len() > tvb:len() and tvb:len() > 0 then
+        there = tvb:bytes():tvb("Captured part")
+    elseif tvb:reported_len() > tvb:len() then
+        return 0
+    end
     -- A frame that ends too early for what it says it is: what was found stays, and it is no error of this script.
-    local whole = pcall(function() ethernet:call(tvb, pinfo, root) end)
+    local whole = pcall(function() ethernet:call(there, pinfo, root) end)
     if not whole then
         root:add(start, tvb(), "Ethernet frame that ends too early")
     end
