@@ -2,8 +2,10 @@ use crate::error::Error;
 
 /// Round trips in one measurement.
 pub(crate) const SAMPLES: u8 = 16;
-/// A tick of the counter that captures both ends of a round trip, in ns. The mean of sixteen is that exact at best.
+/// What the sum may lack for a cable of no length, in ns of its mean: a tick of the counter that captures both ends of a round
+/// trip, and what cutting each round trip takes at most.
 const TICK_NS: u32 = 5;
+const CUT_NS: u32 = 15;
 
 /// How round trips become a line delay. The vendor's master and device do it differently, and so do those of this crate.
 ///
@@ -46,9 +48,7 @@ pub struct RoundTrips {
 pub struct LineDelay {
     model: DelayModel,
     count: u8,
-    /// As the model has it, and of the round trips as they were.
     sum: u32,
-    whole: u32,
     min: u32,
     max: u32,
 }
@@ -56,7 +56,7 @@ pub struct LineDelay {
 impl LineDelay {
     /// Creates a measurement without round trips.
     pub const fn new(model: DelayModel) -> Self {
-        Self { model, count: 0, sum: 0, whole: 0, min: u32::MAX, max: 0 }
+        Self { model, count: 0, sum: 0, min: u32::MAX, max: 0 }
     }
 
     /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips beyond the
@@ -68,7 +68,6 @@ impl LineDelay {
         }
         let term = if self.model.shift_samples { rtt_ns >> 4 } else { rtt_ns };
         self.sum = self.sum.saturating_add(term);
-        self.whole = self.whole.saturating_add(rtt_ns);
         self.count = self.count.saturating_add(1);
         // Compared here: at opt-level s `min` and `max` are calls or not, as it pleases the compiler.
         if rtt_ns < self.min {
@@ -117,18 +116,20 @@ impl LineDelay {
     ///
     /// # Errors
     /// [`Error::ImplausibleRoundTrip`] with the longest if that is 4096 ns or more: sixteen of them do not fit the published
-    /// 16 bits (some 350 m of cable); with the mean if that is more than 5 ns shorter than the forwarding time.
+    /// 16 bits (some 350 m of cable); with the mean if that is shorter than the forwarding time by more than a tick of 5 ns, and
+    /// 15 ns if round trips are cut.
     pub const fn checked(&self) -> Result<u16, Error> {
         if self.max >= 4096 {
             return Err(Error::ImplausibleRoundTrip { rtt_ns: self.max });
         }
         let mean = if self.model.shift_samples { self.sum } else { self.sum >> 4 };
-        let (whole, forward) = (self.whole >> 4, self.model.forward_ns as u32);
+        let forward = self.model.forward_ns as u32;
+        let lacks = if self.model.shift_samples { TICK_NS.saturating_add(CUT_NS) } else { TICK_NS };
         match mean.checked_sub(forward) {
             #[expect(clippy::cast_possible_truncation, reason = "sixteen below 4096 at most, and their mean is")]
             Some(twice) => Ok((twice >> 1) as u16),
-            None if whole.saturating_add(TICK_NS) >= forward => Ok(0),
-            None => Err(Error::ImplausibleRoundTrip { rtt_ns: whole }),
+            None if mean.saturating_add(lacks) >= forward => Ok(0),
+            None => Err(Error::ImplausibleRoundTrip { rtt_ns: mean }),
         }
     }
 }
@@ -154,15 +155,17 @@ mod tests {
         let device = of(DelayModel::DEVICE, [360; 16]);
         assert_eq!((device.checked(), device.published()), (Ok(0), 65532));
         assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
-        // From one to the next there may be a tick less, and not more.
-        for (model, forward) in [(DelayModel::MASTER, 320), (DelayModel::DEVICE, 360)] {
-            let mut uneven = [forward + 5; 16];
-            uneven[..8].fill(forward - 10);
-            assert_eq!(of(model, uneven).checked(), Ok(0));
-            assert_eq!(of(model, [forward - 5; 16]).checked(), Ok(0));
-            let error = Error::ImplausibleRoundTrip { rtt_ns: forward - 6 };
-            assert_eq!(of(model, [forward - 6; 16]).checked(), Err(error));
-        }
+        // A tick less, and 15 ns of each that is cut, are a cable of no length; more is none at all.
+        assert_eq!(of(DelayModel::MASTER, [315; 16]).checked(), Ok(0));
+        assert_eq!(of(DelayModel::MASTER, [314; 16]).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 314 }));
+        let mut cut = [367; 16];
+        cut[..12].fill(351);
+        assert_eq!(of(DelayModel::DEVICE, cut).checked(), Ok(0));
+        cut[12] = 351;
+        assert_eq!(of(DelayModel::DEVICE, cut).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 339 }));
+        let whole = DelayModel { shift_samples: false, ..DelayModel::DEVICE };
+        assert_eq!(of(whole, [355; 16]).checked(), Ok(0));
+        assert_eq!(of(whole, [354; 16]).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 354 }));
     }
 
     /// Sixteen round trips of 4096 ns do not fit the published 16 bits, sixteen of 4095 do.
@@ -202,7 +205,8 @@ mod tests {
                         let exact = mean.saturating_sub(model.forward_ns.into()) / 2;
                         prop_assert!(u32::from(ns) <= exact && exact <= u32::from(ns) + 8);
                     }
-                    Err(_) => prop_assert!(rtt.iter().any(|ns| *ns >= 4096) || mean + 5 < u32::from(model.forward_ns)),
+                    Err(_) => prop_assert!(rtt.iter().any(|ns| *ns >= 4096) || mean + 5 < u32::from(model.forward_ns)
+                        || model.shift_samples && mean < u32::from(model.forward_ns)),
                 }
             }
         }
