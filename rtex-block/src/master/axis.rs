@@ -35,8 +35,8 @@ use crate::sub::Command32;
 ///  On ──stop of category 1 or 2──► Stopping ──stands──► Stopped, Held
 /// ```
 /// Call [`hear`](Self::hear) and then [`transmission`](Self::transmission) once in every update period. While the servo is off the
-/// command position follows the actual position, so switching on causes no jump. In every state but SwitchingOn, On,
-/// Stopping and Held the command is a [`ServoOff`]: Servo_On = 0 with a code that makes the drive evaluate it, whatever the
+/// command position follows the actual position, and Servo_On first goes out in an update period that brought a position, so
+/// switching on causes no jump. In every state but SwitchingOn, On, Stopping and Held the command is a [`ServoOff`]: Servo_On = 0 with a code that makes the drive evaluate it, whatever the
 /// caller does. SX-DSV02310, "Servo_On"; any further waiting times of the vendor are not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -57,6 +57,8 @@ pub struct Axis {
     evidence: Evidence,
     watch: EchoWatch,
     arrival: Arrival,
+    /// Update periods without an exchange before the last one.
+    missed: u8,
     /// The low half of the end of the last update period, ns.
     heard_ns: u32,
     control: ControlBits,
@@ -69,6 +71,9 @@ pub struct Axis {
     refused: u16,
     /// Responses with Servo_Active = 1 since the servo was commanded off.
     active_off: u32,
+    /// Responses on time with Servo_Active = 0 since the servo was last switched off, one after another; enough, if it never was
+    /// on.
+    passive: u8,
     disobeys: bool,
     main: Main,
     sub: Sub,
@@ -85,7 +90,12 @@ struct Wire {
     /// In CP with the servo on, the step from the previous value to this one; in another mode, the distance moved by the
     /// motor since the last block.
     step: i32,
+    /// Servo_On.
+    on: bool,
 }
+
+/// Missed update periods after which a motor stands that got no new command position: the most that are counted.
+const MANY: u8 = 3;
 
 impl Axis {
     /// Creates an axis whose drive has not answered yet.
@@ -109,10 +119,11 @@ impl Axis {
             category: StopCategory::Zero,
             mode: config.mode,
             setpoint: 0,
-            wire: Wire { mode: config.mode, value: 0, step: 0 },
+            wire: Wire { mode: config.mode, value: 0, step: 0, on: false },
             evidence: Evidence::NEVER,
             watch: EchoWatch::new(config.limits.echo),
             arrival: Arrival::Missing,
+            missed: 0,
             heard_ns: 0,
             control: ControlBits::empty(),
             feed_forward: [0; 3],
@@ -120,6 +131,7 @@ impl Axis {
             last_refusal: None,
             refused: 0,
             active_off: 0,
+            passive: u8::MAX,
             disobeys: false,
             main: Main::NONE,
             sub: Sub::NONE,
@@ -143,7 +155,8 @@ impl Axis {
     }
 
     /// Returns what is known about the actual position (Response_Data1), speed and torque. Its instant is that of the last
-    /// block on time, as passed to [`hear`](Self::hear).
+    /// block on time, as passed to [`hear`](Self::hear). The first block after update periods without an exchange may have
+    /// come in any of them, so it has the earliest instant: an update period after the block before.
     pub const fn evidence(&self) -> Evidence {
         let refused = match self.last_refusal {
             Some(error) => Some(error.class()),
@@ -179,13 +192,13 @@ impl Axis {
         let status = self.evidence.status();
         if !matches!(self.state, AxisState::Off) {
             Err(SwitchOnError::State(self.state))
-        } else if !matches!(self.arrival, Arrival::OnTime) || !self.watch.is_sure() {
+        } else if !self.is_current() || !self.watch.is_sure() {
             Err(SwitchOnError::OldPosition)
         } else if status.contains(StatusFlags::ALARM) {
             Err(SwitchOnError::Alarm)
         } else if !status.contains(StatusFlags::SERVO_READY) {
             Err(SwitchOnError::NotReady)
-        } else if self.main.slot.asking().is_some() && self.main.needs_servo_off {
+        } else if self.main.needs_servo_off && (self.main.slot.asking().is_some() || !self.main.quiet.is_kept()) {
             Err(SwitchOnError::Busy)
         } else {
             Ok(())
@@ -197,6 +210,7 @@ impl Axis {
     /// # Errors [`SwitchOnError`]; nothing is changed.
     pub fn switch_on(&mut self) -> Result<(), SwitchOnError> {
         self.can_switch_on()?;
+        self.passive = 0;
         self.enter(AxisState::SwitchingOn, self.config.limits.active);
         Ok(())
     }
@@ -205,7 +219,9 @@ impl Axis {
     /// while invalid data are sent.
     pub fn hear(&mut self, sent: Turn, heard: &Heard, end_ns: u64) {
         let response = self.sound(heard);
+        self.missed = self.missed(end_ns);
         let Turn::Valid(sent) = sent else {
+            self.arrival = Arrival::Missing;
             if let Some(response) = response {
                 // The counter stands still in invalid data, so nothing says when this is from.
                 self.watch.note(response.update_counter_echo);
@@ -214,8 +230,7 @@ impl Axis {
             return self.rest();
         };
         let echo = response.map(|response| response.update_counter_echo);
-        let missed = self.missed(end_ns);
-        self.arrival = self.watch.judge(sent, echo, missed, !self.state.is_servo_on());
+        self.arrival = self.watch.judge(sent, echo, self.missed, !self.state.is_servo_on());
         let on_time = response.filter(|_| self.arrival == Arrival::OnTime);
         self.supervise(response, on_time);
         self.serve(on_time);
@@ -224,7 +239,8 @@ impl Axis {
             if self.wire.mode != ActiveCode::CyclicPosition {
                 self.wire.step = step(self.evidence.last().position(), response.response_data1);
             }
-            self.evidence = Evidence::of(response, end_ns);
+            let known_ns = if self.missed == 0 { end_ns } else { self.first_ns() };
+            self.evidence = Evidence::of(response, known_ns);
         } else if let Some(response) = response {
             self.evidence = self.evidence.alarmed(response.status);
         }
@@ -242,6 +258,10 @@ impl Axis {
             Turn::Invalid => return Command32 { main: Command::nop(mac_id), sub: self.sub_command([0; 2]) },
             Turn::Valid(counter) => counter,
         };
+        let begins = self.wire.mode != ActiveCode::CyclicPosition && self.mode == ActiveCode::CyclicPosition;
+        if begins && self.is_energised() {
+            self.begin_positions();
+        }
         let value = match &self.profile {
             Some(profile) if profile.progress().is_pending() => profile.target_position(),
             _ => self.setpoint,
@@ -252,12 +272,27 @@ impl Axis {
             _ if self.mode == ActiveCode::CyclicPosition => 0,
             _ => self.wire.step,
         };
-        self.wire = Wire { mode: self.mode, value, step };
+        let on = match self.state {
+            AxisState::SwitchingOn => self.wire.on || self.is_current(),
+            state => state.is_servo_on(),
+        };
+        self.wire = Wire { mode: self.mode, value, step, on };
         let off = *ServoOff::new(mac_id, counter, self.mode).command();
         let [data3, sub2, sub3] = self.feed_forward;
-        let control = if self.state.is_servo_on() { self.control.union(self.servo_bits()) } else { self.control };
+        let control = if on { self.control.union(self.servo_bits()) } else { self.control };
         let main = Command { control, command_data1: value, noncyclic: self.noncyclic(data3), ..off };
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
+    }
+
+    /// Returns when the first block after the last one on time can have come.
+    #[cold]
+    fn first_ns(&self) -> u64 {
+        self.evidence.last().sampled_ns().saturating_add(self.config.update_ns.into())
+    }
+
+    /// Whether the last update period has brought a position that is known to be of that period.
+    pub(super) const fn is_current(&self) -> bool {
+        matches!(self.arrival, Arrival::OnTime) && self.missed == 0
     }
 
     /// Returns the number of update periods without an exchange since the last one, by the clock; at most three, because
@@ -268,7 +303,18 @@ impl Axis {
         let gap_ns = (end_ns as u32).wrapping_sub(self.heard_ns);
         self.heard_ns = end_ns as u32;
         let most_ns = self.config.update_ns.saturating_add(self.config.update_ns >> 1);
-        if gap_ns <= most_ns { 0 } else { periods(gap_ns.wrapping_sub(most_ns), self.config.update_ns) }
+        if gap_ns <= most_ns { 0 } else { self.after_gap(gap_ns.wrapping_sub(most_ns)) }
+    }
+
+    /// Takes note of a gap between two exchanges, which is so much longer than the longest one between two neighbours.
+    #[cold]
+    fn after_gap(&mut self, over_ns: u32) -> u8 {
+        let missed = periods(over_ns, self.config.update_ns);
+        if missed >= MANY && self.wire.mode == ActiveCode::CyclicPosition {
+            // The command position has stood still on the wire, and so does the motor by now.
+            self.wire.step = 0;
+        }
+        missed
     }
 
     /// Returns the response, if it is sound and comes from this drive; every block is counted.
@@ -286,7 +332,6 @@ impl Axis {
 }
 
 /// Returns the number of whole and started update periods in this time, at most three.
-#[cold]
 fn periods(over_ns: u32, update_ns: u32) -> u8 {
     let more = over_ns.saturating_sub(1).checked_div(update_ns).unwrap_or(2).min(2);
     u8::try_from(more).unwrap_or(2).saturating_add(1)

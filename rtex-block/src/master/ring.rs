@@ -29,12 +29,14 @@ pub struct Ring<const N: usize> {
 pub struct Fellows {
     failed: Option<u8>,
     timed_out: bool,
+    /// An axis has failed by itself: it was not stopped on request or with others.
+    faulty: bool,
 }
 
 impl Fellows {
     /// No axis has failed.
     pub const fn new() -> Self {
-        Self { failed: None, timed_out: false }
+        Self { failed: None, timed_out: false, faulty: false }
     }
 
     /// Begins a round of looking.
@@ -44,8 +46,11 @@ impl Fellows {
 
     /// Examines the axis at a place of the ring.
     pub const fn look(&mut self, place: u8, axis: &Axis) {
-        if self.failed.is_none() && matches!(axis.state(), AxisState::Stopped(_)) {
-            self.failed = Some(place);
+        if let AxisState::Stopped(reason) = axis.state() {
+            if self.failed.is_none() {
+                self.failed = Some(place);
+            }
+            self.faulty |= !matches!(reason, StopReason::Requested | StopReason::OtherAxis { .. });
         }
         self.timed_out |= axis.has_lost_its_drive();
     }
@@ -57,7 +62,10 @@ impl Fellows {
         let reason = StopReason::OtherAxis { place };
         match axis.config().stop {
             _ if self.timed_out => axis.fail(reason),
-            Some(category) if !matches!(axis.state(), AxisState::Stopping(_)) => axis.stop_for(reason, category),
+            // A stop on request ends on each axis in its own time, but not beside a fault.
+            Some(category) if self.faulty || !matches!(axis.state(), AxisState::Stopping(_)) => {
+                axis.stop_for(reason, category);
+            }
             _ => {}
         }
     }

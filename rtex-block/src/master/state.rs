@@ -69,11 +69,12 @@ servowire_core::one_line!(StopReason {
 
 impl core::error::Error for StopReason {}
 
-/// State of an axis. Servo_On is 1 in `SwitchingOn`, `On`, `Stopping` and `Held`, and in no other state.
+/// State of an axis. Servo_On is 1 in `SwitchingOn` (from the first update period that brings a position), `On`, `Stopping` and
+/// `Held`, and in no other state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AxisState {
-    /// Waiting for Servo_Ready, Servo_On = 0.
+    /// Waiting for Servo_Ready, and for Servo_Active = 0 as in `SwitchingOff`; Servo_On = 0.
     Starting,
     /// Ready, Servo_On = 0.
     Off,
@@ -86,7 +87,8 @@ pub enum AxisState {
     /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not
     /// accepted.
     Held(StopReason),
-    /// Servo_On = 0, waiting for Servo_Active = 0.
+    /// Servo_On = 0, waiting for Servo_Active = 0 for more than a turn of the counter: until then a drive may report the activity
+    /// of before.
     SwitchingOff,
     /// Servo_On = 0 until [`Axis::clear`](super::Axis::clear).
     Stopped(StopReason),
@@ -123,7 +125,7 @@ pub enum SwitchOnError {
     Alarm,
     /// Servo_Ready is 0.
     NotReady,
-    /// A request is pending that changes the position or the state of the drive.
+    /// A request is pending that changes the position or the state of the drive, or positions from before it may still come.
     Busy,
 }
 

@@ -283,7 +283,7 @@ fn a_move_across_the_wrap() {
         monitor_sel: 0,
         setting_data: i32::MAX - 5,
     });
-    pair.update();
+    pair.until(|pair| pair.axis.can_switch_on().is_ok());
     pair.axis.switch_on().unwrap();
     pair.until(|pair| pair.axis.state() == AxisState::On);
     pair.axis.set_position(i32::MIN + 100).unwrap();

@@ -14,7 +14,8 @@ use rtex_block::master::{
 use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{
-    Alarm, Arguments, BlockSize, CommandBlock, MacId, NonCyclicCommand, Policy, SubCode, Tolerated, TypeCode, pack,
+    Alarm, Arguments, BlockSize, CommandBlock, Doubt, MacId, NonCyclicCommand, Policy, SubCode, Tolerated, TypeCode,
+    pack,
 };
 use servowire_world::{Cable, Draw, Kind, Rates, Scenario, Seed, Tally, first_seed, wanted_events};
 
@@ -97,6 +98,8 @@ struct Bench {
     before: [Option<(i32, i32)>; AXES],
     /// Blocks that an axis took, and decelerations that were judged.
     taken: u64,
+    /// The end of the last time that the master hung.
+    hung: u64,
     /// The last period in which an old frame was put into the memory.
     old: u64,
     slowed: u64,
@@ -155,6 +158,7 @@ impl Bench {
             truth: Default::default(),
             before: [None; AXES],
             taken: 0,
+            hung: 0,
             old: 0,
             slowed: 0,
             tx: [0; AXES * 8],
@@ -225,6 +229,11 @@ impl Bench {
         if axis.arrival() == Arrival::OnTime && self.started {
             self.taken += 1;
             let sample = axis.evidence().at(self.now * PERIOD_NS, Policy::new(0).tolerating(Tolerated::ALARM));
+            if self.hung == self.now {
+                // In which frame it came nobody can say.
+                assert!(matches!(sample, Err(Doubt::Old { .. })), "axis {place} at {}: {sample:?}", self.now);
+                return;
+            }
             let said = sample.unwrap_or_else(|doubt| panic!("axis {place} at {}: {doubt}", self.now)).position();
             // A frame of a whole turn of the counter ago has the echo of a new one.
             let allowed = if self.now - self.old <= 1 { 24 } else { 12 };
@@ -366,8 +375,12 @@ fn hurt(bench: &mut Bench, kind: usize, place: usize, draw: &mut Draw) -> bool {
         4 => bench.turned[place] = true,
         5 => bench.drives[place].set_fault(Fault::ServoDrop),
         6 => bench.master.ring_mut().switch_off(),
-        // The master hangs: the same blocks go round again and again.
-        7 => (0..LIMIT).for_each(|_| bench.frame()),
+        // The master hangs: the same blocks go round again and again, and the command positions stand still.
+        7 => {
+            (0..LIMIT).for_each(|_| bench.frame());
+            bench.before.iter_mut().flatten().for_each(|(_, step)| *step = 0);
+            bench.hung = bench.now;
+        }
         8 => bench.drives[place].set_fault(Fault::EmergencyStop),
         9 => {
             bench.stuck = Some(place);

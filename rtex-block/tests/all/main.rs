@@ -18,6 +18,7 @@ mod drive;
 mod drive_bytes;
 mod endings;
 mod fresh;
+mod gaps;
 mod hostile;
 mod impolite;
 mod laws;

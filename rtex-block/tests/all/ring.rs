@@ -180,7 +180,9 @@ fn start_move_and_stop(bench: &mut Bench) {
     assert_eq!(bench.ring.failure(), None);
     assert!(bench.drives.iter().all(|drive| drive.position() != 0));
     bench.ring.switch_off();
-    bench.until(5, |bench| bench.ring.all_are(AxisState::Off));
+    bench.until(5, Bench::all_off);
+    // Off is told a turn of the counter later.
+    bench.until(8, |bench| bench.ring.all_are(AxisState::Off));
     assert!(bench.all_off());
 }
 

@@ -2,7 +2,7 @@
 
 use super::Axis;
 use crate::control::ControlBits;
-use crate::master::echo::{Arrival, TURN};
+use crate::master::echo::TURN;
 use crate::master::profile_move::{CommandEnded, ProfileMove};
 use crate::master::progress::Progress;
 use crate::master::servo_off::ActiveCode;
@@ -31,7 +31,8 @@ impl Axis {
     /// returns to that of the last block, it is the set-point in that block.
     ///
     /// With the servo on the axis must be at rest: the actual position is one or two update periods old when it becomes the
-    /// command position. A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
+    /// command position. If the next update period brings no position, the axis does not change to CP and stays in its mode.
+    /// A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
     ///
     /// # Errors
     /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] between off and on and during
@@ -65,6 +66,17 @@ impl Axis {
         Ok(())
     }
 
+    /// Begins CP, which was asked for and is not yet sent, at the position of this update period. Without one the axis stays in
+    /// the mode of the last block.
+    #[cold]
+    pub(super) fn begin_positions(&mut self) {
+        if self.is_current() {
+            self.rest();
+        } else {
+            (self.mode, self.setpoint) = (self.wire.mode, self.wire.value);
+        }
+    }
+
     /// Whether the axis is at rest, as far as can be determined, for a change to this mode.
     fn stands(&self, mode: ActiveCode) -> bool {
         let commanded = match self.wire.mode {
@@ -74,7 +86,7 @@ impl Axis {
         };
         // The actual position becomes the command position some periods after it was one.
         let drift = self.wire.step.unsigned_abs().saturating_mul(TURN.into());
-        let known = self.arrival == Arrival::OnTime && drift <= self.max_step;
+        let known = self.is_current() && drift <= self.max_step;
         commanded && (mode != ActiveCode::CyclicPosition || known)
     }
 

@@ -3,11 +3,14 @@
 use super::Axis;
 use crate::error::Error;
 use crate::header::MacId;
+use crate::master::echo::TURN;
 use crate::master::profile_move::MoveStage;
 use crate::master::state::{AxisState, StopReason};
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::response::Response;
 use crate::status::StatusFlags;
+
+const READY_OR_ACTIVE: StatusFlags = StatusFlags::SERVO_READY.union(StatusFlags::SERVO_ACTIVE);
 
 impl Axis {
     /// Checks silence, refusals, alarm, readiness, activity, and the limit of the state. An alarm counts in any block of
@@ -68,20 +71,26 @@ impl Axis {
         let [alarm, ready, active] =
             [StatusFlags::ALARM, StatusFlags::SERVO_READY, StatusFlags::SERVO_ACTIVE].map(|flag| status.contains(flag));
         match self.state {
-            AxisState::Starting if ready && !active && !alarm => self.enter(AxisState::Off, 0),
+            AxisState::Starting if ready && !active && !alarm && self.passive > TURN => self.enter(AxisState::Off, 0),
             AxisState::Starting | AxisState::Stopped(_) => {}
             _ if alarm => self.fail(StopReason::Alarm),
             AxisState::Off if !ready => self.enter(AxisState::Starting, self.config.limits.ready.unwrap_or(0)),
-            AxisState::SwitchingOff if !active => self.enter(AxisState::Off, 0),
+            AxisState::SwitchingOff if !active && self.passive > TURN => self.enter(AxisState::Off, 0),
             _ if self.state.is_servo_on() && !ready => self.fail(StopReason::NotReady),
             AxisState::SwitchingOn if active => self.enter(AxisState::On, 0),
             _ if self.is_energised() && !active => self.fail(StopReason::NotActive),
             _ => {}
         }
-        if self.state.is_servo_on() || !active {
+        if self.state.is_servo_on() {
             self.active_off = 0;
             return;
         }
+        if !active {
+            self.active_off = 0;
+            self.passive = self.passive.saturating_add(1);
+            return;
+        }
+        self.passive = 0;
         self.active_off = self.active_off.saturating_add(1);
         if self.active_off > self.config.limits.inactive {
             self.disobeys = true;
@@ -91,12 +100,16 @@ impl Axis {
 
     /// Checks the limit of the present state.
     fn wait(&mut self, on_time: Option<&Response>) {
+        let status = || on_time.map_or(self.status(), |response| response.status);
         let reason = match self.state {
             AxisState::Starting if self.config.limits.ready.is_none() => return,
-            AxisState::Starting => {
-                let status = on_time.map_or(self.status(), |response| response.status);
-                if status.contains(StatusFlags::ALARM) { StopReason::Alarm } else { StopReason::ReadyTimeout }
-            }
+            AxisState::Starting => match status() {
+                status if status.contains(StatusFlags::ALARM) => StopReason::Alarm,
+                // The turn of the counter that is waited for now belongs to no limit.
+                status if status & READY_OR_ACTIVE == StatusFlags::SERVO_READY => return,
+                _ => StopReason::ReadyTimeout,
+            },
+            AxisState::SwitchingOff if !status().contains(StatusFlags::SERVO_ACTIVE) => return,
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
             AxisState::Stopping(reason) => reason,

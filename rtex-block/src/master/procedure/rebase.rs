@@ -54,26 +54,30 @@ impl RebaseWithServoOn {
         match (self.answer, axis.mode()) {
             (None, ActiveCode::CyclicPosition) => self.change(axis, ActiveCode::CyclicVelocity),
             (None, ActiveCode::CyclicVelocity) => self.set(axis),
-            (Some(answer), ActiveCode::CyclicVelocity) => {
-                let changed = self.change(axis, ActiveCode::CyclicPosition);
-                match (axis.mode(), answer) {
-                    (ActiveCode::CyclicPosition, Ok(())) => Progress::Done { value: axis.setpoint() },
-                    (ActiveCode::CyclicPosition, Err(error)) => Progress::Failed { error },
-                    _ => changed,
-                }
-            }
+            // A position in the old coordinates may come for a turn of the counter after the answer.
+            (Some(_), ActiveCode::CyclicVelocity) if !axis.can_ask() => self.wait(),
+            (Some(_), ActiveCode::CyclicVelocity) => self.change(axis, ActiveCode::CyclicPosition),
+            // By now it has been sent.
+            (Some(Ok(())), ActiveCode::CyclicPosition) => Progress::Done { value: axis.setpoint() },
+            (Some(Err(error)), ActiveCode::CyclicPosition) => Progress::Failed { error },
             _ => Progress::Failed { error: Failure::Mode },
         }
     }
 
     /// The mode changes as soon as the axis is at rest.
     fn change(&mut self, axis: &mut Axis, mode: ActiveCode) -> Progress<i32> {
-        match (axis.set_mode(mode), self.left.checked_sub(1)) {
-            (Ok(()), _) => self.left = self.limit,
-            (Err(SetpointError::NotStanding | SetpointError::Busy), Some(left)) => self.left = left,
-            _ => return Progress::Failed { error: Failure::Mode },
+        match axis.set_mode(mode) {
+            Ok(()) => {}
+            Err(SetpointError::NotStanding | SetpointError::Busy) => return self.wait(),
+            Err(_) => return Progress::Failed { error: Failure::Mode },
         }
         Progress::Pending { left: self.left }
+    }
+
+    const fn wait(&mut self) -> Progress<i32> {
+        let Some(left) = self.left.checked_sub(1) else { return Progress::Failed { error: Failure::Mode } };
+        self.left = left;
+        Progress::Pending { left }
     }
 
     fn set(&mut self, axis: &mut Axis) -> Progress<i32> {
@@ -87,6 +91,7 @@ impl RebaseWithServoOn {
             Progress::Failed { error } => self.answer = Some(Err(error)),
             Progress::Pending { left } => return Progress::Pending { left },
         }
+        self.left = self.limit;
         Progress::Pending { left: self.left }
     }
 }
