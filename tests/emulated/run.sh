@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the firmware images and runs those for which there is an emulator: RP2040s in pairs, two chips and a wire, with their PIO's
-# scheduler compared with an independent emulator; the RP2350 with its processors, PIO and DMA against encoders; the STM32F405 under QEMU.
+# scheduler compared with an independent emulator; the RP2350 with its processors, PIO and DMA against encoders; the STM32F405 under QEMU;
+# and the images that move stepper motors, whose pulses are compared with what is due.
 # Needs node, python3 and qemu-system-arm; installs the rest by name: targets from rustup, the emulators from npm and PyPI.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -62,6 +63,10 @@ hdsl=$(built "$firmware/rp2350-hdsl")/thumbv8m.main-none-eabihf/release/servowir
 pico2=$(built "$firmware/pico2")/thumbv8m.main-none-eabihf/release
 .venv/bin/python rp2350/masters.py "$pico2"
 .venv/bin/python rp2350/mistakes.py "$pico2"
+
+.venv/bin/python motion/check.py rp2040 "$(built "$firmware/rp2040")/thumbv6m-none-eabi/release/motion"
+.venv/bin/python motion/check.py stm32f405 \
+    "$(built "$firmware/stm32f405")/thumbv7em-none-eabihf/release/stm32f405-motion"
 
 build stm32f405 --features emulated
 (cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)

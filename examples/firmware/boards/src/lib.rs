@@ -1,5 +1,5 @@
 //! What the firmware images share, and what of them runs on a host too: pin tables that are checked at compile time, clock trees made
-//! from the crystal, the first line of the console, what a master says of its readings, and the control interrupt.
+//! from the crystal, the first line of the console, what a master says of its readings, the control interrupt, and a machine of several axes under commands.
 #![no_std]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects))]
 
@@ -10,6 +10,7 @@ mod clock;
 mod control;
 mod first_line;
 mod line_fault;
+mod motion;
 mod oscillator;
 mod pins;
 mod pll;
@@ -21,6 +22,7 @@ pub use clock::Counter;
 pub use control::{Control, Limits, Outputs, put};
 pub use first_line::FirstLine;
 pub use line_fault::LineFault;
+pub use motion::Machine;
 pub use oscillator::{Source, start, waited};
 pub use pins::{Board, Pin};
 pub use pll::{Pll, PllLimits};

@@ -13,7 +13,7 @@ use crate::hal::clocks::{Clock as _, ClockSource, ClocksManager};
 use crate::hal::dma::{CH0, Channel, DMAExt};
 use crate::hal::fugit::{ExtU32, RateExtU32};
 use crate::hal::gpio::{FunctionPio0, Pin, Pins, PullUp};
-use crate::hal::pac::Peripherals;
+use crate::hal::pac::{CLOCKS, PLL_SYS, PLL_USB, Peripherals, RESETS, XOSC};
 use crate::hal::pio::PIOExt;
 use crate::hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
 use crate::hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
@@ -46,7 +46,7 @@ pub struct Board {
     pub watchdog: Watchdog,
 }
 
-const CONSOLE_BAUD: u32 = 1_000_000;
+pub(crate) const CONSOLE_BAUD: u32 = 1_000_000;
 /// Longer than anything here waits.
 const WATCHDOG_MS: u32 = 1_000;
 
@@ -64,12 +64,7 @@ impl Board {
         let core = Core::take().expect("called once");
         let before = Before::take(&p.WATCHDOG);
         let mut watchdog = Watchdog::new(p.WATCHDOG);
-        watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as _);
-        let crystal = setup_xosc_blocking(p.XOSC, CRYSTAL_HZ.Hz()).expect("crystal");
-        let mut clocks = ClocksManager::new(p.CLOCKS);
-        let system = setup_pll_blocking(p.PLL_SYS, crystal.get_freq(), PLL_120MHZ, &mut clocks, &mut p.RESETS);
-        let usb = setup_pll_blocking(p.PLL_USB, crystal.get_freq(), PLL_USB_48MHZ, &mut clocks, &mut p.RESETS);
-        clocks.init_default(&crystal, &system.expect("PLL"), &usb.expect("PLL")).expect("clocks");
+        let clocks = clocks(&mut watchdog, p.XOSC, p.CLOCKS, (p.PLL_SYS, p.PLL_USB), &mut p.RESETS);
 
         let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
         let mut uart =
@@ -103,4 +98,24 @@ impl Board {
         let usb = UsbBusAllocator::new(usb);
         Self { uart, usb, first, before, clock: clock::start(core.SYST), transmitter, receiver, channel, watchdog }
     }
+}
+
+/// Starts the crystal and both PLLs: 120 MHz for the system, 48 MHz for USB.
+///
+/// # Panics
+/// If a clock does not start.
+pub fn clocks(
+    watchdog: &mut Watchdog,
+    crystal: XOSC,
+    clocks: CLOCKS,
+    (system, usb): (PLL_SYS, PLL_USB),
+    resets: &mut RESETS,
+) -> ClocksManager {
+    watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as _);
+    let crystal = setup_xosc_blocking(crystal, CRYSTAL_HZ.Hz()).expect("crystal");
+    let mut clocks = ClocksManager::new(clocks);
+    let system = setup_pll_blocking(system, crystal.get_freq(), PLL_120MHZ, &mut clocks, resets);
+    let usb = setup_pll_blocking(usb, crystal.get_freq(), PLL_USB_48MHZ, &mut clocks, resets);
+    clocks.init_default(&crystal, &system.expect("PLL"), &usb.expect("PLL")).expect("clocks");
+    clocks
 }

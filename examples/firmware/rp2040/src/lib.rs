@@ -10,8 +10,10 @@ pub mod commands;
 pub mod console;
 pub mod frames;
 pub mod last_words;
+pub mod motion;
 pub mod port;
 pub mod programs;
+pub mod steps;
 pub mod tformat;
 pub mod uart;
 

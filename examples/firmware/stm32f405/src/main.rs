@@ -2,24 +2,15 @@
 #![no_std]
 #![no_main]
 
-mod clock;
-mod stack;
-mod uart;
-mod watchdog;
-
 use core::fmt::Write;
-use core::panic::PanicInfo;
 
 use servowire_boards::{Board, FirstLine, Pin, RESOLUTION, Readings, Source};
 use servowire_drivers::{Clock as _, DirectionPin, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
 use tformat::{Address, BitRate, EvidenceCell, Page};
 
-use crate::clock::{CORE_HZ, CRYSTAL_HZ};
-
-/// Pins that switch a phase or a brake resistor of the servo drives that have this chip: VESC 4 to 6 and ODrive 3.
-const POWER_STAGES: &[&str] =
-    &["PA7", "PA8", "PA9", "PA10", "PB0", "PB1", "PB10", "PB11", "PB13", "PB14", "PB15", "PC6", "PC7", "PC8"];
+use servowire_stm32f405::clock::{CORE_HZ, CRYSTAL_HZ};
+use servowire_stm32f405::{POWER_STAGES, clock, stack, uart, watchdog};
 
 /// Where they are is up to the board.
 const PINS: &[Pin] = &[
@@ -85,14 +76,4 @@ fn first_line(source: Source) -> FirstLine {
     let bits_per_second = BitRate::Mbit2_5.bits_per_second();
     let version = env!("CARGO_PKG_VERSION");
     FirstLine { image: "stm32f405", version, board: &BOARD, core_hz: CORE_HZ, source, bits_per_second }
-}
-
-/// Says where; the watchdog begins again.
-#[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
-    let _ = writeln!(uart::Console::last_words(), "\n{info}");
-    loop {
-        cortex_m::asm::nop();
-    }
 }
