@@ -387,6 +387,10 @@ impl Arguments {
     }
 
     fn bar(&self) -> ProgressBar {
+        if self.part.gcode.is_some() && io::stderr().is_terminal() {
+            let style = ProgressStyle::with_template("{pos} cycles {spinner} {per_sec}, {elapsed}");
+            return ProgressBar::new_spinner().with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        }
         let cycles = self.cycles.unwrap_or(0);
         if cycles < LONG || !io::stderr().is_terminal() {
             return ProgressBar::hidden();

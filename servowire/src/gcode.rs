@@ -69,7 +69,7 @@ impl Part {
 
     /// Its steps, within limits of each axis that has none of its own; ticks are ns.
     pub(crate) fn steps(&self, path: &Path, limits: Limits) -> Result<Steps, Box<dyn std::error::Error>> {
-        Ok(Steps::new(self.open(path)?, self.axes(limits)?, self.deviation)?)
+        Ok(Steps::new(self.open(path)?, path.display().to_string(), self.axes(limits)?, self.deviation)?)
     }
 
     /// The axes of the machine.

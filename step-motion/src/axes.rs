@@ -227,6 +227,15 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Ok(())
     }
 
+    /// Does the same as [`Path::set_deviation`].
+    pub fn set_deviation(&mut self, deviation: u32) {
+        self.path.set_deviation(deviation);
+        self.work.set_deviation(deviation);
+        for stop in &mut self.stops {
+            stop.set_deviation(deviation);
+        }
+    }
+
     /// Does the same as [`PathMover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
         self.begin_anew();

@@ -337,6 +337,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Ok(())
     }
 
+    /// Sets the deviation at corners, for lines appended from now on.
+    pub(super) fn set_deviation(&mut self, deviation: u32) {
+        self.path.set_deviation(deviation);
+    }
+
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
         let other = |part| self.path.exit(self.more, part) != self.wish;

@@ -1,10 +1,11 @@
-//! Lines as steps.
+//! Lines as steps, as firmware makes them: planned and cut into segments by the background, and added up by the interrupt.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::BufReader;
 
-use servowire_decode::fault::Fault;
-use step_motion::{AxisPulse, AxisSetup, Clock, LinePulses, Path};
+use servowire_decode::fault::{At, Fault};
+use step_motion::{Axes, AxesQueue, AxesTimer, AxisPulse, AxisSetup, Clock, Direction, Path, Work};
 
 use super::AXES;
 use super::item::{Item, Line};
@@ -12,35 +13,70 @@ use super::program::Program;
 
 /// Lines that are looked ahead.
 const AHEAD: usize = 64;
+/// Slots of an axis in the queue.
+const SLOTS: usize = 513;
+/// Motion in each half of the queue, in ns: the machine knows so late that it has come to rest.
+const REACH_NS: u32 = 1_000_000;
 
 /// The steps of all axes in the order of time, in ns. A line of the program is read when there is room for it.
 pub(crate) struct Steps {
     program: Program<BufReader<File>>,
-    path: Path<AXES, AHEAD>,
+    name: String,
+    axes: Box<Axes<'static, AXES, AHEAD, SLOTS>>,
+    timer: AxesTimer<'static, AXES, SLOTS>,
     per_mm: [f64; AXES],
     deviation: u32,
-    line: Option<LinePulses<AXES>>,
     /// Nothing moves before a rest of this many ns has ended.
     rest: Option<u64>,
-    /// When the last line ends, in ns.
-    end: u64,
+    /// Nothing follows in the program.
+    over: bool,
+    /// Lines that were read.
+    lines: u64,
+    /// When the interrupt comes next, if it does, in ns; and when it came last.
+    next: Option<u64>,
+    now: u64,
+    /// Of one interrupt.
+    pulses: VecDeque<AxisPulse>,
     fault: Option<Fault>,
 }
 
 impl Steps {
     pub(super) fn new(
         program: Program<BufReader<File>>,
+        name: String,
         axes: [AxisSetup; AXES],
         deviation: u32,
     ) -> Result<Self, step_motion::Error> {
-        let path = Path::new(Clock::NANOSECONDS, axes, deviation)?;
         let per_mm = axes.map(|axis| f64::from(axis.steps_per_m) / 1000.0);
-        Ok(Self { program, path, per_mm, deviation, line: None, rest: None, end: 0, fault: None })
+        // As long-lived as a machine; a run has one.
+        let queue: &'static AxesQueue<AXES, SLOTS> = Box::leak(Box::new(AxesQueue::new()));
+        let (axes, timer) = Axes::new(queue, Path::new(Clock::NANOSECONDS, axes, deviation)?);
+        let axes = Box::new(axes.with_reach(REACH_NS));
+        Ok(Self {
+            program,
+            name,
+            axes,
+            timer,
+            per_mm,
+            deviation,
+            rest: None,
+            over: false,
+            lines: 0,
+            next: None,
+            now: 0,
+            pulses: VecDeque::new(),
+            fault: None,
+        })
     }
 
-    /// When the planned motion ends, in ns.
+    /// When the motion so far has ended, in ns.
     pub(crate) const fn end(&self) -> u64 {
-        self.end
+        self.now
+    }
+
+    /// Lines that were read so far.
+    pub(crate) const fn lines(&self) -> u64 {
+        self.lines
     }
 
     /// Why it ended early.
@@ -50,22 +86,60 @@ impl Steps {
 
     /// Reads on until the path is full, or has to come to rest.
     fn fill(&mut self) {
-        while !self.path.is_full() && self.rest.is_none() {
+        while !self.over && self.rest.is_none() && !self.axes.is_full() {
             match self.program.next() {
-                Some(Ok(Item::Line(Line { to, feed }))) => {
-                    let mut target = [0; AXES];
-                    for ((target, mm), per_mm) in target.iter_mut().zip(to).zip(self.per_mm) {
-                        *target = (mm * per_mm).round() as i64;
-                    }
-                    // It is not full, and 100 m of 10000 steps/mm are fewer than 2^31.
-                    let _: Result<_, _> = self.path.push(target, feed.unwrap_or(u32::MAX));
-                }
+                Some(Ok(Item::Line(line))) => self.push(line),
                 Some(Ok(Item::Rest(ns))) => self.rest = Some(ns),
-                Some(Ok(Item::Deviation(um))) => self.path.set_deviation(um.unwrap_or(self.deviation)),
-                Some(Err(fault)) => self.fault = Some(fault),
-                None => return,
+                Some(Ok(Item::Deviation(um))) => self.axes.set_deviation(um.unwrap_or(self.deviation)),
+                Some(Err(fault)) => (self.fault, self.over) = (Some(fault), true),
+                None => self.over = true,
             }
         }
+    }
+
+    fn push(&mut self, Line { to, feed }: Line) {
+        let mut target = [0; AXES];
+        for ((target, mm), per_mm) in target.iter_mut().zip(to).zip(self.per_mm) {
+            *target = (mm * per_mm).round() as i64;
+        }
+        self.lines += 1;
+        // It is not full, and 100 m of 10000 steps/mm are fewer than 2^31.
+        let _: Result<_, _> = self.axes.push(target, feed.unwrap_or(u32::MAX));
+    }
+
+    /// All work of the background until it has to wait; `false` if it is at rest and nothing is to come.
+    fn plan(&mut self) -> bool {
+        loop {
+            self.fill();
+            match self.axes.poll() {
+                Work::More => {}
+                Work::Start => {
+                    self.next = self.next.or(Some(self.now));
+                    return true;
+                }
+                Work::Later => return true,
+                Work::Rest => match self.rest.take() {
+                    Some(ns) => self.now = self.now.saturating_add(ns),
+                    None => return !self.over,
+                },
+                Work::TooFewSlots => {
+                    let what = "the stop behind a part of the path needs more segments than the queue has";
+                    (self.fault, self.over) = (Some(Fault::new(&self.name, At::File, what)), true);
+                    return false;
+                }
+            }
+        }
+    }
+
+    /// What the interrupt does.
+    fn fire(&mut self, now: u64) {
+        self.now = now;
+        let fired = self.timer.fire();
+        for axis in (0..AXES as u8).filter(|axis| fired.steps() >> axis & 1 == 1) {
+            let direction = if fired.reverse() >> axis & 1 == 1 { Direction::Reverse } else { Direction::Forward };
+            self.pulses.push_back(AxisPulse { axis, tick: now, direction });
+        }
+        self.next = (fired.wait() > 0).then(|| now.saturating_add(fired.wait().into()));
     }
 }
 
@@ -74,20 +148,104 @@ impl Iterator for Steps {
 
     fn next(&mut self) -> Option<AxisPulse> {
         loop {
-            if let Some(pulse) = self.line.as_mut().and_then(Iterator::next) {
+            if let Some(pulse) = self.pulses.pop_front() {
                 return Some(pulse);
             }
-            self.fill();
-            self.line = self.path.next_line();
-            match (&self.line, self.rest) {
-                (Some(line), _) => self.end = line.end(),
-                (None, Some(ns)) => {
-                    self.end = self.end.saturating_add(ns);
-                    self.path.not_before(self.end);
-                    self.rest = None;
-                }
-                (None, None) => return None,
+            if !self.plan() {
+                return None;
+            }
+            if let Some(now) = self.next {
+                self.fire(now);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use step_motion::Limits;
+
+    use super::*;
+
+    fn program(text: &str) -> Program<BufReader<File>> {
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        std::io::Seek::rewind(&mut file).unwrap();
+        Program::new("part.nc", BufReader::new(file), false)
+    }
+
+    fn axes() -> [AxisSetup; AXES] {
+        let limits = Limits::new(100_000, 400_000).unwrap();
+        [limits, limits, limits.with_jerk(8_000_000).unwrap()].map(|limits| AxisSetup::new(limits, 80_000))
+    }
+
+    fn steps(text: &str) -> Steps {
+        Steps::new(program(text), "part.nc".to_owned(), axes(), 20).unwrap()
+    }
+
+    /// The steps of each axis, as the exact search of `Path` has them.
+    fn searched(text: &str) -> [Vec<(u64, Direction)>; AXES] {
+        let mut path = Path::<AXES, 1024>::new(Clock::NANOSECONDS, axes(), 20).unwrap();
+        for item in program(text) {
+            let Ok(Item::Line(Line { to, feed })) = item else { panic!("{item:?}") };
+            path.push(to.map(|mm| (mm * 80.0).round() as i64), feed.unwrap_or(u32::MAX)).unwrap();
+        }
+        let mut found = [const { Vec::new() }; AXES];
+        while let Some(line) = path.next_line() {
+            for pulse in line {
+                found[usize::from(pulse.axis)].push((pulse.tick, pulse.direction));
+            }
+        }
+        found
+    }
+
+    /// Every step is where the exact search has it, to the 25 ns that a segment may be off; in the stop behind the last
+    /// block, to a sixteenth of its interval.
+    #[test]
+    fn segments_make_the_steps_of_the_exact_search() {
+        let text =
+            "G1 X20 Y10 F6000\nX30 Y10\nG3 X30 Y30 J10\nG1 X-5 Y20 Z-3\nX0 Y0 Z0\nX3\nX3.5 Y0.4\nX4 Y1\nG0 X0 Y0\n";
+        let mut found = [const { Vec::new() }; AXES];
+        let mut steps = steps(text);
+        for pulse in steps.by_ref() {
+            found[usize::from(pulse.axis)].push((pulse.tick, pulse.direction));
+        }
+        assert!(steps.fault().is_none());
+        for (found, searched) in found.iter().zip(&searched(text)) {
+            assert!(found.len() == searched.len() && found.len() > 200, "{} of {}", found.len(), searched.len());
+            let mut before = 0;
+            for ((tick, way), (want, want_way)) in found.iter().zip(searched) {
+                let off = tick.abs_diff(*want);
+                let ends = steps.end() - want < 2 * u64::from(REACH_NS) + 5_000_000;
+                let allowed = if ends { 25.max((want - before) / 16) } else { 26 };
+                assert!(way == want_way && off <= allowed, "{off} ns at {want} of {}", steps.end());
+                before = *want;
+            }
+        }
+    }
+
+    /// Rests begin where the machine rests, and last as long as they say.
+    #[test]
+    fn rests_last_as_long_as_they_say() {
+        let still = |text: &str| {
+            let times: Vec<u64> = steps(text).map(|pulse| pulse.tick).collect();
+            times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap()
+        };
+        // Half a step at 400000 steps/s² takes 1.58 ms: from the last step to rest, and from there to the first.
+        let rest = still("G1 X1 F6000\nG4 P0.5\nX2\n");
+        assert!((503_000_000..506_000_000).contains(&rest), "{rest}");
+        assert!(still("G1 X1 F6000\nX2\n") < 2_000_000);
+        assert!(still("G1 X1 F6000\nM0\nX2\n") > 3_000_000);
+        assert!(still("G61 G1 X1 F6000\nX1 Y1\n") > still("G64 P0.5 G1 X1 F6000\nX1 Y1\n"));
+    }
+
+    /// What is wrong in the middle of a program ends it there, at rest.
+    #[test]
+    fn a_fault_ends_the_program_at_rest() {
+        let mut steps = steps("G1 X1 F6000\nX2\nG99\nX3\n");
+        assert_eq!(steps.by_ref().count(), 160);
+        assert!(steps.fault().unwrap().to_string().contains("line 3"));
     }
 }

@@ -4,9 +4,10 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::error::Error;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::Path;
 
+use indicatif::{ProgressBar, ProgressStyle};
 use step_motion::AxisPulse;
 use step_profile::Direction;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
@@ -53,13 +54,13 @@ pub(super) fn write(
     out: &mut dyn Write,
 ) -> Result<(), Box<dyn Error>> {
     if arguments.csv || arguments.json {
-        return rows(arguments.json, steps, out).map_err(Into::into);
+        return rows(arguments.json, lines, steps, out);
     }
     let mut wires = arguments.vcd.as_deref().map(Wires::new).transpose()?;
-    let mut places = vec![(0.0, [0; AXES])];
+    let mut places = Places::new();
     let mut axes = [Axis::default(); AXES];
-    let mut steps = steps;
-    for pulse in steps.by_ref() {
+    let (mut steps, bar) = (steps, bar(lines));
+    while let Some(pulse) = steps.next() {
         let Some(axis) = axes.get_mut(usize::from(pulse.axis)) else { continue };
         axis.add(&pulse);
         if let Some(wires) = &mut wires {
@@ -68,7 +69,9 @@ pub(super) fn write(
         if arguments.svg.is_some() {
             places.push((pulse.tick as f64 / 1e9, axes.map(|axis| axis.position)));
         }
+        bar.set_position(steps.lines());
     }
+    bar.finish_and_clear();
     if let Some(fault) = steps.fault() {
         return Err(fault.to_string().into());
     }
@@ -81,17 +84,30 @@ pub(super) fn write(
         wires.finish()?;
     }
     if let Some(path) = &arguments.svg {
-        fs::write(path, draw(&places)?).map_err(|e| format!("{}: {e}", path.display()))?;
+        fs::write(path, draw(&places.all())?).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     Ok(out.flush()?)
 }
 
-fn rows(json: bool, steps: Steps, out: &mut dyn Write) -> io::Result<()> {
+/// Programs of more lines than this have a progress bar.
+const LONG: usize = 100_000;
+
+/// The lines that were read, on a terminal.
+fn bar(lines: usize) -> ProgressBar {
+    if lines < LONG || !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{pos}/{len} lines [{bar:40}] {per_sec}, {eta} left");
+    ProgressBar::new(lines as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+fn rows(json: bool, lines: usize, mut steps: Steps, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
     if !json {
         writeln!(out, "time_ns,axis,position")?;
     }
-    let mut axes = [Axis::default(); AXES];
-    for pulse in steps {
+    let (mut axes, bar) = ([Axis::default(); AXES], bar(lines));
+    while let Some(pulse) = steps.next() {
+        bar.set_position(steps.lines());
         let at = usize::from(pulse.axis);
         let (Some(axis), Some(name)) = (axes.get_mut(at), NAMES.get(at)) else { continue };
         axis.add(&pulse);
@@ -102,7 +118,11 @@ fn rows(json: bool, steps: Steps, out: &mut dyn Write) -> io::Result<()> {
             writeln!(out, "{time},{name},{position}")?;
         }
     }
-    out.flush()
+    bar.finish_and_clear();
+    if let Some(fault) = steps.fault() {
+        return Err(fault.to_string().into());
+    }
+    Ok(out.flush()?)
 }
 
 /// The wires of an axis.
@@ -206,6 +226,45 @@ impl Wires {
 /// A place of the axes at a time in s.
 type Place = (f64, [i64; AXES]);
 
+/// Some of the places of a path, however long it is.
+struct Places {
+    kept: Vec<Place>,
+    last: Place,
+    /// One in so many is kept.
+    every: u64,
+    seen: u64,
+}
+
+impl Places {
+    /// More than a picture shows.
+    const MOST: usize = 1 << 17;
+
+    fn new() -> Self {
+        Self { kept: vec![(0.0, [0; AXES])], last: (0.0, [0; AXES]), every: 1, seen: 0 }
+    }
+
+    fn push(&mut self, place: Place) {
+        (self.last, self.seen) = (place, self.seen + 1);
+        if self.seen % self.every != 0 {
+            return;
+        }
+        self.kept.push(place);
+        if self.kept.len() > Self::MOST {
+            let mut odd = false;
+            self.kept.retain(|_| {
+                odd = !odd;
+                odd
+            });
+            self.every *= 2;
+        }
+    }
+
+    fn all(mut self) -> Vec<Place> {
+        self.kept.push(self.last);
+        self.kept
+    }
+}
+
 /// The path, a step as long in X as in Y, and the positions of the axes over time.
 fn draw(places: &[Place]) -> Drawn<String> {
     // A point a pixel is enough.
@@ -257,6 +316,19 @@ mod tests {
         let times: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
         let want = [0, 4000, 5000, 5500, 6000, 6500, 9000, 9500, 9700, 10_000, 10_400, 10_500, 11_400, 11_500];
         assert_eq!(times, want.map(|time: u64| format!("#{time}")));
+    }
+
+    /// A long path keeps as much as a picture needs, and its end.
+    #[test]
+    fn a_long_path_keeps_some_of_its_places() {
+        let mut places = Places::new();
+        for k in 1..=1_000_000 {
+            places.push((k as f64, [k; AXES]));
+        }
+        let kept = places.all();
+        assert!((Places::MOST / 2..=Places::MOST + 2).contains(&kept.len()), "{}", kept.len());
+        assert_eq!((kept[0].1[0], kept[kept.len() - 1].1[0]), (0, 1_000_000));
+        assert!(kept.windows(2).all(|pair| pair[0].0 <= pair[1].0 && pair[1].0 - pair[0].0 <= 16.0));
     }
 
     #[test]
