@@ -280,11 +280,11 @@ impl Bench {
             4 => {
                 self.happened.damaged += 1;
                 let checked = arrival.bytes.len() - 2;
-                // In the bytes that the CRC-8 has, or in the high byte of the time stamp.
-                if draw.below(3) == 0 {
-                    arrival.bytes[checked + 1] ^= 2 << draw.below(7);
-                } else {
-                    flip(draw, &mut arrival.bytes[..checked]);
+                // In the bytes that the CRC-8 has, or in the high byte of the time stamp; or the end is missing.
+                match draw.below(4) {
+                    0 => arrival.bytes[checked + 1] ^= 2 << draw.below(7),
+                    1 => arrival.bytes.truncate(draw.below(checked as u64 + 2) as usize),
+                    _ => flip(draw, &mut arrival.bytes[..checked]),
                 }
                 good = false;
             }
@@ -395,7 +395,8 @@ impl Bench {
                 self.wrong = true;
                 let count = |counters: sorte_proto::device::Counters| {
                     let master = counters.master;
-                    counters.crc_errors + u64::from(master.doubled + master.late + master.stale)
+                    let damaged = counters.crc_errors + counters.format_errors;
+                    damaged + u64::from(master.doubled + master.late + master.stale)
                 };
                 assert_eq!(count(self.device.counters()), count(before) + 1, "{error}");
             }
