@@ -20,7 +20,8 @@ pub(crate) const MAX_LOOKS: u32 = 200_000;
 pub trait Clock {
     /// Returns the time in nanoseconds from any origin; it never goes backwards.
     ///
-    /// # Errors What the clock itself has detected.
+    /// # Errors
+    /// What the clock itself has detected.
     fn now_ns(&mut self) -> Result<u64, ClockError>;
 }
 

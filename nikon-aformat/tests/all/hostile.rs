@@ -3,7 +3,7 @@
 //! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile:: -- --nocapture` prints the mix.
 
 use crate::common::exchanges::{Setup, Shown, bus, seeds, single};
-use crate::common::line::{USUAL_EVENTS, events};
+use crate::common::line::{USUAL_FAULTS, faults};
 use crate::common::switches::assert_all_drawn;
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{BusTransaction, Line, Progress};
@@ -28,17 +28,17 @@ fn hostile_transactions() {
 #[test]
 fn hostile_buses() {
     let shown = hostile(|setup, shown| bus(setup, 30, shown));
-    assert!(events() < USUAL_EVENTS || shown.tally.of(Kind::Flip) > 0);
+    assert!(faults() < USUAL_FAULTS || shown.tally.of(Kind::Flip) > 0);
 }
 
 /// A line on which nothing happens: eight encoders with any positions and status, and with shafts at rest of which one looks
-/// like the start of a response, frame by frame and all in one block. `HOSTILE_EVENTS=100000000` runs as many cycles.
+/// like the start of a response, frame by frame and all in one block. `HOSTILE_EVENTS=100000000` runs as many cycles, 10,000 are usual.
 #[test]
 fn a_perfect_line_loses_nothing() {
     let line = Line::new(BitRate::Mbit16);
     let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
     let mut draw = 0x9e37_79b9_7f4a_7c15_u64;
-    let cycles = events() / 10;
+    let cycles = faults();
     for cycle in 0..cycles {
         let mut bus = BusTransaction::start(request, Resolution::default(), Addresses::ALL, line, 0);
         let (mut block, mut want, mut at_ns) = (Vec::with_capacity(32), [0; 8], 4_125);

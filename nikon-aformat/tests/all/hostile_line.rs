@@ -3,7 +3,7 @@
 //! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile_line:: -- --nocapture` prints the mix.
 
 use crate::common::exchanges::{Setup, seeds};
-use crate::common::line::{USUAL_EVENTS, events};
+use crate::common::line::{USUAL_FAULTS, faults};
 use crate::common::sampled::{Shown, lost_frames, single_flips};
 use servowire_world::Kind;
 
@@ -15,7 +15,7 @@ fn hostile(kind: Kind, run: impl Fn(&Setup, &mut Shown)) -> Shown {
         shown.heard > 0 && shown.refused > 0 && shown.tally.of(kind) > 0,
         "the line was not hostile, or nothing but"
     );
-    assert!(events() < USUAL_EVENTS || shown.tally.of(kind) > 100, "{:?}", shown.tally);
+    assert!(faults() < USUAL_FAULTS || shown.tally.of(kind) > 100, "{:?}", shown.tally);
     shown
 }
 

@@ -3,7 +3,7 @@
 //! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile_procedures:: -- --nocapture` prints the mix.
 
 use crate::common::exchanges::{Setup, seeds};
-use crate::common::line::{USUAL_EVENTS, events};
+use crate::common::line::{USUAL_FAULTS, faults};
 use crate::common::procedures::{
     Shown, addresses_by_id, addresses_by_wire, detections, eeprom_reads, writes, zero_presets,
 };
@@ -15,7 +15,7 @@ fn hostile(ends: &[&str], run: impl Fn(&Setup, &mut Shown)) {
     println!("{:?}\n{:?}\n{}", shown.ends, shown.mix, shown.tally);
     assert_all_drawn(&shown.mix);
     for end in ends {
-        assert!(events() < USUAL_EVENTS || shown.ends.contains_key(*end), "{end} never happened");
+        assert!(faults() < USUAL_FAULTS || shown.ends.contains_key(*end), "{end} never happened");
     }
 }
 

@@ -23,6 +23,8 @@ mod bench;
 mod frames;
 mod hostile;
 mod late;
+#[cfg(feature = "tformat")]
+mod parts;
 #[cfg(feature = "async")]
 mod polls;
 mod refusals;

@@ -1,161 +1,22 @@
-//! What a port made of an SPI asks of its parts, call by call: an SPI whose `write` comes back before the bits have left, as the trait
-//! allows, faults of each call, and somebody who talks before the request.
+//! What a port made of an SPI asks of its parts, call by call: faults of each call, and somebody who talks before the request.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
-use embedded_hal::digital::{ErrorKind as PinFault, ErrorType as PinErrorType, OutputPin};
-use embedded_hal::spi::{ErrorKind, ErrorType, SpiBus};
-use servowire_drivers::samples::Order;
-use servowire_drivers::spi::{Sampling, SpiError, SpiUart};
+use embedded_hal::digital::ErrorKind as PinFault;
+use embedded_hal::spi::ErrorKind;
+use servowire_drivers::spi::SpiError;
 use servowire_drivers::tformat::blocking::Driver;
-use servowire_drivers::{Automatic, Clock, ClockError, DirectionPin, Error, Worst};
+use servowire_drivers::{Automatic, Error};
 use tformat::master::Line;
 use tformat::{BitRate, Request};
 
-const WORST: Worst = Worst { uart_start_ns: 0, wake_ns: 50, clock_ns: 50 };
-/// A byte at 20 MHz.
-const BYTE_NS: u64 = 400;
+use crate::parts::{BYTE_NS, Bench, Call};
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Call {
-    On,
-    Off,
-    Write,
-    Flush,
-    Sample,
-}
-
-#[derive(Default)]
-struct World {
-    now_ns: u64,
-    calls: Vec<(Call, u64)>,
-    /// The call that fails, by its number.
-    fails: Option<usize>,
-    on: bool,
-    /// Whether it was on after each request.
-    left_on: Vec<bool>,
-    /// When the bits that were written have left.
-    left_ns: u64,
-    /// The driver went off before that.
-    cut: bool,
-    /// Somebody talks until then, seldom.
-    talks_until_ns: u64,
-    /// What the next samples are; idle after them.
-    samples: Vec<u8>,
-}
-
-#[derive(Clone, Default)]
-struct Bench(Rc<RefCell<World>>);
-
-impl Bench {
-    /// Notes a call; whether it works.
-    fn call(&self, call: Call) -> bool {
-        let mut world = self.0.borrow_mut();
-        let (number, now_ns) = (world.calls.len(), world.now_ns);
-        world.calls.push((call, now_ns));
-        world.fails != Some(number)
-    }
-
-    /// A request is over.
-    fn over(&self) {
-        let mut world = self.0.borrow_mut();
-        let on = world.on;
-        world.left_on.push(on);
-    }
-}
-
-impl Clock for Bench {
-    fn now_ns(&mut self) -> Result<u64, ClockError> {
-        let mut world = self.0.borrow_mut();
-        world.now_ns += 50;
-        Ok(world.now_ns)
-    }
-}
-
-impl PinErrorType for Bench {
-    type Error = PinFault;
-}
-
-impl OutputPin for Bench {
-    fn set_low(&mut self) -> Result<(), PinFault> {
-        if !self.call(Call::Off) {
-            return Err(PinFault::Other);
-        }
-        let mut world = self.0.borrow_mut();
-        world.cut |= world.on && world.now_ns < world.left_ns;
-        world.on = false;
-        Ok(())
-    }
-
-    fn set_high(&mut self) -> Result<(), PinFault> {
-        self.0.borrow_mut().on = true;
-        if self.call(Call::On) { Ok(()) } else { Err(PinFault::Other) }
-    }
-}
-
-impl ErrorType for Bench {
-    type Error = ErrorKind;
-}
-
-impl SpiBus for Bench {
-    fn read(&mut self, _: &mut [u8]) -> Result<(), ErrorKind> {
-        unreachable!("what MOSI sends meanwhile is not defined")
-    }
-
-    /// Comes back at once.
-    fn write(&mut self, words: &[u8]) -> Result<(), ErrorKind> {
-        if !self.call(Call::Write) {
-            return Err(ErrorKind::ModeFault);
-        }
-        let mut world = self.0.borrow_mut();
-        world.left_ns = world.now_ns + BYTE_NS * words.len() as u64;
-        Ok(())
-    }
-
-    fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), ErrorKind> {
-        unreachable!("not needed")
-    }
-
-    fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-        if !self.call(Call::Sample) {
-            return Err(ErrorKind::Overrun);
-        }
-        let mut world = self.0.borrow_mut();
-        assert!(words.iter().all(|word| *word == 0xff), "MOSI idles at 1");
-        for (at, word) in words.iter_mut().enumerate() {
-            world.now_ns += BYTE_NS;
-            // One sample of 0 in ten bytes.
-            *word = if at == 3 && world.now_ns < world.talks_until_ns { 0xfe } else { 0xff };
-        }
-        for (word, sample) in words.iter_mut().zip(std::mem::take(&mut world.samples)) {
-            *word = sample;
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        let mut world = self.0.borrow_mut();
-        world.now_ns = world.now_ns.max(world.left_ns);
-        drop(world);
-        if self.call(Call::Flush) { Ok(()) } else { Err(ErrorKind::Other) }
-    }
-}
-
-type Uart<'b> = SpiUart<'b, Bench, DirectionPin<Bench>>;
 type Failure = Error<SpiError<ErrorKind, PinFault>, core::convert::Infallible, tformat::Error, tformat::Doubt>;
 /// A call with nobody at the line, and another one after it.
 type Transact = fn(&Bench) -> [Failure; 2];
 
-fn uart<'b>(bench: &Bench, buffers: &'b mut ([u8; 48], [u8; 160])) -> Uart<'b> {
-    let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
-    let pin = DirectionPin::new(bench.clone(), WORST);
-    SpiUart::new(bench.clone(), pin, sampling, &mut buffers.0, &mut buffers.1)
-}
-
 fn transact(bench: &Bench) -> [Failure; 2] {
     let mut buffers = ([0; 48], [0; 160]);
-    let uart = uart(bench, &mut buffers);
+    let uart = bench.uart(&mut buffers);
     let mut encoder = Driver::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5)).unwrap();
     std::array::from_fn(|_| {
         let error = encoder.transact(Request::ReadSingleTurn).unwrap_err();
@@ -258,7 +119,7 @@ fn damaged() -> Vec<u8> {
 #[test]
 fn a_wrong_stop_bit_is_told_after_the_bytes_before_it() {
     let (bench, mut buffers) = (Bench::default(), ([0; 48], [0; 160]));
-    let mut uart = uart(&bench, &mut buffers);
+    let mut uart = bench.uart(&mut buffers);
     bench.0.borrow_mut().samples = damaged();
     let mut bytes = [0; 16];
     assert_eq!(embedded_io::Write::write(&mut uart, &[0x1a]), Ok(1));
@@ -303,28 +164,6 @@ mod asynch {
         }
     }
 
-    impl embedded_hal_async::spi::SpiBus for Bench {
-        async fn read(&mut self, _: &mut [u8]) -> Result<(), ErrorKind> {
-            unreachable!("what MOSI sends meanwhile is not defined")
-        }
-
-        async fn write(&mut self, _: &[u8]) -> Result<(), ErrorKind> {
-            unreachable!("a transfer that is dropped is cut off")
-        }
-
-        async fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), ErrorKind> {
-            unreachable!("not needed")
-        }
-
-        async fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-            SpiBus::transfer_in_place(self, words)
-        }
-
-        async fn flush(&mut self) -> Result<(), ErrorKind> {
-            SpiBus::flush(self)
-        }
-    }
-
     /// A timer whose interrupt comes when its time is over; until then only others wake.
     impl Timer for Bench {
         async fn wait_ns(&mut self, ns: u64) {
@@ -335,7 +174,7 @@ mod asynch {
 
     pub(super) fn transact(bench: &Bench) -> [Failure; 2] {
         let mut buffers = ([0; 48], [0; 160]);
-        let uart = uart(bench, &mut buffers);
+        let uart = bench.uart(&mut buffers);
         let mut encoder = Driver::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5)).unwrap();
         std::array::from_fn(|_| {
             let error = run(encoder.transact(Request::ReadSingleTurn)).unwrap_err();
@@ -347,7 +186,7 @@ mod asynch {
     #[test]
     fn a_wrong_stop_bit_is_told_after_the_bytes_before_it() {
         let (bench, mut buffers) = (Bench::default(), ([0; 48], [0; 160]));
-        let mut uart = uart(&bench, &mut buffers);
+        let mut uart = bench.uart(&mut buffers);
         bench.0.borrow_mut().samples = damaged();
         let mut bytes = [0; 16];
         assert_eq!(run(embedded_io_async::Write::write(&mut uart, &[0x1a])), Ok(1));

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use crate::bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_core::Procedure;
-use servowire_world::{Kind, Rates, Scenario, Seed, Tally, first_seed, scenarios, wanted_events};
+use servowire_world::{Draw, Kind, Rates, Scenario, Seed, Tally, first_seed, scenarios, wanted_events};
 use tformat::device::Behaviour;
-use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Reset, SingleTurnZero, Step};
 use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution, Response};
 
 /// Faults of a test, unless the environment says another number.
@@ -82,8 +82,10 @@ fn bench(seed: u64, rates: Rates) -> Bench {
     if seed % 4 == 1 { bench.mixing_up(seed) } else { bench }
 }
 
-/// So that ten exchanges in a row are whole in every second run.
-const MILD: Rates = Rates { per_million: [700; Kind::ALL.len()], longest_ns: 100_000 };
+/// So that ten exchanges in a row are whole in two of three runs, and hardly ever in the third.
+fn procedure_rates(seed: u64) -> Rates {
+    Rates { per_million: [[700, 2_000, 8_000][(seed / 8) as usize % 3]; Kind::ALL.len()], longest_ns: 100_000 }
+}
 
 const READS: [Request; 4] = [Request::ReadSingleTurn, Request::ReadAll, Request::ReadMultiTurn, Request::ReadEncoderId];
 
@@ -128,8 +130,9 @@ fn hostile_turn_zeros() {
 fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
     let mut ends = Ends::default();
     runs(name, |seed| {
-        let mut bench = bench(seed, MILD);
+        let mut bench = bench(seed, procedure_rates(seed));
         bench.moves = false;
+        bench.restarts = (seed % 5 == 0).then_some(Draw::seeded(seed));
         bench.device.set_position(Abs::truncate(0x1000), Abm::truncate(0x100));
         // A host that mixes requests up sends some of the ten by mistake besides.
         let dropped = if seed % 3 == 0 || bench.astray.is_some() { 0 } else { 1 + seed % 9 };
@@ -138,7 +141,7 @@ fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Resul
             bench.wait(at_ns);
             let _ = bench.exchange(request, at_ns);
         }
-        let earlier = bench.device.effects();
+        let earlier = bench.effects();
         let end = set(&mut bench, seed);
         // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
         // So is a request of the attempt before that the line held back, or repeated: with nine more it is the tenth, or with
@@ -147,7 +150,7 @@ fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Resul
         let moved = tally.of(Kind::Repeat) + tally.of(Kind::Delay) > 0;
         let inherited = dropped > 0 && (moved || bench.misheard > 0);
         if bench.forged_requests + bench.misread == 0 && !inherited {
-            done_once_at_most(&end, bench.device.effects() - earlier, seed);
+            done_once_at_most(&end, bench.effects() - earlier, seed);
             ends.count(&end);
         }
         bench
@@ -163,7 +166,7 @@ fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Resul
 fn hostile_resets() {
     let mut ends = Ends::default();
     runs("resets", |seed| {
-        let mut bench = bench(seed, MILD);
+        let mut bench = bench(seed, procedure_rates(seed));
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
         let mut reset = match seed % 8 {
@@ -192,7 +195,7 @@ fn hostile_resets() {
 #[test]
 fn hostile_error_resets() {
     runs("error resets", |seed| {
-        let mut bench = bench(seed, MILD);
+        let mut bench = bench(seed, procedure_rates(seed));
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
         bench.device.raise_alarms(Almc::CE);
@@ -262,7 +265,7 @@ impl Procedure for Watched {
 fn hostile_eeprom_writes() {
     let mut ends = Ends::default();
     runs("EEPROM writes", |seed| {
-        let mut bench = bench(seed, MILD);
+        let mut bench = bench(seed, procedure_rates(seed));
         let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
         let address = Address::truncate(cell as u8);
         if seed % 3 == 0 {
@@ -270,6 +273,7 @@ fn hostile_eeprom_writes() {
             let at_ns = bench.ready_ns;
             let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
         }
+        bench.restarts = (seed % 5 == 0).then_some(Draw::seeded(seed));
         let access = EepromAccess::write(Page::truncate(page as u8), address, data, EEPROM_POLLING);
         let end = bench.run(&mut Watched { access, held: BTreeMap::new(), seed });
         if bench.forged_requests > 0 {
@@ -293,6 +297,58 @@ fn hostile_eeprom_writes() {
     });
     assert!(ends.not_done > 0, "{ends:?}");
     ends.print("EEPROM writes");
+}
+
+/// What is read is what the cell of the named page holds, and reading changes no cell, although an encoder that has restarted is
+/// on page 0 again.
+#[test]
+fn hostile_eeprom_reads() {
+    let (mut done, mut failed) = (0, 0);
+    runs("EEPROM reads", |seed| {
+        let mut bench = bench(seed, procedure_rates(seed));
+        bench.restarts = (seed % 2 == 0).then_some(Draw::seeded(seed));
+        for (page, cells) in (0_u8..).zip(bench.device.eeprom_mut()) {
+            cells.iter_mut().zip(0_u8..).for_each(|(cell, at)| *cell = page << 5 ^ at);
+        }
+        let memory = *bench.device.eeprom_mut();
+        for k in 0..4 {
+            let (page, cell) = ((seed + k) as usize % 6, (seed * 5 + k) as usize % 127);
+            let page_of = Page::truncate(page as u8);
+            let end = bench.run(&mut EepromAccess::read(page_of, Address::truncate(cell as u8), EEPROM_POLLING));
+            // A write that nobody sent, or a reading that was none.
+            if bench.forged_requests + bench.misread > 0 {
+                break;
+            }
+            match end {
+                Ok(value) => assert_eq!(value, memory[page][cell], "seed {seed}: page {page}, cell {cell}"),
+                Err(_) => failed += 1,
+            }
+            done += u32::from(end.is_ok());
+            assert_eq!(*bench.device.eeprom_mut(), memory, "seed {seed}: a read has changed the memory");
+        }
+        bench
+    });
+    println!("EEPROM reads: {done} done, {failed} failed");
+    assert!(done > 0 && failed > 0, "{done} done, {failed} failed");
+}
+
+/// An encoder is found at its rate, with a response that is its own, or not at all.
+#[test]
+fn hostile_detections() {
+    let (mut found, mut lost) = (0, 0);
+    runs("detections", |seed| {
+        let mut bench = bench(seed, Rates::ROUGH);
+        let other = Line::new(BitRate::ALL[1 - (seed / 2) as usize % 2]);
+        let lines = if seed % 3 == 0 { [bench.line, other] } else { [other, bench.line] };
+        let mut draw = Draw::seeded(seed);
+        for _ in 0..10 {
+            let end = bench.detect(&mut Detection::on(lines), &mut draw);
+            *(if end.is_ok() { &mut found } else { &mut lost }) += 1;
+        }
+        bench
+    });
+    println!("detections: {found} found, {lost} not");
+    assert!(found > 0 && lost > 0, "{found} found, {lost} not");
 }
 
 proptest! {

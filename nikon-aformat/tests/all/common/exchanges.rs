@@ -9,7 +9,7 @@ use nikon_aformat::{
 };
 use servowire_world::{Id, Scenario, Seed, Speaker, Tally, Transmission, Verdict, first_seed};
 
-use super::line::{Bench, Spoken, between_ns, events, frame_ns, host_within, idle_ns, rates, value_of};
+use super::line::{Bench, Spoken, between_ns, faults, frame_ns, host_within, idle_ns, rates, value_of};
 use super::switches::{Mix, Switches};
 
 /// What a run depends on.
@@ -48,7 +48,7 @@ pub fn seeds<S: Default>(
         let said = Seed(seed);
         run(&setup(seed), &mut shown);
         drop(said);
-        if tally(&shown).events() > events() {
+        if tally(&shown).all_faults() >= faults() {
             break;
         }
     }

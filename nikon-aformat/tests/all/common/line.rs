@@ -18,12 +18,12 @@ pub struct Handed {
     pub end_ns: u64,
 }
 
-/// Events of a run, unless the environment says another number.
-pub const USUAL_EVENTS: u64 = 100_000;
+/// Faults of a run, unless the environment says another number.
+pub const USUAL_FAULTS: u64 = 10_000;
 
-/// Events of this run.
-pub fn events() -> u64 {
-    servowire_world::wanted_events(USUAL_EVENTS)
+/// Faults of this run.
+pub fn faults() -> u64 {
+    servowire_world::wanted_events(USUAL_FAULTS)
 }
 
 /// The encoders of a line, and what carries their words.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::device::{Behaviour, Ea, FirstRead, Restart, ShownAddress, Shows};
 
-use super::line::{USUAL_EVENTS, events};
+use super::line::{USUAL_FAULTS, faults};
 
 /// One setting of all open points.
 #[derive(Debug, Clone, Copy)]
@@ -137,7 +137,7 @@ pub enum Order {
 
 /// Every setting of every point was drawn, in a run of the usual length or a longer one.
 pub fn assert_all_drawn(mix: &Mix) {
-    if events() < USUAL_EVENTS {
+    if faults() < USUAL_FAULTS {
         return;
     }
     assert_eq!(mix.len(), 4 + 2 + 4 + 2 + 3 + 2 + 2 + 2, "{mix:?}");

@@ -10,9 +10,10 @@ use servowire_world::{
     Wire, World,
 };
 use tformat::device::{Behaviour, Device};
-use tformat::master::{Line, Progress, Transaction};
+use tformat::master::{Detection, Line, Progress, Step, Transaction};
 use tformat::{
-    Abm, Abs, Address, BitRate, Doubt, Error, Evidence, Policy, Request, Resolution, Response, Sample, Tolerated,
+    Abm, Abs, Address, AllData, BitRate, Doubt, Error, Evidence, Policy, Request, Resolution, Response, Sample,
+    Tolerated,
 };
 
 /// What was seen in a run besides the line's own tally.
@@ -70,11 +71,15 @@ pub struct Bench {
     turn: u32,
     budget_ns: u64,
     response_ns: u64,
-    /// Whether the tenth response to a reset shows its effect.
-    tenth_shows_effect: bool,
+    behaviour: Behaviour,
     /// The host has other things to ask and mixes outcomes up: now and then a procedure is given that of another request,
     /// which was sent in place of its own.
     pub astray: Option<Draw>,
+    /// The supply of the encoder fails: now and then it restarts before a request. It keeps its memory, its position and the
+    /// turns; the page register and the count of resets start over.
+    pub restarts: Option<Draw>,
+    /// Effects before the last restart.
+    effects: u32,
 }
 
 impl Bench {
@@ -109,9 +114,25 @@ impl Bench {
             // Four bits of turn-around and a field.
             budget_ns: field_ns(rate) * 14 / 10,
             response_ns: 11 * field_ns(rate),
-            tenth_shows_effect: behaviour.tenth_shows_effect,
+            behaviour,
             astray: None,
+            restarts: None,
+            effects: 0,
         }
+    }
+
+    /// Effects of resets, over all restarts.
+    pub fn effects(&self) -> u32 {
+        self.effects + self.device.effects()
+    }
+
+    fn restart(&mut self) {
+        let (abs, abm, memory) = (self.device.abs(), self.device.abm(), *self.device.eeprom_mut());
+        self.effects = self.effects();
+        self.device = Device::new(0x17, self.line.rate);
+        self.device.set_behaviour(self.behaviour);
+        self.device.set_position(abs, abm);
+        *self.device.eeprom_mut() = memory;
     }
 
     /// With a host that mixes outcomes up.
@@ -143,6 +164,9 @@ impl Bench {
 
     /// One request, judged by the laws of time.
     pub fn exchange(&mut self, request: Request, not_before_ns: u64) -> Ended<Response, Error> {
+        if self.restarts.as_mut().is_some_and(|draw| draw.below(12) == 0) {
+            self.restart();
+        }
         if self.moves {
             self.turn += 1;
             let (abs, abm) = self.shaft();
@@ -237,6 +261,39 @@ impl Bench {
         ended.outcome
     }
 
+    /// Runs a search to its end. At the other rate the encoder understands nothing; it may take a request for some byte.
+    pub fn detect(&mut self, detection: &mut Detection, draw: &mut Draw) -> Result<AllData, Error> {
+        let mut step = detection.start(self.ready_ns);
+        for _ in 0..=6 {
+            let (request, not_before_ns) = match step {
+                Step::Send { request, not_before_ns } => (request, not_before_ns),
+                Step::Done { value, ready_ns } => {
+                    self.wait(ready_ns);
+                    assert_eq!(detection.line(), self.line, "found at the rate at which it does not answer");
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.wait(ready_ns);
+                    return Err(error);
+                }
+            };
+            assert_eq!(request.emit().as_bytes(), [0x1a], "a search sends nothing but ID 3");
+            self.wait(not_before_ns);
+            let Ended { outcome, ready_ns } = if detection.line() == self.line {
+                self.exchange(request, not_before_ns)
+            } else {
+                if draw.below(2) == 0 {
+                    let _ = self.world.intrude(&Message::bytes(&[draw.below(256) as u8]), not_before_ns);
+                }
+                self.wait(not_before_ns + 60_000);
+                Ended { outcome: Err(Error::NoResponse { echo: false }), ready_ns: not_before_ns + 60_000 }
+            };
+            step = detection.receive(outcome, ready_ns);
+            assert_eq!(outcome.is_ok(), matches!(step, Step::Done { .. }), "a sound response ends the search");
+        }
+        panic!("a search does not end");
+    }
+
     fn event(&mut self, transaction: &mut Transaction, until_ns: u64, late_ns: &mut u64) {
         match self.world.next(until_ns) {
             Event::Heard { unit, .. } => {
@@ -249,7 +306,7 @@ impl Bench {
                     self.device.framing_error(unit.end_ns)
                 };
                 if let Some(sent) = sent.filter(|_| byte == 0xc2 && self.device.effects() > effects) {
-                    let want = if self.tenth_shows_effect { 0 } else { abs };
+                    let want = if self.behaviour.tenth_shows_effect { 0 } else { abs };
                     assert_eq!(sent.frame.as_bytes()[2..5], want.to_le_bytes()[..3], "what the tenth response shows");
                 }
                 // Its own answers are not heard by itself.
