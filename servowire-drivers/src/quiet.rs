@@ -80,7 +80,8 @@ impl Line {
         self.look(clock, |check, now_ns| check.check_within(now_ns, wait_ns.saturating_add(MAX_AWAY_NS)))
     }
 
-    /// Reads the clock for the first time in a call, when it is not known how long ago the last reading was.
+    /// Reads the clock for the first time in a call of a user, when it is not known how long ago the last reading was. A second
+    /// reading like this in one call would take a clock that has jumped for time that has passed.
     pub(crate) fn first_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         self.look(clock, ClockCheck::check)
     }

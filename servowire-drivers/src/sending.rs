@@ -29,28 +29,31 @@ pub(crate) struct Sent {
     pub(crate) late_ns: u64,
 }
 
-/// Makes sure that the line driver is off, before listening. A future that was forgotten while its request was being sent has
-/// left the driver on; it is then not switched off before that request has left, however long ago the last look was.
+/// Makes sure that the line driver is off, before listening; returns the time. A future that was forgotten while its request was
+/// being sent has left the driver on; it is then not switched off before that request has left, however long ago the last look
+/// was.
+///
+/// `looked`: what the last look at the clock gave. If that was a fault, the driver is switched off all the same.
 #[inline]
 pub(crate) fn off<D: Direction>(
     switch: &mut Switch<D>,
     clock: &mut impl Clock,
     state: &mut quiet::Line,
     line: &Line,
-) -> Result<Result<(), ClockError>, D::Error> {
+    looked: Result<u64, ClockError>,
+) -> Result<Result<u64, ClockError>, D::Error> {
     let cut = switch.is_on() && switch.worst().is_some() && state.is_leaving();
-    let waited = if cut { outlast(clock, state, line) } else { Ok(()) };
+    let waited = if cut { looked.and(outlast(clock, state, line)) } else { looked };
     switch.off()?;
     Ok(waited)
 }
 
-/// Waits until no part of a request is still leaving, whenever it began.
+/// Waits until no part of a request is still leaving, whenever it began; returns the time.
 #[cold]
 #[inline(never)]
-fn outlast(clock: &mut impl Clock, state: &mut quiet::Line, line: &Line) -> Result<(), ClockError> {
+fn outlast(clock: &mut impl Clock, state: &mut quiet::Line, line: &Line) -> Result<u64, ClockError> {
     let longest_ns = leaving::longest_ns(line.rate.fields_ns(1).into(), line.turn_around_ns.into());
-    let looked = state.first_ns(clock).map(|_| ());
-    looked.and(state.sit_out(clock, u64::MAX, longest_ns))
+    state.sit_out(clock, u64::MAX, longest_ns).map(|()| state.last_ns())
 }
 
 impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {

@@ -13,6 +13,7 @@ mod hostile_line;
 mod hostile_procedures;
 mod noisy_bus;
 mod procedures;
+mod remains;
 #[cfg(feature = "serde")]
 mod serde;
 mod transactions;

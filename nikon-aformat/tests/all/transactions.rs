@@ -352,7 +352,6 @@ fn a_bus_counts_what_is_damaged() {
     assert_eq!((bus.bus().damaged(), bus.bus().missing().bits()), (2, 0b101));
 }
 
-/// Two responses in one block that began after the request; the first of them follows a piece of another one.
 /// The second frame of this response looks like the first one of another: what follows it after a pause, damaged or not, does not
 /// make it the beginning of a damaged response.
 #[test]
@@ -381,6 +380,7 @@ fn what_a_good_response_holds_is_not_damaged() {
     }
 }
 
+/// Two responses in one block that began after the request; the first of them follows a piece of another one.
 #[test]
 fn several_responses_in_a_block() {
     let piece = frames(Command::Abs40Mt, 0)[..2].to_vec();

@@ -87,11 +87,21 @@ macro_rules! driver {
                 operation: Operation,
                 asked: Addresses,
             ) -> Result<BusTransaction, Failure<F>> {
+                let from_ns = self.state.first_ns(&mut self.clock)?;
+                $wait!(self.bus(from_ns, operation, asked))
+            }
+
+            $($asynch)? fn bus(
+                &mut self,
+                from_ns: u64,
+                operation: Operation,
+                asked: Addresses,
+            ) -> Result<BusTransaction, Failure<F>> {
                 let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
                 let line = self.line.with_highest(self.line.highest.max(request.ea));
                 let (resolution, plain) = (self.resolution, self.line);
                 let start = |now_ns| BusTransaction::start(request, resolution, asked, plain, now_ns);
-                let (transaction, ()) = $wait!(self.exchange(request, line, start))?;
+                let (transaction, ()) = $wait!(self.exchange(from_ns, request, line, start))?;
                 Ok(transaction)
             }
 
@@ -108,8 +118,9 @@ macro_rules! driver {
             ) -> Result<BusTransaction, Failure<F>> {
                 let _ = self.state.first_ns(&mut self.clock)?;
                 $wait!(sleep(&mut self.state, &mut self.clock, cycle.next_ns()))?;
-                let _ = cycle.is_due(self.state.now_ns(&mut self.clock)?);
-                $wait!(self.read_bus(operation, asked))
+                let now_ns = self.state.now_ns(&mut self.clock)?;
+                let _ = cycle.is_due(now_ns);
+                $wait!(self.bus(now_ns, operation, asked))
             }
 
             /// Clears the alarms of an encoder: command 8, eight times. Position and turns are unchanged.
@@ -145,7 +156,8 @@ macro_rules! driver {
                         return Err(Error::Protocol(error));
                     }
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
-                    let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
+                    let from_ns = self.state.now_ns(&mut self.clock)?;
+                    let exchanged = $wait!(self.single(from_ns, request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
                 };
                 let ended = $wait!(run(procedure, now_ns, exchange))?;
@@ -158,20 +170,26 @@ macro_rules! driver {
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn transact(&mut self, request: Request) -> Result<Exchange, Failure<F>> {
+                let from_ns = self.state.first_ns(&mut self.clock)?;
+                $wait!(self.single(from_ns, request))
+            }
+
+            $($asynch)? fn single(&mut self, from_ns: u64, request: Request) -> Result<Exchange, Failure<F>> {
                 let (resolution, line) = (self.resolution, self.line);
                 let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
-                let (_, exchange) = $wait!(self.exchange(request, line, start))?;
+                let (_, exchange) = $wait!(self.exchange(from_ns, request, line, start))?;
                 Ok(exchange)
             }
 
-            /// Sends one request and receives all answers.
+            /// Sends one request and receives all answers. The clock was last read at `from_ns`.
             $($asynch)? fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
                 &mut self,
+                from_ns: u64,
                 request: Request,
                 line: Line,
                 start: impl FnOnce(u64) -> M,
             ) -> Result<(M, M::Value), Failure<F>> {
-                $wait!(self.settle())?;
+                $wait!(self.settle(from_ns))?;
                 let start_ns = self.state.now_ns(&mut self.clock)?;
                 let mut transaction = start(start_ns);
                 match transaction.progress() {
@@ -209,9 +227,8 @@ macro_rules! driver {
             }
 
             /// Waits until the line is free and discards what arrives meanwhile, errors of the port included.
-            $($asynch)? fn settle(&mut self) -> Result<(), Failure<F>> {
-                let mut until_ns = self.state.first_ns(&mut self.clock)?;
-                let mut settling = self.state.settle(until_ns);
+            $($asynch)? fn settle(&mut self, from_ns: u64) -> Result<(), Failure<F>> {
+                let (mut until_ns, mut settling) = (from_ns, self.state.settle(from_ns));
                 loop {
                     let (port, state, clock) = (&mut self.port, &mut self.state, &mut self.clock);
                     let Heard { what, now_ns } = $wait!(take(port, state, clock, until_ns))?;

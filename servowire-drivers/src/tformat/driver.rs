@@ -168,7 +168,8 @@ macro_rules! driver {
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
                     let request = tune(self, request)?;
                     self.check()?;
-                    let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
+                    let looked = self.state.now_ns(&mut self.clock);
+                    let exchanged = $wait!(self.exchange(looked, request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
                 };
                 let ended = $wait!(run(procedure, now_ns, exchange))?;
@@ -186,9 +187,20 @@ macro_rules! driver {
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+                let looked = self.state.first_ns(&mut self.clock);
+                $wait!(self.exchange(looked, request))
+            }
+
+            /// `looked`: what the last look at the clock gave.
+            $($asynch)? fn exchange(
+                &mut self,
+                looked: Result<u64, ClockError>,
+                request: Request,
+            ) -> Result<Exchange, Failure<U, D>> {
                 self.check()?;
-                sending::off(&mut self.direction, &mut self.clock, &mut self.state, &self.line).map_err(Error::Pin)??;
-                $wait!(self.settle())?;
+                let (clock, state) = (&mut self.clock, &mut self.state);
+                let from_ns = sending::off(&mut self.direction, clock, state, &self.line, looked).map_err(Error::Pin)??;
+                $wait!(self.settle(from_ns))?;
                 let start_ns = $wait!(self.send(request))?;
                 let mut transaction = Transaction::start(request, self.line, start_ns);
                 let (mut progress, mut bytes) = (transaction.progress(), [0; MAX_BYTES]);
@@ -220,9 +232,8 @@ macro_rules! driver {
             }
 
             /// Waits until the line is free and discards what arrives meanwhile, errors of the UART included.
-            $($asynch)? fn settle(&mut self) -> Result<(), Failure<U, D>> {
-                let mut until_ns = self.state.first_ns(&mut self.clock)?;
-                let mut settling = self.state.settle(until_ns);
+            $($asynch)? fn settle(&mut self, from_ns: u64) -> Result<(), Failure<U, D>> {
+                let (mut until_ns, mut settling) = (from_ns, self.state.settle(from_ns));
                 loop {
                     let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);
                     let Heard { what, now_ns } =

@@ -44,8 +44,9 @@ struct Besides {
 
 #[test]
 fn hostile_events_in_a_harder_world() {
-    let (mut draw, mut besides) = (Draw::default(), Besides::default());
+    let mut besides = Besides::default();
     live_through(|calls, seed| {
+        let mut draw = Draw::seeded(seed);
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
         let twins = draw.below(8) == 0;
         let bench = Bench::with(scenario(seed), misframed, if twins { 2 } else { 1 });
