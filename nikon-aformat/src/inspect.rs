@@ -261,6 +261,21 @@ mod tests {
         Window::from_bits(bits, len.min(128)).unwrap()
     }
 
+    /// A response that is cut off, and one whose fixed bit, bit 11 of the first frame, is 1.
+    #[test]
+    fn what_is_missing_and_what_is_fixed_is_listed() {
+        let request = Request::new(crate::EncoderAddress::ZERO, crate::Operation::Abs40);
+        let data = crate::Data::Abs40 { abs: crate::U40::truncate(1) };
+        let status = crate::EncoderStatus::empty();
+        let line = Response::new(request.ea, crate::Command::Abs40, status, data).emit().line();
+        let findings = |line| inspect(request, Resolution::default(), line).findings();
+        assert!(findings(window(line.bits(), 54)).iter().any(|class| class == ErrorClass::Truncated));
+        assert!(!findings(line).iter().any(|class| class == ErrorClass::Truncated));
+        // One start bit is before it.
+        let fixed = window(line.bits() | 1 << 12, line.len());
+        assert!(findings(fixed).iter().any(|class| class == ErrorClass::FixedBit));
+    }
+
     proptest! {
         #[test]
         fn a_good_response_has_no_findings((request, response) in plain()) {

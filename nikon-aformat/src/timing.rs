@@ -123,6 +123,11 @@ const fn narrow(value: u64) -> u32 {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_time_that_does_not_fit_is_as_long_as_can_be() {
+        assert_eq!((BitRate::Mbit2_5.bits_ns(u32::MAX), BitRate::Mbit16.bits(u32::MAX)), (u32::MAX, 68_719_477));
+    }
+
     /// Request and response on the line, without turn-around, as the tables of the protocol have them.
     #[test]
     fn line_times() {

@@ -218,6 +218,13 @@ mod tests {
         }
         assert_eq!(find(search, message().skip(1).unwrap()), Some((Cause::Shifted { bits: -1 }, Some(CONTENT))));
         assert_eq!(find(search, message().skip(2).unwrap()), None);
+        // Without a limit of one's own as far as the number goes.
+        let far = Search::new().with_late_bits(u8::MAX).with_early_bits(u8::MAX);
+        let late = window(bits << 100 | ((1 << 100) - 1), LEN + 100);
+        assert_eq!(find(far, late), Some((Cause::Shifted { bits: 100 }, Some(CONTENT))));
+        let none = Search::new();
+        assert_eq!(find(none, window(bits << 1 | 1, LEN + 1)), None);
+        assert_eq!(find(none, message().skip(1).unwrap()), None);
         // Its delimiter is beyond the end of what was taken.
         let cut = window(bits << 1 | 1, LEN);
         assert_eq!(find(search, cut), None);

@@ -55,7 +55,8 @@ impl<T: Tolerance> Policy<T> {
     /// does not make a value look young. A short distance is normal, because the writer may interrupt a reader between reading
     /// its clock and reading the value.
     ///
-    /// # Errors The age in ns, if it exceeds the maximum.
+    /// # Errors
+    /// The age in ns, if it exceeds the maximum.
     pub const fn check_age(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
         if now_ns < sampled_ns {
             self.check_ahead(now_ns, sampled_ns)

@@ -400,6 +400,8 @@ mod tests {
         let jumped = Err(ClockError::Ahead { by_ns: 5_000_000_001 });
         assert_eq!(line.after_ns(&mut || 22_000_030_001, 21_000_030_000), jumped);
         assert_eq!(line.after_ns(&mut || 22_000_030_000, u64::MAX), Err(ClockError::Backwards { by_ns: 1 }));
+        // However far back.
+        assert_eq!(line.after_ns(&mut || 30_000, u64::MAX), Err(ClockError::Backwards { by_ns: 22_000_000_000 }));
     }
 
     /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.

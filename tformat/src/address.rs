@@ -106,6 +106,7 @@ mod tests {
         for bits in 0..=255 {
             let adf = Adf::from_bits(bits);
             assert_eq!((adf.bits(), adf.address().get(), adf.busy()), (bits, bits % 128, bits > 127));
+            assert_eq!(adf.with_busy().bits(), bits % 128 + 128);
             assert_eq!(Adf::answered(adf.address(), bits > 127), adf);
         }
         assert_eq!(Adf::from_bits(0x85).to_string(), "5 busy");

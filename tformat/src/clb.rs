@@ -273,6 +273,48 @@ mod tests {
         }
     }
 
+    /// The clock is 1 while nothing is sent or received; else it is low for d cycles and high for d, and rises when it is said to.
+    #[test]
+    fn the_clock_of_each_bit_is_half_low_and_half_high() {
+        const D: u64 = 20;
+        let mut tile = Tile::new(20, 11, 60);
+        let (mut before, mut level, mut lasted, mut rises) = (Idle, true, 0, 0);
+        for cycle in 0..4_000_u64 {
+            let out = tile.cycle(Inputs { start: cycle == 59, response: cycle < 700 });
+            let busy = matches!(out.state, TransmitData | ReceiveData);
+            assert!(busy || out.clock, "{cycle}");
+            if busy && out.state == before && out.clock != level {
+                assert_eq!(lasted, D, "{cycle}");
+                assert!(!out.clock || out.clock_rises, "{cycle}");
+                rises += u32::from(out.clock);
+            }
+            lasted = if out.state == before && out.clock == level { lasted + 1 } else { 1 };
+            (before, level) = (out.state, out.clock);
+        }
+        assert_eq!(rises, 11 + 60);
+    }
+
+    #[test]
+    fn a_start_and_an_edge_at_once_are_one_event() {
+        for state in [Idle, TransmitData, ReceiveData, WaitForStart] {
+            assert!(lut1(true, true, state) && lut1(true, false, state));
+            assert_eq!(lut1(false, true, state), state == WaitForStart);
+        }
+    }
+
+    /// A line that is low when it is waited for has to rise and fall.
+    #[test]
+    fn a_response_begins_with_an_edge() {
+        let mut tile = Tile::new(20, 11, 60);
+        let mut waited = false;
+        for cycle in 0..2_000 {
+            let out = tile.cycle(Inputs { start: cycle == 59, response: cycle < 300 });
+            waited |= out.state == WaitForStart;
+            assert!(out.state != ReceiveData, "{cycle}");
+        }
+        assert!(waited);
+    }
+
     /// A readout of ID 0 at 100 MHz, d = 20: the cycles at which the states are entered, by the arithmetic of the design.
     #[test]
     fn a_transaction_cycle_by_cycle() {

@@ -65,6 +65,12 @@ mod tests {
         }
     }
 
+    #[test]
+    fn what_the_check_field_should_have_been_is_told() {
+        assert_eq!(check(&[0x1a, 0x70, 0x0f]), Err(Error::Crc { got: 0x0f, want: 0x6a }));
+        assert_eq!((check(&[0x1a, 0x70, 0x6a]), check(&[])), (Ok(()), Ok(())));
+    }
+
     /// The undetected share of 2-bit errors that the documentation states, counted pair by pair.
     #[test]
     fn what_it_cannot_see() {

@@ -315,6 +315,15 @@ mod tests {
         assert!(!report.fields()[2].start_ok && !report.fields()[3].delimiter_ok);
     }
 
+    /// The response to ID 1, one whose control field has a wrong parity, and one of which the last field is missing.
+    #[test]
+    fn what_is_wrong_with_the_first_field_and_the_length_is_listed() {
+        let findings = |bytes: &[u8]| inspect(Request::ReadSingleTurn, Frame::new(bytes).unwrap().line()).findings();
+        assert!(findings(&[0x8a, 0, 1, 2, 3, 0x8a]).iter().eq([ErrorClass::CfMismatch]));
+        assert!(findings(&[0x0a, 0, 1, 2, 3, 0x0a]).iter().eq([ErrorClass::Parity]));
+        assert!(findings(&[0x02, 0, 1, 2, 3]).iter().eq([ErrorClass::Truncated]));
+    }
+
     #[test]
     fn causes_are_sentences() {
         assert_eq!(

@@ -189,7 +189,11 @@ mod tests {
                 let mut bad = words.clone();
                 bad[field] |= 0x100;
                 prop_assert_eq!(parse_spi10(request, &bad), Err(Error::StartBit { field: field as u8 }));
-                if field > 0 {
+                if field == 0 {
+                    // What is before the first field is no delimiter.
+                    bad[field] = words[field] & !0x200;
+                    prop_assert_eq!(parse_spi10(request, &bad), Ok(response));
+                } else {
                     bad[field] = words[field] & !0x200;
                     prop_assert_eq!(parse_spi10(request, &bad), Err(Error::Delimiter { field: field as u8 - 1 }));
                 }

@@ -134,6 +134,7 @@ mod tests {
     fn requests() {
         assert_eq!(PRIVATE.emit(&[]).unwrap().as_bytes(), [0x14]);
         assert_eq!(PRIVATE.emit(&[1, 2]).unwrap().as_bytes(), [0x14, 1, 2, 0x17]);
+        assert_eq!(PRIVATE.emit(&[0x10, 2]).unwrap().as_bytes(), [0x14, 0x10, 2, 0x06]);
         assert_eq!(PRIVATE.emit(&[0; 9]).unwrap().fields(), 11);
         assert_eq!(PRIVATE.emit(&[0; 10]), None);
         assert_eq!(PRIVATE.emit(&[0; 11]), None);
@@ -144,6 +145,8 @@ mod tests {
         for fields in 0..=255 {
             assert_eq!(VendorCommand::new(0x14, fields).is_ok(), (2..=11).contains(&fields));
         }
+        let limit = |fields| VendorCommand::new(0x14, fields).map_err(|error| error.max);
+        assert_eq!([limit(0), limit(1), limit(12)], [Err(2), Err(2), Err(11)]);
         assert_eq!((PRIVATE.cf(), PRIVATE.response_fields()), (0x14, 4));
     }
 

@@ -133,3 +133,24 @@ proptest! {
         prop_assert_eq!(short, before);
     }
 }
+
+/// A buffer of just the bits of a request is long enough for it.
+#[test]
+fn a_request_fits_where_it_just_fits() {
+    let frames = Request::new(EncoderAddress::ZERO, Operation::EepromRead { address: 7 }).emit();
+    for gap_bits in [0, 4] {
+        let bits = 36 + gap_bits;
+        let mut bytes = [0; 5];
+        assert_eq!(frames.write_line(&mut bytes, (40 - bits) as usize, gap_bits, BitOrder::LsbFirst), Ok(bits));
+    }
+    assert!(frames.write_line(&mut [0; 5], 1, 4, BitOrder::LsbFirst).is_err());
+}
+
+/// Memory frames in another order are no request: MDF0 has frame code 1, MDF1 2, MDF3 0 and MDF2 3.
+#[test]
+fn memory_frames_in_another_order_are_refused() {
+    let write = Request::new(EncoderAddress::ZERO, Operation::EepromWriteBank { bank: 1, address: 2, data: 3 }).emit();
+    let mut frames = write.as_slice().to_vec();
+    frames.swap(1, 2);
+    assert_eq!(Request::parse(&frames), Err(Error::FrameCode { frame: 1, got: 2, want: 1 }));
+}

@@ -246,3 +246,58 @@ fn repeated_arguments() {
         assert_eq!(got, want, "{operation:?}");
     }
 }
+
+/// The whole position with the velocity behind it: 40 bits and 32, least significant first, from bit 16 of the contents on.
+#[test]
+fn velocity_is_behind_the_position() {
+    let abs40_vel = Data::Abs40Vel { abs: U40::truncate(0x12_3456_789a), velocity: -0x0102_0304 };
+    let sent = Response::new(EncoderAddress::ZERO, Command::Abs24Low, EncoderStatus::empty(), abs40_vel);
+    let raw = sent.emit();
+    assert_eq!(raw.contents()[1..], [0x789a, 0x3456, 0xfc12, 0xfdfc, raw.contents()[5]]);
+    assert_eq!(raw.contents()[5] & 0xff, 0xfe);
+    let expected = Expected::new(Layout::Abs40Vel, Command::Abs24Low);
+    assert_eq!(Response::parse(&expected, &raw), Ok(sent));
+}
+
+/// The encoder is the right one; what it answers is another command.
+#[test]
+fn the_command_that_was_answered_is_told() {
+    let expected = Expected::new(Layout::Abs40, Command::Abs40).from_address(EncoderAddress::truncate(5));
+    let data = Data::Abs40 { abs: U40::truncate(1) };
+    let of = |ea, command| Response::new(EncoderAddress::truncate(ea), command, EncoderStatus::empty(), data).emit();
+    let refused = |raw| Response::parse(&expected, &raw).unwrap_err();
+    assert_eq!(refused(of(5, Command::Abs40Mt)), Error::CommandMismatch { got: 4, want: 0 });
+    assert_eq!(refused(of(2, Command::Abs40Mt)), Error::AddressMismatch { got: 2, want: 5 });
+}
+
+/// Two wrong bits of which one is a start bit or a delimiter: neither hides the other.
+#[test]
+fn no_wrong_framing_is_hidden_by_another_wrong_bit() {
+    let status = EncoderStatus::empty();
+    let abs40 = Data::Abs40 { abs: U40::truncate(0x12_3456_789a) };
+    let abs40_vel = Data::Abs40Vel { abs: U40::truncate(0x12_3456_789a), velocity: 0x0102_0304 };
+    for (command, data) in [(Command::Abs40, abs40), (Command::Abs24Low, abs40_vel)] {
+        let sent = Response::new(EncoderAddress::ZERO, command, status, data);
+        let (line, expected) = (sent.emit().line(), Expected::new(data.layout(), command));
+        assert_eq!(Response::parse_line(&expected, line), Ok(sent));
+        for framing in (0..line.len()).filter(|bit| matches!(bit % 18, 0 | 17)) {
+            for other in (0..line.len()).filter(|bit| *bit != framing) {
+                let error = Response::parse_line(&expected, flipped(flipped(line, framing), other)).unwrap_err();
+                let named = matches!(error, Error::StartBit { .. } | Error::Delimiter { .. });
+                assert!(named, "bits {framing} and {other}: {error}");
+            }
+        }
+    }
+}
+
+/// What is set twice stays set.
+#[test]
+fn the_same_twice_is_the_same() {
+    let (ea, expected) = (EncoderAddress::truncate(5), Expected::new(Layout::Abs40, Command::Abs40));
+    assert_eq!(expected.from_address(ea).from_address(ea), expected.from_address(ea));
+    let of = crate::bus::Addresses::NONE.with(ea);
+    assert_eq!(of.with(ea), of);
+    let (status, alarms) = (EncoderStatus::all(), crate::Alm::all());
+    let tolerated = crate::Tolerated::NOTHING.status(status).alarms(alarms);
+    assert_eq!(tolerated.status(status).alarms(alarms), tolerated);
+}

@@ -27,6 +27,21 @@ fn word(address: u8, data: u16, busy: bool) -> Result<Response, Error> {
     Ok(Response::new(THREE, Command::EepromRead, es, Data::Eeprom { data, address }))
 }
 
+/// The only encoder is the one that has answered with its identification code; any other response does not say who it is.
+#[test]
+fn only_an_identification_code_tells_who_the_only_encoder_is() {
+    let mut write = VerifiedWrite::new(Write::id_of_the_only_encoder(EncoderId::truncate(0x12_3456)));
+    let asked = |step| match step {
+        Step::Send { request, .. } => Some((request.ea, request.operation)),
+        _ => None,
+    };
+    let first = asked(write.start(0));
+    assert!(matches!(first, Some((_, Operation::IdRead2))));
+    assert_eq!(asked(write.receive(status(FIVE, Command::Status, Alm::empty()), 0)), first);
+    let named = response(FIVE, Command::IdRead2, Data::Id { id: EncoderId::truncate(1) });
+    assert_eq!(asked(write.receive(named, 0)), Some((FIVE, Operation::Status)));
+}
+
 /// A host that mixes up the outcomes of its requests: another encoder's response to the same command, or one that repeats
 /// other arguments, says nothing of this write.
 #[test]

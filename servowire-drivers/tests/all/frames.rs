@@ -140,8 +140,10 @@ impl Bench {
         seed: u64,
         call: usize,
     ) {
-        let verdict = |shaft: u32| self.world.truth().verdict(request, shaft.into());
-        calls.count(outcome.map(|result| result.map(verdict)), whole, self.was_preempted(), seed, call);
+        let truth = self.world.truth();
+        let held_up = matches!(outcome, Some(Ok(shaft)) if truth.held_up_into(request, shaft.into()));
+        let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
+        calls.count(outcome, whole, self.was_preempted() || held_up, seed, call);
     }
 
     pub fn pass(&mut self, until_ns: u64) {

@@ -181,6 +181,15 @@ impl Truth {
         verdict
     }
 
+    /// Whether the line held `request` up, and somebody else than the host put `tag` on it meanwhile: a master that believes that
+    /// its request has left cannot tell that from an answer.
+    pub fn held_up_into(&self, request: Id, tag: u64) -> bool {
+        self.transmission(request).is_some_and(|sent| {
+            let meanwhile = |t: &Transmission| t.speaker != Speaker::Host && t.end_ns > sent.asked_ns;
+            sent.start_ns > sent.asked_ns && self.log.iter().any(|t| t.tag == Some(tag) && meanwhile(t))
+        })
+    }
+
     /// Laws 2 and 3: the answers to `request` that came to the host whole, which a master may therefore not lose.
     pub fn intact_answers(&self, request: Id) -> impl Iterator<Item = &Transmission> {
         self.answers(request).filter(|t| t.intact)

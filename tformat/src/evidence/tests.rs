@@ -244,3 +244,16 @@ proptest! {
         prop_assert_eq!(u64::from(sample.angle().to_bits()), u64::from(low) << (32 - abs_bits));
     }
 }
+
+/// 17 bits of turns where the encoder has 16: what is too much is told.
+#[test]
+fn what_is_beyond_the_width_of_the_turns_is_told() {
+    let wide = AllData { abm: Abm::truncate(0x1_fffe), ..data(0, 0) };
+    assert_eq!(all(wide).at(1_000, STRICT), Err(Doubt::UpperBits { value: 0x1_fffe, excess: 0x1_0000 }));
+}
+
+#[test]
+fn alarms_that_are_tolerated_twice_are_tolerated() {
+    let once = Tolerated::NOTHING.alarms(Almc::BE);
+    assert_eq!(once.alarms(Almc::BE), once);
+}

@@ -181,3 +181,38 @@ fn what_the_check_field_cannot_see_is_accepted() {
     let all_ones: Vec<u8> = std::vec![0xff; 6];
     assert_eq!(Response::parse(Request::ReadSingleTurn, &all_ones), Err(Error::SinkCode { cf: 0xff }));
 }
+
+/// A control field without the sink code, whose bits are none of those that are wanted, and the start of a refusal.
+#[test]
+fn a_line_with_another_first_field_is_refused() {
+    let parse = |bytes: &[u8]| Response::parse_line(Request::ReadSingleTurn, Frame::new(bytes).unwrap().line());
+    assert!(
+        matches!(parse(&[0x00, 1, 2, 3, 4, 4]), Err(Error::SinkCode { .. })),
+        "{:?}",
+        parse(&[0x00, 1, 2, 3, 4, 4])
+    );
+    assert_eq!(parse(&[CF3]), Err(Error::Truncated { got: 1, want: 11 }));
+}
+
+/// Two wrong bits of which one is a start bit or a delimiter: neither hides the other.
+#[test]
+fn no_wrong_framing_is_hidden_by_another_wrong_bit() {
+    let full = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+    let cases: [(Request, &[u8]); 3] = [
+        (Request::ReadAll, &full),
+        (Request::ReadSingleTurn, &[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
+        (Request::ReadEncoderId, &[0x92, 0x00, 0x17, 0x85]),
+    ];
+    for (request, bytes) in cases {
+        let line = Frame::new(bytes).unwrap().line();
+        assert!(Response::parse_line(request, line).is_ok());
+        for framing in (0..line.len()).filter(|bit| matches!(bit % 10, 0 | 9)) {
+            for other in (0..line.len()).filter(|bit| *bit != framing) {
+                let bad = Window::from_bits(line.bits() ^ 1 << framing ^ 1 << other, line.len()).unwrap();
+                let error = Response::parse_line(request, bad).unwrap_err();
+                let named = matches!(error, Error::StartBit { .. } | Error::Delimiter { .. } | Error::Truncated { .. });
+                assert!(named, "{request}, bits {framing} and {other}: {error}");
+            }
+        }
+    }
+}

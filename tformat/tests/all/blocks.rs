@@ -163,3 +163,39 @@ fn no_position_is_lost_on_a_sound_line() {
         }
     }
 }
+
+/// The first field is told late, as late as the answer to the request would begin; by the time of the last field, and by four fields
+/// before it, it began too early.
+#[test]
+fn a_response_is_as_old_as_its_last_field_says() {
+    // From 5.6 us on, 1.6 after the request; the first field ends at 9.6 us then.
+    for (begin_ns, taken) in [(5_600, true), (5_500, false)] {
+        let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+        for (k, byte) in (1..).zip(checked(&[0x02, 0, 1, 2, 3])) {
+            let end_ns: u64 = begin_ns + 4_000 * k;
+            let _ = transaction.hear(&[byte], if k == 1 { end_ns.max(9_700) } else { end_ns });
+        }
+        assert_eq!(outcome(&mut transaction).is_ok(), taken, "{begin_ns}");
+    }
+}
+
+/// Two responses are refused: the first one says why.
+#[test]
+fn the_first_fault_is_told() {
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let _ = transaction.hear(&[0x02, 0, 1, 2, 3, 0x55], 31_000);
+    let _ = transaction.hear(&[0x02, 0, 1, 2, 3, 0x66], 55_000);
+    assert_eq!(outcome(&mut transaction), Err(Error::Crc { got: 0x55, want: 0x02 }));
+}
+
+/// Noise that looks like the start of a refusal, with the response right behind it: it ends with the last field of the response, and
+/// not when the time is over.
+#[test]
+fn a_response_behind_what_looks_like_a_refusal_is_not_waited_for() {
+    let response = checked(&[0x02, 0x20, 0xb4, 0xbd, 0x1c]);
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    for (k, byte) in (1..).zip([0x02, 0x1a].iter().chain(&response)) {
+        let _ = transaction.hear(&[*byte], 7_000 + 4_000 * k);
+    }
+    assert!(matches!(transaction.progress(), Progress::Done { .. }), "{:?}", transaction.progress());
+}

@@ -207,6 +207,7 @@ contract!(
     pauses_are_kept,
     a_cycle_keeps_its_grid,
     the_line_is_left_alone_after_a_procedure,
+    a_line_is_silent_for_two_frames,
     silence_ends
 );
 
@@ -370,6 +371,21 @@ mod of_all {
         driver.read_abs40(ONE).unwrap();
         let sent = bench.0.borrow().sent.clone();
         assert!(sent[1].0 - sent[0].0 >= 500_000, "{sent:?}");
+    }
+
+    /// A frame that nobody asked for is on the line until now.
+    pub(super) fn a_line_is_silent_for_two_frames<D: Calls>() {
+        let (bench, mut driver) = driver::<D>();
+        driver.read_abs40(ONE).unwrap();
+        let begun_ns = {
+            let mut world = bench.0.borrow_mut();
+            let now_ns = world.now_ns;
+            world.coming.push_back(Frame { content: 0, framed: true, end_ns: Some(now_ns) });
+            now_ns
+        };
+        driver.read_abs40(ONE).unwrap();
+        let sent_ns = bench.0.borrow().sent.last().unwrap().0;
+        assert!((begun_ns + 2 * FRAME_NS..begun_ns + 3 * FRAME_NS).contains(&sent_ns), "{sent_ns} after {begun_ns}");
     }
 
     pub(super) fn silence_ends<D: Calls>() {
