@@ -261,7 +261,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         if end_safe | safe_taken != 0 {
             self.clear(Register::EventS, [safe], [end_safe | safe_taken])?;
         }
-        if self.reset == Reset::Answered && low & INIT == 0 {
+        if self.reset == Reset::Answered && low & INIT == 0 && !self.is_init_shown()? {
             self.reset = Reset::Done;
         }
         if self.reset != Reset::Done {
@@ -271,6 +271,11 @@ impl<B: RegisterBus> RemoteReceiver<B> {
             (*ended, *dropped) = (0, false);
         }
         Ok(())
+    }
+
+    /// Returns whether the online status says that the encoder sends INIT. (The core raises the event again at once.)
+    fn is_init_shown(&mut self) -> Result<bool, BusError<B::Error>> {
+        Ok(!self.is_core() && self.get::<2>(Register::OnlineStatusD)?[1] & INIT != 0)
     }
 
     /// Drops the messages under way (MRST), for an encoder that does not answer. Until the encoder has answered INIT, or the

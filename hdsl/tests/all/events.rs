@@ -189,7 +189,9 @@ fn a_monitor_over_lost_frames() {
                 }
                 let report = desk.frame();
                 number += 1;
-                match monitor.h_frame(&report) {
+                let findings = monitor.h_frame(&report);
+                assert_eq!(findings.is_some(), report.v_frame.is_some());
+                match findings {
                     Some(Channel2Findings::STALE) | None => {}
                     Some(findings) => {
                         assert_eq!(findings, Channel2Findings::empty(), "{told} {place} {lost}");

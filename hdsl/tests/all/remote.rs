@@ -14,7 +14,7 @@ pub(crate) struct Firmware {
     meanwhile: Option<(usize, u8)>,
     /// The encoder answers no messages.
     pub(crate) mute: bool,
-    /// Frames until the encoder answers INIT.
+    /// Frames until the encoder has answered INIT.
     init: u8,
 }
 
@@ -35,18 +35,18 @@ impl Firmware {
 
     /// What the firmware does in its next frame.
     pub(crate) fn frame(&mut self) {
-        if self.init > 0 {
-            self.init -= 1;
-            self.memory[0x05] |= if self.init == 0 { 0x20 } else { 0 };
-        }
+        // It comes some frames later, and lasts for three.
+        let init = matches!(self.init, 1..=3);
+        self.init = self.init.saturating_sub(1);
+        self.memory[0x05] |= if init { 0x20 } else { 0 };
         if self.memory[0x00] & 0x40 != 0 {
             (self.memory[0x00], self.memory[0x40], self.memory[0x2c]) = (0, 0x3f, 0);
-            (self.memory[0x51], self.memory[0x53], self.init) = (0x02, 0x01, 3);
+            (self.memory[0x51], self.memory[0x53], self.init) = (0x02, 0x01, 6);
             self.memory[0x05] |= 0x02;
             self.memory[0x3d] |= 0x01;
         }
         self.memory[0x53] = u8::from(self.memory[0x40] == 0x3f);
-        self.memory[0x51] = if self.memory[0x2c] & 1 == 0 { 0x02 } else { 0 };
+        self.memory[0x51] = if self.memory[0x2c] & 1 == 0 { 0x02 } else { 0 } | if init { 0x20 } else { 0 };
         if self.mute {
             return;
         }
@@ -94,8 +94,10 @@ pub(crate) struct Core {
     accesses: u32,
     /// The encoder answers no messages, and the core repeats them.
     pub(crate) mute: bool,
-    /// Frames until the encoder answers INIT.
+    /// Frames until the encoder has answered INIT.
     init: u8,
+    /// It does, and the event cannot be cleared.
+    min: bool,
 }
 
 impl Core {
@@ -103,7 +105,7 @@ impl Core {
         let mut registers = [0; 0x40];
         (registers[0x39], registers[0x3a], registers[0x3b]) = (0xff, 0xff, 0xff);
         let encoder = core::array::from_fn(|at| at as u8);
-        Self { registers, encoder, reading: None, writing: false, accesses: 0, mute: false, init: 0 }
+        Self { registers, encoder, reading: None, writing: false, accesses: 0, mute: false, init: 0, min: false }
     }
 
     /// The link restarts and locks again: messages are dropped, FREL and FRES are events of the lock.
@@ -115,16 +117,16 @@ impl Core {
     }
 
     pub(crate) fn frame(&mut self) {
-        if self.init > 0 {
-            self.init -= 1;
-            self.registers[0x05] |= if self.init == 0 { 0x20 } else { 0 };
-        }
+        // It comes some frames later, and lasts for three.
+        self.min = matches!(self.init, 1..=3);
+        self.init = self.init.saturating_sub(1);
+        self.registers[0x05] |= if self.min { 0x20 } else { 0 };
         if self.registers[0x00] & 0x40 != 0 {
             (self.registers[0x00], self.reading, self.writing, self.registers[0x2c]) =
                 (self.registers[0x00] & 0x3f, None, false, 0);
             self.registers[0x05] |= 0x02;
             self.registers[0x3d] |= 0x01;
-            self.init = 3;
+            self.init = 6;
         }
         if self.mute {
             return;
@@ -162,6 +164,7 @@ impl RegisterBus for Core {
     fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Infallible> {
         for (address, byte) in (address..).zip(bytes) {
             match address {
+                0x05 if self.min => self.registers[0x05] &= byte | 0x20,
                 0x04 | 0x05 | 0x3d => self.registers[usize::from(address)] &= byte,
                 0x03 | 0x09..=0x1f | 0x2d..=0x2f | 0x36 => {}
                 0x00..=0x3f => self.registers[usize::from(address)] = *byte,
