@@ -311,7 +311,8 @@ impl LogDecoder for Decoder {
 
 /// A NOP from before the start, in any order of its bytes: there is nothing but an address, or Sub_Chk.
 fn is_empty(block: &[u8]) -> bool {
-    matches!(block, [_, code, control, ..] if code & 0x7f == 0 && *control == 0)
+    let nothing_else = || block.iter().filter(|byte| **byte != 0).count() <= 1;
+    matches!(block, [_, code, control, ..] if code & 0x7f == 0 && *control == 0) || nothing_else()
 }
 
 /// The log says that the other end sent it.

@@ -62,6 +62,13 @@ const CONDITIONS: &[(&str, Condition)] = &[
     ("NOPs before the start", |rng| (Ring { nops: 5 + rng.below(90) as usize, ..ring(rng) }, PLAIN)),
     ("words of 16 bits exchanged", |rng| (ring(rng), Log { word: 2, form: Form::Lines, ..PLAIN })),
     ("words of 32 bits exchanged", |rng| (ring(rng), Log { word: 4, form: Form::Lines, ..PLAIN })),
+    ("NOPs, and words exchanged", |rng| {
+        let nops = 5 + rng.below(300) as usize;
+        (
+            Ring { nops, ..ring(rng) },
+            Log { word: rng.pick(&[2, 4]), form: rng.pick(&[Form::Lines, Form::Records]), ..PLAIN },
+        )
+    }),
     ("much is asked", |rng| (Ring { asked: 0.8, ..ring(rng) }, PLAIN)),
     ("much is refused", |rng| (Ring { asked: 0.8, refused: 0.5, ..ring(rng) }, PLAIN)),
     ("a drive alarms", |rng| (Ring { alarm: true, ..ring(rng) }, PLAIN)),
