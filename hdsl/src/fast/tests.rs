@@ -209,6 +209,29 @@ fn too_fast() {
         follow.fast.step(DeltaDelta::new(-1));
         let tolerated = Tolerated::missing_words(9, 1024);
         assert_eq!((follow.at(Tolerated::NOTHING), follow.at(tolerated)), (Err(Doubt::Speed), Err(Doubt::Speed)));
+        // The upper end is outside.
+        let mut follow = Follow::new(bits, 0, -1);
+        for _ in 0..24 {
+            let _ = follow.frame(0, Event::Good);
+        }
+        assert!(follow.at(Tolerated::NOTHING).is_ok());
+        follow.fast.step(DeltaDelta::new(1));
+        assert_eq!(follow.at(Tolerated::NOTHING), Err(Doubt::Speed));
+    }
+}
+
+/// A register map shows what may be used if both its position and its speed are those.
+#[test]
+fn what_a_register_map_shows() {
+    let mut follow = Follow::new(24, 7, 1 << 20);
+    for frame in 1..=30 {
+        let _ = follow.frame(3, Event::Good);
+        let (position, velocity) = (follow.truth().0.unsigned_abs(), follow.truth().1 as i32);
+        let at = |position, velocity| follow.fast.is_at(position, velocity);
+        assert_eq!(at(position, velocity), frame >= 24);
+        assert!(!at(position ^ 1, velocity) && !at(position, velocity + 1));
+        // Bits above the width do not count.
+        assert_eq!(at(position | 1 << 24, velocity), frame >= 24);
     }
 }
 
