@@ -71,8 +71,8 @@ pub struct Heard {
     /// Whether request and answer came through unhurt.
     pub whole: bool,
     pub preempted: bool,
-    /// Whether the line held the request up while somebody else gave that position.
-    pub held_up: bool,
+    /// Whether an old position is one that no driver could have told from an answer.
+    pub coincidence: bool,
 }
 
 impl Bench {
@@ -129,8 +129,8 @@ impl Bench {
         let whole =
             left && alone && !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
         // Nothing in the window of an SPI is older than the request, not even if the host was busy elsewhere.
-        let held_up = matches!(outcome, Some(Ok(shaft)) if truth.held_up_into(request, shaft.into()));
-        let excused = if self.sampled { !left } else { preempted || held_up };
+        let coincidence = matches!(outcome, Some(Ok(shaft)) if truth.is_coincidence(request, shaft.into()));
+        let excused = if self.sampled { !left } else { preempted || coincidence };
         let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
         calls.count(outcome, whole, excused, seed, call);
         let past_ns = self.now_ns().saturating_sub(1_000_000);
@@ -211,7 +211,7 @@ impl Bench {
         let request = self.request.and_then(|id| truth.transmission(id));
         let given = shaft.zip(request).map(|(shaft, request)| (request.id, shaft.into()));
         let verdict = given.map(|(request, shaft)| truth.verdict(request, shaft));
-        let held_up = given.is_some_and(|(request, shaft)| truth.held_up_into(request, shaft));
+        let coincidence = given.is_some_and(|(request, shaft)| truth.is_coincidence(request, shaft));
         let whole = request.is_some_and(|sent| {
             let gapless = |t: &Transmission| t.end_ns - t.start_ns == 4_000 * t.units as u64;
             let in_time = |answer: &Transmission| {
@@ -223,7 +223,7 @@ impl Bench {
         });
         let past_ns = self.now_ns().saturating_sub(1_000_000);
         self.world.truth_mut().forget_before(past_ns);
-        Heard { verdict, whole, preempted, held_up }
+        Heard { verdict, whole, preempted, coincidence }
     }
 
     fn take(&mut self, bytes: &[(u8, bool)]) {

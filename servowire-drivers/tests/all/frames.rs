@@ -10,6 +10,7 @@ use std::rc::Rc;
 #[cfg(feature = "async")]
 use std::task::Poll;
 
+use nikon_aformat::bus::{Bus, Outcome};
 use nikon_aformat::device::Device;
 use nikon_aformat::master::Line;
 use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
@@ -18,7 +19,7 @@ use servowire_drivers::Timer;
 use servowire_drivers::nikon::{Frame, blocking};
 use servowire_drivers::{Clock, ClockError};
 use servowire_world::{
-    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Wire, World,
+    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Verdict, Wire, World,
 };
 
 use crate::hostile::{Calls, rates};
@@ -131,6 +132,17 @@ impl Bench {
         self.verdict(calls, Some(outcome), whole, request, seed, call);
     }
 
+    /// Whether the CRC-8 of one of these responses is right by chance: of two that overlap nobody can tell which one was sent.
+    pub fn has_chance(&self, bus: &Bus) -> bool {
+        let (truth, Some(request)) = (self.world.truth(), self.request) else { return false };
+        EncoderAddress::ALL.into_iter().any(|ea| match bus.of(ea) {
+            Outcome::Good(response) | Outcome::Extra(response) => {
+                truth.verdict(request, shaft(response).into()) == Verdict::Unknown
+            }
+            _ => false,
+        })
+    }
+
     fn verdict<E: Debug>(
         &self,
         calls: &mut Calls,
@@ -141,9 +153,9 @@ impl Bench {
         call: usize,
     ) {
         let truth = self.world.truth();
-        let held_up = matches!(outcome, Some(Ok(shaft)) if truth.held_up_into(request, shaft.into()));
+        let coincidence = matches!(outcome, Some(Ok(shaft)) if truth.is_coincidence(request, shaft.into()));
         let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
-        calls.count(outcome, whole, self.was_preempted() || held_up, seed, call);
+        calls.count(outcome, whole, self.was_preempted() || coincidence, seed, call);
     }
 
     pub fn pass(&mut self, until_ns: u64) {

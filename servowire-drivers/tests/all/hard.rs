@@ -102,7 +102,7 @@ fn position(response: &Response) -> Option<u32> {
 
 fn judge<E>(calls: &mut Calls, outcome: &Result<Response, E>, heard: &Heard, alone: bool, what: &str) {
     let old = matches!(heard.verdict, Some(Verdict::Old { .. }));
-    assert!(!old || heard.preempted || heard.held_up, "{what}: {:?}", heard.verdict);
+    assert!(!old || heard.preempted || heard.coincidence, "{what}: {:?}", heard.verdict);
     let whole = heard.whole && alone && !heard.preempted;
     assert!(!whole || outcome.is_ok(), "{what}");
     match outcome {

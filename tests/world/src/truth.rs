@@ -181,13 +181,15 @@ impl Truth {
         verdict
     }
 
-    /// Whether the line held `request` up, and somebody else than the host put `tag` on it meanwhile: a master that believes that
-    /// its request has left cannot tell that from an answer.
-    pub fn held_up_into(&self, request: Id, tag: u64) -> bool {
-        self.transmission(request).is_some_and(|sent| {
-            let meanwhile = |t: &Transmission| t.speaker != Speaker::Host && t.end_ns > sent.asked_ns;
-            sent.start_ns > sent.asked_ns && self.log.iter().any(|t| t.tag == Some(tag) && meanwhile(t))
-        })
+    /// Whether a master can have taken the old value `tag` for an answer to `request` without a fault of its own: the line held the
+    /// request up, and somebody else than the host gave that value meanwhile; or it never came whole, and what came in place of
+    /// the rest happened to fit.
+    pub fn is_coincidence(&self, request: Id, tag: u64) -> bool {
+        let carriers = || self.log.iter().filter(|t| t.tag == Some(tag) && t.speaker != Speaker::Host);
+        let held_up = |sent: &Transmission| {
+            sent.start_ns > sent.asked_ns && carriers().any(|carrier| carrier.end_ns > sent.asked_ns)
+        };
+        self.transmission(request).is_some_and(held_up) || carriers().all(|carrier| carrier.delivered < carrier.units)
     }
 
     /// Laws 2 and 3: the answers to `request` that came to the host whole, which a master may therefore not lose.
