@@ -1,21 +1,21 @@
 //! The background half of a path: it plans along the lines, and hands segments for all axes to the interrupt.
 
 mod braking;
+mod making;
 
 use core::sync::atomic::Ordering;
 
 use servowire_core::Direction;
 
-use crate::axes_timer::{AxesQueue, AxesTimer, TURN, TURNS};
-use crate::axis::{COARSE, Work};
-use crate::cutter::Demand;
+use crate::axes_timer::{AxesQueue, AxesTimer};
+use crate::axis::{COARSE, EXACT, Work};
 use crate::error::Error;
 use crate::limits::Limits;
 use crate::path::Path;
 use crate::path_mover::PathMover;
-use crate::queue::{IDLE, Joint, Queue, REST, TICKET};
+use crate::queue::{IDLE, Queue, TICKET};
 use crate::real::Real;
-use crate::writer::{LONGEST, Writer, tick};
+use crate::writer::{LONGEST, Writer};
 
 /// The axes of a path, whose steps are made in an interrupt.
 ///
@@ -23,8 +23,8 @@ use crate::writer::{LONGEST, Writer, tick};
 /// them. A request takes effect at the end of the blocks already handed out: after at most twice the
 /// [reach](Self::with_reach). Only [`halt`](Self::halt) takes effect at once: no step follows it. Each block is followed by
 /// a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to rest on its lines, and
-/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, every other step
-/// to 3/4 of a tick, or 25 ns if that is more. If a block ends within two ticks of a step, or DIR changes, a step may be a
+/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or
+/// [as all others are](Self::with_exact_stops), every other step to 3/4 of a tick, or 25 ns if that is more. If a block ends within two ticks of a step, or DIR changes, a step may be a
 /// tick or two late.
 ///
 /// It contains four copies of the [`PathMover`], so keep it in a `static` or on a large stack.
@@ -79,7 +79,9 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     until: u64,
     put_off: u8,
     joint: [Writer; N],
+    /// How exact the stop is, and is to be at best.
     coarse: u32,
+    finest: u32,
     /// The stop after each of the two blocks, with all later requests.
     stops: [PathMover<N, M>; 2],
     outs: [Out<N>; 2],
@@ -148,6 +150,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             put_off: 0,
             joint: [Writer::new(0, None); N],
             coarse: COARSE,
+            finest: COARSE,
             outs: [out; 2],
             standing: true,
             pending: false,
@@ -162,6 +165,12 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
+    }
+
+    /// Makes the stop behind each block as exact as other steps are, where the [`AxesQueue`] has slots for it: about three times as many
+    /// as else, and instructions.
+    pub fn with_exact_stops(self) -> Self {
+        Self { finest: EXACT, ..self }
     }
 
     /// Steps of each axis made so far, forward less reverse ones.
@@ -408,102 +417,5 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             out.valid = false;
         }
         (self.stage, self.standing, self.pending, self.lost) = (Stage::Idle, true, false, false);
-    }
-
-    /// A block from where those that are out end.
-    fn begin(&mut self) -> Work {
-        let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
-        if reach < 4 {
-            return self.give_up();
-        }
-        self.work.clone_from(&self.path);
-        self.work.look_ahead(self.end);
-        let end = i128::from(self.end) << 32;
-        for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
-            *writer = Writer::new(end, dir);
-        }
-        (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
-        (self.stage, self.axis, self.quiet, self.coarse) = (Stage::Block, 0, 0, COARSE);
-        Work::More
-    }
-
-    /// On to the next axis, or to the first one; true if none has had anything.
-    fn is_through(&mut self) -> bool {
-        self.quiet = self.quiet.saturating_add(1);
-        self.axis = self.axis.saturating_add(1).checked_rem(N).unwrap_or(0);
-        self.quiet >= N
-    }
-
-    /// A segment of the block.
-    fn cut_block(&mut self) -> Work {
-        let (Some(writer), Some(queue)) = (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis)) else {
-            return Work::Later;
-        };
-        let time = self.until.saturating_sub(tick(writer.end)).saturating_mul(1 << 32);
-        let demand = Demand { off: self.off, coarse: None, time };
-        if let Some((stretch, direction)) = self.work.cut(self.axis, &demand, self.until) {
-            writer.put_steps((queue, self.block), &stretch, direction);
-            self.quiet = 0;
-            if writer.len.saturating_add(4) > Queue::<S>::BLOCK / 3 {
-                self.shorter = self.shorter.saturating_add(1);
-                self.stage = Stage::Idle;
-            }
-        } else if self.is_through() && !self.waits_for_a_step() {
-            self.join();
-        }
-        Work::More
-    }
-
-    /// A step comes in the tick in which the block is to end, or in the next one.
-    fn waits_for_a_step(&mut self) -> bool {
-        let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1) && self.put_off < PUT_OFF);
-        if let Some(due) = next {
-            (self.until, self.quiet) = (due.saturating_add(1), 0);
-            self.put_off = self.put_off.saturating_add(1);
-        }
-        next.is_some()
-    }
-
-    /// The end of the block, the same one for all axes.
-    fn join(&mut self) {
-        self.until = self.put_joint(self.until, Joint::Block);
-        self.joint = self.writers;
-        self.stage = Stage::Brake;
-        if let (Some(out), Some(first)) = (self.outs.get_mut(self.block), self.writers.first()) {
-            out.len = first.len;
-        }
-    }
-
-    /// An event of all axes at one tick, not before another one; at which.
-    fn put_joint(&mut self, at: u64, joint: Joint) -> u64 {
-        let last = self.writers.iter().map(|writer| tick(writer.end).saturating_add(1)).max().unwrap_or(at);
-        let at = at.max(last);
-        for (writer, queue) in self.writers.iter_mut().zip(&self.queue.axes) {
-            writer.put_joint((queue, self.block), i128::from(at) << 32, joint);
-        }
-        at
-    }
-
-    /// Lets the interrupt in, after the block before it or from rest.
-    fn publish(&mut self, end: u64) {
-        let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
-        if let Some(out) = self.outs.get_mut(self.block) {
-            *out = Out { valid: true, end, dirs: dirs(self.writers), ..*out };
-        }
-        for ((made, after), before) in self.made.iter_mut().zip(self.work.commanded()).zip(self.path.commanded()) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "modulo 2^32")]
-            let steps = after.wrapping_sub(before) as u32;
-            *made = made.wrapping_add(steps);
-        }
-        self.path.clone_from(&self.work);
-        (self.end, self.dirs) = (self.until, dirs(self.joint));
-        self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
-        let from = if self.standing { REST } else { 0 };
-        let slot = u32::try_from(Queue::<S>::slot(self.block, 0)).unwrap_or(0);
-        self.queue.gate.store(self.turn << TURN | from | slot, Ordering::Release);
-        if self.joint.iter().all(|writer| writer.len < Queue::<S>::BLOCK / 8) {
-            self.shorter = self.shorter.saturating_sub(1);
-        }
-        (self.pending, self.block, self.stage) = (true, 1_usize.wrapping_sub(self.block), Stage::Idle);
     }
 }

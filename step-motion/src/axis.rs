@@ -41,7 +41,7 @@ pub enum Work {
 /// or within 25 ns if that is more. All segments handed out are followed by a stop, unless they end at rest: if
 /// [`poll`](Self::poll) is not called in time, the axis stops after at most eight times the reach, or comes to rest by
 /// itself within four more, and continues from there at the next call. Each step of the stop is exact to a sixteenth of an
-/// interval.
+/// interval, or as all others are [if that is asked for](Self::with_exact_stops).
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -94,9 +94,10 @@ pub struct Axis<'q, const N: usize> {
     told: News,
     /// The stop behind it, while that is cut.
     stop: Option<Tail>,
-    /// Slots for the steps of a block, and how exact its stop is, as the one before had room for.
+    /// Slots for the steps of a block, and how exact its stop is, as the one before had room for; how exact it is to be at best.
     room: usize,
     coarse: u32,
+    finest: u32,
     /// How often in turn the interrupt was beyond the joint before the block was there.
     missed: u32,
     /// Of both blocks, and of their slots.
@@ -160,9 +161,16 @@ struct Tail {
     steps: u32,
 }
 
-/// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few.
+/// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few; or as
+/// exact as all other steps.
 pub(crate) const COARSE: u32 = 4;
 pub(crate) const COARSEST: u32 = 2;
+pub(crate) const EXACT: u32 = 63;
+
+/// The next less exact one.
+pub(crate) const fn coarser(than: u32) -> u32 {
+    if than > COARSE { COARSE } else { than.saturating_sub(1) }
+}
 /// The least reach, in ticks.
 const LEAST: u32 = 16;
 
@@ -197,6 +205,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             stop: None,
             room: Self::ROOM,
             coarse: COARSE,
+            finest: COARSE,
             missed: 0,
             out: [Out::NONE; 2],
             marks: [Mark::default(); N],
@@ -210,6 +219,12 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Sets the reach in ticks, at least 16: a request takes effect after at most twice the reach. 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(LEAST, LONGEST >> 3), ..self }
+    }
+
+    /// Makes the stop behind all that is queued as exact as other steps are, where the [`Queue`] has slots for it: about three
+    /// times as many as else, and instructions.
+    pub fn with_exact_stops(self) -> Self {
+        Self { coarse: EXACT, finest: EXACT, ..self }
     }
 
     /// Does the same as [`Mover::with_reversal_pause`].

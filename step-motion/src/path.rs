@@ -119,7 +119,7 @@ pub struct Path<const N: usize, const M: usize> {
     /// What it begins later than that, less than half a tick.
     offset: Real,
     /// On which curve the first line continues, and where that has begun, if there is one; and whether it knows all lines that there are.
-    on: Option<(Course, Start<N>)>,
+    on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
 }
 
@@ -222,13 +222,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Plans the first line of the queue and takes it out. It begins where and when the previous one ends; after a rest no
     /// earlier than [`not_before`](Self::not_before).
     pub fn next_line(&mut self) -> Option<LinePulses<N>> {
-        let line = self.line(0)?;
-        let (course, start) = match self.on.take() {
-            Some((course, start)) if self.knows_all => (course, start),
-            Some((old, start)) => self.anew(&old, &start).unwrap_or((old, start)),
+        let line = *self.line(0)?;
+        let (course, start, bounds) = match self.on.take() {
+            Some(on) if self.knows_all => on,
+            Some(on) => self.anew(&on).unwrap_or(on),
             None => {
                 self.not_before_turning();
-                (self.begin(0, self.speed, Some(Real::ONE))?.0, self.start())
+                let (course, bounds) = self.begin(0, self.speed, Some(Real::ONE))?;
+                (course, self.start(), bounds)
             }
         };
         self.knows_all = true;
@@ -240,7 +241,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 pulses.left = frame.begin.saturating_add(frame.since(&course.curve, time).to_fixed(0));
             }
             self.pass();
-            self.on = Some((Course { more: course.more.saturating_sub(1), ..course }, Start { before, ..start }));
+            let rest = Course { more: course.more.saturating_sub(1), ..course };
+            self.on = Some((rest, Start { before, ..start }, bounds));
         } else {
             self.finish(&course.curve, start.moment, start.offset, course.exit);
         }
@@ -248,13 +250,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// From the motion on a curve at the start of the first line, along more lines than it knew.
-    fn anew(&self, old: &Course, start: &Start<N>) -> Option<(Course, Start<N>)> {
+    fn anew(&self, (old, start, bounds): &(Course, Start<N>, Bounds)) -> Option<(Course, Start<N>, Bounds)> {
         let Piece { time, v, a, up, .. } = old.curve.after(start.before)?;
-        let (course, _) = self.course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), (Some(Real::ONE), None))?;
+        let how = (Some(Real::ONE), Some(*bounds), false);
+        let (course, bounds) = self.course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), how)?;
         let time = start.offset + (time - old.curve.skipped.0);
         let whole = self.whole(time);
         let offset = time - Real::new(whole);
-        Some((course, Start { before: Real::ZERO, moment: start.moment.saturating_add(whole), offset, ..*start }))
+        let start = Start { before: Real::ZERO, moment: start.moment.saturating_add(whole), offset, ..*start };
+        Some((course, start, bounds))
     }
 
     /// A time in whole units of the grid.
@@ -427,8 +431,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// After a rest, the next line begins no earlier than the pause of an axis that goes the other way, or did so perhaps.
     pub(super) fn not_before_turning(&mut self) {
-        let Some(line) = self.line(0).filter(|_| self.speed.is_zero()) else { return };
-        for ((axis, &steps), gone) in self.axes.iter().zip(&line.steps).zip(self.gone) {
+        let first = self.line(0).filter(|_| self.speed.is_zero());
+        let Some(all) = first.map(|line| line.steps) else { return };
+        for ((axis, steps), gone) in self.axes.iter().zip(all).zip(self.gone) {
             if steps != 0 && gone != Some(Direction::of(steps.into())) {
                 let pause = self.clock.moment(axis.reversal_pause.into());
                 self.moment = self.moment.max(self.over.saturating_add(pause));
@@ -452,12 +457,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Line `at` of the queue.
-    pub(super) fn line(&self, at: usize) -> Option<Line<N>> {
+    pub(super) fn line(&self, at: usize) -> Option<&Line<N>> {
         if at >= self.len {
             return None;
         }
-        let place = self.first.wrapping_add(at).checked_rem(M)?;
-        self.lines.get(place).copied().flatten()
+        let place = self.first.wrapping_add(at);
+        self.lines.get(if place < M { place } else { place.wrapping_sub(M) })?.as_ref()
     }
 }
 

@@ -114,7 +114,7 @@ impl Frame {
 }
 
 /// The curve of one axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Phases {
     pub(super) curve: Curve,

@@ -9,7 +9,7 @@ use crate::real::Real;
 ///
 /// Step k falls into the tick nearest to the time at which the position passes k - 1/2. The times come from segments that are exact to a
 /// part of a tick. That tells in which tick most steps fall; the few others are searched.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
     pub(super) cutter: Cutter,

@@ -1,7 +1,7 @@
 //! The stop behind each block.
 
 use super::{Axes, Stage};
-use crate::axis::{COARSEST, Work};
+use crate::axis::{COARSEST, Work, coarser};
 use crate::cutter::Demand;
 use crate::path_mover::PathMover;
 use crate::queue::{Joint, Queue};
@@ -42,7 +42,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         }
         if self.coarse > COARSEST {
             // Once more with fewer segments.
-            (self.coarse, self.stage) = (self.coarse.saturating_sub(1), Stage::Brake);
+            (self.coarse, self.stage) = (coarser(self.coarse), Stage::Brake);
             return Work::More;
         }
         self.give_up()

@@ -8,7 +8,7 @@ use crate::mover::cutting::{Cut, News};
 use crate::queue::{IDLE, Queue, TICKET};
 use crate::writer::{TICK, Writer, tick};
 
-use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work};
+use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work, coarser};
 
 /// Slots for the steps of a block before those of its stop, at least.
 const LEAST_ROOM: usize = 4;
@@ -355,6 +355,8 @@ impl<const N: usize> Axis<'_, N> {
         self.room = Queue::<N>::BLOCK.saturating_sub(slots.saturating_add(slots >> 3)).clamp(LEAST_ROOM, Self::ROOM);
         if rest.1.len < Queue::<N>::BLOCK / 2 && self.coarse < COARSE {
             self.coarse = self.coarse.saturating_add(1);
+        } else if rest.1.len < Queue::<N>::BLOCK / 8 {
+            self.coarse = self.finest;
         }
         self.complete(Some(rest))
     }
@@ -362,7 +364,7 @@ impl<const N: usize> Axis<'_, N> {
     /// There are too few slots for the stop: once more with fewer segments of it, or with fewer before it.
     fn stop_shorter(&mut self) -> Work {
         if self.coarse > COARSEST {
-            self.coarse = self.coarse.saturating_sub(1);
+            self.coarse = coarser(self.coarse);
             self.close();
             return Work::More;
         }

@@ -35,7 +35,7 @@ impl Mover {
         if let Some(bounds) = self.wish.quick.filter(|_| self.is_moving(moment)) {
             self.replan_within(moment, &bounds);
         } else {
-            self.wish.quick = None;
+            // It is over for who says so: his clock may be ahead.
             self.change(now);
         }
     }

@@ -31,8 +31,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(part.map_or(line.bounds, |part| line.bounds(part)))
     }
 
-    /// The run that begins at line `at`, where the speed is no more than `speed` or than its lines allow.
-    fn run(&self, at: usize, part: Option<Real>, speed: Real) -> Option<Run> {
+    /// The run that begins at line `at`, where the speed is no more than `speed` or than its lines allow, with an acceleration and jerk under
+    /// way: limits below those would have it jump.
+    fn run(&self, at: usize, part: Option<Real>, speed: Real, held: [Real; 2]) -> Option<Run> {
         let mut last = self.line(at)?;
         let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
         while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
@@ -41,12 +42,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let Some(other) = own.jerk else { break };
             let most = if part.is_some() { run.bounds.v.max(speed) } else { speed };
             let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
-            let fits = line.corner >= most && own.v * EQUAL >= most;
+            let fits = line.corner >= most && own.v >= speed;
             let v = part.is_none() || alike(own.v, run.bounds.v, EQUAL);
             if !fits || !v || !alike(own.a, run.bounds.a, ALIKE) || !alike(other.j, jerk.j, ALIKE) {
                 break;
             }
-            let bounds = Bounds::new(run.bounds.v.min(own.v), run.bounds.a.min(own.a), Some(jerk.j.min(other.j)));
+            let (a, j) = (run.bounds.a.min(own.a), jerk.j.min(other.j));
+            if a < held[0] || j < held[1] {
+                break;
+            }
+            let bounds = Bounds::new(run.bounds.v.min(own.v), a, Some(j));
             run = Run { more: run.more.saturating_add(1), length: run.length + line.length, bounds };
             last = line;
         }
@@ -56,22 +61,26 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// From a motion at a place on line `at`, or so far before it. With `part` of the requested speeds; without one it brakes at once, and
     /// may come to rest before the end. `None` if rounding leaves no solution.
     ///
-    /// Also the limits of the run; those of a brake under way are `least`, which it keeps if lines have come that allow less.
+    /// Also the limits of the run. `present` are those of the motion; a brake under way keeps them if lines have come that allow less.
     pub(crate) fn course(
         &self,
         at: usize,
         start: Motion,
         (place, before): (Real, Real),
-        (part, least): (Option<Real>, Option<Bounds>),
+        (part, present, brakes): (Option<Real>, Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
         let first = self.line(at)?;
-        let fastest = match first.bounds.jerk {
-            // When the acceleration is back at 0.
-            Some(jerk) if start.up => start.v + (start.a.squared() * jerk.per_j).half(),
-            _ => start.v,
-        };
-        let Run { more, length, bounds: own } = self.run(at, part, fastest)?;
-        let own = least.map_or(own, |least| own.or_higher(&least));
+        let (mut fastest, mut held) = (start.v, [Real::ZERO; 2]);
+        if let Some(jerk) = first.bounds.jerk.filter(|_| !start.a.is_zero()) {
+            let j = present.and_then(|bounds| bounds.jerk).map_or(jerk.j, |own| own.j.min(jerk.j));
+            held = [start.a - start.a.scaled(-20), j - j.scaled(-20)];
+            if start.up {
+                // When the acceleration is back at 0.
+                fastest = start.v + (start.a.squared() / j).half();
+            }
+        }
+        let Run { more, length, bounds: own } = self.run(at, part, fastest, held)?;
+        let own = present.filter(|_| brakes && part.is_none()).map_or(own, |least| own.or_higher(&least));
         let bounds = own;
         let left = (length + before) - place;
         let last = at.saturating_add(more);
@@ -121,11 +130,13 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// From the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
     pub(crate) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<(Course, Bounds)> {
         let line = self.line(at)?;
-        Some(self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None)).unwrap_or_else(|| {
-            let mut curve = Curve::new();
-            curve.cruise(speed, line.length);
-            (Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds)
-        }))
+        Some(self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None, false)).unwrap_or_else(
+            || {
+                let mut curve = Curve::new();
+                curve.cruise(speed, line.length);
+                (Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds)
+            },
+        ))
     }
 
     /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
@@ -156,7 +167,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let mut runs = [None; M];
         let mut next = at.saturating_add(1);
         for place in &mut runs {
-            let Some(run) = self.run(next, Some(part), Real::ZERO) else { break };
+            let Some(run) = self.run(next, Some(part), Real::ZERO, [Real::ZERO; 2]) else { break };
             *place = Some((next, run));
             next = next.saturating_add(run.more).saturating_add(1);
         }

@@ -28,11 +28,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some((motion, Start { place, before, moment, offset: Real::ZERO, ..start }))
     }
 
-    /// The limits of a brake under way.
-    pub(super) fn least(&self) -> Option<Bounds> {
-        self.bounds.filter(|_| self.braking && self.line.is_some())
-    }
-
     /// How what runs leaves its lines.
     pub(super) const fn leaving(&self) -> Leaving {
         Leaving { more: self.more, exit: self.exit, bounds: None }
@@ -51,7 +46,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         let course = here.and_then(|(motion, start)| {
             let Start { place, before, .. } = start;
-            Some((place, before, self.path.course(0, motion, (place, before), (None, self.least()))?))
+            Some((place, before, self.path.course(0, motion, (place, before), (None, self.bounds, self.braking))?))
         });
         let (end, left) = match course {
             Some((place, before, (Course { curve, exit, more, .. }, bounds))) => {
@@ -81,7 +76,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return;
         }
         if self.line.is_none() {
-            self.path.not_before(now);
+            if self.part().is_some() {
+                self.path.not_before(now);
+            }
             self.begin();
         } else {
             self.plan(now);
@@ -93,8 +90,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
         let part = self.part();
-        let within = (part, self.least().filter(|_| part.is_none()));
-        if let Some((course, bounds)) = self.path.course(0, motion, (start.place, start.before), within) {
+        let how = (part, self.bounds, self.braking);
+        if let Some((course, bounds)) = self.path.course(0, motion, (start.place, start.before), how) {
             self.adopt(&course, start, bounds);
         }
     }
@@ -117,7 +114,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn adopt(&mut self, course: &Course, start: Start<N>, bounds: Bounds) {
         let Some(first) = self.path.line(0) else { return };
         let whole = course.more > 0 || course.whole;
-        let mut line = LinePulses::new(self.clock(), &course.curve, &first, Start { whole, ..start }, self.steps);
+        let mut line = LinePulses::new(self.clock(), &course.curve, first, Start { whole, ..start }, self.steps);
         if whole && line.first().is_none() && self.made != first.ends {
             return;
         }
@@ -133,15 +130,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Continues with the next line on the same curve.
     pub(super) fn go_on(&mut self) {
-        let (Some(line), Some(first), Some(next)) = (self.line.take(), self.path.line(0), self.path.line(1)) else {
-            return;
-        };
-        let before = (line.start.before + first.length) - line.start.place;
+        let (Some(line), Some(length)) = (&self.line, self.path.line(0).map(|line| line.length)) else { return };
+        let before = (line.start.before + length) - line.start.place;
         self.path.pass();
+        let Some(next) = self.path.line(0) else { return };
         self.more = self.more.saturating_sub(1);
         let (place, whole) = (Real::ZERO, self.more > 0 || self.whole);
         let start = Start { place, before, made: [0; N], whole, ..line.start };
-        let mut line = LinePulses::new(self.clock(), &line.curve, &next, start, self.steps);
+        let mut line = LinePulses::new(self.clock(), &line.curve, next, start, self.steps);
         for (due, free) in line.due.iter_mut().zip(self.free) {
             *due = due.map(|due| due.max(free));
         }
@@ -155,12 +151,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             if line.first().is_some() || self.made != first.ends {
                 return;
             }
+            let cut = first.cut;
             if self.more > 0 {
                 self.go_on();
                 continue;
             }
             self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
-            self.stopping &= !first.cut;
+            self.stopping &= !cut;
             self.begin();
         }
     }

@@ -382,3 +382,39 @@ fn soft_limits_of_a_path_refuse_and_change_nothing() {
     assert_eq!((machine.due(), machine.target(), machine.len()), (due, [500, 9000], 1));
     machine.push([-10, 0], 100_000, 0).unwrap();
 }
+/// A stop while the acceleration fades, with a line behind that allows less jerk: with that the speed would rise above the limit.
+#[test]
+fn a_stop_takes_no_jerk_of_lines_that_it_does_not_reach() {
+    let first = Limits::new(4256, 9321).unwrap().with_jerk(46_714).unwrap();
+    let axes = [AxisSetup::new(first, 20_466), AxisSetup::new(Limits::new(49, 1_351_593).unwrap(), 19_416)];
+    let mut machine = PathMover::new(Path::<2, 4>::new(Clock::MICROSECONDS, axes, 134).unwrap());
+    machine.push([501, -427], 77_725, 4921).unwrap();
+    machine.push([-651, 0], 10, 4921).unwrap();
+    while machine.due().is_some_and(|due| due <= 63_376) {
+        machine.pulse();
+    }
+    machine.stop(63_376);
+    let mut last = 0;
+    while let Some(pulse) = machine.pulse() {
+        if pulse.axis == 1 {
+            assert!(last == 0 || pulse.tick - last >= 20_407, "{} ticks at {last}", pulse.tick - last);
+            last = pulse.tick;
+        }
+    }
+    assert!(last > 90_000);
+}
+
+/// Held, and told of a new target by a clock that is ahead: the rest has begun when it has.
+#[test]
+fn a_clock_that_is_ahead_does_not_make_a_rest_later() {
+    let setup = |a, j, scale| AxisSetup::new(Limits::new(49, a).unwrap().with_jerk(j).unwrap(), scale);
+    let axes = [setup(3_516_624, 13_436_394, 45_028), setup(999, 1_000_000, 115_549)];
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::new(1000).unwrap(), axes, 0).unwrap());
+    machine.push([-475, 0], 102, 0).unwrap();
+    machine.set_override(66, 0);
+    machine.set_override(0, 165);
+    machine.hold(0);
+    machine.move_to([0, 0], 10, 169).unwrap();
+    machine.stop(0);
+    assert!(machine.due().is_none() && machine.is_at_rest(168));
+}

@@ -278,6 +278,45 @@ fn a_background_that_starves_ends_in_a_stop_at_every_segment() {
     assert!(stalls > 200, "{stalls}");
 }
 
+/// The stop behind the queue as exact as all else: from interval to interval the speed changes by no more than the acceleration and 25 ns
+/// at either end of an interval make of it.
+#[test]
+fn a_stop_that_nobody_asked_for_is_exact_if_that_is_asked_for() {
+    let hz = 168_000_000;
+    let limits = limits(20_000, 200_000, 0);
+    let worst = |exact: bool| {
+        let mut worst = 0.0;
+        for at in (10..160).step_by(7) {
+            let queue: &'static Queue<513> = Box::leak(Box::default());
+            let (axis, mut timer) = Axis::new(queue, Clock::new(hz).unwrap(), limits).unwrap();
+            let mut axis = if exact { axis.with_exact_stops() } else { axis };
+            axis.run(Direction::Forward, 20_000).unwrap();
+            let (mut now, mut steps) = (0_u64, Vec::new());
+            loop {
+                while now < at * u64::from(hz) / 1000 && axis.poll() == Work::More {}
+                let fired = timer.fire();
+                if fired.is_step() {
+                    steps.push(now);
+                }
+                now += u64::from(fired.wait());
+                if fired.wait() == 0 {
+                    break;
+                }
+            }
+            assert!(axis.commanded() > 20, "{at}");
+            for step in steps.windows(3) {
+                let [first, second] = [step[1] - step[0], step[2] - step[1]].map(|ticks| f64::from(hz) / ticks as f64);
+                let time = (step[2] - step[0]) as f64 / 2.0 / f64::from(hz);
+                let noise = (first.powi(2) + second.powi(2)) * 50e-9;
+                worst = f64::max(worst, (second - first).abs() / (200_000.0 * time + noise));
+            }
+        }
+        worst
+    };
+    let (exact, coarse) = (worst(true), worst(false));
+    assert!(exact < 1.005 && coarse > 1.03, "{exact}, {coarse}");
+}
+
 #[test]
 fn a_halt_acts_in_the_interrupt() {
     for at in (3000..400_000).step_by(1777) {

@@ -1,0 +1,109 @@
+//! Blocks: what is cut for each, and how the interrupt is let in.
+
+use core::sync::atomic::Ordering;
+
+use super::{Axes, Out, PUT_OFF, Stage};
+use crate::axes_timer::{TURN, TURNS};
+use crate::axis::Work;
+use crate::cutter::Demand;
+use crate::queue::{Joint, Queue, REST};
+use crate::writer::{Writer, tick};
+
+impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
+    /// A block from where those that are out end.
+    pub(super) fn begin(&mut self) -> Work {
+        let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
+        if reach < 4 {
+            return self.give_up();
+        }
+        self.work.clone_from(&self.path);
+        self.work.look_ahead(self.end);
+        let end = i128::from(self.end) << 32;
+        for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
+            *writer = Writer::new(end, dir);
+        }
+        (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
+        (self.stage, self.axis, self.quiet, self.coarse) = (Stage::Block, 0, 0, self.finest);
+        Work::More
+    }
+
+    /// On to the next axis, or to the first one; true if none has had anything.
+    pub(super) fn is_through(&mut self) -> bool {
+        self.quiet = self.quiet.saturating_add(1);
+        self.axis = self.axis.saturating_add(1).checked_rem(N).unwrap_or(0);
+        self.quiet >= N
+    }
+
+    /// A segment of the block.
+    pub(super) fn cut_block(&mut self) -> Work {
+        let (Some(writer), Some(queue)) = (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis)) else {
+            return Work::Later;
+        };
+        let time = self.until.saturating_sub(tick(writer.end)).saturating_mul(1 << 32);
+        let demand = Demand { off: self.off, coarse: None, time };
+        if let Some((stretch, direction)) = self.work.cut(self.axis, &demand, self.until) {
+            writer.put_steps((queue, self.block), &stretch, direction);
+            self.quiet = 0;
+            if writer.len.saturating_add(4) > Queue::<S>::BLOCK / 3 {
+                self.shorter = self.shorter.saturating_add(1);
+                self.stage = Stage::Idle;
+            }
+        } else if self.is_through() && !self.waits_for_a_step() {
+            self.join();
+        }
+        Work::More
+    }
+
+    /// A step comes in the tick in which the block is to end, or in the next one.
+    pub(super) fn waits_for_a_step(&mut self) -> bool {
+        let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1) && self.put_off < PUT_OFF);
+        if let Some(due) = next {
+            (self.until, self.quiet) = (due.saturating_add(1), 0);
+            self.put_off = self.put_off.saturating_add(1);
+        }
+        next.is_some()
+    }
+
+    /// The end of the block, the same one for all axes.
+    pub(super) fn join(&mut self) {
+        self.until = self.put_joint(self.until, Joint::Block);
+        self.joint = self.writers;
+        self.stage = Stage::Brake;
+        if let (Some(out), Some(first)) = (self.outs.get_mut(self.block), self.writers.first()) {
+            out.len = first.len;
+        }
+    }
+
+    /// An event of all axes at one tick, not before another one; at which.
+    pub(super) fn put_joint(&mut self, at: u64, joint: Joint) -> u64 {
+        let last = self.writers.iter().map(|writer| tick(writer.end).saturating_add(1)).max().unwrap_or(at);
+        let at = at.max(last);
+        for (writer, queue) in self.writers.iter_mut().zip(&self.queue.axes) {
+            writer.put_joint((queue, self.block), i128::from(at) << 32, joint);
+        }
+        at
+    }
+
+    /// Lets the interrupt in, after the block before it or from rest.
+    pub(super) fn publish(&mut self, end: u64) {
+        let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
+        if let Some(out) = self.outs.get_mut(self.block) {
+            *out = Out { valid: true, end, dirs: dirs(self.writers), ..*out };
+        }
+        for ((made, after), before) in self.made.iter_mut().zip(self.work.commanded()).zip(self.path.commanded()) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "modulo 2^32")]
+            let steps = after.wrapping_sub(before) as u32;
+            *made = made.wrapping_add(steps);
+        }
+        self.path.clone_from(&self.work);
+        (self.end, self.dirs) = (self.until, dirs(self.joint));
+        self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
+        let from = if self.standing { REST } else { 0 };
+        let slot = u32::try_from(Queue::<S>::slot(self.block, 0)).unwrap_or(0);
+        self.queue.gate.store(self.turn << TURN | from | slot, Ordering::Release);
+        if self.joint.iter().all(|writer| writer.len < Queue::<S>::BLOCK / 8) {
+            self.shorter = self.shorter.saturating_sub(1);
+        }
+        (self.pending, self.block, self.stage) = (true, 1_usize.wrapping_sub(self.block), Stage::Idle);
+    }
+}
