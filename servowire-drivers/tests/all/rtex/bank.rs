@@ -45,6 +45,26 @@ fn a_switch_of_the_bank_never_tears_an_exchange() {
     assert!(driver.late() >= u32::from(LIMIT));
 }
 
+/// The echo of one drive stands still, so the blocks never look like those of one frame: they are counted as torn, and the others are
+/// taken all the same.
+#[test]
+fn an_echo_that_stands_still_costs_the_others_nothing() {
+    for external in [true, false] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        ring.borrow_mut().drives[1].set_fault(Fault::StaleEcho);
+        let mut torn = 0;
+        for _ in 1..LIMIT {
+            torn += u32::from(update(&ring, &mut driver).unwrap().torn);
+            for (place, axis) in driver.master().ring().axes().iter().enumerate() {
+                assert!(place == 1 || axis.arrival() == Arrival::OnTime, "{external} {place}: {}", axis.arrival());
+            }
+        }
+        assert!(torn >= u32::from(LIMIT) - 3, "{external}: {torn}");
+        assert_eq!((driver.torn(), driver.master().ring().failure()), (torn, None), "{external}");
+    }
+}
+
 /// The interrupt is noticed 60 us late and the exchange goes over the next edge, so the clock sees nothing: what an axis takes is of
 /// the frame that is due, whichever access the bank was switched at.
 #[test]
