@@ -166,13 +166,13 @@ fn what_is_kept_and_comes_again() {
                 remote.bus().lose();
                 works(&mut remote);
             }
-            for last in [true, false] {
-                if last {
+            for (lose, want) in [(false, true), (false, false), (true, true), (false, false)] {
+                if lose {
                     remote.bus().lose();
                 }
                 let events = remote.take_events().unwrap();
-                let told = events.drive.contains(Event::PRST) && events.safe.contains(EventS::PRST);
-                assert_eq!(told, last, "{times} {events:?}");
+                let told = [events.drive.contains(Event::PRST), events.safe.contains(EventS::PRST)];
+                assert_eq!(told, [want; 2], "{times} {events:?}");
             }
             for _ in 0..times {
                 remote.reset_messages().unwrap();
@@ -182,9 +182,23 @@ fn what_is_kept_and_comes_again() {
                 remote.bus().pass();
                 assert_eq!(remote.poll_short(), Ok(Some(B::VALUE)));
             }
-            *remote.bus().register(0x05) |= 0x20;
+            // MIN of all of them, and none after it.
             assert!(remote.take_events().unwrap().drive.contains(Event::MIN));
             assert!(!remote.take_events().unwrap().drive.contains(Event::MIN));
+            // Asked for, and not answered yet: no MIN. QMLW comes meanwhile, and stays.
+            remote.reset_messages().unwrap();
+            *remote.bus().register(0x05) |= 0x04;
+            assert_eq!(remote.start_short(READ), Err(BusError::Link(Error::Busy)));
+            assert_eq!(remote.take_events().unwrap().drive & (Event::MIN | Event::QMLW), Event::QMLW);
+            // MIN that was there before each of two resets.
+            for _ in 0..times {
+                *remote.bus().register(0x05) |= 0x20;
+                remote.reset_messages().unwrap();
+            }
+            assert!(remote.take_events().unwrap().drive.contains(Event::MIN));
+            remote.bus().lose();
+            works(&mut remote);
+            let _ = remote.take_events();
         }
     }
     both!(run);
