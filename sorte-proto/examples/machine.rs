@@ -12,9 +12,11 @@
 )]
 
 use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, State, Trigger};
-use sorte_proto::follow::{Asked, Follower, InputSlice};
+use sorte_proto::follow::{Asked, Follower};
 use sorte_proto::master::{self, Action, Master};
-use sorte_proto::{Correction, Direction, Discovery, Error, Evidence, Link, Policy, Positions, Pto, Slice, TRANSIT_NS};
+use sorte_proto::{
+    Correction, Direction, Discovery, Error, Evidence, Link, Policy, Positions, Pto, Slice, TRANSIT_NS, drv8711,
+};
 
 const CABLE_NS: u64 = 50;
 const DEVICES: usize = 3;
@@ -27,8 +29,6 @@ struct Node {
     ahead_ns: u64,
     due_ns: u64,
     follower: Follower,
-    /// Words for the SYNC0 generator so far.
-    words: u64,
 }
 
 impl Node {
@@ -47,17 +47,14 @@ impl Node {
         reaction
     }
 
-    /// A master frame of the exchange: a step, or none.
-    fn exchange(&mut self, frame: &[u8], captured_ns: u64) -> Result<(), Error> {
+    /// A master frame of the exchange: the word for the SYNC0 generator.
+    fn exchange(&mut self, frame: &[u8], captured_ns: u64) -> Result<Pto, Error> {
         let output = self.device.hear_exchange(frame, self.times(captured_ns))?;
-        let slice = output.data.first_chunk().map(|bytes| Slice::parse(*bytes));
-        self.words += u64::from(self.follower.next(slice).start().is_some());
-        Ok(())
+        Ok(self.follower.next(output.data.first_chunk().map(|bytes| Slice::parse(*bytes))))
     }
 
-    /// Does what is due until then; the frame that leaves, with its time.
+    /// Does what is due until then, or until a frame leaves: the frame, with its time.
     fn run(&mut self, until_ns: u64) -> Option<(u64, [u8; 6])> {
-        let mut sent = None;
         while self.due_ns < until_ns {
             let counter_ns = self.times(self.due_ns).sof_ns;
             match self.device.poll(counter_ns, self.due_ns) {
@@ -65,19 +62,14 @@ impl Node {
                 device::Action::CycleStart { .. } | device::Action::Restart => {}
                 device::Action::Lost { .. } => drop(self.follower.next(None)),
                 device::Action::Send { at_ns, .. } => {
-                    // A position that it does not know must not look like one.
-                    let ordered = self.follower.ordered().unwrap_or_else(|| {
-                        self.device.flag_error();
-                        0
-                    });
                     let mut bytes = [0; 6];
-                    let answer = self.device.answer(InputSlice { ordered, ..InputSlice::default() }.emit())?;
+                    let answer = self.device.answer_ordered(drv8711::Status::default(), self.follower.ordered())?;
                     answer.emit_into(&mut bytes).ok()?;
-                    sent = Some((self.due_ns + u64::from(at_ns.wrapping_sub(counter_ns)), bytes));
+                    return Some((self.due_ns + u64::from(at_ns.wrapping_sub(counter_ns)), bytes));
                 }
             }
         }
-        sent
+        None
     }
 }
 
@@ -121,6 +113,8 @@ fn measure(nodes: &mut [Node], trigger: Trigger, at_ns: u64) {
 struct Axis {
     asked: Asked,
     evidence: Evidence,
+    /// Pulses that its device was to make.
+    pulses: u64,
 }
 
 /// One cycle at `at_ns`: the master's frame to every device, and a frame of each back. Each axis steps, the second one
@@ -145,7 +139,7 @@ fn exchange(
         // From the first bit of a preamble of two bytes to the capture of the start.
         let captured_ns = at_ns + way_ns + 120;
         let before = node.run(captured_ns);
-        node.exchange(&frame[..len], captured_ns)?;
+        axis.pulses += u64::from(node.exchange(&frame[..len], captured_ns)?.start().is_some());
         if let Some((sent_ns, bytes)) = before.or(node.run(at_ns - 500 + 4000)) {
             let heard = master.hear(&bytes, sent_ns + way_ns + 120)?;
             // These devices send positions, and take them in the cycle of their frame.
@@ -191,7 +185,6 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
             ahead_ns: k * 123_456_789,
             due_ns: 0,
             follower: Follower::new(128),
-            words: 0,
         })
         .collect();
     for (k, node) in nodes.iter_mut().enumerate() {
@@ -200,7 +193,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
     }
     let mut master = Master::new(master::Config::new());
     master.set_link(Link::Up);
-    let mut axes = [(); DEVICES].map(|()| Axis { asked: Asked::new(), evidence: Evidence::NEVER });
+    let mut axes = [(); DEVICES].map(|()| Axis { asked: Asked::new(), evidence: Evidence::NEVER, pulses: 0 });
     let end_ns = run(&mut master, &mut axes, &mut nodes, CYCLES)?;
     println!("{}; {CYCLES} cycles from {} ns of the master's time on", master.network(), end_ns - master.epoch_ns());
     println!("{}", master.counters());
@@ -212,7 +205,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         // What control may use: of this cycle or the one before, and from a driver without a fault.
         let sample = axis.evidence.at(end_ns + 4000, Policy::new(8000))?;
         let (asked, position) = (axis.asked.asked(), axis.asked.position(sample));
-        println!("  asked to {asked}, its frame of this cycle says {position}, {} steps ordered", node.words);
+        println!("  asked to {asked}, its frame of this cycle says {position}, {} steps ordered", axis.pulses);
         assert!(node.device.state() == State::Exchange && asked.abs_diff(position) <= 1);
     }
     // The host of the last device wants its motor driver off the line, and takes the device out.

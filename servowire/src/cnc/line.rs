@@ -382,8 +382,7 @@ impl Line {
             return;
         }
         let Some(node) = self.nodes.get_mut(k) else { return };
-        let input = node.input(now);
-        let Some(answer) = node.device.answer(input.emit()) else { return };
+        let Some(answer) = node.answer(now) else { return };
         let mut bytes = vec![0; DEVICE_FRAME];
         if answer.emit_into(&mut bytes).is_err() {
             return;

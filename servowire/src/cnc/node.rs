@@ -5,7 +5,7 @@ use std::rc::Rc;
 use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, Reaction, State};
 use sorte_proto::drv8711;
 use sorte_proto::follow::{Asked, Follower, InputSlice};
-use sorte_proto::{Pto, Slice};
+use sorte_proto::{DeviceFrame, Pto, Slice};
 
 use super::axis::{Axis, Build, Incoming};
 use super::clock::Clock;
@@ -231,14 +231,10 @@ impl Node {
         });
     }
 
-    /// The payload of the device's frame.
-    pub(super) fn input(&mut self, now: f64) -> InputSlice {
-        let told = self.follower.ordered().filter(|_| self.positions);
-        if self.positions && told.is_none() {
-            // A position that it does not know must not look like one.
-            self.device.flag_error();
-        }
-        InputSlice { driver: self.axis.driver.status(now as u64), ordered: told.unwrap_or_default() }
+    /// The device's frame. Without positions the steps are 0, as the published device sends them.
+    pub(super) fn answer(&mut self, now: f64) -> Option<DeviceFrame<{ InputSlice::LEN }>> {
+        let ordered = if self.positions { self.follower.ordered() } else { Some(0) };
+        self.device.answer_ordered(self.axis.driver.status(now as u64), ordered)
     }
 
     /// The master has got the device's frame.

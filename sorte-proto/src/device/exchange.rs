@@ -5,8 +5,10 @@ use super::machine::Device;
 use super::port::State;
 use super::raster::{Due, Plan, Raster};
 use crate::address::DeviceAddress;
+use crate::drv8711;
 use crate::error::Error;
 use crate::exchange::{DeviceFrame, MasterFrameView};
+use crate::payload::InputSlice;
 use crate::status::Status;
 use crate::tally::Fault;
 use crate::timing::{BYTE_NS, TRIGGER_NS};
@@ -210,6 +212,21 @@ impl Device {
         }
         let status = Status::of_device(self.is_last(), core::mem::take(&mut self.error));
         Some(DeviceFrame { address: place.address, status, payload })
+    }
+
+    /// Returns the frame with the payload of the published application: STATUS of the driver, and the steps ordered, see
+    /// [`Follower::ordered`](crate::follow::Follower::ordered). A position that the device does not know must not look
+    /// like one: it is sent as 0, with ERROR. Otherwise as [`answer`](Self::answer).
+    pub fn answer_ordered(
+        &mut self,
+        driver: drv8711::Status,
+        ordered: Option<u16>,
+    ) -> Option<DeviceFrame<{ InputSlice::LEN }>> {
+        let mut answer = self.answer(InputSlice { driver, ordered: ordered.unwrap_or_default() }.emit())?;
+        if ordered.is_none() {
+            answer.status |= Status::ERROR;
+        }
+        Some(answer)
     }
 
     /// When to send the device's own frame, in ns of its cycle, as [`Config::slots`](super::Config::slots) says; `None`

@@ -5,7 +5,8 @@ use sorte_proto::device::{Action, Config, Device, FrameTimes, PortId, State};
 use sorte_proto::master::{self, Heard, Master};
 use sorte_proto::timing::Slots;
 use sorte_proto::{
-    Correction, Discovery, Error, ErrorClass, Link, Parameters, Place, Status, Sync, Tally, emit_master_frame_into,
+    Correction, Discovery, Error, ErrorClass, Link, Parameters, Place, Status, Sync, Tally, drv8711,
+    emit_master_frame_into,
 };
 
 /// Common time at the start of cycle 0: the last SYNC frame was triggered at 30,500 ns, and 10 us later it begins.
@@ -56,6 +57,18 @@ fn a_device_is_silent_until_its_first_master_frame() {
     assert_eq!(device.counters().master, Tally::default(), "nobody has sent anything");
     device.hear_exchange(&frame(5), captured(5, 0)).unwrap();
     assert!(device.answer([0; 3]).is_some());
+}
+
+/// The payload of the published application: STATUS of the driver, and the steps from their low byte on.
+#[test]
+fn steps_that_are_not_known_are_sent_with_error() {
+    let mut device = device();
+    let driver = drv8711::Status::from_bits_retain(0x21);
+    assert_eq!(device.answer_ordered(driver, Some(0x1234)), None, "before the first master frame");
+    device.hear_exchange(&frame(5), captured(5, 0)).unwrap();
+    let answers = [Some(0x1234), None, Some(0)].map(|ordered| device.answer_ordered(driver, ordered).unwrap());
+    assert_eq!(answers.map(|answer| answer.payload), [[0x21, 0x34, 0x12], [0x21, 0, 0], [0x21, 0, 0]]);
+    assert_eq!(answers.map(|answer| answer.status.contains(Status::ERROR)), [false, true, false]);
 }
 
 /// Slot, cycle and close of the published device at 4 us: 500 ns into the cycle, given out 400 ns before.
