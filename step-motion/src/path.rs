@@ -202,9 +202,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         let (bounds, feed) = self.bounds(&steps, length, feed.max(1));
         let corner = match self.before {
-            Some((before, long)) => self
-                .corner((&before, long), (&steps, length), bounds.a)
-                .min(self.turning((&before, long), (&steps, length))),
+            Some((before, long)) => {
+                self.corner((&before, long), (&steps, length)).min(self.turning((&before, long), (&steps, length)))
+            }
             None => Real::ZERO,
         };
         let place = self.first.wrapping_add(self.len).checked_rem(M).and_then(|at| self.lines.get_mut(at));

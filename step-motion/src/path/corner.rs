@@ -58,11 +58,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
-    /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits.
+    /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits. a is what the axes allow in the direction in which the corner turns.
     ///
     /// Chords of a circle are bounded by its radius, however small they are: with l the shorter line, v² = a l/2 s / sqrt(1 - s²), which
     /// is a r.
-    pub(super) fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real), a: Real) -> Real {
+    pub(super) fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real)) -> Real {
         let (mut along, mut against) = (Real::ZERO, Real::ZERO);
         let parts = |axis, before, after| (self.way(axis, before) / long, self.way(axis, after) / length);
         for (axis, (&before, &after)) in from.iter().zip(to).enumerate() {
@@ -84,7 +84,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         // The speed turns along the difference of both directions, which is as long as this; an axis takes its part of that.
         let whole = shut.scaled(1).sqrt();
-        let mut most = a;
+        let mut most = Real::HUGE;
         for (axis, (setup, (&before, &after))) in self.axes.iter().zip(from.iter().zip(to)).enumerate() {
             let (part, next) = parts(axis, before, after);
             let turn = if (before < 0) == (after < 0) { part.distance(next) } else { part + next };

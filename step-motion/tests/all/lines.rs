@@ -98,7 +98,8 @@ fn look_ahead_over_a_straight_line() {
     assert!(run(10, 500, 500) > whole);
 }
 
-/// At a right angle s = sin 45°, so v² = a δ / (sqrt 2 - 1).
+/// At a right angle s = sin 45°, so v² = a δ / (sqrt 2 - 1). The speed turns by as much in both axes, and each has its limit there: together
+/// they have sqrt 2 times that.
 #[test]
 fn the_speed_at_a_right_angle() {
     let axes = [axis(50_000, 100_000, 0, 100_000); 2];
@@ -107,8 +108,8 @@ fn the_speed_at_a_right_angle() {
     path.push([3000, 3000], 500_000).unwrap();
     let before: Vec<u64> = path.next_line().unwrap().map(|pulse| pulse.tick).collect();
     let gap = (before[2999] - before[2998]) as f64 / 1e9;
-    // a = 1 m/s², δ = 100 µm: 15.54 mm/s, or 1554 steps/s; a step and a half before it is 1640.
-    let corner = (100_000.0 * 10.0 / (2_f64.sqrt() - 1.0)).sqrt();
+    // a = 1.414 m/s², δ = 100 µm: 18.48 mm/s, or 1848 steps/s; a step before it is 1901.
+    let corner = (100_000.0 * 2_f64.sqrt() * 10.0 / (2_f64.sqrt() - 1.0)).sqrt();
     let want = (corner * corner + 2.0 * 100_000.0).sqrt();
     assert!((1.0 / gap - want).abs() < 2.0, "{} steps/s for {want}", 1.0 / gap);
 }
@@ -233,7 +234,7 @@ fn on_chords_of_a_circle_the_axes_keep_their_acceleration() {
     {
         // 100 steps/mm, 2 m/s².
         let axes = [axis(100_000, 200_000, 0, 100_000); 2];
-        let mut path = Path::<2, 2000>::new(Clock::new(100_000_000).unwrap(), axes, deviation).unwrap();
+        let mut path = Path::<2, 512>::new(Clock::new(100_000_000).unwrap(), axes, deviation).unwrap();
         let circle = Arc::new([radius, 0], [radius, 0], [0, 0], Turning::Counterclockwise, error).unwrap();
         let begin = [i64::from(radius) / 10, 0];
         for [x, y] in circle {
