@@ -31,7 +31,7 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sorte_proto::sync0::Variant;
-use step_motion::{Limits, PtoMover};
+use step_motion::Limits;
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
 use crate::drawing::Drawn;
@@ -48,6 +48,9 @@ use program::Program;
 use record::Recorder;
 use setup::Setup;
 use wires::{LONGEST_CABLE_NS, Physics};
+
+/// Steps/s of an axis: one in each cycle of 4 us.
+const MOST_STEPS: u32 = 250_000;
 
 /// Runs of more cycles than this have a progress bar.
 const LONG: u64 = 2_000_000;
@@ -279,7 +282,7 @@ impl Arguments {
             let limits = Limits::new(self.freq.first().copied().unwrap_or(Part::SPEED), self.accel)?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
             let fastest = self.part.axes(limits)?.iter().map(|axis| axis.limits.speed()).max().unwrap_or(0);
-            if fastest > PtoMover::MAX_SPEED {
+            if fastest > MOST_STEPS {
                 return Err(
                     format!("{fastest} steps/s: an axis makes a step in each cycle of 4 us at most, 250000").into()
                 );

@@ -5,8 +5,8 @@
 //! and by no more than an arc that touches both lines in their middles: so chords of a circle are bounded by its radius. grbl has no such
 //! bound, and exceeds the acceleration of its axes on short chords; it gets it here, or it would be compared with what no axis can do.
 
-use std::f64::consts::TAU;
-use std::fmt::Write;
+use core::f64::consts::TAU;
+use core::fmt::Write;
 
 use step_motion::{AxisSetup, Clock, Limits, Path};
 
@@ -41,7 +41,7 @@ struct Stretch {
 
 /// Where a line really ends: on a step.
 fn on_steps(place: Place) -> [i64; N] {
-    std::array::from_fn(|axis| (place[axis] * AXES[axis][0]).round() as i64)
+    core::array::from_fn(|axis| (place[axis] * AXES[axis][0]).round() as i64)
 }
 
 fn stretches(lines: &[(Place, f64)]) -> Vec<Stretch> {
@@ -49,7 +49,7 @@ fn stretches(lines: &[(Place, f64)]) -> Vec<Stretch> {
     let mut made = Vec::new();
     for (to, feed) in lines {
         let to = on_steps(*to);
-        let way: Place = std::array::from_fn(|axis| (to[axis] - at[axis]) as f64 / AXES[axis][0]);
+        let way: Place = core::array::from_fn(|axis| (to[axis] - at[axis]) as f64 / AXES[axis][0]);
         at = to;
         let length = way.iter().map(|part| part * part).sum::<f64>().sqrt();
         if length == 0.0 {
@@ -67,7 +67,7 @@ fn stretches(lines: &[(Place, f64)]) -> Vec<Stretch> {
 
 /// The square of the speed at a corner.
 fn corner(from: &Stretch, to: &Stretch) -> f64 {
-    let turn: Place = std::array::from_fn(|axis| to.direction[axis] - from.direction[axis]);
+    let turn: Place = core::array::from_fn(|axis| to.direction[axis] - from.direction[axis]);
     let whole = turn.iter().map(|part| part * part).sum::<f64>().sqrt();
     if whole < 1e-7 {
         return f64::INFINITY;
@@ -95,7 +95,7 @@ fn corners(path: &[Stretch]) -> Vec<f64> {
 /// Time on a line from one square of a speed to another.
 fn time(line: &Stretch, from: f64, to: f64) -> f64 {
     let a = line.acceleration;
-    let peak = (a * line.length + (from + to) / 2.0).min(line.speed * line.speed);
+    let peak = (a * line.length + f64::midpoint(from, to)).min(line.speed * line.speed);
     let ramps = (2.0 * peak - from - to) / (2.0 * a);
     let cruise = (line.length - ramps).max(0.0) / peak.sqrt();
     (2.0 * peak.sqrt() - from.sqrt() - to.sqrt()) / a + cruise

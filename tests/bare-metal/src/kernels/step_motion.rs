@@ -1,6 +1,6 @@
 //! step-motion: plans, their steps, an axis that is told something new, lines of two axes.
 
-use step_motion::{AxisSetup, Clock, Command, Direction, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint};
+use step_motion::{AxisSetup, Clock, Direction, Limits, Mover, Path, Plan, Reloads, Setpoint};
 
 use super::kernels;
 
@@ -21,7 +21,6 @@ const S_ENTRY_FAST: Limited = Limited { steps: 120, ends: [1900, 500], ..S_CURVE
 const CRUISE: Limited = Limited { steps: 500, ends: [20_000; 2], ..TRAPEZOID };
 const TRAPEZOID_64: Limited = Limited { steps: 64, ..TRAPEZOID };
 const S_CURVE_64: Limited = Limited { steps: 64, ..S_CURVE };
-const FAST: Limited = Limited { speed: 250_000, acceleration: 100_000_000, ..TRAPEZOID };
 
 fn limits(move_: &Limited) -> Option<Limits> {
     let limits = Limits::new(move_.speed, move_.acceleration).ok()?;
@@ -84,17 +83,6 @@ kernels! {
         mover.set_commanded(0, now + 1).ok()?;
         Some((mover.commanded(), state))
     } over [TRAPEZOID, S_CURVE];
-
-    /// 100 cycles of a PTO axis.
-    fn step_motion_pto_100(move_: &Limited) -> Option<u32> {
-        let mut axis = PtoMover::new(limits(move_)?).ok()?;
-        axis.mover().move_to(-500, 0).ok()?;
-        let mut pulses = 0;
-        for _ in 0..100 {
-            pulses += u32::from(matches!(axis.tick(), Command::Pulse { .. }));
-        }
-        Some(pulses)
-    } over [FAST];
 
     /// Reloads of a 16-bit timer over a short move.
     fn step_motion_reloads(move_: &Limited) -> Option<u32> {

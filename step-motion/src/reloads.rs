@@ -1,0 +1,84 @@
+//! Motion in the reloads of a timer.
+
+/// The next value to load into a timer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Reload {
+    /// Ticks until it runs out, from 1 to its maximum. Many timers need one less in their register.
+    pub ticks: u32,
+    /// Whether a step is due then; if not, the timer is too short for the interval and this is only part of it.
+    pub step: bool,
+}
+
+/// The reloads of a timer from the ticks of steps.
+///
+/// A reload is the difference of two rounded times, never a rounded interval: the rounding error of one step is made up by
+/// the next, so the error never exceeds half a tick.
+#[derive(Debug, Clone)]
+pub struct Reloads<I> {
+    ticks: I,
+    longest: u32,
+    last: u64,
+    /// The step after `last`, if its interval has begun.
+    next: Option<u64>,
+}
+
+impl<I: Iterator<Item = u64>> Reloads<I> {
+    /// Creates the reloads from the ticks of steps, counted from the start; `longest` is the maximum of the timer, 65535
+    /// for 16 bits (0 counts as 1).
+    pub fn new(ticks: I, longest: u32) -> Self {
+        Self { ticks, longest: longest.max(1), last: 0, next: None }
+    }
+}
+
+impl<I: Iterator<Item = u64>> Iterator for Reloads<I> {
+    type Item = Reload;
+
+    fn next(&mut self) -> Option<Reload> {
+        let next = match self.next.take() {
+            Some(next) => next,
+            None => self.ticks.next()?,
+        };
+        let wait = next.saturating_sub(self.last);
+        match u32::try_from(wait) {
+            Ok(ticks) if ticks <= self.longest => {
+                self.last = next;
+                Some(Reload { ticks, step: true })
+            }
+            _ => {
+                self.last = self.last.saturating_add(self.longest.into());
+                self.next = Some(next);
+                Some(Reload { ticks: self.longest, step: false })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::{Clock, Limits};
+    use crate::plan::Plan;
+    use std::vec::Vec;
+
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn reloads_add_up_to_the_ticks() {
+        let plan = Plan::new(Clock::MICROSECONDS, Limits::new(61_000, 100_000).unwrap(), 40_000).unwrap();
+        let ticks: Vec<u64> = plan.pulses().collect();
+        let (mut now, mut at) = (0_u64, 0);
+        for reload in Reloads::new(plan.pulses(), 999) {
+            assert!((1..=999).contains(&reload.ticks));
+            now += u64::from(reload.ticks);
+            if reload.step {
+                assert_eq!(now, ticks[at]);
+                at += 1;
+            }
+        }
+        assert_eq!(at, ticks.len());
+        // At 61 kHz a step lasts 16.39 ticks: 16 and 17 take turns.
+        let cruise = &ticks[20_000..21_000];
+        assert!((cruise[999] - cruise[0]).abs_diff(999 * 1_000_000 / 61_000) <= 1);
+    }
+}
