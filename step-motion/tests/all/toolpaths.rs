@@ -199,7 +199,7 @@ fn toolpaths() -> [Toolpath; 10] {
     [
         path("rectangle", rectangle.map(|place| (place, 120.0)).to_vec(), 4.3),
         path("raster", raster.collect(), 9.4),
-        path("circle", curve(120.0, TAU, 0.02, |t| [20.0 - 20.0 * t.cos(), 20.0 * t.sin(), 0.0]), 15.8),
+        path("circle", curve(120.0, TAU, 0.02, |t| [20.0 - 20.0 * t.cos(), 20.0 * t.sin(), 0.0]), 20.3),
         path("small circles", curve(60.0, 5.0 * TAU, 0.09, |t| [1.0 - t.cos(), t.sin(), 0.0]), 65.6),
         path("spiral", curve(100.0, 40.0, 0.05, |t| [0.5 * t * t.cos(), 0.5 * t * t.sin(), 0.0]), 13.4),
         path("trochoid", curve(80.0, 60.0, 0.1, |t| [0.3 * t + 2.0 * t.sin(), 2.0 - 2.0 * t.cos(), 0.0]), 63.8),
