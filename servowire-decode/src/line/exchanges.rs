@@ -30,6 +30,8 @@ pub(crate) struct StartStopLine<P> {
     /// Of a line without bias.
     floating: Option<Floating>,
     told: Told<P>,
+    /// Whether failed frames stay as they are.
+    once: bool,
     /// For the numbers of samples.
     room: Vec<u64>,
 }
@@ -42,14 +44,18 @@ struct Told<P> {
     passed: Vec<Time>,
     /// Events from the first one onwards that failed or is in doubt.
     failed: Vec<Event>,
-    /// Remaining second attempts, as long as none helps.
+    /// Remaining second attempts, as long as none helps. Each sound exchange earns one.
     luck: u32,
+    /// Failures since the last one that had a second attempt.
+    untried: u32,
     dips: u64,
     dip_bits: f64,
 }
 
-/// Consecutive second attempts that need not help.
+/// Second attempts that need not help.
 const LUCK: u32 = 24;
+/// Where there are none left, one failure in this many has a second attempt: the line may have changed.
+const NOW_AND_THEN: u32 = 16;
 /// Maximum number of changes used to find the first field.
 const OPENING: usize = 256;
 /// Bits of idle line after which the opening has ended.
@@ -59,7 +65,7 @@ const STARTS: u32 = 18;
 
 impl<P> Told<P> {
     fn new(before: P, luck: u32) -> Self {
-        Self { before, passed: Vec::new(), failed: Vec::new(), luck, dips: 0, dip_bits: 0.0 }
+        Self { before, passed: Vec::new(), failed: Vec::new(), luck, untried: 0, dips: 0, dip_bits: 0.0 }
     }
 }
 
@@ -119,7 +125,19 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     fn with(receiver: EdgeReceiver, protocol: P, weights: Weights, bit: i64, luck: u32) -> Self {
         let told = Told::new(protocol.clone(), luck);
         let (opening, room) = (Vec::new(), Vec::new());
-        Self { receiver, protocol, weights, bit, begun: false, opening, tried: 0, floating: None, told, room }
+        Self {
+            receiver,
+            protocol,
+            weights,
+            bit,
+            begun: false,
+            opening,
+            tried: 0,
+            floating: None,
+            told,
+            once: false,
+            room,
+        }
     }
 
     /// Passes the complete fields to the protocol.
@@ -146,6 +164,8 @@ impl<P: StartStop + Clone> StartStopLine<P> {
             self.again(now, far, out)?;
         } else if self.told.passed.is_empty() && !far {
             return Ok(());
+        } else if self.told.luck < LUCK {
+            self.told.luck += 1;
         }
         self.receiver.forget();
         self.told.passed.clear();
@@ -159,12 +179,18 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         if !failed.iter().any(is_failed) {
             return failed.iter().try_for_each(|event| out.event(event));
         }
+        if self.once {
+            self.receiver.unlearn();
+            return failed.iter().try_for_each(|event| out.event(event));
+        }
         let edges = self.receiver.past();
         let now = now.or(edges.last().map(|last| last.time)).unwrap_or_default();
         let bit = self.receiver.bit_heard();
-        let Told { before, passed, luck, .. } = &self.told;
+        let Told { before, passed, luck, untried, .. } = &self.told;
         let trial = Failed { receiver: &self.receiver, before, weights: self.weights, edges, passed, now, bit };
-        let better = if *luck > 0 && !far { trial.again() } else { None };
+        let tried = !far && (*luck > 0 || *untried + 1 >= NOW_AND_THEN);
+        let better = if tried { trial.again() } else { None };
+        self.told.untried = if tried { 0 } else { untried.saturating_add(1) };
         let Some(better) = better else {
             self.told.luck = self.told.luck.saturating_sub(1);
             for mut event in failed {
@@ -252,7 +278,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     /// Creates a line that has only begun.
     fn fresh(&self, skipped: u32, luck: u32) -> Self {
         let receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS).beginning_at(skipped);
-        Self::with(receiver, self.protocol.clone(), self.weights, self.bit, luck)
+        Self { once: self.once, ..Self::with(receiver, self.protocol.clone(), self.weights, self.bit, luck) }
     }
 
     /// Whether the line is low rather than high when idle.
@@ -385,6 +411,10 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
 
     fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         self.end(time, &Verdict::cut_off(), out)
+    }
+
+    fn look_once(&mut self) {
+        self.once = true;
     }
 
     fn rates(&self) -> Rates {

@@ -39,6 +39,9 @@ pub trait LineDecoder {
     /// The capture ends at `time`.
     fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
+    /// From now on frames that fail are not read a second time: an impression of the line at first sight.
+    fn look_once(&mut self) {}
+
     /// Returns the measurements of the line.
     fn rates(&self) -> Rates;
 }

@@ -4,6 +4,7 @@
 //! length is fitted to the edges, then every field is read on the grid that fits it best. So a controller and an encoder
 //! may be off by some per cent each, and jitter and spikes move no bit.
 
+mod even;
 mod field;
 mod grid;
 mod rates;
@@ -15,8 +16,6 @@ use super::start_stop::LineField;
 use crate::capture::samples::Turns;
 use crate::time::Time;
 
-/// Bits without a field after which another speaker may follow.
-const OTHER_SPEAKER: f64 = 3.0;
 /// Maximum number of edges kept of an open burst; beyond that, whole fields are read.
 const MOST_EDGES: usize = 512;
 /// A line that is low for longer ends a burst too, in picoseconds: 13 days. So 64 bits hold the times of a burst from its beginning.
@@ -46,6 +45,7 @@ pub(crate) struct EdgeReceiver {
     past: Vec<Edge>,
     /// Bit lengths known when they were read.
     heard_before: Vec<f64>,
+    tried: grid::Tried,
 }
 
 impl EdgeReceiver {
@@ -65,6 +65,7 @@ impl EdgeReceiver {
             skipped: 0,
             past: Vec::new(),
             heard_before: Vec::new(),
+            tried: grid::Tried::default(),
         }
     }
 
@@ -261,12 +262,14 @@ impl EdgeReceiver {
             rest = fields;
         }
         while !rest.is_empty() {
-            let speech = self.speech(rest);
+            let bit = self.heard.first().copied();
+            let exact = bit.and_then(|bit| even::exact(rest, self.field_bits(), bit, &mut self.tried.best));
+            let speech = exact.unwrap_or_else(|| self.speech(rest));
             let (now, after) = rest.split_at(speech.min(rest.len()));
             if after.is_empty() && !whole && now.len() < MOST_EDGES / 2 {
                 break;
             }
-            self.speak(now);
+            self.speak(now, bit.filter(|_| exact.is_some()));
             rest = after;
         }
         let kept = burst.len() - rest.len();
@@ -281,7 +284,7 @@ impl EdgeReceiver {
         let bit = self.bit_heard();
         let mut start = first.time;
         let last = ((f64::from(self.field_bits()) - 1.0) * bit) as i64;
-        let other = ((f64::from(self.field_bits()) + OTHER_SPEAKER) * bit) as i64;
+        let other = (f64::from(self.field_bits() + even::OTHER_SPEAKER) * bit) as i64;
         for (at, edge) in rest.iter().enumerate() {
             let time = edge.time.after(start);
             if edge.level || time < last {
@@ -295,20 +298,34 @@ impl EdgeReceiver {
         edges.len()
     }
 
-    /// Fields of one speaker.
-    fn speak(&mut self, edges: &[Edge]) {
+    /// Fields of one speaker; `exact`: the bit length by which they were read already, as all edges are where they should be.
+    fn speak(&mut self, edges: &[Edge], exact: Option<f64>) {
         let field_bits = self.field_bits();
-        let grid::Found { bit, is_sure } = grid::fit(edges, field_bits, self.bit, &mut self.heard);
+        let grid::Found { bit, is_sure, read_by } = match exact {
+            Some(bit) => grid::Found { bit, is_sure: true, read_by: exact },
+            None => grid::fit(edges, field_bits, self.bit, &mut self.heard, &mut self.tried),
+        };
         if is_sure {
             self.rates.measured(self.bit / bit);
         }
         let speaker = field::Speaker::new(field_bits, bit);
         let first = self.fields.len();
-        let (mut rest, mut line) = (edges, field::Line::IDLE);
-        while let Some((read, next)) = field::read(rest, speaker) {
-            line.add(&read, speaker);
-            self.take_field(&read, speaker);
-            rest = next;
+        let mut line = field::Line::IDLE;
+        if let Some(by) = read_by {
+            let mut fields = std::mem::take(&mut self.tried.best);
+            for field in fields.drain(..) {
+                let read = field.read(bit, by / bit);
+                line.add(&read, speaker);
+                self.take_field(&read, speaker);
+            }
+            self.tried.best = fields;
+        } else {
+            let mut rest = edges;
+            while let Some((read, next)) = field::read(rest, speaker) {
+                line.add(&read, speaker);
+                self.take_field(&read, speaker);
+                rest = next;
+            }
         }
         self.time_fields(first, bit);
         if let Some(field) = self.fields.get_mut(first) {

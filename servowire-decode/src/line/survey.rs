@@ -1,7 +1,8 @@
 //! Finds out from their first edges which channels carry a protocol, which protocol, how fast, and with which polarity.
 //!
 //! Every rate of every protocol is tried on every channel with edges, in both polarities; a trial ends early if hardly any
-//! frame is good. So a spike, a slow encoder or a decoy never hides a line.
+//! frame is good. So a spike, a slow encoder or a decoy never hides a line. Failed frames are read a second time only where that
+//! can decide between two readings.
 
 use super::evidence::{CERTAIN, Evidence};
 use super::lane::{Tap, Wires};
@@ -20,6 +21,8 @@ const PIECE: usize = 96;
 pub(super) const FEWEST: usize = 5;
 /// A rival within this share of the best score is mentioned.
 const CLOSE: f64 = 0.5;
+/// Where a line is certain at first sight, readings with less than one in this many of its score are not looked at again.
+const FAR: i64 = 4;
 
 /// The edges of a channel, by time.
 pub(super) type Edges = [(Time, bool)];
@@ -31,6 +34,15 @@ pub(super) struct Speech {
     pub(super) protocol: &'static dyn Codec,
     /// Bits per second.
     pub(super) rate: u32,
+}
+
+/// How a line is read in a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    /// At first sight.
+    Once,
+    /// With a second reading of failed frames.
+    Again,
 }
 
 /// A line that was found.
@@ -121,26 +133,22 @@ impl Candidates {
     /// Returns the best reading of two channels as one line.
     pub(super) fn read_pair(&self, channels: [u16; 2], edges: [&Edges; 2]) -> Option<Found> {
         let edges = edges.map(|edges| edges.get(..SAMPLE.min(edges.len())).unwrap_or_default());
-        let mut best: Option<Found> = None;
+        let mut readings = Vec::new();
         for speech in &self.speeches {
-            for inverted in [false, true].into_iter().filter(|way| self.inverted.is_none_or(|given| given == *way)) {
-                let taps: Vec<Tap> = channels.into_iter().map(|channel| Tap { channel, inverted }).collect();
-                let (evidence, rates) = self.trial(*speech, &taps, &edges);
-                let found =
-                    Found { taps, speech: *speech, evidence, rates, idle: None, seen: None, rival: None, whole: false };
-                if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
-                    best = Some(found);
-                }
+            for inverted in self.polarities() {
+                let taps = channels.into_iter().map(|channel| Tap { channel, inverted }).collect();
+                readings.push(self.reading(*speech, taps, None, &edges));
             }
         }
-        best
+        self.look_again(&mut readings, &edges);
+        // The first of the best.
+        readings.into_iter().rev().max_by_key(mark)
     }
 
     /// Returns the best reading of a channel, and the second best.
     pub(super) fn read(&self, channel: u16, edges: &Edges) -> Option<Found> {
         let edges = edges.get(..SAMPLE.min(edges.len()))?;
-        let mut best: Option<Found> = None;
-        let mut second: Option<(Speech, i64)> = None;
+        let mut readings = Vec::new();
         for speech in &self.speeches {
             let bit = 1e12 / f64::from(speech.rate.max(1));
             if !may_run_at(edges, bit) && self.speeches.len() > 1 {
@@ -148,23 +156,23 @@ impl Candidates {
             }
             // A line with a clock never rests.
             let idle = if speech.protocol.clocked { None } else { idle_level(edges, bit as i64) };
-            for inverted in [false, true] {
-                if self.inverted.is_some_and(|given| given != inverted) {
-                    continue;
+            for inverted in self.polarities() {
+                readings.push(self.reading(*speech, vec![Tap { channel, inverted }], idle, &[edges]));
+            }
+        }
+        self.look_again(&mut readings, &[edges]);
+        let mut best: Option<Found> = None;
+        let mut second: Option<(Speech, i64)> = None;
+        for found in readings {
+            let (speech, score) = (found.speech, found.evidence.score);
+            if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
+                if let Some(old) = best.replace(found).filter(|old| old.speech != speech) {
+                    second = Some((old.speech, old.evidence.score));
                 }
-                let taps = vec![Tap { channel, inverted }];
-                let (evidence, rates) = self.trial(*speech, &taps, &[edges]);
-                let found =
-                    Found { taps, speech: *speech, evidence, rates, idle, seen: None, rival: None, whole: false };
-                if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
-                    if let Some(old) = best.replace(found).filter(|old| old.speech != *speech) {
-                        second = Some((old.speech, old.evidence.score));
-                    }
-                } else if best.as_ref().is_some_and(|best| best.speech != *speech)
-                    && second.is_none_or(|(_, score)| found.evidence.score > score)
-                {
-                    second = Some((*speech, found.evidence.score));
-                }
+            } else if best.as_ref().is_some_and(|best| best.speech != speech)
+                && second.is_none_or(|(_, second)| score > second)
+            {
+                second = Some((speech, score));
             }
         }
         let mut best = best?;
@@ -176,12 +184,38 @@ impl Candidates {
         Some(best)
     }
 
+    /// The polarities that the options leave open.
+    fn polarities(&self) -> impl Iterator<Item = bool> {
+        let given = self.inverted;
+        [false, true].into_iter().filter(move |inverted| given.is_none_or(|given| given == *inverted))
+    }
+
+    /// Returns a reading at first sight.
+    fn reading(&self, speech: Speech, taps: Vec<Tap>, idle: Option<bool>, channels: &[&Edges]) -> Found {
+        let (evidence, rates) = self.trial(speech, &taps, channels, Look::Once);
+        Found { taps, speech, evidence, rates, idle, seen: None, rival: None, whole: false }
+    }
+
+    /// Reads failed frames a second time, where that may still make a reading the best or the second best.
+    fn look_again(&self, readings: &mut [Found], channels: &[&Edges]) {
+        let most = readings.iter().map(|found| found.evidence.score).max().unwrap_or(0);
+        for found in readings {
+            let far = most >= CERTAIN && found.evidence.score.saturating_mul(FAR) < most;
+            if found.evidence.tally.faults() > 0 && !far && !found.speech.protocol.clocked {
+                (found.evidence, found.rates) = self.trial(found.speech, &found.taps, channels, Look::Again);
+            }
+        }
+    }
+
     /// Returns what a protocol makes of one channel, or of two as one line.
-    pub(super) fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges]) -> (Evidence, Rates) {
+    fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges], look: Look) -> (Evidence, Rates) {
         let mut evidence = Evidence::new(speech.protocol.weights);
         let Some(mut decoder) = speech.protocol.line(speech.rate, &self.settings) else {
             return (evidence, Rates::default());
         };
+        if look == Look::Once {
+            decoder.look_once();
+        }
         let mut wires = Wires::new(taps);
         let mut at = vec![0_usize; channels.len()];
         let mut end = Time::ZERO;
@@ -256,7 +290,7 @@ impl Candidates {
                     let lines: Vec<Vec<(Time, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
                     let lines: Vec<&Edges> =
                         lines.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
-                    let (evidence, rates) = self.trial(asking.speech, &taps, &lines);
+                    let (evidence, rates) = self.trial(asking.speech, &taps, &lines, Look::Again);
                     let found = Found { taps, evidence, rates, ..asking.clone() };
                     let most = best.as_ref().map_or(asking.evidence.alone, |best| best.evidence.alone);
                     if found.evidence.alone > most {
@@ -286,7 +320,7 @@ impl Candidates {
                 let channels: Vec<Vec<(Time, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
                 let channels: Vec<&Edges> =
                     channels.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
-                let (evidence, rates) = self.trial(answering.speech, &taps, &channels);
+                let (evidence, rates) = self.trial(answering.speech, &taps, &channels, Look::Again);
                 if evidence.answers > 0 && evidence.score > answering.evidence.score {
                     pairs.push((evidence.score, a, b, Found { taps, evidence, rates, ..answering.clone() }));
                 }

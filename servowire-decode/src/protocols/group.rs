@@ -70,20 +70,15 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
 
     /// Where content bits `first` to `last` are, counted from 0 through the contents of all fields.
     pub(super) fn span(&self, first: u32, last: u32) -> Option<Span> {
-        let width = 8 * size_of::<T>() as u32;
+        self.spans()?.of(first, last)
+    }
+
+    /// Places of content bits.
+    pub(super) fn spans(&self) -> Option<Spans<'_>> {
+        let starts = self.starts();
         // A field as its speaker sent it, with start bit and delimiter.
-        let field = self.end - *self.starts().last()?;
-        let at = |bit: u32, after: u32| {
-            let within = 1 + bit % width;
-            let start = *self.starts().get((bit / width) as usize)?;
-            Some((bit / width * (width + 2) + within, start + field * i64::from(within + after) / i64::from(width + 2)))
-        };
-        let ((first, start), (last, end)) = (at(first, 0)?, at(last, 1)?);
-        let place = match self.place() {
-            Place::Time { .. } => Place::Time { start, end },
-            line @ Place::Line(_) => line,
-        };
-        Some(Span { first, last, place })
+        let field = self.end - *starts.last()?;
+        Some(Spans { starts, field, width: 8 * size_of::<T>() as u32, line: self.line })
     }
 
     /// Number of fields.
@@ -124,6 +119,31 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         let time = start.filter(|_| self.line.is_none());
         let field = field.and_then(|field| names.get(field)).map(|name| (*name).to_owned());
         Refusal { field, bit: bit.map(u32::from), time, ..why }
+    }
+}
+
+/// Where the content bits of fields are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spans<'a> {
+    starts: &'a [Time],
+    /// Picoseconds of a field, and its content bits.
+    field: i64,
+    width: u32,
+    line: Option<u64>,
+}
+
+impl Spans<'_> {
+    /// Where content bits `first` to `last` are.
+    pub(super) fn of(&self, first: u32, last: u32) -> Option<Span> {
+        let Self { starts, field, width, line } = *self;
+        let at = |bit: u32, after: u32| {
+            let within = 1 + bit % width;
+            let start = *starts.get((bit / width) as usize)?;
+            Some((bit / width * (width + 2) + within, start + field * i64::from(within + after) / i64::from(width + 2)))
+        };
+        let ((first, start), (last, end)) = (at(first, 0)?, at(last, 1)?);
+        let place = line.map_or(Place::Time { start, end }, Place::Line);
+        Some(Span { first, last, place })
     }
 }
 

@@ -43,7 +43,7 @@ pub(super) struct Read {
     /// Spikes that were dropped before its edges.
     pub(super) spikes: u32,
     /// Whether all its edges are near to their places on the grid, and it ends high.
-    is_even: bool,
+    pub(super) is_even: bool,
 }
 
 /// So far from its place is an edge that is near to it at most, and the start of a field from a bit of the line, in bits: both

@@ -1,6 +1,7 @@
 //! How edges lie on grids of bits: the bit length of a speaker.
 
 use super::super::spikes::Edge;
+use super::even::{self, Even};
 
 /// How far a speaker's bit may be from the nominal one: one part in this many.
 const OFF: f64 = 0.065;
@@ -25,12 +26,12 @@ pub(super) fn nearest(number: f64) -> u32 {
 
 /// How edges lie on a grid.
 #[derive(Debug, Clone, Copy)]
-struct Fit {
+pub(super) struct Fit {
     /// Mean square distance, in bits.
-    misfit: f64,
+    pub(super) misfit: f64,
     /// How the distances go with the places, and how far the places are spread: sums of products.
-    above: f64,
-    below: f64,
+    pub(super) above: f64,
+    pub(super) below: f64,
 }
 
 impl Fit {
@@ -112,16 +113,29 @@ pub(super) struct Found {
     pub(super) bit: f64,
     /// Whether it was measured, not only the best of all.
     pub(super) is_sure: bool,
+    /// The bit length by which fields were read already, if they were.
+    pub(super) read_by: Option<f64>,
+}
+
+/// Fields read while bit lengths are tried: by the best one so far, and by the next one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tried {
+    pub(super) best: Vec<Even>,
+    next: Vec<Even>,
 }
 
 /// The bit length that fits the edges: one that was heard before if it does, else the best around `nominal`. What was `heard` is
 /// led by that of the last speaker.
-pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec<f64>) -> Found {
+pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec<f64>, tried: &mut Tried) -> Found {
     let mut best: Option<(Fit, usize)> = None;
+    let mut read_by = None;
     for (at, bit) in heard.iter().enumerate() {
-        let fit = measure(edges, field_bits, *bit);
+        let even = even::read(edges, field_bits, *bit, &mut tried.next);
+        let fit = even.unwrap_or_else(|| measure(edges, field_bits, *bit));
         if fit.misfit < GOOD_FIT && best.is_none_or(|(least, _)| fit.misfit < least.misfit) {
             best = Some((fit, at));
+            read_by = even.map(|_| *bit);
+            std::mem::swap(&mut tried.best, &mut tried.next);
             if at == 0 && fit.misfit < PERFECT_FIT {
                 break;
             }
@@ -132,9 +146,9 @@ pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec
         if let Some(before) = heard.get_mut(..=at).filter(|before| before.len() > 1) {
             before.rotate_right(1);
         }
-        let Some(bit) = heard.first_mut() else { return Found { bit: nominal, is_sure: false } };
+        let Some(bit) = heard.first_mut() else { return Found { bit: nominal, is_sure: false, read_by: None } };
         *bit += 0.2 * (fit.slope(*bit) - *bit);
-        return Found { bit: *bit, is_sure: true };
+        return Found { bit: *bit, is_sure: true, read_by };
     }
     let found = search(edges, field_bits, nominal);
     if found.is_sure {
@@ -160,5 +174,6 @@ fn search(edges: &[Edge], field_bits: u32, nominal: f64) -> Found {
             }
         }
     }
-    Found { bit: found.0.slope(found.1), is_sure: found.0.misfit < GOOD_FIT && edges.len() > 3 }
+    let is_sure = found.0.misfit < GOOD_FIT && edges.len() > 3;
+    Found { bit: found.0.slope(found.1), is_sure, read_by: None }
 }

@@ -1,6 +1,5 @@
 //! T-Format frames as events: names, values, positions, reasons.
 
-use std::cell::Cell;
 use std::sync::LazyLock;
 
 use tformat::{
@@ -30,7 +29,8 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
     }
     fields.extend(frame.spikes());
     let names = id.map_or(&["CF"][..], |id| id.layout().request);
-    located(event(frame, Direction::Request, id, fields, verdict(frame, names, result.err())), frame, names)
+    let event = event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()));
+    located(event, frame, parts(id, Direction::Request))
 }
 
 /// What is known about the encoder.
@@ -82,9 +82,10 @@ impl Encoder {
         }
         fields.extend(note);
         fields.extend(frame.spikes());
-        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().response);
+        let said = frame.data_id().ok().or(id);
+        let names = said.map_or(&["CF"][..], |id| id.layout().response);
         let event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
-        let mut event = located(event, frame, names);
+        let mut event = located(event, frame, parts(said, Direction::Answer));
         event.position = position;
         event.delay = delay;
         event
@@ -210,29 +211,53 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
     Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
 }
 
-/// With the places of its fields, which have these `names` on the line: ABS is ABS0 to ABS2.
-fn located(event: Event, frame: &Frame, names: &[&str]) -> Event {
+/// With the places of its fields, of which these are on the line.
+fn located(mut event: Event, frame: &Frame, parts: &[Part]) -> Event {
+    let Some(spans) = frame.spans() else { return event };
     // The fields come in the order of the line, but for those that have no place.
-    let next = Cell::new(0);
-    event.locate(|name| {
-        let is_part = |known: &&str| is_part(known, name);
-        let (before, behind) = names.split_at_checked(next.get())?;
-        let first = match behind.iter().position(is_part) {
-            Some(at) => before.len() + at,
-            None => before.iter().position(is_part)?,
-        };
-        let parts = names.iter().skip(first).take_while(|known| is_part(known)).count();
-        next.set(first + parts);
-        frame.span(8 * first as u32, 8 * (first + parts) as u32 - 1)
-    })
+    let mut rest = parts.iter();
+    for field in &mut event.fields {
+        let mut behind = rest.clone();
+        let found = behind.find(|part| part.name == field.name);
+        if found.is_some() {
+            rest = behind;
+        }
+        if let Some(Part { first, last, .. }) = found.or_else(|| parts.iter().find(|part| part.name == field.name)) {
+            field.span = spans.of(*first, *last);
+        }
+    }
+    event
 }
 
-/// Whether a field of the line is this one, or one of several of it.
-fn is_part(known: &str, name: &str) -> bool {
-    let end = name.len().saturating_sub(1);
-    // Nearly all differ there.
-    known.as_bytes().get(end) == name.as_bytes().last()
-        && known.strip_prefix(name).is_some_and(|rest| matches!(rest, "" | "0" | "1" | "2"))
+/// A value of a frame on the line, and its bits: ABS is in the fields ABS0 to ABS2.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    name: &'static str,
+    first: u32,
+    last: u32,
+}
+
+/// The values of requests and of answers, by the data ID; of none where it is not known.
+fn parts(id: Option<DataId>, direction: Direction) -> &'static [Part] {
+    type Both = [Vec<Part>; 2];
+    static ALL: LazyLock<[(DataId, Both); 9]> =
+        LazyLock::new(|| DataId::ALL.map(|id| (id, [id.layout().request, id.layout().response].map(gathered))));
+    let of = |id| ALL.iter().find(|(known, _)| *known == id);
+    let Some((_, [request, answer])) = id.and_then(of) else { return &[] };
+    if direction == Direction::Request { request } else { answer }
+}
+
+/// The values in fields of these names.
+fn gathered(names: &[&'static str]) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    for (first, name) in (0..).step_by(8).zip(names) {
+        let name = name.strip_suffix(['0', '1', '2']).unwrap_or(name);
+        match parts.last_mut() {
+            Some(part) if part.name == name => part.last += 8,
+            _ => parts.push(Part { name, first, last: first + 7 }),
+        }
+    }
+    parts
 }
 
 /// The data ID as it displays itself, written once and not for every frame.

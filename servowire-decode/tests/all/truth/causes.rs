@@ -1,6 +1,6 @@
 //! What spoils a line is named where it is so, with its place, and nowhere else.
 
-use super::bus::{Bus, Kind, build};
+use super::bus::{Bias, Bus, Kind, build};
 use super::line::{Recording, Wire, record};
 use super::rng::Rng;
 use super::{decode, judge};
@@ -45,6 +45,39 @@ fn spikes_are_named_with_the_edges_that_they_are_on() {
                 }
             }
         }
+    }
+}
+
+/// However many frames were damaged beyond help, dips that come later are passed over.
+#[test]
+fn dips_after_many_damaged_frames_are_passed_over() {
+    for kind in [Kind::Tformat, Kind::Aformat] {
+        let plain = Bus { kind, ..Bus::PLAIN };
+        let weak = Bias::Weak(0.6, 1.5);
+        let parts = [
+            plain,
+            Bus { damaged: 1.0, exchanges: 100, ..plain },
+            // The line changes at once, and after a while.
+            Bus { bias: weak, exchanges: 60, ..plain },
+            Bus { damaged: 1.0, exchanges: 100, ..plain },
+            plain,
+            Bus { bias: weak, ..plain },
+        ];
+        let mut wire = Wire::new(true);
+        let (mut said, mut now, mut from) = (Vec::new(), 0.0, Vec::new());
+        for (seed, bus) in (0..).zip(&parts) {
+            let (part, mut own, end) = build(bus, seed);
+            part.edges.iter().for_each(|(time, level)| wire.drive(now + time, *level));
+            own.iter_mut().for_each(|it| it.start += now);
+            said.append(&mut own);
+            from.push(now);
+            now += end;
+        }
+        let (events, notes) = decode(&record(&wire, Recording::EXACT, &mut Rng::new(0)), now);
+        // One failure in sixteen shows that the line has changed.
+        let changed = |start: f64| start >= from[2] && start < from[2] + (from[3] - from[2]) / 3.0;
+        let outcome = judge(&events, &said, 400e3, |said, _| !changed(said.start));
+        assert!(outcome.is_right(), "{kind:?}: {notes}\n{}", outcome.told("", 0));
     }
 }
 

@@ -1,0 +1,191 @@
+//! Fields whose edges are all near to the grid of their speaker: bits and fit in one pass, in whole numbers.
+
+use super::super::spikes::Edge;
+use super::field::Read;
+use super::grid::Fit;
+use crate::time::Time;
+
+/// Parts of a bit, in binary digits, in which places are counted, and those of distances whose squares are added up.
+const PART: u32 = 48;
+const COARSE: u32 = 20;
+const ONE: i64 = 1 << PART;
+/// So far from its place, in parts of a bit, is an edge that is near to it. Even on the grid of a bit length that is a little
+/// different, as it is after this speech, the edge is that of the same bit.
+const NEAR: i64 = ONE * 15 / 100;
+/// An edge that is nearer than this is where it should be.
+const EXACT: i64 = ONE >> 12;
+/// Bits without a field after which another speaker may follow.
+pub(super) const OTHER_SPEAKER: u32 = 3;
+/// Longer fields, in bits, are not read here, nor bits of which a picosecond is fewer parts: those would be counted too coarsely.
+const LONGEST: u32 = 30;
+const FEWEST: i64 = 1 << 20;
+/// One divided by the number of edges in a field.
+const SHARES: [f64; 32] = {
+    let mut shares = [1.0; 32];
+    let mut count = 1;
+    while count < 32 {
+        shares[count] = 1.0 / count as f64;
+        count += 1;
+    }
+    shares
+};
+
+/// A field on the grid by which it was read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Even {
+    first: Time,
+    bits: u32,
+    /// The sum of the places of its edges, and of their distances from them, in bits.
+    places: f64,
+    off: f64,
+    share: f64,
+}
+
+impl Even {
+    /// The same on the grid of bits of `bit` picoseconds, of which the one by which it was read has `ratio`.
+    #[inline]
+    pub(super) fn read(self, bit: f64, ratio: f64) -> Read {
+        let shift = ((self.places + self.off) * ratio - self.places) * self.share;
+        Read { bits: self.bits, start: self.first + (shift * bit) as i64, spikes: 0, is_even: true }
+    }
+}
+
+/// The sums over the edges of a field.
+#[derive(Debug, Clone, Copy)]
+struct Field {
+    first: Time,
+    /// Each edge turns all bits from its place on.
+    bits: u32,
+    edges: usize,
+    off: i64,
+    squares: i64,
+    places: i64,
+    spread: i64,
+    both: i64,
+}
+
+impl Field {
+    const fn beginning_at(first: Time) -> Self {
+        Self { first, bits: 0, edges: 1, off: 0, squares: 0, places: 0, spread: 0, both: 0 }
+    }
+}
+
+/// How the edges of a speaker are taken.
+#[derive(Debug, Clone, Copy)]
+struct Grid {
+    /// Parts of a bit in a picosecond.
+    per: i64,
+    /// Picoseconds of a field that is longer than any.
+    longest: i64,
+    /// From this place on a falling edge is that of the next field, and from this one on that of another speaker.
+    last: i64,
+    other: i64,
+}
+
+impl Grid {
+    fn new(field_bits: u32, bit: f64) -> Option<Self> {
+        let per = (ONE as f64 / bit) as i64;
+        let longest = (f64::from(LONGEST) * bit) as i64;
+        let last = i64::from(field_bits) * ONE - ONE * 6 / 10;
+        let other = i64::from(field_bits + OTHER_SPEAKER) * ONE;
+        (field_bits + OTHER_SPEAKER < LONGEST && per >= FEWEST).then_some(Self { per, longest, last, other })
+    }
+
+    /// Where an edge lies in a field that began at `first`, in parts of a bit.
+    #[inline]
+    fn place(self, edge: &Edge, first: Time) -> i64 {
+        let time = edge.time.after(first);
+        // Beyond the longest one no edge is in the field, and the product would be too large.
+        time.min(self.longest).wrapping_mul(self.per)
+    }
+}
+
+/// Reads the fields of a speaker, of `field_bits` bits of `bit` picoseconds, and measures how they lie; `None` where an edge is far
+/// from its place, or a spike or a low level is where none should be.
+pub(super) fn read(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<Even>) -> Option<Fit> {
+    let grid = Grid::new(field_bits, bit)?;
+    fields.clear();
+    let (first, rest) = edges.split_first()?;
+    let mut fit = Fit { misfit: 0.0, above: 0.0, below: 0.0 };
+    let mut field = Field::beginning_at(first.time);
+    let mut spikes = first.spikes;
+    for edge in rest {
+        let place = grid.place(edge, field.first);
+        spikes |= edge.spikes;
+        if place > grid.last && !edge.level {
+            close(field, field_bits, &mut fit, fields)?;
+            field = Field::beginning_at(edge.time);
+            continue;
+        }
+        let whole = (place + ONE / 2) >> PART;
+        let off = place - (whole << PART);
+        if off.abs() > NEAR || whole >= i64::from(field_bits) {
+            return None;
+        }
+        field.bits ^= u32::MAX << (whole & 31);
+        field.edges += 1;
+        field.off += off;
+        let off = off >> (PART - COARSE);
+        field.squares += off * off;
+        field.places += whole;
+        field.spread += whole * whole;
+        field.both += whole * off;
+    }
+    close(field, field_bits, &mut fit, fields)?;
+    let measured = edges.len() - fields.len();
+    fit.misfit = if measured > 0 { fit.misfit / measured as f64 } else { 0.0 };
+    (spikes == 0).then_some(fit)
+}
+
+/// Reads the fields of the next speaker whose edges are all where they should be, so that nothing has to be measured: how many
+/// edges these are.
+pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<Even>) -> Option<usize> {
+    let grid = Grid::new(field_bits, bit)?;
+    fields.clear();
+    let (first, rest) = edges.split_first()?;
+    let (mut first, mut spikes, mut bits, mut count) = (first.time, first.spikes, 0_u32, edges.len());
+    let all = (1 << field_bits) - 1;
+    let mut close = |first: Time, bits: u32| {
+        fields.push(Even { first, bits: bits & all, places: 0.0, off: 0.0, share: 1.0 });
+        (bits >> (field_bits - 1) & 1 == 1).then_some(())
+    };
+    for (at, edge) in rest.iter().enumerate() {
+        let place = grid.place(edge, first) + EXACT;
+        if place > grid.last {
+            if edge.level {
+                return None;
+            }
+            if place > grid.other {
+                count = at + 1;
+                break;
+            }
+            close(first, bits)?;
+            (first, bits) = (edge.time, 0);
+        } else if place & (ONE - 1) > 2 * EXACT {
+            return None;
+        } else {
+            bits ^= u32::MAX << (place >> PART & 31);
+        }
+        spikes |= edge.spikes;
+    }
+    close(first, bits)?;
+    (spikes == 0).then_some(count)
+}
+
+/// The field has no more edges. It ends high.
+#[inline]
+fn close(field: Field, field_bits: u32, fit: &mut Fit, fields: &mut Vec<Even>) -> Option<()> {
+    let Field { first, bits, edges, off, squares, places, spread, both } = field;
+    let all = (1 << field_bits) - 1;
+    let share = *SHARES.get(edges)?;
+    if bits >> (field_bits - 1) & 1 == 0 {
+        return None;
+    }
+    let part = 1.0 / (1_u64 << COARSE) as f64;
+    let (places, off) = (places as f64, off as f64 / ONE as f64);
+    fit.misfit += squares as f64 * part * part - off * off * share;
+    fit.below += spread as f64 - places * places * share;
+    fit.above += both as f64 * part - places * off * share;
+    fields.push(Even { first, bits: bits & all, places, off, share });
+    Some(())
+}
