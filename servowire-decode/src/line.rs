@@ -1,6 +1,7 @@
 //! From a recorded line to its events: find the channels, the protocol, the rate and the polarity, then receive.
 
 mod again;
+mod blame;
 pub(crate) mod evidence;
 pub(crate) mod exchanges;
 mod floating;

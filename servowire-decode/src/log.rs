@@ -18,6 +18,8 @@ use crate::time::{SECOND, Time};
 
 /// Bursts by which the protocol is recognised.
 const SAMPLE: usize = 256;
+/// The same of a log that arrives slowly.
+const FEW: usize = 16;
 
 /// Decodes a log; if the protocol is unknown, with the one that has the most good frames.
 pub(crate) fn decode(
@@ -30,7 +32,7 @@ pub(crate) fn decode(
     let mut bursts = Vec::new();
     let mut end = Ok(true);
     let mut origin = None;
-    while bursts.len() < SAMPLE && end == Ok(true) && (bursts.is_empty() || !log.pauses()) {
+    while bursts.len() < SAMPLE && end == Ok(true) && !is_enough(bursts.len(), &mut log) {
         match log.burst() {
             Ok(Some(burst)) => bursts.push(since_first(burst, &mut origin)),
             Ok(None) => end = Ok(false),
@@ -47,7 +49,7 @@ pub(crate) fn decode(
         join(reader.as_mut(), burst, &mut whole, out)?;
     }
     while end == Ok(true) && !out.is_done() {
-        if log.pauses() {
+        if log.is_due() {
             out.flush()?;
         }
         out.tick();
@@ -70,6 +72,11 @@ pub(crate) fn decode(
         (None, Some(what)) => Err(Stop::Trouble(fault(what))),
         (None, None) => Ok(()),
     }
+}
+
+/// Whether so many bursts have to do: no more arrive for now, or they arrive slowly.
+fn is_enough(bursts: usize, log: &mut ByteLog) -> bool {
+    bursts > 0 && log.pauses() || bursts >= FEW && log.is_due()
 }
 
 /// Times of day and dates are counted from the first one, as in a capture; other times are already times of the log.

@@ -60,11 +60,15 @@ impl fmt::Display for Recognition {
         let rate = f64::from(self.rate);
         write!(f, " {rests}, {} Mbit/s", mbit(rate))?;
         let off = |share: f64| (share - 1.0) * 100.0;
+        // No sign for what is no difference.
+        let none = |off: f64| if off.abs() < 0.05 { 0.0 } else { off };
+        let wide = off(self.rates.most) - off(self.rates.least) > 1.0;
+        let ends = self.rates.ends().or(wide.then_some([self.rates.least, self.rates.most])).unwrap_or_default();
         let strange = self.seen.filter(|seen| (seen / rate - 1.0).abs() > 0.1);
         match (strange, self.rates.mean()) {
             (Some(seen), _) => write!(f, ", though the runs look like {:.3} Mbit/s", mbit(seen))?,
-            (None, Some(_)) if off(self.rates.most) - off(self.rates.least) > 1.0 => {
-                write!(f, " ({:+.1} to {:+.1} % on the line)", off(self.rates.least), off(self.rates.most))?;
+            (None, Some(_)) if ends[1] - ends[0] > 0.0 => {
+                write!(f, " ({:+.1} to {:+.1} % on the line)", none(off(ends[0])), none(off(ends[1])))?;
             }
             (None, Some(mean)) => {
                 // No sign for what is no difference.

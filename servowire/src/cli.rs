@@ -20,7 +20,7 @@ pub struct Cli {
 enum Command {
     /// Decode captures of a line.
     Decode(Decode),
-    /// Write a report about a capture, for a browser or a printer.
+    /// Write a report on a capture, for a browser or a printer.
     Report(report::Arguments),
     /// Show one frame of a capture, bit by bit.
     Explain(explain::Arguments),
@@ -28,13 +28,13 @@ enum Command {
     Profile(profile::Arguments),
     /// Run the reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),
-    /// Talk to a T-Format encoder on a USB-RS485 adapter, or act as one.
+    /// Talk to a T-Format encoder through a USB-RS485 adapter, or act as one.
     Talk(talk::Arguments),
-    /// Show who is on an encoder's line when: shortest cycle, worst fault.
+    /// Show the timing of an encoder's line: who sends when, shortest cycle, worst fault.
     Timing(timing::Arguments),
     /// Describe the register map of a HIPERFACE DSL receiver in words.
     Registers(registers::Arguments),
-    /// Print completions for a shell, to be put where the shell looks for them.
+    /// Print completions for a shell; save them where the shell looks for them.
     Completions {
         /// Which shell.
         shell: clap_complete::Shell,

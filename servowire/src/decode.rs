@@ -12,6 +12,7 @@ use anstream::{AutoStream, ColorChoice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use servowire_decode::capture::{self, Capture, Format, Hints, Input};
+use servowire_decode::codec::Codec;
 use servowire_decode::fault::{At, Fault, Stop};
 use servowire_decode::output::Output;
 use servowire_decode::output::json::JsonLines;
@@ -23,6 +24,7 @@ use servowire_decode::output::vcd::VcdOut;
 use servowire_decode::protocols::CODECS;
 use servowire_decode::recognition::Note;
 use servowire_decode::sink::Tally;
+use tformat::BitRate;
 
 pub(crate) use arguments::Decode;
 
@@ -30,7 +32,8 @@ use crate::files::{self, Piped};
 use crate::interrupt;
 use crate::live::{Live, Shown};
 use crate::picture::Picture;
-use crate::terminal;
+use crate::units::tformat_rate;
+use crate::{serial, terminal};
 
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
@@ -62,6 +65,13 @@ impl End {
 /// Decodes all files. 0: all frames good; 1: not so; 4: something shows that somebody has to look after; 5: both; 2: the options do
 /// not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
+    if let Some(what) = arguments.contradiction() {
+        eprintln!("error: {what}");
+        return ExitCode::from(2);
+    }
+    if let Some(port) = &arguments.serial {
+        return listen(arguments, port);
+    }
     let files = arguments.files.len();
     let described = arguments.reading.describes_a_file();
     let piped = match if files == 0 { files::piped(described.is_some()) } else { Piped::Nothing } {
@@ -93,10 +103,48 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
             return ExitCode::from(2);
         }
     }
+    let headed = files != 1 && piped.is_none();
+    print(arguments, piped.is_some(), headed, |printer| all(arguments, piped, printer))
+}
+
+/// Decodes what a serial port hears.
+fn listen(arguments: &Decode, port: &str) -> ExitCode {
+    let protocol =
+        arguments.reading.protocol.0.or_else(|| CODECS.iter().copied().find(|codec| codec.name == "tformat"));
+    if protocol.is_none_or(|protocol| protocol.name != "tformat") {
+        eprintln!("error: a serial port receives bytes of T-Format only: record the line with a logic analyser");
+        return ExitCode::from(2);
+    }
+    let rate = arguments.reading.bit_rate().unwrap_or(BitRate::Mbit2_5.bits_per_second());
+    let rate = match tformat_rate(&rate.to_string()) {
+        Ok(rate) => rate,
+        Err(what) => {
+            eprintln!("error: {what}");
+            return ExitCode::from(2);
+        }
+    };
+    let input = match serial::listen(port, rate) {
+        Ok(input) => input,
+        Err(what) => {
+            eprintln!("error: {what}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let hints = Hints { format: Some(Format::Hex), ..arguments.reading.hints() };
+    print(arguments, true, false, |printer| one(arguments, Ok(input), hints, protocol, &Bar { bar: None }, printer))
+}
+
+/// Prints what `decode` finds as the arguments want it. `live`: it comes while it happens; `headed`: each file has a heading.
+fn print(
+    arguments: &Decode,
+    live: bool,
+    headed: bool,
+    decode: impl FnOnce(&mut dyn Printer) -> io::Result<End>,
+) -> ExitCode {
     interrupt::note();
     let stdout = io::stdout();
     let out = BufWriter::with_capacity(1 << 16, stdout.lock());
-    let mut printer: Box<dyn Printer> = if let Some(every) = every(arguments, piped.is_some(), stdout.is_terminal()) {
+    let mut printer: Box<dyn Printer> = if let Some(every) = every(arguments, live, stdout.is_terminal()) {
         let shown = match (arguments.json, stdout.is_terminal()) {
             (true, _) => Shown::Json,
             (false, true) => Shown::InPlace,
@@ -112,7 +160,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         Box::new(Csv::new(out))
     } else {
         let mut text = Text::new(out);
-        if files != 1 && piped.is_none() {
+        if headed {
             text = text.with_headings();
         }
         if AutoStream::choice(&stdout) != ColorChoice::Never {
@@ -123,7 +171,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         }
         Box::new(text)
     };
-    match all(arguments, piped, printer.as_mut()) {
+    match decode(printer.as_mut()) {
         Ok(end) => ExitCode::from(end.code()),
         // The reader has seen enough.
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
@@ -143,19 +191,20 @@ fn every(arguments: &Decode, piped: bool, terminal: bool) -> Option<Duration> {
 /// What was found in all files.
 fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<End> {
     let mut end = End::default();
+    let (hints, protocol) = (arguments.reading.hints(), arguments.reading.protocol.0);
     if let Some(input) = piped {
-        return one(arguments, Ok(input), arguments.reading.hints(), &Bar { bar: None }, printer);
+        return one(arguments, Ok(input), hints, protocol, &Bar { bar: None }, printer);
     }
     for path in arguments.files.iter().take_while(|_| !interrupt::asked()) {
         let bar = Bar::new(path);
         let input = files::open(path, arguments.reading.file.follow);
-        end = end.and(one(arguments, input, arguments.reading.hints(), &bar, printer)?);
+        end = end.and(one(arguments, input, hints, protocol, &bar, printer)?);
         bar.finish();
     }
     if arguments.files.is_empty() {
         for (name, bytes) in bundled(arguments) {
             let hints = Hints { format: Some(Format::Vcd), ..Hints::default() };
-            end = end.and(one(arguments, Ok(Input::over(name, *bytes)), hints, &Bar { bar: None }, printer)?);
+            end = end.and(one(arguments, Ok(Input::over(name, *bytes)), hints, protocol, &Bar { bar: None }, printer)?);
         }
     }
     Ok(end)
@@ -171,6 +220,7 @@ fn one(
     arguments: &Decode,
     input: Result<Input, Fault>,
     hints: Hints,
+    protocol: Option<&'static dyn Codec>,
     bar: &Bar,
     printer: &mut dyn Printer,
 ) -> io::Result<End> {
@@ -212,7 +262,7 @@ fn one(
     let mut settings = arguments.reading.settings();
     // A row of a table stands alone.
     settings.rtex.whole = arguments.csv;
-    let end = servowire_decode::decode(name, capture, arguments.reading.protocol.0, &settings, &mut out);
+    let end = servowire_decode::decode(name, capture, protocol, &settings, &mut out);
     out.end()?;
     let (tally, chosen, refusals, done) = (out.tally, out.chosen, out.refusals(), out.is_done());
     if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {

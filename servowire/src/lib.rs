@@ -25,6 +25,7 @@ mod reading;
 pub mod registers;
 mod report;
 mod scope;
+mod serial;
 pub mod talk;
 mod terminal;
 pub mod timing;

@@ -93,7 +93,8 @@ pub(crate) struct FileArgs {
     /// File format, if the content does not tell it.
     #[arg(long, value_enum)]
     format: Option<Named>,
-    /// Samples a second of a raw file, such as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
+    /// Samples per second of a raw file, such as 24000000 or 24M; with it, a file is read as raw samples unless --format says
+    /// otherwise.
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     rate: Option<u64>,
     /// Bytes per sample of a raw file; 1 by default.
@@ -109,10 +110,10 @@ pub(crate) struct FileArgs {
     #[arg(long)]
     pub(crate) follow: bool,
     /// Whether the packets of a network capture end with their frame check sequence, which most network cards strip; by default
-    /// as the file says.
+    /// as stated in the file.
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     fcs: Option<bool>,
-    /// Voltage above which a column of an oscilloscope's table is high; by default half-way between its levels.
+    /// Voltage above which a column of an oscilloscope's table is high; by default halfway between its two levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     threshold: Option<f64>,
 }
@@ -121,7 +122,7 @@ pub(crate) struct FileArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Line")]
 pub(crate) struct LineArgs {
-    /// Channel by name or number; by default the one that decodes best.
+    /// Channel by name or number; by default all channels are examined.
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
     /// Channel of the requests, if the answers are on another one.
@@ -130,10 +131,10 @@ pub(crate) struct LineArgs {
     /// Channel of the answers.
     #[arg(long, value_name = "NAME", requires = "tx", conflicts_with = "channel")]
     rx: Option<String>,
-    /// Bits per second, such as 2500000 or 2.5M; by default found from the lengths of the runs.
+    /// Bits per second, such as 2500000 or 2.5M; by default determined from the capture.
     #[arg(long, value_name = "HZ", value_parser = bit_rate)]
     bit_rate: Option<u32>,
-    /// Whether the line idles high (normal) or low; by default the one that decodes best.
+    /// Whether the line idles high (normal) or low; by default whichever decodes better.
     #[arg(long, value_enum)]
     polarity: Option<Polarity>,
 }
@@ -151,10 +152,10 @@ pub(crate) enum Polarity {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Encoder (T-Format, A-format)")]
 pub(crate) struct TformatArgs {
-    /// Bits of a turn; by default from the encoder ID or type word seen on the line.
+    /// Bits per turn; by default taken from the encoder ID or type word on the line.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=24))]
     single_turn_bits: Option<u8>,
-    /// Bits that count turns; by default from the encoder ID or type word, else 16.
+    /// Bits of the turn counter; by default taken from the encoder ID or type word, otherwise 16.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(0..=24))]
     multi_turn_bits: Option<u8>,
 }
@@ -163,7 +164,7 @@ pub(crate) struct TformatArgs {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "RTEX")]
 pub(crate) struct RtexArgs {
-    /// Bytes of a block, 16 or 32; by default what the log looks like. A line or record may hold several blocks.
+    /// Bytes per block, 16 or 32; by default determined from the log. A line or record may hold several blocks.
     #[arg(long, value_name = "BYTES", value_parser = block_size)]
     block_size: Option<u8>,
     /// Update period, such as 500us or 0.5ms: supplies the times of a log that has none, and is used to check the steps of the
@@ -228,6 +229,11 @@ impl Reading {
             (self.rtex.mac_id.is_some(), "--mac-id"),
         ];
         said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
+    }
+
+    /// The rate of the line, where it was given.
+    pub(crate) fn bit_rate(&self) -> Option<u32> {
+        self.line.bit_rate
     }
 
     /// What was said about the files.

@@ -22,7 +22,7 @@ use crate::scope::{Scope, Wanted};
 /// Refused frames that are listed.
 const LISTED: usize = 500;
 
-/// Write a report about a capture: one file, for a browser or a printer.
+/// Write a report on a capture: one file, for a browser or a printer.
 ///
 /// What was found and how, the settings, figures of each encoder, its position, delays and errors over time, each kind of
 /// damage once as it looks on the line, a list of the refused frames, and the SHA-256 of the capture. Exit code 0: all frames

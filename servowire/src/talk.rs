@@ -24,7 +24,7 @@ use record::Recorded;
 
 use crate::units::tformat_rate;
 
-/// Talk to a T-Format encoder on a USB-RS485 adapter, or act as one.
+/// Talk to a T-Format encoder through a USB-RS485 adapter, or act as one.
 ///
 /// Exit code 0: done; 1: the encoder did not answer as it should, or the port failed; 2: wrong use.
 #[derive(Debug, Args)]
@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Bits per second, 2.5M or 5M.
     #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = tformat_rate)]
     rate: BitRate,
-    /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.
+    /// Longest wait for an answer. USB adapters may hold short answers back for up to 16 ms.
     #[arg(long, value_name = "MS", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     timeout: u64,
     /// Print JSON, one object per line.
@@ -63,7 +63,7 @@ enum What {
         /// Required: afterwards the machine no longer knows where it is.
         #[arg(long, required = true)]
         lose_multi_turn_reference: bool,
-        /// Turns by which the count may differ from 0 afterwards: a shaft at the boundary of a turn may tremble.
+        /// Turns by which the count may differ from 0 afterwards: a shaft at the boundary of a turn may waver.
         #[arg(long, value_name = "TURNS", default_value_t = 1)]
         tolerance: u32,
         /// Do not ask for confirmation.
@@ -134,7 +134,7 @@ enum Eeprom {
 
 #[derive(Debug, Args)]
 struct Simulate {
-    /// Encoder ID, 0x17 for 23 bits a turn.
+    /// Encoder ID, such as 0x17 for 23 bits per turn.
     #[arg(long, default_value = "0x17", value_parser = encoder_id)]
     id: u8,
     /// Speed of the shaft in turns per minute.
@@ -143,10 +143,10 @@ struct Simulate {
     /// The adapter hears its own transmissions.
     #[arg(long)]
     echo: bool,
-    /// The port of a second adapter with a real encoder: requests are passed on to it, answers back, and everything is printed.
+    /// The port of a second adapter with a real encoder: requests are passed on to it, its answers are passed back, and everything is printed.
     #[arg(long, value_name = "PORT", conflicts_with_all = ["id", "rpm"])]
     encoder: Option<String>,
-    /// Also write it into this file as CSV.
+    /// Also write this log into a CSV file.
     #[arg(long, value_name = "FILE", requires = "encoder")]
     csv: Option<PathBuf>,
 }

@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 
 use crate::terminal::say;
 
-/// Show who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
+/// Show the timing of a line with encoders: who sends when, the shortest cycle and the worst fault of an exchange.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]

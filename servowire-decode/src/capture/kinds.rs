@@ -2,6 +2,7 @@
 
 use super::byte_table::ByteTable;
 use super::hexlog::{Burst, HexLog};
+use super::input::Input;
 use super::pcapng::Pcapng;
 use super::raw::Raw;
 use super::recording::Line;
@@ -61,10 +62,19 @@ impl ByteLog {
 
     /// Returns whether reading the next burst would have to wait.
     pub(crate) fn pauses(&mut self) -> bool {
+        self.input().pauses()
+    }
+
+    /// Returns whether complete events should be shown now.
+    pub(crate) fn is_due(&mut self) -> bool {
+        self.input().is_due()
+    }
+
+    fn input(&mut self) -> &mut Input {
         match self {
-            Self::Hex(log) => log.input().pauses(),
-            Self::Records(log) => log.input().pauses(),
-            Self::Table(log) => log.input().pauses(),
+            Self::Hex(log) => log.input(),
+            Self::Records(log) => log.input(),
+            Self::Table(log) => log.input(),
         }
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! When a driver releases the line, the line may dip for a bit before the bias pulls it up, or it may be disturbed. A
 //! receiver takes that for a start bit, and the following frame is lost. Here it is read a second time, from the next edge
-//! onwards. If a frame stays broken, its edges may show that two drivers were active at once.
+//! onwards.
 
 use super::evidence::Weights;
 use super::receive::EdgeReceiver;
 use super::spikes::Edge;
 use super::start_stop::StartStop;
 use super::trial::{Trial, is_failed};
-use crate::event::{Event, Field, Place, Value, Verdict};
+use crate::event::{Event, Field, Place, Value};
 use crate::time::Time;
 
 /// Maximum number of edges read again: those of one or two exchanges.
@@ -146,46 +146,4 @@ fn note(event: &mut Event, what: &str) {
         }
         _ => event.fields.push(Field::text("note", what)),
     }
-}
-
-/// An edge further than this from the grid of the others, in bits, belongs to another grid.
-const OFF_GRID: f64 = 0.27;
-/// Minimum number of edges off the grid that two drivers leave in a frame, and minimum share: one in this many.
-const FEWEST_OFF: usize = 4;
-const SHARE_OFF: usize = 6;
-/// Minimum number of times that the edges of a frame change from one grid to the other. Two speakers in turn change grid
-/// once.
-const FEWEST_TURNS: usize = 4;
-
-/// Names the cause of a failed frame as shown by its edges: two drivers at once have two clocks, so no grid fits all edges.
-/// `bit`: the bit length of the speaker, in picoseconds.
-pub(super) fn blame(event: &mut Event, edges: &[Edge], bit: f64) {
-    let Place::Time { start, end } = event.place else { return };
-    let Verdict::Refused(refusal) = &mut event.verdict else { return };
-    let first = edges.partition_point(|edge| edge.time < start - (0.5 * bit) as i64);
-    let last = edges.partition_point(|edge| edge.time < end + (3.0 * bit) as i64);
-    let own = edges.get(first..last).unwrap_or_default();
-    let Some(begin) = own.first() else { return };
-    // The grid on which most edges lie; clocks are off by up to 4 %.
-    let off = |bit: f64| {
-        move |edge: &Edge| {
-            let place = (edge.time - begin.time) as f64 / bit;
-            (place - place.round()).abs() > OFF_GRID
-        }
-    };
-    let bits = (-16_i32..=16).map(|k| bit * (1.0 + f64::from(k) / 400.0));
-    let counted = bits.map(|bit| (own.iter().filter(|edge| off(bit)(edge)).count(), bit));
-    let Some((count, bit)) = counted.min_by_key(|(count, _)| *count) else { return };
-    let is_off = off(bit);
-    let turns = own.windows(2).filter(|pair| matches!(pair, [a, b] if is_off(a) != is_off(b))).count();
-    if count < FEWEST_OFF || count * SHARE_OFF < own.len() || turns < FEWEST_TURNS {
-        return;
-    }
-    let at = own.iter().find(|edge| is_off(edge)).map_or(start, |edge| edge.time);
-    refusal.cause = Some(format!(
-        "two drive at once: from {:.3} us on, {count} of {} edges are off the grid of the others",
-        at.us(),
-        own.len()
-    ));
-    refusal.time = refusal.time.or(Some(at));
 }

@@ -2,7 +2,8 @@
 
 use std::io;
 
-use super::again::{Failed, MOST_AGAIN, blame};
+use super::again::{Failed, MOST_AGAIN};
+use super::blame::blame;
 use super::evidence::{CERTAIN, Evidence, Weights};
 use super::floating::Floating;
 use super::lane::LineDecoder;
@@ -175,7 +176,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
 
     #[cold]
     fn again(&mut self, now: Option<Time>, far: bool, out: &mut dyn Sink) -> io::Result<()> {
-        let failed = std::mem::take(&mut self.told.failed);
+        let mut failed = std::mem::take(&mut self.told.failed);
         if !failed.iter().any(is_failed) {
             return failed.iter().try_for_each(|event| out.event(event));
         }
@@ -193,14 +194,9 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         self.told.untried = if tried { 0 } else { untried.saturating_add(1) };
         let Some(better) = better else {
             self.told.luck = self.told.luck.saturating_sub(1);
-            for mut event in failed {
-                if is_failed(&event) {
-                    blame(&mut event, self.receiver.past(), bit);
-                }
-                out.event(&event)?;
-            }
+            blame(&mut failed, &self.receiver);
             self.receiver.unlearn();
-            return Ok(());
+            return failed.iter().try_for_each(|event| out.event(event));
         };
         self.told.luck = LUCK;
         self.told.dips += better.dips;

@@ -8,6 +8,7 @@ mod even;
 mod field;
 mod grid;
 mod rates;
+mod reading;
 
 pub use rates::Rates;
 
@@ -16,6 +17,11 @@ use super::start_stop::LineField;
 use crate::capture::samples::Turns;
 use crate::time::Time;
 
+/// Who speaks after so few bits of pause answers somebody.
+const ANSWERS_WITHIN: f64 = 22.0;
+/// Speeches over which the spread of edges is a mean, and the fewest that tell it.
+const LATELY: u32 = 32;
+const FEWEST: u32 = 4;
 /// Maximum number of edges kept of an open burst; beyond that, whole fields are read.
 const MOST_EDGES: usize = 512;
 /// A line that is low for longer ends a burst too, in picoseconds: 13 days. So 64 bits hold the times of a burst from its beginning.
@@ -45,6 +51,10 @@ pub(crate) struct EdgeReceiver {
     past: Vec<Edge>,
     /// Bit lengths known when they were read.
     heard_before: Vec<f64>,
+    /// When the last field ended.
+    until: Option<Time>,
+    /// Mean square distance of edges from the grid of who speaks first, in bits, over so many speeches.
+    spread: (f64, u32),
     tried: grid::Tried,
 }
 
@@ -65,6 +75,8 @@ impl EdgeReceiver {
             skipped: 0,
             past: Vec::new(),
             heard_before: Vec::new(),
+            until: None,
+            spread: (0.0, 0),
             tried: grid::Tried::default(),
         }
     }
@@ -92,6 +104,17 @@ impl EdgeReceiver {
             self.edge(*edge);
         }
         self.close();
+    }
+
+    /// Returns the mean square distance of edges from their grid, in bits, as those of who speaks first have it: nobody else is
+    /// on then.
+    pub(super) fn spread(&self) -> Option<f64> {
+        (self.spread.1 >= FEWEST).then_some(self.spread.0)
+    }
+
+    /// Returns the bit length of the last speaker before edges were forgotten, in picoseconds.
+    pub(super) fn bit_before(&self) -> f64 {
+        self.heard_before.first().copied().unwrap_or(self.bit)
     }
 
     /// Returns the edges read since they were last forgotten.
@@ -301,8 +324,8 @@ impl EdgeReceiver {
     /// Fields of one speaker; `exact`: the bit length by which they were read already, as all edges are where they should be.
     fn speak(&mut self, edges: &[Edge], exact: Option<f64>) {
         let field_bits = self.field_bits();
-        let grid::Found { bit, is_sure, read_by } = match exact {
-            Some(bit) => grid::Found { bit, is_sure: true, read_by: exact },
+        let grid::Found { bit, is_sure, alone, misfit, read_by } = match exact {
+            Some(bit) => grid::Found { bit, is_sure: true, alone: exact, misfit: 0.0, read_by: exact },
             None => grid::fit(edges, field_bits, self.bit, &mut self.heard, &mut self.tried),
         };
         if is_sure {
@@ -327,6 +350,16 @@ impl EdgeReceiver {
                 rest = next;
             }
         }
+        let pause = edges.first().zip(self.until).map(|(edge, until)| (edge.time - until) as f64 / bit);
+        let answers = pause.is_some_and(|pause| pause < ANSWERS_WITHIN);
+        if let Some(alone) = alone.filter(|_| is_sure) {
+            self.rates.spoke(answers, self.bit / alone);
+        }
+        if is_sure && !answers {
+            self.spread.1 = (self.spread.1 + 1).min(LATELY);
+            self.spread.0 += (misfit - self.spread.0) / f64::from(self.spread.1);
+        }
+        self.until = self.fields.last().map(|field| field.end);
         self.time_fields(first, bit);
         if let Some(field) = self.fields.get_mut(first) {
             field.bits = line.bits(edges, field.start, speaker);
@@ -346,8 +379,8 @@ impl EdgeReceiver {
 
     /// A field of a speaker.
     #[inline]
-    fn take_field(&mut self, read: &field::Read, speaker: field::Speaker) {
-        let field::Read { bits, start, spikes, .. } = *read;
+    fn take_field(&mut self, read: &reading::Read, speaker: field::Speaker) {
+        let reading::Read { bits, start, spikes, .. } = *read;
         let spikes = spikes.saturating_add(std::mem::take(&mut self.dropped));
         if bits & 1 == 1 {
             // The start bit was no bit.

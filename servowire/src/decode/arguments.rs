@@ -24,12 +24,17 @@ use crate::units::moment;
   servowire decode --cut 1ms..2ms -o piece.vcd line.vcd
   sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary |
     servowire decode --rate 24M --stats --until error --around 5ms -o fault.vcd -
-  sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary | servowire decode --rate 24M -")]
+  sigrok-cli --driver fx2lafw --config samplerate=24M --continuous -O binary | servowire decode --rate 24M -
+  servowire decode --stats --serial /dev/ttyUSB0")]
 pub(crate) struct Decode {
-    /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
-    /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
-    /// comes through a pipe, or else the bundled captures.
+    /// Captures: VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also
+    /// compressed with gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for standard input. Without a file,
+    /// standard input is read if it is a pipe; otherwise the bundled captures are decoded.
     pub(super) files: Vec<PathBuf>,
+    /// Listen to a T-Format line through this serial port without sending anything, at 2.5 Mbit/s unless --bit-rate says
+    /// otherwise. A port gives no times, so no delays and cycle times are shown.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["files", "format", "rate", "unit_size", "bytes", "record_size", "follow", "fcs", "threshold", "channel", "tx", "rx", "polarity"])]
+    pub(super) serial: Option<String>,
     /// JSON Lines, one object per frame; times in picoseconds.
     #[arg(long)]
     pub(super) json: bool,
@@ -42,24 +47,24 @@ pub(crate) struct Decode {
     /// With --stats, list moves of the position by more than this from one frame to the next.
     #[arg(long, value_name = "COUNTS", requires = "stats")]
     pub(super) jump: Option<u64>,
-    /// With --stats, of what comes in live (a pipe, --follow): also the figures of what came since the last ones, so often, such
-    /// as 1s or 200ms, a line an encoder. On a terminal every second without being asked.
+    /// With --stats and live input (a pipe, --follow, --serial): at this interval, such as 1s or 200ms, also show the figures of
+    /// the time since then, one line per encoder. On a terminal this happens every second by default.
     #[arg(long, value_name = "TIME", value_parser = interval, requires = "stats")]
     pub(super) every: Option<Duration>,
     /// Write the capture as VCD, with the decoded fields beside it as strings.
     #[arg(short = 'o', long, value_name = "OUT")]
     pub(super) vcd: Option<PathBuf>,
-    /// Write only this piece of it, such as 1ms..2ms, and show only its frames.
+    /// With -o, write only this part of the capture, such as 1ms..2ms, and show only its frames.
     #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, requires = "vcd", conflicts_with_all = ["from", "to"])]
     pub(super) cut: Option<(Time, Time)>,
-    /// With -o, write only the line so long before and after each refused frame or missing answer; no more of it is held in
-    /// memory. With --until error, go on for so long.
+    /// With -o, write only this much of the line before and after each refused frame or missing answer; no more is held in
+    /// memory. With --until error, continue for this long after the error.
     #[arg(long, value_name = "TIME", value_parser = around, requires = "vcd", conflicts_with = "cut")]
     pub(super) around: Option<i64>,
     /// Stop at the first refused frame or missing answer.
     #[arg(long, value_name = "EVENT", value_enum)]
     pub(super) until: Option<Until>,
-    /// Draw position and errors over time, and how long answers took.
+    /// Draw positions, errors and answer delays over time.
     #[arg(long, value_name = "OUT")]
     pub(super) svg: Option<PathBuf>,
     /// What to read, and how.
@@ -80,10 +85,10 @@ pub(crate) struct FilterArgs {
     /// Only the encoder (EA), drive (MAC-ID) or device (SA) of this address.
     #[arg(long, value_name = "N")]
     pub(super) address: Option<u16>,
-    /// Only the encoder of this channel, address, or both as A/3, as the tables name it.
+    /// Only the encoder with this name in the tables: its channel, its address, or both, such as A/3.
     #[arg(long, value_name = "NAME")]
     pub(super) encoder: Option<String>,
-    /// Only frames from this time of the capture on, such as 20us, 1.5ms or 2s.
+    /// Only frames from this time onwards, such as 20us, 1.5ms or 2s.
     #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
     pub(super) from: Option<Time>,
     /// Only frames before this time.
@@ -125,6 +130,12 @@ fn stretch(text: &str) -> Result<(Time, Time), String> {
 }
 
 impl Decode {
+    /// What cannot be meant.
+    pub(super) fn contradiction(&self) -> Option<&'static str> {
+        let empty = self.filter.from.zip(self.filter.to).is_some_and(|(from, to)| from >= to);
+        empty.then_some("--from is not before --to")
+    }
+
     /// Which frames are asked for.
     pub(super) fn filter(&self) -> Filter {
         let FilterArgs { id, address, encoder, from, to, errors } = &self.filter;

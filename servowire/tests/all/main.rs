@@ -42,6 +42,8 @@ mod recognise;
 mod rtex;
 mod samples;
 mod scopes;
+mod serial;
 mod talk;
 mod talk_memory;
 mod talk_ports;
+mod talk_relay;

@@ -15,14 +15,14 @@ use serialport::{SerialPort, TTYPort};
 use servowire::talk::backup::Backup;
 use servowire::talk::fault::Fault;
 use servowire::talk::link::Link;
-use servowire::talk::{relay, simulate};
+use servowire::talk::simulate;
 use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
 use tformat::device::Device;
 use tformat::{Abm, Abs, Address, Almc, BitRate, Request, Response};
 
 /// An encoder in a thread of its own at the other end of a pseudo-terminal.
-struct Bench {
-    name: String,
+pub(crate) struct Bench {
+    pub(crate) name: String,
     stop: Arc<AtomicBool>,
     encoder: Option<JoinHandle<Tally>>,
     /// As long as this is open, the encoder's end is; the program locks the port for itself.
@@ -40,7 +40,7 @@ impl Bench {
         (Self { name, stop, encoder, _kept: kept.ok() }, slave)
     }
 
-    fn end(mut self) -> Tally {
+    pub(crate) fn end(mut self) -> Tally {
         self.stop.store(true, Ordering::Relaxed);
         self.encoder.take().unwrap().join().unwrap()
     }
@@ -56,7 +56,7 @@ impl Bench {
 }
 
 /// The encoder of `talk simulate`.
-fn simulated(id: u8) -> (Bench, TTYPort) {
+pub(crate) fn simulated(id: u8) -> (Bench, TTYPort) {
     Bench::new(move |master, stop| {
         let encoder = simulate::Simulated { rate: BitRate::Mbit2_5, id, rpm: 0.0, echo: false };
         simulate::run(Box::new(master), encoder, Some(stop)).unwrap();
@@ -65,7 +65,7 @@ fn simulated(id: u8) -> (Bench, TTYPort) {
 }
 
 /// An encoder whose answers go through a line with these faults, and whose requests come back if `echo`.
-fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
+pub(crate) fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
     Bench::new(move |mut master, stop| {
         let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
         device.raise_alarms(Almc::OS);
@@ -395,108 +395,4 @@ fn an_encoder_that_is_not_there_is_said_to_be_so() {
     assert!(text(&output).contains(": the port is gone or refused: "), "{}", text(&output));
     let counted = String::from_utf8_lossy(&output.stdout);
     assert!(counted.lines().last().unwrap().ends_with(" good, 0 refused or missing"), "{counted}");
-}
-
-/// Two adapters: the master at one, the encoder at the other, and the program between them.
-#[test]
-fn a_man_in_the_middle_passes_on_and_logs() {
-    let (encoder, encoder_port) = simulated(0x17);
-    drop(encoder_port);
-    let (master, ours) = TTYPort::pair().unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let csv = folder.path().join("log.csv");
-    let name = ours.name().unwrap();
-    // Open by name, so that the master's end lives on until the program has the port for itself.
-    let kept = File::options().read(true).write(true).open(&name).unwrap();
-    drop(ours);
-    let mut program = Command::new(env!("CARGO_BIN_EXE_servowire"))
-        .args(["talk", "--port", &name, "simulate", "--encoder", &encoder.name])
-        .args(["--csv", csv.to_str().unwrap()])
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut master: Box<dyn SerialPort> = Box::new(master);
-    // The program begins with a look at the encoder.
-    let mut link = (0..100)
-        .find_map(|_| {
-            thread::sleep(Duration::from_millis(20));
-            Link::open(master.try_clone().unwrap(), Duration::from_millis(300)).ok()
-        })
-        .unwrap();
-    let write = Request::write_eeprom(Address::truncate(3), 0x77);
-    let Response::WriteEeprom(memory) = link.exchange(write).unwrap() else { panic!() };
-    assert_eq!(memory.edf, 0x77);
-    for _ in 0..5 {
-        assert!(matches!(link.exchange(Request::ReadAll), Ok(Response::ReadAll(all)) if all.enid == 0x17));
-    }
-    master.write_all(&[0x55]).unwrap();
-    let end = Instant::now() + Duration::from_secs(5);
-    let log = loop {
-        let log = std::fs::read_to_string(&csv).unwrap();
-        if log.contains("no request: [55]") || Instant::now() > end {
-            break log;
-        }
-        thread::sleep(Duration::from_millis(20));
-    };
-    program.kill().unwrap();
-    program.wait().unwrap();
-    drop(kept);
-    encoder.end();
-    assert!(log.starts_with("time_s,request,answer,fault\n"), "{log}");
-    let asked = |request: Request| {
-        let request = request.to_string();
-        log.lines().filter(|line| line.split(',').nth(1) == Some(&request)).count()
-    };
-    assert!(asked(Request::ReadAll) >= 6, "{log}");
-    assert_eq!(asked(write), 1, "a write is passed on once: {log}");
-    assert!(log.contains("no request: [55]"), "{log}");
-}
-
-/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is no longer one.
-#[test]
-fn only_good_answers_are_passed_on() {
-    for echo in [false, true] {
-        let (bench, port) = hurt(Scenario::quiet(), false);
-        let mut encoder = Link::open(Box::new(port), Duration::from_millis(50)).unwrap();
-        let (mut master, ours) = TTYPort::pair().unwrap();
-        master.set_timeout(Duration::from_secs(1)).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&stop);
-        let relay = thread::spawn(move || {
-            let mut said = Vec::new();
-            let log = |entry: &relay::Said| {
-                said.push(format!("{entry:?}"));
-                Ok(())
-            };
-            let ours: Box<dyn SerialPort> = Box::new(ours);
-            let end = relay::run(ours, &mut encoder, echo, log, Some(&seen));
-            (said, end)
-        });
-        let mut answer = [0; 11];
-        master.write_all(&[0x1a]).unwrap();
-        master.read_exact(&mut answer).unwrap();
-        assert_eq!(answer[0], 0x1a);
-        if echo {
-            // The adapter hears what it has sent.
-            master.write_all(&answer).unwrap();
-        }
-        // Reads the EEPROM at 3, in two pieces.
-        let request = Request::read_eeprom(Address::truncate(3)).emit();
-        master.write_all(&request.as_bytes()[..1]).unwrap();
-        master.write_all(&request.as_bytes()[1..]).unwrap();
-        master.read_exact(&mut answer[..4]).unwrap();
-        assert!(Response::parse(Request::read_eeprom(Address::truncate(3)), &answer[..4]).is_ok());
-        bench.end();
-        // The encoder is gone: no answer.
-        master.set_timeout(Duration::from_millis(150)).unwrap();
-        thread::sleep(Duration::from_millis(150));
-        master.write_all(&[0x1a]).unwrap();
-        assert!(master.read(&mut answer).is_err());
-        stop.store(true, Ordering::Relaxed);
-        let (said, end) = relay.join().unwrap();
-        assert!(end.unwrap_err().to_string().starts_with("the encoder's port is gone"));
-        let requests = said.iter().filter(|entry| entry.starts_with("Request")).count();
-        assert_eq!(requests, 3, "{said:?}");
-        assert!(said.last().unwrap().contains("Err"), "{said:?}");
-    }
 }

@@ -10,6 +10,7 @@
     clippy::std_instead_of_core
 )]
 
+#[path = "../../../servowire/tests/random/mod.rs"]
 mod random;
 
 use std::error::Error;
@@ -56,6 +57,9 @@ const LINES: [Drawn; 3] = [
     Drawn { name: "hdsl", kind: Kind::Dsl, bit_rate: 9_375_000, counts: [1200, 4800], formats: &["packed", "vcd"] },
 ];
 
+/// Exchanges of the clean line whose edges all lie on the grid of samples.
+const ALIGNED: [u32; 2] = [2000, 6000];
+
 /// Writes all captures into a folder.
 fn write(folder: &Path) -> io::Result<()> {
     for Drawn { name, kind, bit_rate, counts, formats } in LINES {
@@ -67,18 +71,53 @@ fn write(folder: &Path) -> io::Result<()> {
             let samples = sampled(&line.edges, drawn.end, 1e12 / rate as f64);
             let events: usize = drawn.due.iter().map(|due| due.events.len()).sum();
             for format in formats {
-                let bytes = match *format {
-                    "packed" => samples.chunks_exact(8).map(packed).collect(),
-                    "bytes" => samples.iter().map(|level| u8::from(*level)).collect(),
-                    _ => vcd(&line.edges),
-                };
+                let bytes = if *format == "vcd" { vcd(&line.edges) } else { raw(&samples, format) };
                 let file = format!("{name}-{length}.{format}");
                 fs::write(folder.join(&file), bytes)?;
                 println!("{file} {name} {rate} {} {events}", samples.len());
             }
         }
     }
+    for (length, count) in iter::zip(["short", "long"], ALIGNED) {
+        let samples = aligned(count);
+        for format in ["packed", "bytes"] {
+            let file = format!("aligned-{length}.{format}");
+            fs::write(folder.join(&file), raw(&samples, format))?;
+            println!("{file} tformat {} {} {}", 2_500_000 * PER_BIT, samples.len(), 2 * count);
+        }
+    }
     Ok(())
+}
+
+fn raw(samples: &[bool], format: &str) -> Vec<u8> {
+    match format {
+        "packed" => samples.chunks_exact(8).map(packed).collect(),
+        _ => samples.iter().map(|level| u8::from(*level)).collect(),
+    }
+}
+
+/// A T-Format axis that turns, every bit of it 8 samples long.
+fn aligned(count: u32) -> Vec<bool> {
+    let mut samples = Vec::new();
+    let idle = |samples: &mut Vec<bool>, count: u64| samples.extend(iter::repeat_n(true, count as usize));
+    let send = |samples: &mut Vec<bool>, bytes: &[u8]| {
+        for byte in bytes {
+            let bits = [false].into_iter().chain((0..8).map(|k| byte >> k & 1 == 1)).chain([true]);
+            samples.extend(bits.flat_map(|bit| [bit; PER_BIT as usize]));
+        }
+    };
+    for k in 0..count {
+        let [a0, a1, a2, _] = (k.wrapping_mul(7919) & 0x7f_ffff).to_le_bytes();
+        let [m0, m1, ..] = (k / 1059).to_le_bytes();
+        let values = [0x1a, 0x00, a0, a1, a2, 0x17, m0, m1, 0x00, 0x00];
+        let check = values.iter().fold(0, |sum, byte| sum ^ byte);
+        idle(&mut samples, 25 * PER_BIT);
+        send(&mut samples, &[0x1a]);
+        idle(&mut samples, 15 * PER_BIT / 2);
+        send(&mut samples, &[&values[..], &[check]].concat());
+    }
+    idle(&mut samples, 100 * PER_BIT);
+    samples
 }
 
 /// Eight samples in a byte, the first in bit 0.

@@ -1,8 +1,7 @@
 //! Fields whose edges are all near to the grid of their speaker: bits and fit in one pass, in whole numbers.
 
 use super::super::spikes::Edge;
-use super::field::Read;
-use super::grid::Fit;
+use super::reading::{Fit, Read};
 use crate::time::Time;
 
 /// Parts of a bit, in binary digits, in which places are counted, and those of distances whose squares are added up.
@@ -19,17 +18,6 @@ pub(super) const OTHER_SPEAKER: u32 = 3;
 /// Longer fields, in bits, are not read here, nor bits of which a picosecond is fewer parts: those would be counted too coarsely.
 const LONGEST: u32 = 30;
 const FEWEST: i64 = 1 << 20;
-/// One divided by the number of edges in a field.
-const SHARES: [f64; 32] = {
-    let mut shares = [1.0; 32];
-    let mut count = 1;
-    while count < 32 {
-        shares[count] = 1.0 / count as f64;
-        count += 1;
-    }
-    shares
-};
-
 /// A field on the grid by which it was read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Even {
@@ -56,7 +44,7 @@ struct Field {
     first: Time,
     /// Each edge turns all bits from its place on.
     bits: u32,
-    edges: usize,
+    edges: u32,
     off: i64,
     squares: i64,
     places: i64,
@@ -177,7 +165,7 @@ pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<
 fn close(field: Field, field_bits: u32, fit: &mut Fit, fields: &mut Vec<Even>) -> Option<()> {
     let Field { first, bits, edges, off, squares, places, spread, both } = field;
     let all = (1 << field_bits) - 1;
-    let share = *SHARES.get(edges)?;
+    let share = 1.0 / f64::from(edges);
     if bits >> (field_bits - 1) & 1 == 0 {
         return None;
     }

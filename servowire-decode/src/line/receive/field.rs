@@ -1,7 +1,7 @@
 //! Fields on the grid of their speaker.
 
 use super::super::spikes::Edge;
-use super::grid::nearest;
+use super::reading::{Read, nearest};
 use crate::time::Time;
 
 /// Bits of a speaker.
@@ -32,18 +32,6 @@ impl Speaker {
             inside: whole - 0.4,
         }
     }
-}
-
-/// What a field's edges say.
-pub(super) struct Read {
-    /// All bits from the start bit to the delimiter, the first in bit 0.
-    pub(super) bits: u32,
-    /// Where its grid begins.
-    pub(super) start: Time,
-    /// Spikes that were dropped before its edges.
-    pub(super) spikes: u32,
-    /// Whether all its edges are near to their places on the grid, and it ends high.
-    pub(super) is_even: bool,
 }
 
 /// So far from its place is an edge that is near to it at most, and the start of a field from a bit of the line, in bits: both

@@ -2,6 +2,7 @@
 
 use super::super::spikes::Edge;
 use super::even::{self, Even};
+use super::reading::{Fit, nearest};
 
 /// How far a speaker's bit may be from the nominal one: one part in this many.
 const OFF: f64 = 0.065;
@@ -17,30 +18,6 @@ const PERFECT_FIT: f64 = 2e-4;
 const UNLIKELY: f64 = (0.07 * 0.07) / (0.02 * 0.02);
 /// Speakers whose bit lengths are remembered.
 const SPEAKERS: usize = 4;
-
-/// The nearest whole number; 0 for what is below.
-#[inline]
-pub(super) fn nearest(number: f64) -> u32 {
-    (number + 0.5) as u32
-}
-
-/// How edges lie on a grid.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Fit {
-    /// Mean square distance, in bits.
-    pub(super) misfit: f64,
-    /// How the distances go with the places, and how far the places are spread: sums of products.
-    pub(super) above: f64,
-    pub(super) below: f64,
-}
-
-impl Fit {
-    /// The bit length by which the edges lie best, where `bit` is that of the grid.
-    fn slope(self, bit: f64) -> f64 {
-        // Few short fields say little.
-        if self.below < 40.0 { bit } else { bit * (1.0 + self.above / self.below).clamp(0.97, 1.03) }
-    }
-}
 
 /// Sums over the edges of a field, whose first edge lies at 0.
 #[derive(Debug, Clone, Copy)]
@@ -113,6 +90,10 @@ pub(super) struct Found {
     pub(super) bit: f64,
     /// Whether it was measured, not only the best of all.
     pub(super) is_sure: bool,
+    /// As these edges alone tell it, in picoseconds, if they do.
+    pub(super) alone: Option<f64>,
+    /// Mean square distance of the edges from the grid, in bits.
+    pub(super) misfit: f64,
     /// The bit length by which fields were read already, if they were.
     pub(super) read_by: Option<f64>,
 }
@@ -146,9 +127,12 @@ pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec
         if let Some(before) = heard.get_mut(..=at).filter(|before| before.len() > 1) {
             before.rotate_right(1);
         }
-        let Some(bit) = heard.first_mut() else { return Found { bit: nominal, is_sure: false, read_by: None } };
+        let Some(bit) = heard.first_mut() else {
+            return Found { bit: nominal, is_sure: false, alone: None, misfit: fit.misfit, read_by: None };
+        };
+        let alone = fit.alone(*bit);
         *bit += 0.2 * (fit.slope(*bit) - *bit);
-        return Found { bit: *bit, is_sure: true, read_by };
+        return Found { bit: *bit, is_sure: true, alone, misfit: fit.misfit, read_by };
     }
     let found = search(edges, field_bits, nominal);
     if found.is_sure {
@@ -175,5 +159,6 @@ fn search(edges: &[Edge], field_bits: u32, nominal: f64) -> Found {
         }
     }
     let is_sure = found.0.misfit < GOOD_FIT && edges.len() > 3;
-    Found { bit: found.0.slope(found.1), is_sure, read_by: None }
+    let (fit, bit, _) = found;
+    Found { bit: fit.slope(bit), is_sure, alone: fit.alone(bit), misfit: fit.misfit, read_by: None }
 }

@@ -1,5 +1,30 @@
 //! What was measured of a line while its fields were received.
 
+/// Many measurements of the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Many {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Many {
+    const NONE: Self = Self { count: 0.0, sum: 0.0, squares: 0.0 };
+
+    /// The mean, and how far it may be off, if there are enough.
+    fn mean(self) -> Option<(f64, f64)> {
+        let mean = self.sum / self.count;
+        let variance = (self.squares / self.count - mean * mean).max(0.0);
+        (self.count >= FEWEST).then(|| (mean, SURE * (variance / self.count).sqrt()))
+    }
+}
+
+/// Measurements that a mean needs, and standard errors by which it may be off.
+const FEWEST: f64 = 6.0;
+const SURE: f64 = 4.0;
+/// Clocks that differ by less are not told apart.
+const SAME_CLOCK: f64 = 0.002;
+
 /// Bit rates measured on a line, relative to the nominal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rates {
@@ -9,6 +34,8 @@ pub struct Rates {
     pub most: f64,
     sum: f64,
     weight: f64,
+    /// Of who speaks after a pause, as a controller does, and of who answers at once.
+    ends: [Many; 2],
     /// Spikes dropped so far.
     pub spikes: u64,
     /// Edges that stayed.
@@ -32,6 +59,7 @@ impl Default for Rates {
             most: 0.0,
             sum: 0.0,
             weight: 0.0,
+            ends: [Many::NONE; 2],
             spikes: 0,
             edges: 0,
             spikes_at: [0; 2],
@@ -66,6 +94,23 @@ impl Rates {
         self.least = self.least.min(rate);
         self.most = self.most.max(rate);
         self.weigh(rate, 1.0);
+    }
+
+    /// The rate of one end of the line, of that which `answers` or of the other one.
+    #[inline]
+    pub(super) fn spoke(&mut self, answers: bool, rate: f64) {
+        let [asking, answering] = &mut self.ends;
+        let end = if answers { answering } else { asking };
+        let off = rate - 1.0;
+        *end = Many { count: end.count + 1.0, sum: end.sum + off, squares: end.squares + off * off };
+    }
+
+    /// Returns the rates of the two ends of the line, the slower one first, if they have different clocks.
+    pub(crate) fn ends(&self) -> Option<[f64; 2]> {
+        let [asking, answering] = self.ends.map(Many::mean);
+        let ((asking, near), (answering, also_near)) = (asking?, answering?);
+        let differ = (asking - answering).abs() > SAME_CLOCK.max(near + also_near);
+        differ.then(|| [1.0 + asking.min(answering), 1.0 + asking.max(answering)])
     }
 
     /// A rate counts in the mean.
