@@ -32,17 +32,20 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// The run that begins at line `at`, where the speed is no more than `speed` or than its lines allow, with an acceleration and jerk under
-    /// way: limits below those would have it jump.
-    fn run(&self, at: usize, part: Option<Real>, speed: Real, held: [Real; 2]) -> Option<Run> {
+    /// way: limits below those would have it jump. It has `most` lines after the first one at most.
+    fn run(&self, at: usize, part: Option<Real>, speed: Real, held: [Real; 2], most: usize) -> Option<Run> {
         let mut last = self.line(at)?;
         let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
         while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
+            if run.more >= most {
+                break;
+            }
             let next = at.saturating_add(run.more).saturating_add(1);
             let (Some(line), Some(own)) = (self.line(next), self.allowed(next, part)) else { break };
             let Some(other) = own.jerk else { break };
-            let most = if part.is_some() { run.bounds.v.max(speed) } else { speed };
+            let fastest = if part.is_some() { run.bounds.v.max(speed) } else { speed };
             let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
-            let fits = line.corner >= most && own.v >= speed;
+            let fits = line.corner >= fastest && own.v >= speed;
             let v = part.is_none() || alike(own.v, run.bounds.v, EQUAL);
             if !fits || !v || !alike(own.a, run.bounds.a, ALIKE) || !alike(other.j, jerk.j, ALIKE) {
                 break;
@@ -79,26 +82,37 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 fastest = start.v + (start.a.squared() / j).half();
             }
         }
-        let Run { more, length, bounds: own } = self.run(at, part, fastest, held)?;
-        let own = present.filter(|_| brakes && part.is_none()).map_or(own, |least| own.or_higher(&least));
-        let bounds = own;
-        let left = (length + before) - place;
+        let mut run = self.run(at, part, fastest, held, if part.is_some() { M } else { 0 })?;
+        let mut own = run.bounds;
+        let mut left = (run.length + before) - place;
+        if part.is_none() {
+            // With the limits of no more lines than the stop takes.
+            for _ in 0..M {
+                own = present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least));
+                let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
+                let (end, rest) = self.locate(at, (place + curve.way()) - before);
+                if curve.way() <= left + SLACK {
+                    let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
+                    let more = end.saturating_sub(at);
+                    return Some((Course { curve, exit: Real::ZERO, wish: Real::ZERO, whole, more }, own));
+                }
+                let most = end.saturating_sub(at).max(run.more.saturating_add(1));
+                let more = self.run(at, None, fastest, held, most)?;
+                if more.more == run.more {
+                    break;
+                }
+                run = more;
+                left = (run.length + before) - place;
+            }
+        }
+        let more = run.more;
         let last = at.saturating_add(more);
         let line = self.line(last)?;
         let most = part.map_or(Real::ZERO, |part| self.exit(last, part));
         let (bounds, wish) = if part.is_some() {
-            (bounds, most.min(fastest_exit(start, left, &bounds)))
+            (own, most.min(fastest_exit(start, left, &own)))
         } else {
-            let stop = plan(start, Goal::Speed(Real::ZERO), &bounds).ok();
-            if let Some(curve) = stop.filter(|curve| curve.way() <= left + SLACK) {
-                let (end, rest) = self.locate(at, (place + curve.way()) - before);
-                let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
-                return Some((
-                    Course { curve, exit: Real::ZERO, wish: most, whole, more: end.saturating_sub(at) },
-                    own,
-                ));
-            }
-            (bounds.slower(start.v), Real::ZERO)
+            (own.slower(start.v), Real::ZERO)
         };
         let to = |exit| {
             let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
@@ -167,7 +181,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let mut runs = [None; M];
         let mut next = at.saturating_add(1);
         for place in &mut runs {
-            let Some(run) = self.run(next, Some(part), Real::ZERO, [Real::ZERO; 2]) else { break };
+            let Some(run) = self.run(next, Some(part), Real::ZERO, [Real::ZERO; 2], M) else { break };
             *place = Some((next, run));
             next = next.saturating_add(run.more).saturating_add(1);
         }

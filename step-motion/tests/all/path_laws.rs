@@ -418,3 +418,27 @@ fn a_clock_that_is_ahead_does_not_make_a_rest_later() {
     machine.stop(0);
     assert!(machine.due().is_none() && machine.is_at_rest(168));
 }
+
+/// A line of a step, and one behind it that allows less where the axes use more: a stop that ends on the first one has nothing to do with that.
+#[test]
+fn a_quick_stop_is_no_later_for_a_line_that_it_does_not_reach() {
+    let limits = |a, j| Limits::new(49, a).unwrap().with_jerk(j).unwrap();
+    let axes =
+        [AxisSetup::new(limits(115_833, 185_103), 4623), AxisSetup::new(Limits::new(49, 137_593).unwrap(), 147_013)];
+    let rest = |quick: bool| {
+        let mut machine = PathMover::new(Path::<2, 4>::new(Clock::MICROSECONDS, axes, 4).unwrap());
+        machine.push([-1, 5], 3198, 0).unwrap();
+        machine.push([136, 47], 10, 1).unwrap();
+        while machine.due().is_some_and(|due| due <= 21_183) {
+            machine.pulse();
+        }
+        if quick {
+            machine.quick_stop([limits(999, 10_000), Limits::new(1, 8_187_864).unwrap()], 21_183);
+        } else {
+            machine.hold(21_183);
+        }
+        while machine.pulse().is_some() {}
+        (21_183..100_000).find(|now| machine.is_at_rest(*now)).unwrap()
+    };
+    assert!(rest(true) <= rest(false) + 18, "{} {}", rest(true), rest(false));
+}
