@@ -21,7 +21,7 @@ impl DeltaDelta {
     pub const MAX: Self = Self(1023);
     /// -1024.
     pub const MIN: Self = Self(-1024);
-    /// No change of speed.
+    /// The acceleration 0: no change of speed.
     pub const ZERO: Self = Self(0);
 
     /// Creates an acceleration; `None` outside -1024..=1023.

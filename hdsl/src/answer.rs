@@ -128,7 +128,7 @@ impl Answer {
         plain.is_data() && !self.pipe.or(self.secondary).is_byte_error()
     }
 
-    /// Returns whether no other word can be read either, as with an encoder that did not hear the head and is silent.
+    /// Returns whether the other words cannot be read either, as with an encoder that did not hear the head and is silent.
     pub(crate) const fn is_silence(&self) -> bool {
         self.parameter.is_byte_error()
             && self.secondary.is_byte_error()
@@ -208,8 +208,8 @@ pub(crate) const PIPE: u8 = 1 << 2;
 pub(crate) const ACCELERATION: u8 = 1 << 3 | 1 << 4;
 pub(crate) const SECONDARY: u8 = 1 << 5;
 
-/// The words that are bad, and those of the others that are special characters without a meaning in their channel. (In the pipe
-/// and secondary channels all of them have one.)
+/// The words that are bad, and the other words that are special characters without a meaning in their channel. (In the pipe and
+/// secondary channels all special characters have one.)
 pub(crate) struct BadWords {
     pub(crate) bad: u8,
     pub(crate) special: u8,
@@ -244,7 +244,7 @@ pub struct Content {
     pub vertical: Character,
     /// Parameter byte.
     pub parameter: EncoderByte,
-    /// SensorHub data; K30.7 stands for none.
+    /// SensorHub data; K30.7 means that there are none.
     pub pipe: Character,
     /// The acceleration word, high byte first; `None` is sent as K29.7 K29.7.
     pub acceleration: Option<DeltaDelta>,
@@ -259,7 +259,7 @@ pub struct Content {
 pub struct EncodedAnswer {
     /// The 61 line bits, the first in bit 0.
     pub bits: u64,
-    /// The running disparity after them.
+    /// The running disparity after the answer.
     pub disparity: RunningDisparity,
 }
 
@@ -341,7 +341,7 @@ pub(crate) mod tests {
         if plus { RunningDisparity::Plus } else { RunningDisparity::Minus }
     }
 
-    /// D0.0 is 100111 0100 and 011000 1011, K30.7 is 011110 1000 and 100001 0111; no character is ten ones.
+    /// D0.0 is 100111 0100 or 011000 1011, K30.7 is 011110 1000 or 100001 0111; no character is ten ones.
     #[test]
     fn an_answer_is_printed_word_by_word() {
         let bits = |text: &str| text.bytes().rev().fold(0_u64, |bits, c| bits << 1 | u64::from(c == b'1'));
@@ -367,7 +367,7 @@ pub(crate) mod tests {
             prop_assert_eq!(reduced.parameter(), Ok(content.parameter));
         }
 
-        /// The kernel against taking the answer apart bit by bit.
+        /// Compares the fast code with one that takes the answer apart bit by bit.
         #[test]
         fn any_bits_against_a_slow_reader(bits: u64) {
             let answer = Answer::from_bits(Rule::Strict, bits);
@@ -379,7 +379,7 @@ pub(crate) mod tests {
             prop_assert_eq!(answer.switch_ok(), bits >> 49 & 1 != bits >> 50 & 1);
         }
 
-        /// One flipped bit is seen in the word it is in and in no other, or turns it into another good word.
+        /// One flipped bit makes its own word bad and no other, or turns that word into another good word.
         #[test]
         fn a_flip_stays_in_its_word(content in contents(), plus: bool, at in 0..61_u32) {
             let bits = content.emit(column(plus)).bits;
@@ -393,7 +393,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Silent is an answer of which no word can be read; a mark is two K29.7, and one of them is a special character like any other.
+    /// An answer is silent if none of its words can be read. The mark is two K29.7; a single one is a special character like
+    /// any other.
     #[test]
     fn silence_and_marks() {
         let content = Content {
@@ -432,8 +433,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// All second differences in both columns with every flip of a line bit: data characters let none through that the
-    /// check bits do not see; taken by their values 240 pass, 64 with a wrong value.
+    /// All second differences in both columns, with every single line bit flipped: if only data characters are accepted, every
+    /// flip is detected; if words are taken by their values, 240 pass, 64 of them with a wrong value.
     #[test]
     fn single_flips_of_the_acceleration() {
         let (mut by_value, mut wrong) = (0, 0);

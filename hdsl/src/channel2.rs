@@ -34,8 +34,8 @@ servowire_core::show_flags!(Channel2Findings);
 
 /// Watches safe channel 2.
 ///
-/// It checks only what the documents say about the channel. The application has to compare the two safe positions, because
-/// scaling and complement of the second one depend on the encoder.
+/// It checks only what the documents say about the channel. The application has to compare the two safe positions, because the
+/// scaling and the complement of the second one depend on the encoder.
 ///
 /// ```
 /// use hdsl::device::{Device, Fault};
@@ -73,8 +73,8 @@ impl Channel2Monitor {
         Self { toggle: None, number: None, frames: 0 }
     }
 
-    /// Takes every H-frame; returns what a V-frame shows that has ended with it. Lost frames and restarts of the link are taken
-    /// into account: TOG2 is compared in neighbouring V-frames only.
+    /// Takes every H-frame; returns the faults of the V-frame that ended with it, if one did. Lost frames and restarts of
+    /// the link are taken into account: TOG2 is compared in neighbouring V-frames only.
     pub fn h_frame(&mut self, frame: &HFrame) -> Option<Channel2Findings> {
         let passed = self.number.map_or(1, |before| frame.number.wrapping_sub(before));
         self.number = Some(frame.number);

@@ -1,15 +1,15 @@
 //! The encoder as a state machine without I/O, for simulators and test benches.
 //!
-//! In every H-frame it receives the line bits from SYNC to PARA and the position at the sampling edge, and returns the answer,
-//! which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, no matter what the
-//! acceleration channel was able to carry.
+//! In every H-frame it receives the line bits from SYNC to PARA and the position at the sampling edge, and returns the
+//! answer, which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, whatever the
+//! acceleration channel could carry.
 //!
 //! On a sampled line [`Heard::on_line`] finds the bits and, to an eighth of a bit, the edge;
 //! [`Device::sampling_instant`] is when to take the position.
 //!
 //! It shares no protocol rule with the receiver: code, test pattern, symbols, messages, checks and limits are implemented
-//! separately here. Each point that the documents leave to the encoder is a switch in [`Behaviour`]; each thing that it can do
-//! wrong is a [`Fault`].
+//! separately here. Each point that the documents leave to the encoder is a switch in [`Behaviour`]; each way in which it can
+//! fail is a [`Fault`].
 //!
 //! ```
 //! use hdsl::EncoderId;
@@ -88,7 +88,7 @@ pub struct Device {
     shaft: u64,
     /// True position at the last sampling edge.
     position: u64,
-    /// Position and speed as the receiver can know them from the acceleration words.
+    /// Position and speed as a receiver derives them from the acceleration words.
     told: u64,
     velocity: i64,
     blocks: [[Symbol; 8]; 2],
@@ -197,8 +197,8 @@ impl Device {
         (self.fault != Fault::Silent).then_some(Transmission { bits: answer })
     }
 
-    /// Returns when to take the position for [`hear`](Self::hear), in eighths of a bit (13.333 ns) on the time base of the samples
-    /// in which the head was heard: at the sampling edge, and later by [`Behaviour::sampling_lag`].
+    /// Returns when to take the position for [`hear`](Self::hear), in eighths of a bit (13.333 ns) on the time base of the
+    /// samples in which the head was heard: at the sampling edge, plus [`Behaviour::sampling_lag`].
     pub const fn sampling_instant(&self, heard: &Heard) -> u32 {
         (heard.edge as u32).saturating_add(self.behaviour.sampling_lag as u32)
     }
@@ -264,7 +264,7 @@ impl Device {
         i64::from_le_bytes((difference << unused).to_le_bytes()) >> unused
     }
 
-    /// Counts the frame although its head could not be read.
+    /// Counts a frame whose head could not be read.
     fn go_on(&mut self, before: u64) {
         if let Some(at) = self.at {
             if at == 0 {
@@ -296,7 +296,7 @@ impl Device {
         self.emit([vertical, Symbol::data(parameter), pipe, high, low, secondary])
     }
 
-    /// Takes the master's symbol; a complete request waits for its answer, unless it is forgotten.
+    /// Takes the master's symbol; a complete request is queued to be answered, unless it is forgotten.
     fn take(&mut self, symbol: u8) {
         let Some(request) = self.channel.hear(symbol) else { return };
         self.requests = self.requests.wrapping_add(1);
@@ -314,7 +314,7 @@ impl Device {
         }
     }
 
-    /// Creates the two safe blocks of a V-frame; `position` is that of the sampling edge before it.
+    /// Creates the two safe blocks of a V-frame; `position` is the position at the sampling edge before it.
     fn latch(&mut self, position: u64) {
         let test = if self.fault == Fault::Test2 { 0x40 } else { 0 };
         let error = if self.fault == Fault::Error2 { 0x20 } else { 0 };
@@ -349,7 +349,7 @@ fn block(status: Symbol, position: i64, bad_crc: bool) -> [Symbol; 8] {
     marked([status; 8], [p4, p3, p2, p1, p0], bad_crc)
 }
 
-/// Returns the block with another position and the matching CRC.
+/// Returns the block with its position replaced and a matching CRC.
 fn marked(block: [Symbol; 8], position: [Symbol; 5], bad_crc: bool) -> [Symbol; 8] {
     let [status, ..] = block;
     let [p4, p3, p2, p1, p0] = position;
@@ -358,7 +358,7 @@ fn marked(block: [Symbol; 8], position: [Symbol; 5], bad_crc: bool) -> [Symbol; 
     [status, p4, p3, p2, p1, p0, high, low]
 }
 
-/// Appends to eleven bits the remainder of x^5 + x^2 + 1 with its five bits inverted, by long division.
+/// Appends the CRC-5 to eleven bits, by long division: the remainder modulo x^5 + x^2 + 1, with its five bits inverted.
 fn acceleration_word(value: i16) -> u16 {
     let [high, low] = value.to_be_bytes();
     let word = u16::from_be_bytes([high, low]) << 5;

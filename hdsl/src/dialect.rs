@@ -59,7 +59,7 @@ pub struct Dialect {
     pub position: PositionRule,
     /// What the register map shows, and when events are raised.
     pub registers: RegisterRule,
-    /// A V-frame without a good safe position is aligned with the last good one. Otherwise it makes the position
+    /// A V-frame without a good safe position is aligned with the last good one. Otherwise such a V-frame makes the position
     /// unreliable and restarts the alignment.
     pub stale_position: bool,
     /// The flag POS is set from the lock until the first alignment succeeds. The register list requires this; the vendor's

@@ -28,8 +28,8 @@ impl EncoderId {
         self.acceleration_bits().wrapping_add(more)
     }
 
-    /// Returns a position of this encoder as a number, without the unused high bits of `raw`, and with its sign if the positions
-    /// are signed.
+    /// Returns a position of this encoder as a number: without the unused high bits of `raw`, and sign-extended if the
+    /// positions are signed.
     pub const fn position(self, raw: u64) -> i64 {
         let unused = 64_u8.saturating_sub(self.position_bits()) as u32;
         let shifted = raw.wrapping_shl(unused);
@@ -128,7 +128,7 @@ ranged! {
 }
 
 impl PositionBits {
-    /// A mask with this many ones.
+    /// A mask of this width.
     pub const fn mask(self) -> u64 {
         match 1_u64.checked_shl(self.0 as u32) {
             Some(one) => one.wrapping_sub(1),

@@ -16,9 +16,9 @@ servowire_core::errors! {
         /// Fewer bits, samples or bytes than the unit has.
         #[error("{got} of {want} are there")]
         Truncated = 1 {
-            /// How many there were.
+            /// How many were received.
             got: u16,
-            /// How many the unit has.
+            /// How many the unit takes.
             want: u16,
         },
         /// A 10-bit word is in neither column of the 8b/10b tables.
@@ -167,7 +167,7 @@ servowire_core::errors! {
         /// The EXTRA window of the start-up arithmetic is outside 4..=9 bits.
         #[error("the EXTRA window would be {extra} bits, 4 to 9 are allowed")]
         ExtraOutOfRange = 29 {
-            /// Whole bits per frame.
+            /// The whole bits of the window in each frame.
             extra: u32,
         },
     }

@@ -4,7 +4,7 @@ use servowire_core::{Angle, Feedback, Shaft, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
-/// How many missing acceleration words a position may have and still be used.
+/// How many acceleration words may be missing before the position must not be used.
 ///
 /// One wrong bit makes an acceleration word unusable, and with it the exact position is lost for 17 to 24 frames, until a safe
 /// position has shown what was in the word and another one has agreed. In the meantime the position is estimated, with a bound
@@ -30,7 +30,7 @@ impl Tolerated {
     pub const NOTHING: Self = Self { words: 0, acceleration: 0 };
 
     /// Tolerates at most this many missing acceleration words since the position was exact, in answers of which something
-    /// could be read (a silent encoder may not have heard the head, and then it has not sampled). `acceleration` is the
+    /// could be read (a silent encoder may not have heard the head, in which case it has not sampled). `acceleration` is the
     /// largest of the shaft, in either direction, in steps per frame²; 1024 is the most that the link can carry.
     /// [`Sample::bound`] holds for this acceleration.
     pub const fn missing_words(words: u8, acceleration: u16) -> Self {
@@ -123,9 +123,9 @@ servowire_core::one_line!(Sample {
 pub struct Evidence {
     pub(crate) doubt: Option<Doubt>,
     pub(crate) sample: Sample,
-    /// Number of missing words, if the position would be known but for them.
+    /// Number of missing words, if they are all that keeps the position from being known.
     pub(crate) missing: Option<u8>,
-    /// The sum of the frames for which they have counted, and the distance estimated in these.
+    /// For these words, the sum of the frames since each of them, and the distance estimated over those frames.
     pub(crate) frames: u32,
     pub(crate) way: u32,
 }
@@ -140,7 +140,7 @@ impl Evidence {
     }
 
     /// Returns the fast position, if it may be used at this time. It is the true position as long as the real speed stays below
-    /// a sixteenth of the range per frame, or within [`Sample::bound`] of it over missing words that the policy tolerates.
+    /// a sixteenth of the range per frame, or is within [`Sample::bound`] of it if words that the policy tolerates are missing.
     ///
     /// # Errors
     /// [`Doubt::Never`], [`Doubt::NoLink`], [`Doubt::Speed`], [`Doubt::Estimated`], [`Doubt::Alignment`], then
@@ -159,7 +159,7 @@ impl Evidence {
         }
     }
 
-    /// Returns how far the position may be off, if no more words are missing than are tolerated.
+    /// Returns how far the position may be off; `None` if more words are missing than are tolerated.
     #[cold]
     const fn over_missing_words(&self, tolerated: Tolerated) -> Option<u32> {
         match self.missing {
@@ -178,8 +178,8 @@ impl Shaft for Evidence {
     }
 }
 
-/// A safe position that may be used. It must not close a control loop: it is not in step with the pulse (SICK manual,
-/// p. 67).
+/// A safe position that may be used. It must not be used in a control loop, because it is not synchronous with the pulse (SICK
+/// manual, p. 67).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -267,7 +267,7 @@ feedback! {
     SafeEvidence => SafeSample;
 }
 
-/// The numbers that stand for doubts in a cell; 0 stands for a value.
+/// The numbers of the doubts in a cell; 0 means that there is a value.
 const fn number(doubt: Doubt) -> u32 {
     match doubt {
         Doubt::Never => 1,
@@ -282,7 +282,7 @@ const fn number(doubt: Doubt) -> u32 {
     }
 }
 
-/// Returns the doubt with this number; `wide` is what came in place of the position.
+/// Returns the doubt with this number; `wide` is the number that the cell carries in place of the position.
 const fn doubt(number: u32, wide: u64) -> Doubt {
     match number {
         2 => Doubt::NoLink,
@@ -313,7 +313,7 @@ pub type EvidenceCell = servowire_core::Cell<Evidence, 10>;
 /// Like [`EvidenceCell`], and also returns the angle at an instant between two samples.
 pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 10>;
 
-/// For an [`EvidenceCell`]; the lower half of a number of 64 bits is first.
+/// For an [`EvidenceCell`]; of a 64-bit number, the low half comes first.
 ///
 /// ```text
 ///  word 0      doubt in bits 0..=7, missing words in 8..=15, whether but for them the position would be known in 16

@@ -9,7 +9,7 @@ use crate::doubt::Doubt;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::evidence::{Evidence, Sample};
 
-/// Speeds are below this, in steps per frame, so that two of them can be added.
+/// The limit of speeds, in steps per frame, which keeps the sum of two in range.
 const FASTEST: i64 = 1 << 30;
 /// H-frames of a V-frame.
 const V_FRAME: u32 = 8;
@@ -23,14 +23,14 @@ enum Known {
     Position,
     /// Position and speed are known.
     Speed,
-    /// Another safe position has agreed.
+    /// A further safe position has agreed.
     Confirmed,
 }
 
 /// The missing acceleration words.
 ///
-/// If the estimate of word k is wrong by d, then n frames later the position is wrong by n d. The caller knows how large d can be:
-/// the largest acceleration and what was estimated.
+/// If the estimate of word k is wrong by d, then n frames later the position is wrong by n d. The caller knows how large d can
+/// be: it follows from the largest acceleration and the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Missing {
@@ -94,22 +94,22 @@ impl Missing {
 pub struct FastPosition {
     id: EncoderId,
     bits: PositionBits,
-    /// Modulo 2^64; the low bits count.
+    /// Modulo 2^64; only the low bits are significant.
     position: u64,
     /// Steps per frame.
     velocity: i32,
-    /// The last accelerations, the newest at `at`.
+    /// The most recent accelerations, the newest at `at`.
     recent: [i16; 8],
     at: u8,
     known: Known,
-    /// It was confirmed, and only missing words have occurred since.
+    /// The position was confirmed, and nothing but missing words has happened since.
     followed: bool,
     missing: Missing,
     /// The missing words of this V-frame.
     missing_here: Missing,
-    /// Whether words of the V-frame before are missing.
+    /// Whether words of the previous V-frame are missing.
     missing_before: bool,
-    /// Missing words in a row up to now.
+    /// Number of missing words in a row, up to now.
     in_a_row: u32,
     /// `position` at the sampling edge before this V-frame.
     begin: u64,
@@ -188,8 +188,8 @@ impl FastPosition {
         estimate
     }
 
-    /// Takes the safe position of a V-frame after its last H-frame; `None` if it brought none. That is the position at the sampling
-    /// edge before the V-frame, 40 bits.
+    /// Takes the safe position of a V-frame after its last H-frame; `None` if it brought none. It is the position at the
+    /// sampling edge before the V-frame, 40 bits.
     pub fn align(&mut self, safe: Option<u64>) {
         if let Some(safe) = safe {
             self.compare(safe);
@@ -259,29 +259,30 @@ impl FastPosition {
         }
     }
 
-    /// Returns the real speed if it was off for `frames` frames and this caused an `error` of the position. A speed of up to a
-    /// sixteenth of the range per frame is determined exactly, because eight frames of it are half a range.
+    /// Returns the real speed, given that a wrong speed over `frames` frames caused this `error` of the position. A speed of
+    /// up to a sixteenth of the range per frame is determined exactly, because the motion in eight frames is then at most
+    /// half the range.
     fn speed(&self, error: i64, frames: u32) -> Option<i32> {
         let way = self.signed_of(i64::from(self.velocity).wrapping_mul(frames.into()).wrapping_add(error));
         let speed = divide(way, frames)?;
         if speed.unsigned_abs() > FASTEST.unsigned_abs() { None } else { i32::try_from(speed).ok() }
     }
 
-    /// Handles a wrong word that has passed its checks, or a lost frame: only the position is known now.
+    /// Handles a wrong word that has passed its checks, or a lost frame: only the position is known after it.
     fn lose(&mut self, error: i64) {
         self.position = self.position.wrapping_add_signed(error);
         self.missing.position_known(&self.missing_here);
         (self.known, self.followed) = (Known::Position, false);
     }
 
-    /// Notes that frames have passed of which nothing is known.
+    /// Notes that frames have passed about which nothing is known.
     pub const fn interrupt(&mut self) {
         self.known = Known::Nothing;
         self.followed = false;
     }
 
-    /// Notes that there was no answer at all. If the encoder has not heard the head, it has not sampled, and its next word is
-    /// not a second difference from frame to frame. It is not known how far the estimate is off.
+    /// Notes that no answer came at all. If the encoder has not heard the head, it has not sampled, and its next word is
+    /// not a second difference from frame to frame. How far the estimate is off is then unknown.
     pub(crate) const fn unanswered(&mut self) {
         self.followed = false;
     }
@@ -291,7 +292,7 @@ impl FastPosition {
         self.in_a_row
     }
 
-    /// Returns the evidence after the last H-frame, whose number is `frame` and whose sampling edge was at `sampled_ns`.
+    /// Returns the evidence after the last H-frame, which has the number `frame` and whose sampling edge was at `sampled_ns`.
     ///
     /// A position returned without a doubt is the true one as long as the real speed stays below a sixteenth of the range per
     /// frame (more than 300 000 revolutions per minute for an encoder that counts one turn), and below 2^30 steps per frame.
@@ -323,7 +324,7 @@ impl FastPosition {
         Evidence { doubt, sample, missing, frames, way }
     }
 
-    /// Returns whether a register map shows what may be used.
+    /// Returns whether a register map shows a position that may be used.
     pub(crate) fn is_at(&self, position: u64, velocity: i32) -> bool {
         let agrees = self.signed(position.wrapping_sub(self.position)) == 0 && velocity == self.velocity;
         agrees && self.evidence(0, 0).doubt.is_none()
@@ -342,8 +343,8 @@ impl FastPosition {
 
 /// Divides a distance of less than 2^40 by 1 to 8 frames; `None` if there is a remainder.
 ///
-/// The inverse of an odd divisor modulo 2^64 yields the quotient directly; `None` if it is too large. (A 64-bit division takes
-/// hundreds of instructions.)
+/// Multiplying by the inverse of an odd divisor modulo 2^64 yields the quotient directly; `None` if it is too large. (A 64-bit
+/// division takes hundreds of instructions.)
 const fn divide(way: i64, frames: u32) -> Option<i64> {
     let (halvings, inverse) = match frames {
         1 => (0, 1),

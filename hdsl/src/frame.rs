@@ -7,7 +7,7 @@
 //!                          ^ the encoder samples          1 bit      cable
 //! ```
 //!
-//! The falling edge inside SAMPLE is the instant for which the encoder reports its position. A free-running frame has no
+//! The encoder reports its position at the instant of the falling edge inside SAMPLE. A free-running frame has no
 //! EXTRA window and no stuffing, and takes 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and 0..=26 stuffing
 //! blocks stretch it (HDSL Protocol Design; SICK manual, p. 31).
 
@@ -78,7 +78,7 @@ impl Extra {
         eighths.wrapping_mul(13).wrapping_add(eighths.div_ceil(3))
     }
 
-    /// The samples of the last bit as they are on the line.
+    /// The samples of the last bit, as on the line.
     const fn last_bit(self) -> u8 {
         if self.0 % 8 == 0 { 0xff } else { self.edge_register() }
     }

@@ -92,13 +92,13 @@ servowire_core::report! {
 }
 
 impl Report {
-    /// What the words tell about the running disparity. If there is no other fault and the disparity does not hold, bits of at
+    /// What the words say about the running disparity. If there is no other fault but the disparity is violated, bits of at
     /// least one word were flipped.
     pub const fn disparity(&self) -> Chain {
         self.disparity
     }
 
-    /// The answer as received if nothing is wrong, otherwise as it would be without the cause. For display only.
+    /// The answer as received if nothing is wrong, otherwise as it would be with the cause removed. It is for display only.
     pub const fn answer(&self) -> Option<Answer> {
         self.answer
     }

@@ -6,7 +6,7 @@ use core::fmt;
 use crate::parameter::ParameterByte;
 use crate::symbol::{FOUR_MORE_ZEROS, NEUTRAL, Rule, SIX_MORE_ZEROS, Word};
 
-/// Ones minus zeros that the master has sent, as its receiver counts them.
+/// The ones minus the zeros that the master has sent, as its receiver counts them.
 ///
 /// The count follows the vendor's rule and is not exact: SYNC, SAMPLE and CYCLE RESET are taken as neutral, and so
 /// is an EQUALISATION of 0000 for a disparity of -1..=1. It starts at 0 and returns to 0 with the TRAILER of every
@@ -24,7 +24,7 @@ pub struct LineDisparity(i8);
 pub struct Equalisation {
     /// The four bits, the first line bit in bit 0.
     pub bits: u8,
-    /// The disparity after them.
+    /// The disparity after these bits.
     pub disparity: LineDisparity,
 }
 
@@ -35,7 +35,7 @@ pub struct Equalisation {
 pub struct EncodedParameter {
     /// The word.
     pub word: Word,
-    /// The disparity after it.
+    /// The disparity after the word.
     pub disparity: LineDisparity,
 }
 
@@ -62,7 +62,7 @@ impl LineDisparity {
         self.plus(if ones > 127 { 127 } else { i8::from_le_bytes([ones]) })
     }
 
-    /// Returns the four EQUALISATION bits, and the disparity that counts afterwards.
+    /// Returns the four EQUALISATION bits, and the disparity to continue with.
     ///
     /// ```text
     ///  disparity   bits sent   afterwards
@@ -93,7 +93,7 @@ impl LineDisparity {
 
     /// Returns the word for the parameter byte, and the disparity afterwards.
     ///
-    /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),
+    /// 1. the 6-bit block of bits 4:0 (28 yields the block of K.28): a neutral block as tabulated (7 always 000111),
     ///    otherwise the version with more zeros if d >= 0, its inverse if d < 0; its balance is added to d;
     /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), using the new d, which it does not change.
     #[inline]

@@ -62,8 +62,8 @@ use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
 
-/// Number of bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: the rest of
-/// the head, the direction switch, the answer and its reserve.
+/// Number of bits from the sampling edge to the end of the window of the answer, in a frame without an EXTRA window: the
+/// rest of the head, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
 /// Half and one and a half free-running frames, in ns.
 const HALF_FRAME_NS: u32 = 5_760;
@@ -98,9 +98,9 @@ pub struct Master {
     /// When the window of the last answer ended, and whether frames after it were lost.
     end_ns: u64,
     gap: bool,
-    /// Time from the end of a window to that of the next, plus half a frame: if it takes longer, a frame was lost.
+    /// Time from the end of one window to the end of the next, plus half a frame; if more time passes, a frame was lost.
     longest_ns: u32,
-    /// Number of stuffing blocks after a frame of a free-running link that is up, and the `longest_ns` that belongs to it.
+    /// Number of stuffing blocks after a frame of a free-running link that is up, and the corresponding `longest_ns`.
     stuffing: Stuffing,
     usual_ns: u32,
     /// Steps per turn for the angle in a sample; 0 if not known.
@@ -113,10 +113,10 @@ pub struct Master {
     late: Option<i16>,
     /// The next head, if it was sent before this frame's answer was processed.
     ahead: Option<Transmission>,
-    /// Why the link was lost, while the frame after the loss is already on the line.
+    /// Why the link was lost, if the frame after the loss is already on the line.
     lost: Option<RestartReason>,
     /// The frame does not end in the usual way: because of sync mode, a requested restart, frames lost before it, or one of the
-    /// two above.
+    /// two fields above.
     detour: bool,
 }
 
@@ -277,8 +277,8 @@ impl Master {
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
-    /// ends the H-frame. `signal` is what that front end knows about the quality of the line; without it RSSI does not
-    /// count. In START frames, too, the bits have to be the test pattern.
+    /// ends the H-frame. `signal` is what that front end knows about the quality of the line; without it, RSSI is not
+    /// evaluated. In START frames, too, the bits have to be the test pattern.
     ///
     /// For a frame without an answer the bits are ignored. `end_ns` is when the [`WINDOW`] bit times had ended in which an
     /// answer can come, regardless of the delay of the cable.
@@ -310,8 +310,7 @@ impl Master {
         self.late = Some(late);
     }
 
-    /// Notes that another H-frame was heard. If it ended too late, a frame was lost that was not reported, and the position with
-    /// it.
+    /// Notes that another H-frame was heard. If it ended too late, an unreported frame was lost, and with it the position.
     #[inline]
     fn frame_ends(&mut self, end_ns: u64) {
         let is_late = end_ns.saturating_sub(self.end_ns) > self.longest_ns.into();
@@ -321,7 +320,7 @@ impl Master {
         }
     }
 
-    /// Handles lost frames that were not reported.
+    /// Handles unreported lost frames.
     #[cold]
     fn interrupt(&mut self) {
         self.note_gap();
@@ -342,7 +341,7 @@ impl Master {
         self.longest_ns.saturating_sub(HALF_FRAME_NS)
     }
 
-    /// Returns when the encoder sampled in the last H-frame.
+    /// Returns when the encoder took its sample in the last H-frame.
     const fn sampled_ns(&self) -> u64 {
         let since_edge_ns = SINCE_EDGE_NS.wrapping_add(self.edge_ns as u64).saturating_sub(self.latency_ns as u64);
         self.end_ns.saturating_sub(since_edge_ns)
@@ -365,7 +364,7 @@ impl Master {
         self.go_on()
     }
 
-    /// Ends a frame in the usual way: what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
+    /// Ends a frame in the usual way: does what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
     fn go_on(&mut self) -> &HFrame {
         self.count_frame();
         self.h_frame.restarted = None;

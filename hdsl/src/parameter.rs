@@ -69,7 +69,7 @@ symbols! {
 }
 
 impl MasterSymbol {
-    /// Returns whether it belongs to the start-up frames that are answered by the test pattern or the identifier.
+    /// Returns whether it is the symbol of a start-up frame, which is answered with the test pattern or the identifier.
     pub const fn is_start_up(self) -> bool {
         matches!(self, Self::Start | Self::Learn | Self::Check | Self::IdReq)
     }
@@ -216,7 +216,7 @@ impl EncoderByte {
     }
 }
 
-/// The name of a bit that is set.
+/// Names a bit that is set.
 const fn flag(set: bool, name: &'static str) -> &'static str {
     if set { name } else { "" }
 }

@@ -1,5 +1,5 @@
 //! The registers POS and VEL of a receiver: the second differences of the acceleration channel, integrated twice and aligned
-//! with the safe position once per V-frame, as by the vendors.
+//! with the safe position once per V-frame, as the vendors do.
 
 use crate::acceleration::DeltaDelta;
 use crate::encoder_id::PositionBits;
@@ -50,7 +50,8 @@ pub enum AlignmentStage {
 
 /// The registers of a receiver that belong to the fast position, by the vendor's names.
 ///
-/// They hold numbers whether these are right or not. What may be used comes from [`FastPosition`](crate::FastPosition).
+/// They hold numbers whether or not these are right. For a position that may be used, see
+/// [`FastPosition`](crate::FastPosition).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -84,7 +85,7 @@ pub struct PositionRegisters {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionTracker {
     bits: PositionBits,
-    /// Returns a mask of this many ones.
+    /// Returns a mask of this width.
     mask: u64,
     rule: PositionRule,
     position: u64,
@@ -94,7 +95,7 @@ pub struct PositionTracker {
     last: i16,
     /// Differences between successive values, the newest first.
     history: [i16; 5],
-    /// Position at stage 0, from which stage 1 derives the error of the velocity.
+    /// Position at stage 0, from which the error of the velocity is derived in stage 1.
     reference: u64,
     stage: AlignmentStage,
     unreliable: bool,
@@ -288,7 +289,7 @@ mod tests {
         DeltaDelta::new(value as i16)
     }
 
-    /// Drives a tracker with a real motion and gives it the safe position after every eighth frame.
+    /// Runs a tracker with a real motion and passes it the safe position after every eighth frame.
     fn follow(
         tracker: &mut PositionTracker,
         start: i64,
@@ -310,7 +311,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the encoder did before, four V-frames later the position is exact and stays so.
+        /// Whatever the encoder did before, the position is exact four V-frames later and stays exact.
         #[test]
         fn aligns_in_four_v_frames(start in 0..1_i64 << 31, speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 48)) {
             let mut tracker = PositionTracker::new(PositionBits::new(40).unwrap());
@@ -320,8 +321,8 @@ mod tests {
             prop_assert_eq!(tracker.registers().pos, end.rem_euclid(1 << 40) as u64);
         }
 
-        /// A lost word is found out and repaired, at the latest in the second round: the first learns a wrong error
-        /// of the velocity if the word was lost in the middle of a V-frame.
+        /// A lost word is detected and corrected, at the latest in the second round: if the word was lost in the middle of a
+        /// V-frame, the first round derives a wrong error of the velocity.
         #[test]
         fn repairs_after_lost_words(speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 128), lost in 33..48_usize) {
             let mut tracker = PositionTracker::new(PositionBits::new(36).unwrap());
@@ -330,7 +331,7 @@ mod tests {
             prop_assert_eq!(tracker.registers().pos, end.rem_euclid(1 << 40) as u64 & tracker.bits.mask());
         }
 
-        /// As long as nothing wraps both estimators agree.
+        /// As long as nothing wraps, both estimators agree.
         #[test]
         fn the_estimators_agree_without_wrap(a in prop::collection::vec(prop::option::of(-200..200_i16), 40)) {
             let bits = PositionBits::MAX;
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// At constant acceleration, speed 0 or not, the estimate is exact.
+    /// At constant acceleration the estimate is exact, at speed 0 or any other.
     #[test]
     fn constant_acceleration_needs_no_words() {
         for a in [-7, 0, 7] {
@@ -373,7 +374,8 @@ mod tests {
         }
     }
 
-    /// Off by an eighth of the range a V-frame brings it to the same place, so every check agrees. It does not stay so.
+    /// If the speed is off by an eighth of the range, a V-frame ends at the same position, so every check agrees. The error
+    /// does not last.
     #[test]
     fn a_speed_that_is_off_by_an_eighth_of_the_range() {
         for bits in 11..=40 {
@@ -408,7 +410,7 @@ mod tests {
         }
     }
 
-    /// An estimate of 1100 has bit 10: the firmware takes it for -948.
+    /// An estimate of 1100 has bit 10 set, so the firmware reads it as -948.
     #[test]
     fn an_estimate_outside_eleven_bits() {
         for (rule, want) in [(PositionRule::Sick, 1023), (PositionRule::Ti, 1100 - 2048)] {

@@ -1,4 +1,4 @@
-//! The quality monitor: counts what is right and wrong on the link and decides when the link is lost.
+//! The quality monitor: rates what is right and wrong on the link and decides when the link is lost.
 
 use crate::answer::{ACCELERATION, Answer, BadWords, PARAMETER, PIPE, SECONDARY, VERTICAL};
 use crate::vframe::VFrame;
@@ -162,7 +162,8 @@ impl QualityMonitor {
         self.count(event);
     }
 
-    /// Counts bad words and special characters without a meaning. All of these subtract, so one sum is equivalent to single steps.
+    /// Counts bad words and special characters without a meaning. All of these subtract, so applying their sum is equivalent to
+    /// applying them one by one.
     #[cold]
     fn count_bad_words(&mut self, answer: &Answer) -> u8 {
         let ti = self.rule == QualityRule::Ti;
@@ -209,7 +210,7 @@ impl QualityMonitor {
         self.count_blocks(frame.safe1.is_sound(), frame.safe2.is_sound());
     }
 
-    /// Does the same if it is known whether they are sound.
+    /// Does the same if the caller knows whether they are sound.
     pub(crate) fn count_blocks(&mut self, sound1: bool, sound2: bool) {
         if sound1 {
             self.count(QualityEvent::Safe1Ok);

@@ -4,8 +4,8 @@
 //! has its own map: 40h registers, a bank with those of safe channel 2, and separately POSTX and the flags of the online status.
 //! [`Registers::from_core`] converts an image of it to this map; [`RemoteReceiver`] accesses either device by its own map.
 //!
-//! A [`Registers`] is an image of that map. Next to a [`Master`](crate::master::Master), [`Registers::apply`] keeps it up to
-//! date and [`Registers::write`] takes what an application writes. [`Registers::from_bytes`] creates it from the image of
+//! A [`Registers`] is an image of that map. If used with a [`Master`](crate::master::Master), [`Registers::apply`] keeps it up
+//! to date and [`Registers::write`] takes what an application writes. [`Registers::from_bytes`] creates one from the image of
 //! another receiver, for example the memory of the SDK's firmware.
 //!
 //! ```
@@ -51,7 +51,7 @@ pub struct Registers {
     pipe: PipeFifo,
     /// POS and VEL by the rule of the dialect.
     tracker: PositionTracker,
-    /// What may be used of them; nothing from the image of another receiver.
+    /// Which of them may be used; none in the image of another receiver.
     fast: Option<FastPosition>,
     /// The blocks of a V-frame, which are shown one H-frame after its end.
     v_frame: Option<VFrame>,
@@ -63,7 +63,7 @@ impl Registers {
     /// Bytes of the map.
     pub const LEN: usize = 0x56;
 
-    /// Creates the map as after power-up: the flags of a restart are set.
+    /// Creates the map as it is after power-up: the flags of a restart are set.
     pub fn new(dialect: &Dialect) -> Self {
         let mut all = Self::from_bytes(dialect, [0; Self::LEN]);
         all.put(Register::Version, [0x10]);
@@ -98,7 +98,7 @@ impl Registers {
 
     /// Creates the map from an image of the SICK core: its registers 00h..3Fh, and 00h..1Fh of the bank of safe channel 2 if
     /// that was read. The online status is not a register there. Of its flags, POS is set here, because it is unknown whether
-    /// the fast position is aligned, so [`pos`](Self::pos) returns none; all others are clear.
+    /// the fast position is aligned, so [`pos`](Self::pos) returns `None`; all others are clear.
     pub fn from_core(drive: &[u8; Self::CORE_LEN], safe2: Option<&[u8; 0x20]>) -> Self {
         let mut all = Self::from_bytes(&Dialect::SICK, [0; Self::LEN]);
         for (address, byte) in (0..).zip(drive) {
@@ -235,7 +235,7 @@ impl Registers {
         Online2::from_bits_retain(u16::from_be_bytes(self.get(Register::OnlineStatus2)))
     }
 
-    /// Takes the events that happened and clears them.
+    /// Takes the events that have occurred and clears them.
     pub fn take_events(&mut self) -> Events {
         let events = Events { drive: self.event(), safe: self.event_s() };
         self.put(Register::EventH, [0, 0]);

@@ -5,13 +5,13 @@ servowire_core::number! {
     pub struct ResourceAddress(u16, 10);
 }
 
-/// Declares the addresses that have a name.
+/// Declares the named addresses.
 macro_rules! addresses {
     ($($(#[$doc:meta])* $name:ident = $address:literal,)*) => {
         impl ResourceAddress {
             $($(#[$doc])* pub const $name: Self = Self::truncate($address);)*
 
-            /// The name that the manual gives it, if it gives one.
+            /// Its name in the manual, if it has one there.
             pub const fn name(self) -> Option<&'static str> {
                 match self.get() {
                     $($address => Some(stringify!($name)),)*
@@ -87,7 +87,7 @@ addresses! {
     LOADFILE = 0x130,
     /// Contents of the loaded file; the offset is the address within it.
     RWFILE = 0x131,
-    /// Rights and size of the loaded file, 4 bytes.
+    /// Access rights and size of the loaded file, 4 bytes.
     FILESTAT = 0x132,
     /// Creates, changes and **deletes** user files.
     MAKEFILE = 0x133,

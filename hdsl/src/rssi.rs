@@ -24,7 +24,7 @@ impl Rssi {
         Self::of_ones(ONES[edges as usize])
     }
 
-    /// Half of it, as a row of that many ones, so that the smaller of two is their bitwise AND.
+    /// Half the RSSI in unary, as that many ones in a row, so that the smaller of two is their bitwise AND.
     #[expect(clippy::cast_possible_truncation, reason = "at most six ones")]
     pub(crate) const fn of_ones(ones: u8) -> Self {
         Self(2_u8.wrapping_mul(ones.count_ones() as u8))
@@ -60,7 +60,7 @@ pub const fn longest_gap(edges: u8) -> Option<u8> {
 /// The value for a bit time with one edge or none.
 const PERFECT: u8 = 0x3f;
 
-/// Half the RSSI of an edge byte, as a row of that many ones.
+/// Half the RSSI of an edge byte, in unary.
 #[expect(clippy::indexing_slicing, clippy::cast_possible_truncation, reason = "runs at compile time")]
 static ONES: [u8; 256] = {
     let mut table = [0; 256];
@@ -82,7 +82,7 @@ static ONES: [u8; 256] = {
 pub struct EdgeWatch {
     previous: bool,
     seen: u8,
-    /// Half the lowest RSSI, as a row of that many ones.
+    /// Half the lowest RSSI, in unary.
     ones: u8,
 }
 
@@ -126,7 +126,7 @@ impl WordWatch {
         Self { previous, seen: 0, ones: PERFECT }
     }
 
-    /// Takes the samples of four bit times. Only edges in `of` count.
+    /// Takes the samples of four bit times. Counts only edges in `of`.
     #[inline(always)]
     pub(crate) fn step(&mut self, samples: u32, of: u32) {
         let edges = (samples ^ samples >> 1 ^ self.previous << 31) & of;
@@ -148,8 +148,7 @@ impl WordWatch {
     }
 }
 
-/// Returns the lowest RSSI, as a row of that many ones, of the bit times in four words, which follow the word with the samples
-/// before them.
+/// Returns half the lowest RSSI, in unary, of the bit times in four words; the word before them holds the samples before them.
 #[inline(always)]
 pub(crate) fn lowest(before: u32, words: impl IntoIterator<Item = (u32, u32)>) -> u8 {
     let (mut previous, mut ones) = (before, PERFECT);

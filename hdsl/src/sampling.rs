@@ -69,7 +69,7 @@ impl SampleIndex {
         Self::truncate(7_u8.wrapping_sub(Self::after_falling_edge(byte).get()))
     }
 
-    /// Returns the bit that a byte of samples stands for.
+    /// Returns the bit that a byte of samples represents.
     #[inline]
     pub const fn bit(self, samples: u8) -> bool {
         samples >> (7 & !self.get()) & 1 == 1
@@ -113,8 +113,8 @@ pub enum EdgeRule {
     /// The ones before the edge count.
     #[default]
     Leading,
-    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the next edge
-    /// comes a sample early, a one after that edge is counted too, and the pattern is not found.
+    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the next
+    /// edge comes a sample early, the one after that edge is counted too, and the pattern is not found.
     All,
 }
 

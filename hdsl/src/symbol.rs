@@ -1,6 +1,6 @@
 //! 8b/10b words, as which every byte of the link is sent.
 //!
-//! The word is sent in the order `a b c d e i f g h j`; `a` belongs to bit 0 of the byte (HDSL Protocol Design).
+//! The word is sent in the order `a b c d e i f g h j`; `a` corresponds to bit 0 of the byte (HDSL Protocol Design).
 //! A [`Word`] holds it with `a` in bit 0, so that nothing is ever reversed.
 //!
 //! ```text
@@ -43,7 +43,7 @@ impl Word {
         if entry & INVALID != 0 { None } else { Some(Character(entry & 0x1ff)) }
     }
 
-    /// Returns whether the word is K28.1, 2, 5 or 6 of column RD+.
+    /// Returns whether the word is K28.1, K28.2, K28.5 or K28.6 in column RD+.
     const fn is_crossed_k28(self) -> bool {
         let k28_plus = self.get() & 63 == 0b00_0011;
         // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
@@ -235,7 +235,7 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// What the words stand for.
+    /// The meaning of the words.
     #[inline]
     pub(crate) const fn table(self) -> &'static Table {
         match self {
@@ -274,8 +274,8 @@ impl Entry {
         self.0 & INVALID != 0
     }
 
-    /// Returns the same word as read in the secondary channel, where the reduced rule corrects K28.1, 2, 5 and 6 of column RD+.
-    /// With the strict rule nothing needs correcting.
+    /// Returns the same word as read in the secondary channel, where the reduced rule corrects K28.1, K28.2, K28.5 and K28.6
+    /// of column RD+. With the strict rule nothing needs correcting.
     #[inline]
     pub(crate) const fn in_secondary(self, rule: Rule, word: Word) -> Self {
         if matches!(rule, Rule::Reduced) && word.is_crossed_k28() { Self(self.0 ^ 0b1110_0000) } else { self }
@@ -361,7 +361,7 @@ servowire_core::one_line!(Reading {
     reading => "{}", Character(reading.entry.0 & 0x1ff);
 });
 
-/// The verdict of a [`DisparityCheck`] on a word.
+/// How a [`DisparityCheck`] judges a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -392,8 +392,8 @@ impl DisparityCheck {
         self.rd
     }
 
-    /// Judges the next word. After a word of the other column it continues from that column's result; after a word of neither
-    /// column, the sign of the word's own disparity counts, if it has one.
+    /// Judges the next word. After a word of the other column it continues with that column's result; after a word of neither
+    /// column, with the sign of the word's own disparity, if that is not 0.
     pub fn step(&mut self, word: Word) -> DisparityStatus {
         let other = self.rd.other();
         if word.is_in(self.rd) {

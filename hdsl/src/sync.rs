@@ -39,7 +39,8 @@ pub struct ExtraWindow {
 }
 
 impl ExtraWindow {
-    /// Creates the state. `window` is TIME_EXTRA_WINDOW in eighths; the window of the first frame has its edge at `edge`.
+    /// Creates the state. `window` is TIME_EXTRA_WINDOW in eighths; `edge` is the position of the edge in the window of the
+    /// first frame.
     pub const fn new(edge: Extra, stuffing: Stuffing, window: i16) -> Self {
         Self { edge, stuffing, window }
     }
@@ -99,7 +100,7 @@ impl Es {
     pub const ONE: Self = Self::MIN;
 }
 
-/// What comes next on the line.
+/// What to send next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Next {
@@ -111,9 +112,9 @@ pub struct Next {
 
 /// Keeps the sampling edge of every ES-th frame on the pulse.
 ///
-/// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a pulse, and
-/// the correction takes care of fractions of an eighth. It learns by how much the real period differs from the given one, so the
-/// edges stay where they belong while some pulses are not seen.
+/// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a pulse,
+/// and the correction takes care of fractions of an eighth. It learns by how much the real period differs from the given
+/// one, so the edges stay in place even if some pulses are not seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Synchroniser {
@@ -125,13 +126,13 @@ pub struct Synchroniser {
     remainder: u8,
     /// Number of the present frame in its pulse group, 0 for the one on the pulse.
     frame: u8,
-    /// The eighths times ES that are due; starts in the middle, so that the edges are at most half an eighth off.
+    /// The eighths that are due, times ES; starts in the middle, so that the edges are at most half an eighth off.
     spread: u8,
-    /// How much later each pulse comes than the period says, in 1/256 of an eighth, and how much of this is due when a pulse is
-    /// not seen.
+    /// How much later each pulse comes than the nominal period, in 1/256 of an eighth, and how much of this is due when a pulse
+    /// is not seen.
     learned: i16,
     due: i16,
-    /// By how much the next edge has to come later because the window of the present frame had no room for it.
+    /// How much later the next edge has to come because the window of the present frame had no room for it.
     owed: i16,
     /// Number of pulses in a row that were close to their edges, and number in a row that were not seen.
     close: u8,
@@ -142,17 +143,17 @@ impl Synchroniser {
     /// Largest correction in one frame, in eighths, as in the vendor's receiver.
     const MAX_CORRECTION: i16 = 6;
 
-    /// The most that later frames make up for.
+    /// The largest deviation that later frames make up for.
     const MAX_OWED: i16 = 64;
 
     /// How close to its edge a pulse has to come to be in step, in eighths: 93 ns. The vendor's receiver allows 100 ns.
     const CLOSE: i16 = 7;
     /// Number of pulses in a row that have to be this close.
     const PULSES: u8 = 4;
-    /// Number of pulses that may be missing; after that it is unknown where the edges are.
+    /// Number of pulses that may be missing before it is unknown where the edges are.
     const UNSEEN: u8 = 8;
-    /// Time from the beginning of a frame to the end of the shortest EXTRA window from which every edge of the next frame can be
-    /// reached, including a correction in either direction, and the same for the longest one.
+    /// Time from the beginning of a frame to the end of the shortest EXTRA window from which every edge of the next frame
+    /// can be reached, including a correction in either direction; and the same for the longest window.
     const FRAMES: [u32; 2] = [FRAME + 32, FRAME + 26 * 48 + 69];
 
     /// Creates the synchroniser for a pulse every `period` eighths of a bit (13.333 ns each) with `es` frames per pulse: frames

@@ -87,9 +87,9 @@ pub(super) struct Channel {
     heard: Message,
     /// The first nibble of its next byte.
     half: Option<u8>,
-    /// There has been an IDLE since the last message, or since a lost one.
+    /// An IDLE has come since the last message, whether complete or lost.
     listening: bool,
-    /// A short and a long request whose answers are pending, with the H-frames left.
+    /// A short and a long request whose answers are pending, with the number of H-frames left.
     waiting: [Option<(Message, u16)>; 2],
     /// A short and a long answer waiting for the channel.
     answers: [Option<Message>; 2],
@@ -128,7 +128,7 @@ impl Channel {
         None
     }
 
-    /// Takes a symbol that could not be read: what was being received is lost, up to the next IDLE.
+    /// Takes a symbol that could not be read: the message being received is lost, and reception resumes at the next IDLE.
     pub(super) const fn miss(&mut self) {
         self.heard = Message::EMPTY;
         self.half = None;
@@ -166,7 +166,7 @@ impl Channel {
         *(if request.is_long() { long } else { short }) = Some((request, frames));
     }
 
-    /// Returns the requests whose time has come.
+    /// Returns the requests that are due for an answer.
     pub(super) fn due(&mut self) -> [Option<Message>; 2] {
         let due = self.waiting.map(|waiting| waiting.filter(|(_, frames)| *frames == 0).map(|(request, _)| request));
         self.waiting = self.waiting.map(|waiting| {

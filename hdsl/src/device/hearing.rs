@@ -1,4 +1,4 @@
-//! The encoder's reception: finds the bits of a head on a sampled line, and the instant at which the position is taken.
+//! The encoder's reception: finds the bits of a head on a sampled line, and the instant at which to take the position.
 
 use nrz_line::Window;
 
@@ -57,7 +57,7 @@ impl Heard {
     }
 }
 
-/// Returns where SYNC begins: the best of the first possible places. (PARA may end in the same way.)
+/// Returns where SYNC begins: the best match among the first possible places. (PARA may end with the same bits.)
 fn lock(samples: &[u8], last: usize) -> Option<usize> {
     let wrong = |place: &usize| (window(samples, *place) ^ LOCK).count_ones();
     let first = (0..=last).find(|place| wrong(place) <= TOLERANCE)?;

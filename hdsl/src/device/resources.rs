@@ -16,7 +16,7 @@ pub struct Resource {
     pub size: u8,
     /// Access level needed to read.
     pub read_level: u8,
-    /// Access level needed to write; 15 stands for nobody.
+    /// Access level needed to write; 15 means that nobody may.
     pub write_level: u8,
     /// The time-out stated by the encoder, in ms.
     pub timeout_ms: u8,
@@ -49,7 +49,7 @@ impl Default for Resources {
 
 /// The level at which nobody may write.
 const READ_ONLY: u8 = 15;
-/// The index of SRSSI among the 64 registers, and the value to which it returns.
+/// The index of SRSSI among the 64 registers, and the value to which reading resets it.
 const SRSSI: usize = 0x3c;
 const SRSSI_BEST: u8 = 7;
 

@@ -2,7 +2,7 @@
 
 use crate::symbol::{RunningDisparity, Word};
 
-/// What the words of an answer tell about the running disparity.
+/// What the words of an answer say about the running disparity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -10,7 +10,7 @@ pub struct Chain {
     before: Option<RunningDisparity>,
     after: Option<RunningDisparity>,
     holds: bool,
-    /// The first word that tells and the last one, 0..=5.
+    /// The first word that determines the disparity and the last one, 0..=5.
     first: u8,
     last: u8,
 }
@@ -67,14 +67,16 @@ impl Chain {
         self.after
     }
 
-    /// The first word that tells, 0..=5. If the answer does not begin where the one before ended and the fault is in it, it is in this
-    /// word or in one before it; the last word where none tells.
+    /// The first word that determines the disparity, 0..=5. If the answer does not begin with the disparity with which the one
+    /// before ended, and the fault is in this answer, it is in this word or in an earlier one. If no word determines the
+    /// disparity, this is the last word.
     pub const fn first_told(self) -> u8 {
         self.first
     }
 
-    /// The last word that tells, 0..=5. If the next answer does not begin where this ends and the fault is in this, it is in this word
-    /// or in one behind it; the first word where none tells.
+    /// The last word that determines the disparity, 0..=5. If the next answer does not begin with the disparity with which this
+    /// one ends, and the fault is in this answer, it is in this word or in a later one. If no word determines the disparity,
+    /// this is the first word.
     pub const fn last_told(self) -> u8 {
         self.last
     }

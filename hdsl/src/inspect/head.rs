@@ -51,11 +51,11 @@ pub fn find_head(line: Window) -> Option<FoundHead> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum HeadDamage {
-    /// SYNC, SAMPLE and CYCLE RESET are there, but the word of the parameter byte is in no table.
+    /// SYNC, SAMPLE and CYCLE RESET are correct, but the word of the parameter byte is in no table.
     Parameter,
     /// One of the twelve fixed bits is wrong.
     OneBit,
-    /// Two of them are wrong.
+    /// Two of the twelve fixed bits are wrong.
     TwoBits,
     /// No head.
     Missing,
@@ -79,8 +79,8 @@ impl HeadDamage {
     }
 }
 
-/// Determines what is at the place where the head of a frame was expected: `line` begins three bits before that place, and the
-/// head may be three bits off in either direction.
+/// Examines the place where the head of a frame was expected: `line` begins three bits before it, and the head may be up to
+/// three bits off in either direction.
 pub fn head_damage(line: Window) -> HeadDamage {
     let wrong = |at: u32| ((line.bits() >> at & 0xfff) ^ WHOLE).count_ones();
     match (0..=6).map(wrong).min() {
@@ -118,17 +118,17 @@ pub(crate) const fn head_fault(head: ParsedHead) -> Option<HeadFault> {
     }
 }
 
-/// Returns whether EQUALISATION and PARA, the last 14 bits of a head, are coded as for a balanced line, which is the case for
-/// every head without an EXTRA window that follows an answered frame.
+/// Returns whether EQUALISATION and PARA, the last 14 bits of a head, are coded as for a balanced line. This is so for every
+/// head without an EXTRA window that follows an answered frame.
 pub(crate) fn is_coded_for_balance(head: ParsedHead, line: Window) -> bool {
     let due = Head::new(head.byte, None, LineDisparity::ZERO);
     let coded = line.bits() >> head.len.saturating_sub(14) & 0x3fff;
     coded == u128::from(due.equalisation()) | u128::from(due.para().get()) << 4
 }
 
-/// Returns whether the line before a head ends with TRAILER as a master drives it, 000011, followed by stuffing blocks. `front`
-/// holds at most [`FRONT_BITS`] bits, the last of which is just before the head; if all of them are stuffing, that is taken as
-/// good.
+/// Returns whether the line before a head ends with TRAILER as a master drives it, 000011, followed by stuffing blocks.
+/// `front` holds at most [`FRONT_BITS`] bits, the last of which is just before the head; if all of them are stuffing, this
+/// counts as good.
 pub fn ends_with_trailer(front: Window) -> bool {
     // The first bit in bit 0.
     const TRAILER: u128 = 0b11_0000;

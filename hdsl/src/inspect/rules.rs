@@ -1,4 +1,4 @@
-//! Rules that hold from frame to frame of a link. Whatever all heads so far have done is a rule, and a head that breaks it was
+//! Rules that hold from frame to frame of a link. What all heads so far have in common is a rule, and a head that breaks it was
 //! damaged.
 
 use nrz_line::Window;
@@ -9,16 +9,16 @@ use crate::frame::ParsedHead;
 use crate::parameter::MasterSymbol;
 use crate::symbol::RunningDisparity;
 
-/// The number of heads after which what all of them did becomes a rule.
+/// The number of heads that have to agree before their behaviour becomes a rule.
 const RULE: u8 = 16;
 
-/// The faults of a head in view of those before it.
+/// The faults of a head, judged by the heads before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum BrokenRule {
     /// The head itself is wrong.
     Fault(HeadFault),
-    /// No byte is coded like this on a balanced line.
+    /// No byte is coded in this way on a balanced line.
     Balance,
     /// FIRST.
     First,
@@ -64,27 +64,27 @@ impl Kept {
     }
 }
 
-/// What the heads of a link have done so far.
+/// How the heads of a link have behaved so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct HeadRules {
-    /// Heads in a row that were coded for a balanced line.
+    /// Number of heads in a row that were coded for a balanced line.
     balanced: Kept,
-    /// Whether the previous frame was answered: with its TRAILER the count of the line restarts.
+    /// Whether the previous frame was answered; if so, its TRAILER has reset the line disparity.
     answered: bool,
     /// Number of frames in a row with FIRST.
     first: Kept,
     /// Number of frames in a row that end with TRAILER and stuffing.
     ended: Kept,
-    /// MSYNC of this V-frame, and for how many frames it followed the rule.
+    /// MSYNC of this V-frame, and the number of frames for which it has followed the rule.
     msync: Option<bool>,
     steady: Kept,
 }
 
 impl HeadRules {
-    /// Heads of a lesson from which a rule is taken; one of so many may break it.
+    /// Number of heads from which a rule is learned; one in this many may break it.
     const LESSON: usize = 8;
 
-    /// Learns from the first heads of a link, which followed each other, what they do: each with the line that it begins.
+    /// Learns the rules from the first heads of a link, which are consecutive, each given with the line that it begins.
     pub fn learn(&mut self, heads: &[(ParsedHead, Window)]) {
         let rule = |kept: usize, all: usize| all >= Self::LESSON && all.saturating_sub(kept) <= all / Self::LESSON;
         let of = |head: &ParsedHead| head.byte.symbol().ok();
@@ -120,7 +120,7 @@ impl HeadRules {
         !self.ended.holds(ends_with_trailer(front))
     }
 
-    /// Checks whether the head is coded for a balanced line: in a free-running link the count of the line is 0 before each head
+    /// Checks whether the head is coded for a balanced line: in a free-running link the line disparity is 0 before each head
     /// that follows an answered frame.
     fn is_balanced(&mut self, head: ParsedHead, line: Window) -> bool {
         head.extra_bits > 0 || !self.answered || self.balanced.holds(is_coded_for_balance(head, line))
@@ -135,7 +135,7 @@ impl HeadRules {
         }
     }
 
-    /// Checks MSYNC, which is the same in the eight frames of a V-frame and changes from one to the next.
+    /// Checks MSYNC, which is constant within the eight frames of a V-frame and changes from one V-frame to the next.
     fn goes_with_v_frame(&mut self, head: ParsedHead, at: Option<u8>) -> bool {
         let said = head.byte.msync();
         let Some(at) = at else {
@@ -158,7 +158,7 @@ const fn may_be_first(symbol: MasterSymbol) -> bool {
 /// Learns from the line with which running disparity the answers of an encoder begin, because no document says so.
 ///
 /// An answer that begins with + after one that ended with + has carried the disparity on; one that begins with - in that place
-/// has restarted it. After an answer that ended with -, both kinds begin with -, which proves nothing.
+/// has restarted it. After an answer that ended with -, the next one begins with - in either case, which proves nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Beginnings {
     carried: u32,

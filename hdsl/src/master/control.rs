@@ -64,9 +64,9 @@ impl Master {
     /// for example because a block of samples was overwritten or a head was repeated. Their words are missing, their V-frames
     /// have no safe position, and the frame numbers include them. This takes some 60 instructions per frame.
     ///
-    /// A lost frame that is not reported is recognised by its time, if the reported end is half a frame too late. Then no fast
-    /// position is returned until three safe positions have come, no safe position from that V-frame, and the number of the
-    /// frame is not known.
+    /// A lost frame that is not reported is recognised by its time, if the reported end is half a frame too late. Then no
+    /// fast position is returned until three safe positions have come, no safe position is returned from that V-frame, and
+    /// the number of the frame is not known.
     pub fn skip(&mut self, frames: u8) {
         self.counters.frames = self.counters.frames.wrapping_add(frames.into());
         let frame_ns = self.frame_ns();

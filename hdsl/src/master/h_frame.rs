@@ -12,7 +12,7 @@ use crate::sampling::Delay;
 use crate::symbol::{Character, Control, Reading};
 use crate::vframe::VFrame;
 
-/// What is known about the quality of the line besides the bits of an answer.
+/// The measured quality of the line, in addition to the bits of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -159,15 +159,15 @@ pub struct Counters {
     pub frames: u64,
     /// Restarts.
     pub restarts: u32,
-    /// Bad words in answers, all channels.
+    /// Number of bad words in answers, in all channels.
     pub words: u32,
-    /// Acceleration words that could not be used.
+    /// Number of acceleration words that could not be used.
     pub acceleration: u32,
-    /// V-frames without a good safe channel 1.
+    /// Number of V-frames without a good safe channel 1.
     pub safe1: u32,
-    /// V-frames without a good safe channel 2.
+    /// Number of V-frames without a good safe channel 2.
     pub safe2: u32,
-    /// Answers with a wrong switch bit.
+    /// Number of answers with a wrong switch bit.
     pub switch_bits: u32,
 }
 

@@ -28,9 +28,9 @@ pub(super) struct Link {
     settled: bool,
     /// The safe position of the last V-frame, with SUMMARY.
     safe: Result<(u64, u8), Doubt>,
-    /// TEST2 of the last V-frame has to be counted.
+    /// TEST2 of the last V-frame is still to be counted.
     test2: bool,
-    /// When the safe position of the last V-frame was sampled, and that of the present one.
+    /// When the safe positions of the last V-frame and of the present one were sampled.
     last_sampled_ns: u64,
     sampled_ns: u64,
 }
@@ -94,8 +94,8 @@ impl Link {
         last
     }
 
-    /// Handles an unknown number of unheard frames: what follows need not belong to the V-frame that had begun. The last one was
-    /// sampled at `before_ns`.
+    /// Handles an unknown number of unheard frames: the next frame may not belong to the V-frame under way. The last unheard
+    /// frame was sampled at `before_ns`.
     pub(super) fn interrupt(&mut self, before_ns: u64) {
         self.fast.interrupt();
         self.vframe = VFrame::default();
@@ -174,7 +174,7 @@ impl Master {
         self.h_frame.acceleration_errors = self.link.fast.missing_in_a_row();
     }
 
-    /// Handles a faulty acceleration word: counts it, and uses it all the same if the dialect does so.
+    /// Handles a faulty acceleration word: counts it, and uses it anyway if the dialect does so.
     #[cold]
     fn unusable(&mut self, answer: &Answer, error: Error) -> Option<DeltaDelta> {
         if self.dialect.damaged_acceleration && matches!(error, Error::InvalidWord { .. }) {
@@ -190,7 +190,7 @@ impl Master {
         None
     }
 
-    /// After RX7, judges the safe channels and aligns the fast position.
+    /// Judges the safe channels and aligns the fast position, after RX7.
     fn end_v_frame(&mut self) {
         let link = &mut self.link;
         let VFrame { safe1, safe2 } = &link.vframe;

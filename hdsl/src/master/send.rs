@@ -29,7 +29,7 @@ impl Master {
     /// its end; [`fast`](Self::fast) and [`safe`](Self::safe) return nothing after the loss, and what [`hear`](Self::hear)
     /// returns for that frame says why the link restarts.
     ///
-    /// `None` while the next head depends on the answer: before the link runs, in sync mode, before a restart.
+    /// `None` while the next head depends on the answer: before the link runs, in sync mode, and before a restart.
     ///
     /// ```
     /// use hdsl::device::Device;
@@ -88,7 +88,7 @@ impl Master {
         bits.wrapping_add(H_FRAME_BITS / 2).wrapping_mul(320) / 3
     }
 
-    /// Stuffing after a START frame: time for the search.
+    /// Number of stuffing blocks after a START frame, to give time for the search.
     pub(super) fn search_time(&self, was: State, restarted: Option<RestartReason>) -> Stuffing {
         let blocks = match (was, restarted, self.alignment) {
             (State::Start, Some(_), _) => 16,
@@ -143,7 +143,7 @@ pub(super) fn transmission(
     (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
 }
 
-/// Returns how a frame ends that was sent in this state.
+/// Returns the end of a frame that was sent in this state.
 pub(super) const fn trailer(before: State, restarted: Option<RestartReason>) -> Trailer {
     match (before, restarted) {
         (State::Reset | State::Sync, _) => Trailer::Whole,

@@ -1,4 +1,4 @@
-//! The start-up: test pattern, identifier, the first VSYNC, and all of it again.
+//! The start-up: test pattern, identifier, the first VSYNC, and restarts.
 
 use super::link::Link;
 use super::state::{RestartReason, State};
@@ -37,7 +37,7 @@ impl Master {
         }
     }
 
-    /// The answer to IDREQ.
+    /// Handles the answer to IDREQ.
     pub(super) fn identify(&mut self, bits: u64) -> Result<(), Error> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
         let id = EncoderId::from_answer(answer)?;
@@ -48,7 +48,7 @@ impl Master {
         Ok(())
     }
 
-    /// An answer of an encoder that runs, as long as the beginning of a V-frame is not known.
+    /// Handles an answer of a running encoder while the beginning of the V-frame is not yet known.
     pub(super) fn wait_for_vsync(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
         self.h_frame.encoder = None;

@@ -12,7 +12,7 @@ pub enum State {
     Sync,
     /// Nine frames: sampling index and delay are searched in the test pattern.
     Start,
-    /// Nine frames: the test pattern has to appear at the learned place.
+    /// Nine frames: the test pattern has to appear at the learned delay.
     Learn,
     /// Sixteen more such frames: line check.
     Check,

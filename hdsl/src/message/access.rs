@@ -22,8 +22,8 @@ servowire_core::codes! {
 }
 
 impl LongRequest {
-    /// Resets the encoder (RID 100h, SICK manual, p. 114). The encoder saves its lifetime data and does not answer; the link
-    /// restarts, and a position that the encoder does not save is lost.
+    /// Resets the encoder (RID 100h, SICK manual, p. 114). The encoder saves its lifetime data and does not answer. The link
+    /// restarts, and the position is lost if the encoder does not save it.
     pub const fn reset_encoder() -> Self {
         Self { address: ResourceAddress::RESET, indirect: true, offset: None, access: Access::Write(Data::NONE) }
     }

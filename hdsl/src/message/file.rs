@@ -57,7 +57,7 @@ servowire_core::one_line!(FileName {
     name => "{}", name.as_str();
 });
 
-/// Rights and size of the loaded file, as returned by FILESTAT (132h).
+/// Access rights and size of the loaded file, as returned by FILESTAT (132h).
 ///
 /// ```
 /// use hdsl::message::{AccessLevel, Data, FileStatus};
@@ -120,7 +120,7 @@ impl LongRequest {
         Self { address: ResourceAddress::RWFILE, indirect: true, offset: Some(address), access: Access::Write(data) }
     }
 
-    /// Reads rights and size of the loaded file, see [`FileStatus`].
+    /// Reads the access rights and the size of the loaded file, see [`FileStatus`].
     pub const fn file_status() -> Self {
         Self::read(ResourceAddress::FILESTAT, Length::Four)
     }
@@ -130,7 +130,7 @@ impl LongRequest {
         Self::write_file_resource(ResourceAddress::MAKEFILE, 0x300 | rights(write, read), Data::eight(name.0))
     }
 
-    /// Changes the rights of the loaded file.
+    /// Changes the access rights of the loaded file.
     pub fn change_file_rights(name: FileName, write: AccessLevel, read: AccessLevel) -> Self {
         Self::write_file_resource(ResourceAddress::MAKEFILE, 0x100 | rights(write, read), Data::eight(name.0))
     }

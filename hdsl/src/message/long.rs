@@ -77,7 +77,7 @@ impl Data {
         Self { bytes, length: Length::Eight }
     }
 
-    /// All eight bytes, 0 after the data.
+    /// All eight bytes; those after the data are 0.
     pub const fn padded(&self) -> [u8; 8] {
         self.bytes
     }
@@ -307,7 +307,7 @@ impl LongRequest {
     }
 }
 
-/// The encoder's answer to a long message. LOFF = 1 marks an error; then two bytes of error code follow.
+/// The encoder's answer to a long message. LOFF = 1 marks an error, in which case a two-byte error code follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -393,7 +393,7 @@ impl LongRequest {
         }
     }
 
-    /// The offset, as used in a text.
+    /// The offset, as shown in text.
     const fn shown_offset(&self) -> u16 {
         match self.offset {
             Some(offset) => offset.get(),

@@ -45,7 +45,7 @@ pub(super) struct Collector {
     bytes: MessageBytes,
     crc: RunningCrc16,
     high: Option<Nibble>,
-    /// An IDLE has been seen since the last message.
+    /// An IDLE has come since the last message.
     ready: bool,
 }
 

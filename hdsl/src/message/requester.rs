@@ -35,7 +35,7 @@ pub struct Requester {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Slot<T> {
     Free,
-    /// Not yet sent this time; sent `tries` times before.
+    /// Waiting to be sent; it was sent `tries` times before.
     Queued {
         request: T,
         tries: u8,
@@ -76,7 +76,7 @@ impl<T: Copy> Slot<T> {
 }
 
 impl Requester {
-    /// Creates the requester with nothing under way.
+    /// Creates a requester with nothing under way.
     pub const fn new(limits: Limits) -> Self {
         Self {
             limits,
@@ -140,7 +140,7 @@ impl Requester {
         finished
     }
 
-    /// Does the same, and keeps messages that have ended in this frame.
+    /// Does the same, but keeps messages that have ended in this frame.
     pub(crate) fn drop_into(&mut self, finished: &mut Finished) {
         if !self.short.is_free() {
             (self.short, finished.short) = (Slot::Free, Some(Err(Error::Dropped)));
@@ -267,7 +267,7 @@ impl Requester {
         }
     }
 
-    /// Counts the frames spent waiting.
+    /// Counts the frames that a message has waited.
     #[inline]
     fn count(&mut self, finished: &mut Finished) {
         if let Slot::Waiting { request, tries, frames } = &mut self.short {

@@ -73,7 +73,7 @@ impl Default for Responder {
 }
 
 impl Responder {
-    /// Creates the responder with nothing under way.
+    /// Creates a responder with nothing under way.
     pub const fn new() -> Self {
         Self { collector: Collector::new(), short: None, long: None, signal: None, sending: None }
     }

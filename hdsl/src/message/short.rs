@@ -15,7 +15,7 @@ impl RemoteRegister {
     pub const SRSSI: Self = Self(0x7c);
     /// MAIL, write only.
     pub const MAIL: Self = Self(0x7e);
-    /// PING, keeps what is written; holds the hardware version after a start.
+    /// PING, keeps the value written to it; holds the hardware version after power-up.
     pub const PING: Self = Self(0x7f);
 
     /// Creates the address of a register; `None` outside 40h..=7Fh.

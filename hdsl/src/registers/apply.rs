@@ -132,7 +132,7 @@ impl Registers {
         }
     }
 
-    /// Handles unheard frames: what is shown is not known to be right until it is aligned again.
+    /// Handles unheard frames: the position shown may be wrong until it is aligned again.
     #[cold]
     fn interrupt(&mut self) {
         self.tracker.no_safe_position();

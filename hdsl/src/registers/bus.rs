@@ -65,12 +65,13 @@ impl<E: core::error::Error> core::error::Error for BusError<E> {}
 /// | short message | SLAVE_REG_CTRL, S_PC_DATA | an access to the encoder's register; PC_DATA |
 /// | under way | FRES, FREL in the online status | what was started here |
 ///
-/// The firmware of the SDK also sets its events by reading and writing. If both coincide, an event can be lost or come twice;
-/// rely on the online status.
+/// The firmware of the SDK also sets its events by reading and writing. If both access them at the same time, an event can be
+/// lost or come twice; rely on the online status.
 ///
-/// Messages are started with `start_...` and polled with `poll_...` until there is a result; their ends are recognised by the
-/// events FRES and FREL, which are then cleared. A restart of the link ends them too. A message to an encoder that does not
-/// answer has no end of its own (the core repeats it for ever, p. 72): [`reset_messages`](RemoteReceiver::reset_messages) drops it.
+/// Messages are started with `start_...` and polled with `poll_...` until there is a result; the end of a message is
+/// recognised by the event FRES or FREL, which is then cleared. A restart of the link ends them too. A message to an encoder
+/// that does not answer has no end of its own (the core repeats it for ever, p. 72):
+/// [`reset_messages`](RemoteReceiver::reset_messages) drops it.
 ///
 /// ```
 /// use hdsl::Dialect;
@@ -129,11 +130,11 @@ pub struct RemoteReceiver<B> {
     under_way: [bool; 2],
     /// Their ends, if they were taken along with other events: FRES; FREL and ANS.
     ended: [u8; 2],
-    /// Whether the link was restarted since.
+    /// Whether the link has restarted since then.
     dropped: [bool; 2],
-    /// The messages were reset, and INIT was not seen to come and go.
+    /// The messages were reset, and INIT has not yet been seen to come and go.
     reset: Reset,
-    /// Events that were cleared in the receiver and not handed out.
+    /// Events that were cleared in the receiver and not yet returned.
     kept: [u8; 3],
 }
 
@@ -172,7 +173,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         matches!(self.dialect.registers, RegisterRule::Sick)
     }
 
-    /// Reads all registers; for the IP core, those that are not in a bank of safe channel 2. The bytes are not from the same
+    /// Reads all registers; for the IP core, all but the bank of safe channel 2. The bytes are not from the same
     /// instant; to get a position, read only POS or VPOS.
     ///
     /// # Errors
@@ -188,7 +189,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(Registers::from_bytes(&self.dialect, bytes))
     }
 
-    /// Clears events, of which `present` were read.
+    /// Clears events; `present` holds those that were read.
     fn clear<const N: usize>(
         &mut self,
         register: Register,
@@ -204,8 +205,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         self.put(register, &written)
     }
 
-    /// Takes the events that happened: reads them and clears those that were read. The end of a message is among them, and it is still
-    /// found by `poll_...`. If the bus fails, they come with the next call.
+    /// Takes the events that have occurred: reads them, and clears those that were read. The end of a message is among them,
+    /// and it is still found by `poll_...`. If the bus fails, the next call returns them.
     ///
     /// # Errors
     /// The errors of the bus.
@@ -239,8 +240,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         }
     }
 
-    /// Clears what a message looks for, before it is started: its end, and a restart of the link. An event of the latter is kept
-    /// for [`take_events`](Self::take_events).
+    /// Clears the events that a message waits for, before it is started: its end, and a restart of the link. The event of a
+    /// restart is kept for [`take_events`](Self::take_events).
     fn prepare(&mut self, message: usize, end: [u8; 3]) -> Result<(), BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
@@ -278,8 +279,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
         Ok(!self.is_core() && self.get::<2>(Register::OnlineStatusD)?[1] & INIT != 0)
     }
 
-    /// Drops the messages under way (MRST), for an encoder that does not answer. Until the encoder has answered INIT, or the
-    /// link has restarted, no other can be started.
+    /// Drops the messages under way (MRST), for an encoder that does not answer. No other message can be started until the
+    /// encoder has answered INIT or the link has restarted.
     ///
     /// # Errors
     /// The errors of the bus.
@@ -328,7 +329,8 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     /// Returns whether the short message has ended, and its data if it was a read.
     ///
     /// # Errors
-    /// [`Error::Dropped`] if the link was restarted meanwhile: whether the encoder has seen the message is not known; the errors of
+    /// [`Error::Dropped`] if the link was restarted meanwhile: it is not known whether the encoder has received the message; the
+    /// errors of
     /// the bus.
     pub fn poll_short(&mut self) -> Result<Option<u8>, BusError<B::Error>> {
         let [safe] = self.get(Register::EventS)?;

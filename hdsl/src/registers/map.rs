@@ -13,11 +13,11 @@ servowire_core::codes! {
         EventH = 0x04 => "EVENT_H",
         /// EVENT_L, see [`Event`](super::Event).
         EventL = 0x05 => "EVENT_L",
-        /// MASK_H: which events interrupt. According to the manual, bit 6 MSUM is set if any bit of MASK_SUM is set.
+        /// MASK_H: which events raise an interrupt. According to the manual, bit 6 MSUM is set if any bit of MASK_SUM is set.
         MaskH = 0x06 => "MASK_H",
         /// MASK_L.
         MaskL = 0x07 => "MASK_L",
-        /// MASK_SUM: which bits of SUMMARY make the event SUM.
+        /// MASK_SUM: which bits of SUMMARY raise the event SUM.
         MaskSum = 0x08 => "MASK_SUM",
         /// EDGES: bit n is set when an edge of the test pattern was seen in sample period n of the start-up. Not filled by the
         /// SDK.
@@ -42,7 +42,7 @@ servowire_core::codes! {
         PcBuffer = 0x20 => "PC_BUFFER",
         /// PC_ADD_H, PC_ADD_L: header of a long message; bit 5 of PC_ADD_H in an answer marks an error.
         PcAdd = 0x28 => "PC_ADD",
-        /// PC_OFF_H, PC_OFF_L: offset; without an offset in the request it is not used.
+        /// PC_OFF_H, PC_OFF_L: offset; not used if the request has none.
         PcOff = 0x2a => "PC_OFF",
         /// PC_CTRL: bit 0 LSTA starts a long message.
         PcCtrl = 0x2c => "PC_CTRL",
@@ -67,7 +67,7 @@ servowire_core::codes! {
         MaxDev = 0x3a => "MAXDEV",
         /// EVENT_S, see [`EventS`](super::EventS).
         EventS = 0x3d => "EVENT_S",
-        /// MASK_S: which safe events interrupt.
+        /// MASK_S: which safe events raise an interrupt.
         MaskS = 0x3e => "MASK_S",
         /// SLAVE_REG_CTRL: bit 7 read, bits 5:0 register of the encoder minus 40h; writing starts a short message. 3Fh when
         /// idle. In the SICK core the registers of the encoder are at 40h..7Fh of this map.

@@ -12,7 +12,7 @@ const EVENT_H: u8 = Register::EventH as u8;
 const EVENT_L: u8 = Register::EventL as u8;
 const MASK_H: u8 = Register::MaskH as u8;
 const MASK_SUM: u8 = Register::MaskSum as u8;
-/// Bit 6 of MASK_H: the OR of the bits of MASK_SUM (SICK manual, p. 41).
+/// Bit 6 of MASK_H: all bits of MASK_SUM ORed (SICK manual, p. 41).
 const MSUM: u8 = 0x40;
 const PC_ADD: u8 = Register::PcAdd as u8;
 const PC_CTRL: u8 = Register::PcCtrl as u8;
@@ -42,10 +42,10 @@ impl Registers {
 
     /// Writes a register as an application does over the bus.
     ///
-    /// Writing 0 to a bit of an event register clears it; 1 changes nothing with [`RegisterRule::Sick`], and sets the event in the
-    /// memory of the SDK. PRST and MRST in SYS_CTRL or SAFE_CTRL, SYNC_CTRL, SLAVE_REG_CTRL
-    /// and LSTA in PC_CTRL start what they stand for. With [`RegisterRule::Sick`], registers that the receiver writes cannot be
-    /// written; all other registers take the value.
+    /// Writing 0 to a bit of an event register clears it; 1 changes nothing with [`RegisterRule::Sick`], and sets the event
+    /// in the memory of the SDK. PRST and MRST in SYS_CTRL or SAFE_CTRL, SYNC_CTRL, SLAVE_REG_CTRL and LSTA in PC_CTRL
+    /// trigger their actions. With [`RegisterRule::Sick`], registers that the receiver writes cannot be written; all other
+    /// registers take the value.
     ///
     /// # Errors
     /// [`Error::NotLocked`] and [`Error::Busy`] for messages that cannot be started; [`Error::NoPulse`],

@@ -102,7 +102,7 @@ impl<I: Iterator<Item = u32>> Words<I> {
         SampledAnswer { bits: whole(low, gather.after(high, self.last), lead), edges: watch.finish(lead) }
     }
 
-    /// Returns the bits alone.
+    /// Returns only the bits.
     #[inline(always)]
     pub(super) fn bits(self, alignment: Alignment) -> u64 {
         let gather = Gather::new(alignment.index);

@@ -97,7 +97,7 @@ pub(super) const MINUS: u16 = 1 << 10;
 /// The word is in column RD+.
 pub(super) const PLUS: u16 = 1 << 11;
 
-/// What each of the 1024 words stands for under a rule.
+/// The meaning of each of the 1024 words under a rule.
 pub(crate) struct Table([u16; 1024]);
 
 impl Table {
