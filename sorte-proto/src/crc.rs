@@ -61,7 +61,7 @@ impl RunningFcs {
         !self.0
     }
 
-    /// Returns the FCS of all bytes but the last four, which were `trailer`. All of them have gone through
+    /// Returns the FCS of all bytes except the last four, which were `trailer`. All of them have gone through
     /// [`push`](Self::push).
     ///
     /// No byte is held back; the last four steps are undone here.
@@ -74,7 +74,7 @@ impl RunningFcs {
         !(undone ^ trailer)
     }
 
-    /// Whether the bytes end with the FCS of the bytes before it: the register then always holds the same value.
+    /// Whether the bytes end with the FCS of the bytes before it; if so, the register always holds the same value.
     pub(crate) const fn is_whole(self) -> bool {
         self.0 == 0xdebb_20e3
     }

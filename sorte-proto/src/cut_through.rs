@@ -1,7 +1,7 @@
 //! Rewrites start-up frames on their way through a device, byte by byte: a few bytes of state, no frame buffer.
 //!
-//! A device sends each byte on as soon as the next one has come, so it must know what to write before it has seen the
-//! rest of the frame. The rewriter takes the frame from DA to FCS, returns one byte for each byte, and computes a new FCS
+//! A device forwards each byte as soon as the next one has come, so it must know what to write before it has seen the rest of
+//! the frame. The rewriter takes the frame from DA to FCS, returns one byte for each byte, and computes a new FCS
 //! as it goes.
 //!
 //! If the incoming FCS turns out wrong, the last byte is sent inverted: the new FCS must not hide the error. (The
@@ -19,7 +19,7 @@ use crate::sync::{Sync, hop_ns};
 
 pub(crate) use transit::Transit;
 
-/// A frame that has passed a device, and what the device learnt from it.
+/// A frame that has passed through a device, and what the device learned from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,29 +28,30 @@ pub enum Passed {
     Discovery {
         /// STATUS as it was received.
         status: Status,
-        /// What the device has learnt about itself.
+        /// What the device has learned about itself.
         assignment: Assignment,
     },
     /// SYNC, rewritten; the content is as received.
     Sync(Sync),
     /// PARAM: its parameters.
     Param([u8; Parameters::LEN]),
-    /// Any other frame, which has passed unchanged.
+    /// Any other frame; it passed unchanged.
     Unchanged(FrameType),
 }
 
-/// A device's part of DISCOVERY or of SYNC, byte by byte, or [`pass`](Self::pass) for a frame in a buffer.
+/// Does a device's part of DISCOVERY or SYNC, byte by byte; for a frame in a buffer, see [`pass`](Self::pass).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rewriter {
     transit: Transit,
     sent: RunningFcs,
-    /// The type of frame to rewrite; `None`: nothing is rewritten.
+    /// The type of frame to rewrite; `None` if nothing is rewritten.
     frame_type: Option<FrameType>,
-    /// Where its FCS begins.
+    /// Where the FCS of that frame begins.
     fcs_at: u16,
     add: Status,
-    /// The number added to bytes 4 to 9, which hold numbers of this many bytes, and the carry of the addition in progress.
+    /// What is added to the numbers in bytes 4 to 9, how many bytes each of these numbers has, and the carry of the addition in
+    /// progress.
     addends: [u8; 6],
     width: u16,
     carry: bool,
@@ -88,11 +89,11 @@ impl Rewriter {
     }
 
     /// For DISCOVERY: the device takes the next address and the present totals as its offsets, and adds its lengths.
-    /// `adds`: what it sets in STATUS, LAST if it is the last one and ERROR if it has seen a wrong checksum since its previous
-    /// STATUS byte.
+    /// `adds`: the bits that it sets in STATUS, LAST if it is the last device and ERROR if it has seen a wrong checksum since
+    /// its previous STATUS byte.
     ///
-    /// A device that finds 254 devices before it, or more, makes the count 255 and takes nothing: the master then refuses the
-    /// network.
+    /// A device that finds 254 or more devices before it sets the count to 255 and takes no address: the master then refuses
+    /// the network.
     pub const fn discovery(lengths: Entry, adds: Status) -> Self {
         let ([i0, i1], [o0, o1]) = (lengths.input.to_le_bytes(), lengths.output.to_le_bytes());
         Self {
@@ -143,7 +144,7 @@ impl Rewriter {
         self.finish()
     }
 
-    /// Whether DA and TYPE are those of the frame that is rewritten. Known once the third byte has come.
+    /// Whether DA and TYPE are those of the frame to be rewritten. Known once the third byte has come.
     const fn rewrites(&self) -> bool {
         match self.frame_type {
             Some(frame_type) => self.transit.is_for_all(frame_type),
@@ -232,7 +233,7 @@ impl Rewriter {
         bytes.map_or(0, u16::from_le_bytes)
     }
 
-    /// Returns what the frame was and what the device learnt from it.
+    /// Returns what the frame was and what the device learned from it.
     ///
     /// # Errors
     /// As [`LongFrame::parse`](crate::LongFrame::parse); [`Error::TooManyDevices`].
@@ -259,12 +260,12 @@ impl Rewriter {
         &self.transit
     }
 
-    /// Whether STATUS was sent with bits that the device added.
+    /// Whether the device added bits to STATUS.
     pub(crate) const fn has_written_status(&self) -> bool {
         self.transit.len() > 3 && self.rewrites()
     }
 
-    /// Output bytes of the line behind the device, if it is DISCOVERY.
+    /// Number of output bytes of all devices behind this one, if the frame is DISCOVERY.
     pub(crate) fn output_total(&self) -> Option<u16> {
         let [_, _, o0, o1] = self.entry;
         let own = if self.rewrites() { u16::from_le_bytes([o0, o1]) } else { 0 };

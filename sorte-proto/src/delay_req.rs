@@ -4,7 +4,7 @@ use crate::frame_type::FrameType;
 use crate::place::Place;
 use crate::status::Status;
 
-/// A line-delay request. The neighbour's port sends it back after a fixed time; there is no answer of its own.
+/// A line-delay request. The neighbour's port sends it back after a fixed time; it has no separate answer.
 ///
 /// ```text
 ///  byte 0    1   2   3       4

@@ -1,6 +1,6 @@
 //! The device's side: two ports, and what a device learns from the frames that pass.
 //!
-//! Sans-IO: frames and the time go in, and what to do comes out. The caller moves bytes between the ports as [`Reaction::path`]
+//! Sans-IO: frames and the time go in, and actions come out. The caller moves bytes between the ports as [`Reaction::path`]
 //! says, sends the delay requests that are asked for, and writes the corrections into its counter. A frame in a buffer goes
 //! through [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`]. In the IO exchange [`Device::poll`]
 //! says when a cycle begins, when the device must send its own frame and in which cycle no frame arrived;

@@ -5,7 +5,7 @@ use crate::frame_type::FrameType;
 use crate::place::Place;
 use crate::status::Status;
 
-/// Devices that a discovery frame has room for.
+/// Number of devices for which a discovery frame has room.
 pub(crate) const MAX_DEVICES: usize = 254;
 const TABLE: usize = MAX_DEVICES * 4;
 const PAYLOAD: usize = 6 + TABLE;
@@ -43,11 +43,11 @@ impl Entry {
 ///                            u16    u16          u16           input u16, output u16
 /// ```
 ///
-/// Only the first `count` entries are valid. The rest is whatever the master filled in: the published master
-/// sends a debug pattern there.
+/// Only the first `count` entries are valid. The other entries hold what the master filled in: the published master sends a
+/// debug pattern there.
 ///
-/// A device takes the next address and the present totals as its offsets, adds its lengths, and LAST and ERROR to STATUS: see
-/// [`Rewriter::discovery`](crate::cut_through::Rewriter::discovery).
+/// A device takes the next address and the present totals as its offsets, adds its lengths, and sets LAST and ERROR in
+/// STATUS if they apply: see [`Rewriter::discovery`](crate::cut_through::Rewriter::discovery).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DiscoveryView<'a> {
     frame: LongFrame<'a>,
@@ -254,17 +254,17 @@ pub struct Assignment {
     pub out_offset: u16,
 }
 
-/// A device of a line as its master knows it.
+/// A device of a line, as its master knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Member {
     /// Its place in the line and in the process data.
     pub assignment: Assignment,
-    /// Its process data.
+    /// The lengths of its process data.
     pub lengths: Entry,
 }
 
-/// Returns the device count after one more device. A passing frame shows its low byte first, so a carry cannot reach the
+/// Returns the device count after one more device. The low byte of a passing frame comes first, so a carry cannot reach the
 /// high one: 254 and 255 both become 255.
 pub(crate) fn count_after(before: u16) -> u16 {
     let [low, high] = before.to_le_bytes();
@@ -325,7 +325,7 @@ impl Network {
         Ok(network)
     }
 
-    /// Does the same in place, which saves copying a kilobyte. A refusal leaves the network as it was.
+    /// Does the same in place, which avoids copying a kilobyte. A refusal leaves the network as it was.
     ///
     /// # Errors
     /// As [`new`](Self::new).

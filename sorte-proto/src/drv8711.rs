@@ -1,5 +1,5 @@
-//! What the wire and the pins need to know about the stepper driver DRV8711: its STATUS byte in the device frame, and its
-//! limits. The chip itself is set up by the feature `drv8711` of `servowire-drivers`.
+//! The facts about the stepper driver DRV8711 that matter on the wire and at the pins: its STATUS byte in the device frame, and
+//! its limits. The chip itself is set up by the feature `drv8711` of `servowire-drivers`.
 //!
 //! From the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
 //! section 2.1.
@@ -52,7 +52,7 @@ servowire_core::show_flags!(Status);
 impl Status {
     /// The six faults; the stall bits are not faults.
     pub const FAULTS: Self = Self(0x3f);
-    /// The value that clears the six fault bits and leaves the stall bits: writing 0 clears.
+    /// The value that clears the six fault bits and leaves the stall bits; writing 0 clears a bit.
     pub const CLEAR_FAULTS: u16 = 0xfc0;
     /// The value that clears all bits.
     pub const CLEAR_ALL: u16 = 0;
@@ -68,7 +68,7 @@ impl Status {
         self.intersects(Self::FAULTS)
     }
 
-    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF reveals a dead bus.
+    /// All ones: with the fault pin inactive, the chip has no supply. Reading back the OFF register reveals a dead bus.
     pub const fn looks_unpowered(self) -> bool {
         self.is_all()
     }

@@ -6,7 +6,7 @@ servowire_core::errors! {
     /// The checks are made in the order given with each parser; the first that fails is reported. A refusal leaves
     /// every state machine as it was.
     pub enum Error {
-        /// Fewer bytes than the frame has.
+        /// There are fewer bytes than the frame has.
         #[error("frame of {got} bytes, {want} are needed")]
         Truncated = 1 {
             /// Bytes given.
@@ -42,12 +42,12 @@ servowire_core::errors! {
             /// TYPE requested.
             want: u8,
         },
-        /// More bytes than a frame of this kind has.
+        /// There are more bytes than a frame of this kind has.
         #[error("frame of {got} bytes, its kind has {want}")]
         TooLong = 6 {
             /// Bytes given.
             got: u16,
-            /// Bytes of this kind.
+            /// Bytes of a frame of this kind.
             want: u16,
         },
         /// The CRC-8 of an IO-exchange frame does not match.
@@ -70,7 +70,7 @@ servowire_core::errors! {
             /// Index of the first byte that does not fit.
             at: u8,
         },
-        /// A network of more than 254 devices.
+        /// The network has more than 254 devices.
         #[error("device count {count}, 254 is the maximum")]
         TooManyDevices = 10 {
             /// Count in the frame.
@@ -92,12 +92,12 @@ servowire_core::errors! {
             /// Its length.
             len: u16,
         },
-        /// The number of output bytes handed over for a master frame is not that of the line.
+        /// The number of output bytes passed for a master frame is not that of the line.
         #[error("{got} output bytes were given, the line has {want}")]
         OutputLength = 13 {
             /// Bytes given.
             got: u16,
-            /// Bytes of the line.
+            /// Number of output bytes of the line.
             want: u16,
         },
         /// The buffer to write a frame into is too small.
@@ -108,7 +108,7 @@ servowire_core::errors! {
             /// Bytes of the frame.
             want: u16,
         },
-        /// A PTO word between 3991 and 0x7FFE, with or without bit 15, or 0xFFFF.
+        /// The PTO word is undefined: between 3991 and 0x7FFE, with or without bit 15, or 0xFFFF.
         #[error("PTO word {raw:#06x} has no meaning")]
         ReservedPtoValue = 15 {
             /// The word.
@@ -155,18 +155,19 @@ servowire_core::errors! {
         DevicesMissing = 23 {
             /// Address of the first that is missing.
             first: u8,
-            /// How many are missing.
+            /// How many device frames are missing.
             count: u8,
-            /// For this many cycles.
+            /// Number of consecutive cycles in which they were missing.
             cycles: u8,
         },
         /// Device frames were damaged in too many consecutive cycles.
         #[error("damaged device frames in {cycles} consecutive cycles")]
         TooManyCrcErrors = 24 {
-            /// For this many cycles.
+            /// Number of consecutive cycles in which they were missing.
             cycles: u8,
         },
-        /// A device frame comes from beyond the line, or LAST is set or missing where it was not before.
+        /// A device frame has an address beyond the end of the line, or LAST is set or missing at a device where that was
+        /// not so before.
         #[error("the line has changed: device {address} does not fit what DISCOVERY found")]
         TopologyChanged = 25 {
             /// Address of the sender.
@@ -181,15 +182,15 @@ servowire_core::errors! {
         /// The cycle is too short for the line.
         #[error("the cycle is too short from device {device} on, which needs {needs_ns} ns")]
         CycleTooShort = 27 {
-            /// The first device that does not fit.
+            /// Address of the first device that does not fit.
             device: u8,
-            /// The cycle that it needs.
+            /// The cycle that it would need.
             needs_ns: u32,
         },
         /// The link of the master is down.
         #[error("the link is down")]
         LinkDown = 28,
-        /// The frame does not belong to the present state.
+        /// The frame does not fit the present state.
         #[error("the frame does not belong to the present state")]
         WrongState = 29,
         /// A `nom` combinator of the caller refused the input.
@@ -200,7 +201,7 @@ servowire_core::errors! {
         GapTooShort = 31 {
             /// Whose frame.
             device: u8,
-            /// From the end of the one before, at the master; negative: they overlap.
+            /// Gap after the previous frame, at the master; negative if they overlap.
             gap_ns: i32,
             /// Gap needed for six sigma of jitter.
             needs_ns: u32,
@@ -222,17 +223,18 @@ servowire_core::errors! {
         /// A frame from this sender has already come in this cycle.
         #[error("a second frame of {address} in one cycle")]
         Doubled = 34 {
-            /// Who sent it; 0: the master.
+            /// Address of the sender; 0 for the master.
             address: u8,
         },
         /// A frame of the IO exchange belongs to a cycle that has ended.
         #[error("the frame belongs to a cycle that is over")]
         CycleOver = 35,
-        /// The last SYNC frame has gained less time than the devices of the line add to it: one of them has let it pass,
-        /// because it could not measure its cable or has started again. Its clock and those behind it are wrong.
+        /// The last SYNC frame has gained less time than the devices of the line add to it: one of them has let it pass
+        /// unchanged, because it could not measure its cable or has started again. The clocks of that device and of those
+        /// behind it are wrong.
         #[error("SYNC has passed {got} devices at most, DISCOVERY found {want}")]
         NotInSync = 36 {
-            /// The most devices that can have added their time.
+            /// The largest number of devices that can have added their time.
             got: u8,
             /// Devices that DISCOVERY found.
             want: u8,

@@ -9,7 +9,7 @@ use crate::payload::InputSlice;
 use crate::status::Status;
 
 /// The devices of a line send positions, as [`follow`](crate::follow) says: an extension of this crate. The reference design
-/// sends 0 in their place, and nothing in a frame tells the two apart, so the caller has to know.
+/// sends 0 in their place, and nothing in a frame distinguishes the two, so the caller has to know which it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,8 +19,8 @@ pub struct Positions {
 
 impl Positions {
     /// `taken_before_ns`: the longest time between the moment a device takes the position and the start of its frame at the
-    /// master, in ns: delays of its own firmware, and the way of the frame. A device that takes it at the start of its
-    /// cycle, with the published send times: one cycle.
+    /// master, in ns: the delays of its own firmware, and the travel time of the frame. A device that takes it at the start
+    /// of its cycle, with the published send times: one cycle.
     pub const fn taken_before_ns(taken_before_ns: u32) -> Self {
         Self { taken_before_ns }
     }
@@ -73,15 +73,15 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Evidence {
     sampled_ns: u64,
-    /// `None`: nothing was heard yet.
+    /// `None` if nothing was heard yet.
     from: Option<DeviceAddress>,
     status: Status,
-    /// `None`: the frame is too short for one.
+    /// `None` if the frame is too short for one.
     told: Option<InputSlice>,
 }
 
 impl Evidence {
-    /// Before the first frame: a doubt under every policy.
+    /// The evidence before the first frame: a doubt under every policy.
     pub const NEVER: Self = Self { sampled_ns: 0, from: None, status: Status::empty(), told: None };
 
     /// Creates the evidence of a device's frame that began at `sof_ns` at the master.
@@ -94,8 +94,7 @@ impl Evidence {
     /// Returns the position, if it may be used at this time. The doubts are checked in the order in which [`Doubt`]
     /// declares them.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
         let Some(address) = self.from else { return Err(Doubt::Never) };
         let Some(told) = self.told else { return Err(Doubt::NoPosition { address }) };
@@ -127,7 +126,7 @@ impl Feedback for Evidence {
 /// Carries evidence from where it is received to where it is used, between two priorities or cores.
 pub type EvidenceCell = servowire_core::Cell<Evidence, 4>;
 
-/// Time, low half first; steps, STATUS of the driver, and in the last byte whether they are there; address and STATUS.
+/// The time, low half first; steps, STATUS of the driver, and in the last byte whether these are present; address and STATUS.
 impl Words<4> for Evidence {
     fn to_words(&self) -> [u32; 4] {
         let [a, b, c, d, e, f, g, h] = self.sampled_ns.to_le_bytes();
@@ -168,9 +167,9 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Steps that the device has ordered from its pulse generator, modulo 2^16, backward ones negative.
-    /// [`Asked::position`](crate::follow::Asked::position) gives them in all their bits. A motor that has lost steps is
-    /// elsewhere, and nothing on this wire shows it.
+    /// Steps that the device has ordered from its pulse generator, modulo 2^16; backward steps count as negative.
+    /// [`Asked::position`](crate::follow::Asked::position) returns the full number. A motor that has lost steps is somewhere
+    /// else, and nothing on this wire shows that.
     pub const fn position(self) -> u16 {
         self.told.ordered
     }
@@ -185,7 +184,7 @@ impl Sample {
         self.told.driver
     }
 
-    /// The earliest instant at which it was taken, in ns.
+    /// The earliest instant at which the position can have been taken, in ns.
     pub const fn sampled_ns(self) -> u64 {
         self.sampled_ns
     }
@@ -197,8 +196,8 @@ servowire_core::one_line!(Sample {
 
 /// Why a position must not be used.
 ///
-/// A follower that has stopped because it was too far behind does not say so on the wire: its position falls behind what was
-/// asked for, see [`Asked::lag`](crate::follow::Asked::lag).
+/// A follower that has stopped because it was too far behind does not say so on the wire: its position falls behind the
+/// commanded one, see [`Asked::lag`](crate::follow::Asked::lag).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -215,14 +214,14 @@ pub enum Doubt {
         /// Who sets it.
         address: DeviceAddress,
     },
-    /// The motor driver reports what the policy does not tolerate: the motor need not be where the steps are.
+    /// The motor driver reports a fault that the policy does not tolerate: the motor may not be where the steps are.
     Alarms {
         /// Address of the device.
         address: DeviceAddress,
         /// Bits that are not tolerated; all eight if the driver has no supply.
         alarms: drv8711::Status,
     },
-    /// It was sampled too long ago.
+    /// The position was sampled too long ago.
     Old {
         /// Its age in ns.
         age_ns: u64,

@@ -21,7 +21,7 @@ pub(crate) const STOCK_INPUT: usize = 3;
 ///                                  before time at the start of this frame
 /// ```
 ///
-/// Device `a` owns the bytes `2 + offset ..` as DISCOVERY told it. The time stamp is inserted while the frame is being
+/// Device `a` owns the bytes `2 + offset ..`, as assigned by DISCOVERY. The time stamp is inserted while the frame is being
 /// sent, and no check covers it: see [`check_time_stamp`](Self::check_time_stamp).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -32,11 +32,10 @@ pub struct MasterFrameView<'a> {
 }
 
 impl<'a> MasterFrameView<'a> {
-    /// Bytes in addition to the output bytes.
+    /// Number of bytes in addition to the output bytes.
     pub const OVERHEAD: usize = 5;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be the whole frame and nothing after
-    /// it.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be exactly one frame.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
@@ -177,11 +176,10 @@ pub struct DeviceFrameView<'a> {
 }
 
 impl<'a> DeviceFrameView<'a> {
-    /// Bytes in addition to the payload.
+    /// Number of bytes in addition to the payload.
     pub const OVERHEAD: usize = 3;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be the whole frame and nothing after
-    /// it.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes must be exactly one frame.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
@@ -257,7 +255,7 @@ impl<const P: usize> DeviceFrame<P> {
 }
 
 /// The device frame as the published image builds it: two payload bytes and a CRC byte that covers registers which
-/// were never set, so nothing can be checked. The call of that routine is commented out; the published firmware never sends
+/// were never set, so nothing can be checked. The call to that routine is commented out, so the published firmware never sends
 /// such a frame.
 ///
 /// ```text
@@ -327,7 +325,7 @@ servowire_core::one_line!(PublishedDeviceFrame {
     Self { address, status, drv8711_status } => "device {}, DRV8711 {:02X}h, STATUS {}", address, drv8711_status, status;
 });
 
-/// Everything that the views offer also exists for values of any length.
+/// Everything that the views offer also works for values of any length.
 macro_rules! as_view {
     ($frame:ident) => {
         impl<const N: usize> core::fmt::Display for $frame<N> {

@@ -1,10 +1,10 @@
 //! Motion that survives lost frames. **An extension of this crate, not TI's.**
 //!
 //! If a frame is lost, the published device repeats the step of the previous cycle, and nothing reveals it. Here the command
-//! word of each [`Slice`], which the reference design leaves free, carries the position that the axis has after the step
-//! of this word, modulo 2^16. A device that missed a frame sees how far it is behind and catches up in cycles that have no
-//! step of their own; if it is too far behind it stops. The reserved bytes of its device frame tell the master how many
-//! steps it has ordered from its pulse generator: [`Evidence`](crate::Evidence) judges whether that may be used.
+//! word of each [`Slice`], which the reference design leaves free, carries the position of the axis after the step of this
+//! word, modulo 2^16. A device that missed a frame sees how far it is behind and catches up in cycles that have no step of
+//! their own; if it is too far behind, it stops. The reserved bytes of its device frame tell the master how many steps it
+//! has ordered from its pulse generator: [`Evidence`](crate::Evidence) decides whether that number may be used.
 //!
 //! ```text
 //!  Slice         byte 0..2  PTO             byte 2..4  steps asked for after it, LSB first
@@ -42,7 +42,7 @@ const fn step(word: Pto) -> i16 {
     }
 }
 
-/// The master's end: the steps asked of one axis.
+/// The master's end: the steps commanded for one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -56,13 +56,13 @@ impl Asked {
         Self { steps: 0 }
     }
 
-    /// Returns the slice with this word and the steps asked for after it.
+    /// Returns the slice with this word and the number of steps commanded, including it.
     pub const fn slice(&mut self, word: Pto) -> Slice {
         self.steps = self.steps.saturating_add(step(word) as i64);
         Slice { pto: word, command: self.low() }
     }
 
-    /// Steps asked for so far, backward ones negative.
+    /// Steps commanded so far; backward steps count as negative.
     pub const fn asked(&self) -> i64 {
         self.steps
     }
@@ -78,7 +78,7 @@ impl Asked {
         difference(self.low(), ordered)
     }
 
-    /// Returns the full position of a sample, in steps: the one nearest to what was asked for.
+    /// Returns the full position of a sample, in steps: the one nearest to the commanded position.
     pub const fn position(&self, sample: Sample) -> i64 {
         self.steps.saturating_sub(self.lag(sample.position()) as i64)
     }
@@ -114,20 +114,20 @@ pub struct Follower {
     ordered: Option<u16>,
     asked: u16,
     direction: Direction,
-    /// The cycle before had no pulse.
+    /// The previous cycle had no pulse.
     quiet: bool,
     stopped: bool,
     max_lag: u16,
 }
 
 impl Follower {
-    /// `max_lag`: steps behind the master beyond which the axis stops. 128 is half a full step at 1/256.
+    /// `max_lag` is the number of steps behind the master beyond which the axis stops. 128 is half a full step at 1/256.
     pub const fn new(max_lag: u16) -> Self {
         Self { ordered: None, asked: 0, direction: Direction::Low, quiet: false, stopped: false, max_lag }
     }
 
-    /// Returns what the axis does in the next cycle. `slice`: the device's bytes of a good frame; `None` if none came. The
-    /// first one only tells where the axis is.
+    /// Returns what the axis does in the next cycle. `slice` holds the device's bytes of a good frame; `None` if none came. The
+    /// first one only sets the position of the axis.
     pub fn next(&mut self, slice: Option<Slice>) -> Pto {
         let word = self.word(slice);
         self.quiet = word.start().is_none();
@@ -160,7 +160,7 @@ impl Follower {
     }
 
     /// Steps ordered from the pulse generator, modulo 2^16, as the device reports them to the master. `None` before the
-    /// first word and after [`resume`](Self::resume): it is not known where the axis is, and the device's frame must carry
+    /// first word and after [`resume`](Self::resume): the position of the axis is not known, and the device's frame must carry
     /// ERROR, see [`Device::flag_error`](crate::device::Device::flag_error).
     pub const fn ordered(&self) -> Option<u16> {
         self.ordered
@@ -179,7 +179,7 @@ impl Follower {
         self.stopped
     }
 
-    /// Resumes after the host has dealt with the loss: the next word says again where the axis is.
+    /// Resumes after the host has dealt with the loss: the next word sets the position of the axis again.
     pub const fn resume(&mut self) {
         (self.stopped, self.ordered) = (false, None);
     }
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!((device.ordered(), device.lag(), device.is_stopped()), (Some(7), 0, false));
     }
 
-    /// A stop of the steps is no reason to keep the current on.
+    /// A follower that has stopped stepping must not keep the current on.
     #[test]
     fn a_stopped_axis_lets_its_driver_be_switched_off() {
         let (mut asked, mut device) = (Asked::new(), Follower::new(2));
@@ -247,7 +247,7 @@ mod tests {
         assert!(device.is_stopped());
     }
 
-    /// A step forward was lost, and the next one is back: neither is made, and the axis is where it was asked to.
+    /// A step forward was lost and the next one is backward: neither is made, and the axis is where it should be.
     #[test]
     fn a_step_against_the_lag_is_left_out() {
         let (mut asked, mut device) = (Asked::new(), Follower::new(9));
@@ -261,7 +261,7 @@ mod tests {
         assert_eq!((device.next(Some(asked.slice(word(1)))).start(), device.lag()), (None, 1));
     }
 
-    /// What a device says it has made, in steps of the master's count: the nearest one, beyond 16 bits and below zero too.
+    /// Converts the steps that a device reports to the master's count: the nearest number, also beyond 16 bits and below zero.
     #[test]
     fn the_lag_and_the_position_in_all_bits() {
         for (steps, ordered, lag) in
@@ -280,7 +280,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is lost: nothing is made twice, steps stay 4 us apart, and after some rest all are made.
+        /// Whatever is lost, no step is made twice, steps stay 4 us apart, and after some cycles without steps all have been
+        /// made.
         #[test]
         fn every_step_is_made_in_the_end(cycles in proptest::collection::vec((0u8..6, any::<bool>()), 0..200), start: u16) {
             let mut asked = Asked { steps: start.into() };

@@ -1,4 +1,4 @@
-//! What all long-header frames share: everything but the IO exchange.
+//! What all long-header frames have in common; these are all frames but those of the IO exchange.
 
 use crate::crc::fcs;
 use crate::error::Error;
@@ -31,8 +31,7 @@ impl<'a> LongFrame<'a> {
     /// Bytes of header and FCS.
     pub const OVERHEAD: usize = 8;
 
-    /// Checks, in this order: at least 8 bytes, FCS, DA, TYPE, length. The bytes must be the whole frame and nothing after
-    /// it.
+    /// Checks, in this order: at least 8 bytes, FCS, DA, TYPE, length. The bytes must be exactly one frame.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::BadFcs`], [`Error::WrongDestination`], [`Error::UnknownType`],
@@ -89,7 +88,7 @@ impl<'a> LongFrame<'a> {
 }
 
 /// Makes the checks of a long-header frame in their order, for a frame in a buffer and for one that has passed byte by byte.
-/// `got`, `want`: the FCS in the frame and the one of the bytes before it.
+/// `got` is the FCS in the frame, `want` that of the bytes before it.
 pub(crate) fn check(len: usize, [da, _, code, _]: [u8; 4], got: u32, want: u32) -> Result<FrameType, Error> {
     if len < LongFrame::OVERHEAD {
         return Err(truncated(len));
@@ -112,14 +111,14 @@ fn truncated(len: usize) -> Error {
     Error::Truncated { got: count(len), want: count(LongFrame::OVERHEAD) }
 }
 
-/// Returns the error for `got` bytes of a frame that has `want`.
+/// Returns the error for `got` bytes in place of a frame of `want`.
 #[cold]
 pub(crate) fn wrong_length(got: usize, want: usize) -> Error {
     let (got, want) = (count(got), count(want));
     if got < want { Error::Truncated { got, want } } else { Error::TooLong { got, want } }
 }
 
-/// Returns header, payload and FCS as one array; `N` = payload + 8, written by the frames of known length.
+/// Returns header, payload and FCS as one array, for the frames of known length; `N` is the payload length plus 8.
 pub(crate) fn emit<const N: usize>(source: u8, frame_type: FrameType, status: Status, payload: &[u8]) -> [u8; N] {
     let mut bytes = [0; N];
     if let [da, sa, code, flags, rest @ ..] = bytes.as_mut_slice() {
@@ -137,7 +136,7 @@ pub(crate) fn refresh_fcs(frame: &mut [u8]) {
     }
 }
 
-/// Converts a length to the type that the errors carry.
+/// Converts a length to the type used in errors.
 pub(crate) fn count(len: usize) -> u16 {
     u16::try_from(len).unwrap_or(u16::MAX)
 }

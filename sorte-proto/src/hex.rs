@@ -1,4 +1,4 @@
-/// Bytes as logs show them, `[00, 1A]`.
+/// Bytes as shown in logs, `[00, 1A]`.
 pub(crate) struct Hex<'a>(pub(crate) &'a [u8]);
 
 impl core::fmt::Display for Hex<'_> {

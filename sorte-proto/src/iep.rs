@@ -1,8 +1,8 @@
 //! An ideal IEP timer with its SYNC0 output and a [`Sync0`] handler, for test benches and simulators.
 //!
 //! The counter runs in ticks of 5 ns: 0, 5, .. 3995, 0. A compare fires in the tick in which the counter reaches or
-//! passes its value, if it is enabled then. The handler runs a fixed time after the first event not yet served, after the
-//! compares of that tick, and serves every event that has fired by then. Its register writes take effect at once, or one
+//! passes its value, if it is enabled then. The handler runs a fixed time after the first event that is not yet served, after
+//! the compares of that tick, and serves all events that have fired by then. Its register writes take effect at once, or one
 //! after the other, see [`Channel::with_write_time`].
 //!
 //! Nothing is simulated between events, so a cycle costs a handful of steps instead of 800.
@@ -36,9 +36,9 @@ const NEVER: u64 = u64::MAX;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Edge {
-    /// When, in ns since the start.
+    /// When it changes, in ns since the start.
     pub ns: u64,
-    /// To which level.
+    /// The new level.
     pub high: bool,
 }
 
@@ -64,17 +64,17 @@ pub struct Events {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Served {
-    /// When, in ns since the start.
+    /// When it changes, in ns since the start.
     pub ns: u64,
-    /// What it served.
+    /// The events that it served.
     pub events: Events,
-    /// What CMP6, CMP0 and CMP7 wrote.
+    /// The writes made for CMP6, CMP0 and CMP7.
     pub writes: [Option<Writes>; 3],
     /// New levels of DIR and enable, if they change.
     pub levels: Option<Levels>,
 }
 
-/// What changes next.
+/// The next change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Activity {
@@ -109,7 +109,7 @@ pub struct Channel {
     sync_start: u16,
     armed: bool,
     pending: Events,
-    /// What the handler writes, one after the other, and how many of these writes have been made; the time of one, of the
+    /// The writes of the handler, in order, and how many of them have been made; the time that one takes, and the times of the
     /// next and of the last.
     queue: [Writes; 3],
     made: u8,
@@ -118,7 +118,7 @@ pub struct Channel {
     busy_until: u64,
 }
 
-/// The fields that nearly always tell two channels apart.
+/// The fields that nearly always distinguish two channels.
 impl Hash for Channel {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.sync0, self.word, self.cmp6_ns).hash(state);
@@ -127,8 +127,8 @@ impl Hash for Channel {
 }
 
 impl Channel {
-    /// Creates a timer at 0. `cmp7_ns`: when new data are taken, 2000 in the reference design; `latency_ns`: from an event
-    /// to its handler, rounded up to ticks.
+    /// Creates a timer at 0. `cmp7_ns` is when new data are taken, 2000 in the reference design; `latency_ns` is the time from
+    /// an event to its handler, rounded up to ticks.
     pub const fn new(variant: Variant, cmp7_ns: u16, latency_ns: u16) -> Self {
         Self {
             sync0: Sync0::new(variant),
@@ -210,8 +210,8 @@ impl Channel {
         }
     }
 
-    /// Returns the same channel with time zero moved `cycles` later: the times of later events are smaller by that many
-    /// cycles. Run it up to there first, with [`next`](Self::next).
+    /// Returns the same channel with its time origin moved `cycles` later: the times of later events are smaller by that many
+    /// cycles. Run it up to that point first, with [`next`](Self::next).
     ///
     /// Channels that will behave alike then compare equal, whatever they did before, so a bench need not compute the same
     /// behaviour twice.
@@ -314,7 +314,7 @@ impl Channel {
         Edge { ns: self.now.saturating_mul(TICK_NS), high }
     }
 
-    /// A cut pulse falls right after the handler, in the same tick.
+    /// A pulse that is cut falls right after the handler, in the same tick.
     fn run_handler(&mut self) -> Activity {
         let events = core::mem::take(&mut self.pending);
         self.serve = NEVER;

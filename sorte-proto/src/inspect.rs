@@ -1,6 +1,6 @@
 //! For tools: looks at a frame that was refused, lists every fault and guesses the cause.
 //!
-//! Decoders stop at the first fault and give no value; that is right for a master and unhelpful at a bench. This module
+//! Decoders stop at the first fault and return no value, which is right for a master and unhelpful at a bench. This module
 //! examines everything it can, and the usual mistakes (the network card has taken the FCS, padded the frame, cut it, the
 //! bytes are inverted, the preamble is still there) are undone one by one; the one whose removal makes the frame sound is
 //! the cause.
@@ -36,7 +36,7 @@ use crate::pto::Pto;
 /// The kinds of faults found, as a set.
 pub type Findings = servowire_core::Findings<ErrorClass>;
 
-/// What there is to say about a frame.
+/// The result of an inspection of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report<'a> {
@@ -48,12 +48,12 @@ pub struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    /// What it is, or was meant to be.
+    /// What the frame is, or was meant to be.
     pub const fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Why a decoder refuses it.
+    /// Why a decoder refuses the frame.
     pub const fn error(&self) -> Option<Error> {
         self.error
     }
@@ -69,8 +69,8 @@ impl<'a> Report<'a> {
         self.cause
     }
 
-    /// The values: as they are if the frame is not refused, or as they would be without the cause. Only for display to a
-    /// person.
+    /// The values as received if the frame is not refused, otherwise as they would be with the cause removed. They are for
+    /// display only.
     pub const fn frame(&self) -> Option<Frame<'a>> {
         self.frame
     }
@@ -102,7 +102,7 @@ pub fn inspect(during: During, bytes: &[u8]) -> Report<'_> {
     Report { kind: Kind::of(during, bytes), frame, error: decoded.err(), findings, cause }
 }
 
-/// Every fault of a long-header frame, whichever comes first.
+/// Finds all faults of a long-header frame, not just the first.
 fn of_start_up(bytes: &[u8], findings: &mut Findings) {
     let (Some((body, trailer)), &[da, _, code, ..]) = (bytes.split_last_chunk(), bytes) else { return };
     if u32::from_le_bytes(*trailer) != fcs(body) {
@@ -125,8 +125,8 @@ fn of_start_up(bytes: &[u8], findings: &mut Findings) {
     }
 }
 
-/// Every fault of a frame of the exchange. Four bytes a device, of four devices at most, is the CNC machine, whose words have a
-/// meaning; anything else is opaque.
+/// Finds all faults of a frame of the exchange. Four bytes for each of at most four devices are those of the CNC machine, whose
+/// words have a meaning; anything else is opaque.
 fn of_exchange(bytes: &[u8], findings: &mut Findings) {
     let Ok(Frame::Master(frame)) = Frame::parse(During::Exchange, bytes) else { return };
     let words = cnc_slices(frame.output()).map(|slice| slice.pto);

@@ -6,7 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-/// Stride of a sweep in a test: every value, but every `thin`th one in an interpreter.
+/// Step of a test sweep: every value natively, only every `thin`th one in an interpreter.
 #[cfg(test)]
 const fn stride(thin: usize) -> usize {
     if cfg!(miri) { thin } else { 1 }

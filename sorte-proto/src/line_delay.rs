@@ -1,13 +1,13 @@
 use crate::error::Error;
 
-/// Round trips in one measurement.
+/// Number of round trips in one measurement.
 pub(crate) const SAMPLES: u8 = 16;
-/// What the sum may lack for a cable of no length, in ns of its mean: a tick of the counter that captures both ends of a round
-/// trip, and what cutting each round trip takes at most.
+/// By how much the mean of a cable of zero length may be too short, in ns: a tick of the counter that captures both ends of a
+/// round trip, plus the most that truncating each round trip takes away.
 const TICK_NS: u32 = 5;
 const CUT_NS: u32 = 15;
 
-/// How round trips become a line delay. The vendor's master and device do it differently, and so do those of this crate.
+/// How round trips become a line delay. The vendor's master and device compute it differently, and so do those of this crate.
 ///
 /// | | sum | line delay |
 /// |---|---|---|
@@ -59,8 +59,8 @@ impl LineDelay {
         Self { model, count: 0, sum: 0, min: u32::MAX, max: 0 }
     }
 
-    /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips beyond the
-    /// sixteenth are ignored.
+    /// Takes one round trip in ns: from the start of the request as sent to the start of the reflection as received. Round
+    /// trips beyond the sixteenth are ignored.
     #[inline]
     pub const fn add(&mut self, rtt_ns: u32) {
         if self.is_complete() {
@@ -78,7 +78,7 @@ impl LineDelay {
         }
     }
 
-    /// Round trips taken.
+    /// Number of round trips taken.
     pub const fn count(&self) -> u8 {
         self.count
     }
@@ -100,8 +100,8 @@ impl LineDelay {
         if self.model.shift_samples { sum } else { sum >> 4 }
     }
 
-    /// The line delay in ns as the published firmware computes it: everything wraps, and round trips shorter than the
-    /// forwarding time give a huge delay. The master halves a 16-bit value; the device halves a 32-bit one and then keeps
+    /// The line delay in ns as the published firmware computes it: everything wraps, and round trips shorter than the forwarding
+    /// time yield a huge delay. The master halves a 16-bit value; the device halves a 32-bit one and then keeps
     /// 16 bits.
     pub const fn published(&self) -> u16 {
         if !self.model.shift_samples {
@@ -111,13 +111,13 @@ impl LineDelay {
         u16::from_le_bytes([low, high])
     }
 
-    /// The line delay in ns: as [`published`](Self::published), and 0 for a cable so short that the cutting of the round trips, or
-    /// a tick of the counter, makes it negative.
+    /// The line delay in ns: as [`published`](Self::published), and 0 for a cable so short that truncation of the round trips,
+    /// or a tick of the counter, makes it negative.
     ///
     /// # Errors
     /// [`Error::ImplausibleRoundTrip`] with the longest if that is 4096 ns or more: sixteen of them do not fit the published
     /// 16 bits (some 350 m of cable); with the mean if that is shorter than the forwarding time by more than a tick of 5 ns, and
-    /// 15 ns if round trips are cut.
+    /// another 15 ns if round trips are truncated.
     pub const fn checked(&self) -> Result<u16, Error> {
         if self.max >= 4096 {
             return Err(Error::ImplausibleRoundTrip { rtt_ns: self.max });

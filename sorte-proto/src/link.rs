@@ -4,10 +4,10 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Link {
-    /// No link: nothing comes and nothing leaves.
+    /// No link: no frame comes in or goes out.
     #[default]
     Down,
-    /// The other end of the cable is there.
+    /// The other end of the cable is connected.
     Up,
 }
 

@@ -1,7 +1,7 @@
 //! The controller's side: the start-up sequence, then the IO exchange.
 //!
 //! Sans-IO. [`Master::poll`] says what to send and when; [`Master::hear`] takes what comes back. Every wait ends:
-//! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
+//! an answer that does not come, devices that fall silent, or a line that changes takes the master back to IDLE with an
 //! [`Action::Restart`] that says why; after a pause it restarts. (The published master waits for ever.)
 //!
 //! ```text

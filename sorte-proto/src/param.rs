@@ -19,7 +19,7 @@ servowire_core::codes! {
 }
 
 servowire_core::codes! {
-    /// Check of the IO-exchange frames, a nibble of `crc_mode`.
+    /// The check of the IO-exchange frames, a nibble of `crc_mode`.
     pub enum CrcKind: u8 {
         /// No check.
         None = 0 => "none",
@@ -81,11 +81,11 @@ impl CrcMode {
 pub struct Parameters {
     /// Cycle time in ns.
     pub cycle_time_ns: u32,
-    /// 0: no synchronisation; 1..=1000: every this many cycles; above: its own period in units of 5 ns.
+    /// 0: no synchronisation; 1..=1000: once in this many cycles; above: a separate period in units of 5 ns.
     pub sync_cycle: u32,
     /// Time between line-delay measurements in ms.
     pub delay_period_ms: u16,
-    /// Measurements in a burst.
+    /// Number of measurements in a burst.
     pub delay_burst: u8,
     /// Time between the measurements of a burst in ms.
     pub delay_gap_ms: u8,
@@ -99,7 +99,7 @@ pub struct Parameters {
     pub t_out_ns: u32,
     /// Shape of the network, the code of a [`Topology`].
     pub topology: u8,
-    /// 0: diagnostics in the payload; 1: in a frame of their own.
+    /// 0: diagnostics in the payload; 1: in separate frames.
     pub diagnostics: u8,
     /// 1: an alarm resets the network.
     pub alarm: u8,
@@ -235,7 +235,7 @@ impl<'a> ParamView<'a> {
     }
 }
 
-/// As the values.
+/// Returns the values of the frame.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
 impl serde::Serialize for ParamView<'_> {

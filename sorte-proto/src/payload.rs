@@ -65,7 +65,7 @@ servowire_core::show_flags!(MotorMask);
 impl TryFrom<u8> for MotorMask {
     type Error = OutOfRange;
 
-    /// `mask`: 0..=15.
+    /// `mask` is 0..=15.
     fn try_from(mask: u8) -> Result<Self, OutOfRange> {
         Self::from_bits(mask).ok_or_else(|| OutOfRange::above(mask.into(), Self::all().bits().into()))
     }
@@ -155,7 +155,7 @@ pub struct InputSlice {
     /// The driver's STATUS.
     pub driver: drv8711::Status,
     /// [`Follower::ordered`](crate::follow::Follower::ordered). The reference design sends 0, and nothing in the frame
-    /// tells the two apart.
+    /// distinguishes the two.
     pub ordered: u16,
 }
 

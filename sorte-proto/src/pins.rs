@@ -1,4 +1,4 @@
-//! DIR and the driver's enable: when they may follow a word.
+//! DIR and the driver's enable, and when they may follow a word.
 
 use crate::pto::{Direction, Pto};
 use crate::sync0::Flags;
@@ -47,12 +47,12 @@ pub struct Levels {
 
 /// DIR and enable of an axis, beside its [`Sync0`](crate::sync0::Sync0).
 ///
-/// A word applies to the next cycle, and so do its DIR and enable. If a pulse is still programmed when CMP7 takes the
-/// word, the pins follow at the end of that pulse, in the CMP6 handler: 2000 ns and more after its rise, and with steps
-/// 4000 ns apart 1380 ns and more before the next one. Otherwise they follow at once, before the earliest pulse of the
-/// next cycle by 1380 ns and more. Both are far beyond the 200 ns of set-up and hold time that the driver asks for, at
-/// every latency up to [`MAX_LATENCY_NS`](crate::sync0::MAX_LATENCY_NS). (A change at the wrap, or at a fixed time, is not
-/// safe: a pulse that begins 3960 ns into the cycle leaves 40 ns.)
+/// A word, including its DIR and enable, applies to the next cycle. If a pulse is still programmed when CMP7 takes the word,
+/// the pins follow at the end of that pulse, in the CMP6 handler: at least 2000 ns after its rise and, with steps 4000 ns
+/// apart, at least 1380 ns before the next one. Otherwise they follow at once, at least 1380 ns before the earliest pulse of
+/// the next cycle. Both are far beyond the 200 ns of set-up and hold time that the driver requires, at every latency up to
+/// [`MAX_LATENCY_NS`](crate::sync0::MAX_LATENCY_NS). (A change at the wrap, or at a fixed time, is not safe: a pulse that
+/// begins 3960 ns into the cycle leaves 40 ns.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pins {
@@ -72,8 +72,8 @@ impl Pins {
         self.now
     }
 
-    /// Takes a word at CMP7. `before`: the flags of its [`Sync0`](crate::sync0::Sync0) before this
-    /// event. Returns the levels to write, if they change.
+    /// Takes a word at CMP7. `before` holds the flags of its [`Sync0`](crate::sync0::Sync0) before this event. Returns the
+    /// levels to write, if they change.
     pub fn cmp7(&mut self, word: Pto, before: Flags) -> Option<Levels> {
         // A driver-off word holds DIR.
         let direction = word.direction().unwrap_or(self.next.direction);
@@ -81,7 +81,7 @@ impl Pins {
         if before.contains(Flags::PENDING_PULSE) { None } else { self.follow() }
     }
 
-    /// Ends the pulse. Returns the levels to write, if they change.
+    /// Takes the end of the pulse. Returns the levels to write, if they change.
     pub fn cmp6(&mut self) -> Option<Levels> {
         self.follow()
     }

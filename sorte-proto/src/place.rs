@@ -1,16 +1,16 @@
 use crate::status::Status;
 
-/// Place of a frame among those of its phase of the start-up. Only the last carries STATE_CHANGE, which takes the devices
+/// The place of a frame in its phase of the start-up. Only the last carries STATE_CHANGE, which takes the devices
 /// to the next phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Place {
-    /// More frames of its phase follow.
+    /// More frames of the phase follow.
     #[default]
     Inner,
-    /// The last of its phase.
+    /// The last frame of the phase.
     Last,
 }
 
@@ -20,7 +20,7 @@ impl Place {
         if frame.saturating_add(1) >= frames { Self::Last } else { Self::Inner }
     }
 
-    /// Returns the STATUS of the last frame or of all others.
+    /// Returns the STATUS for this place: one for the last frame, another for all others.
     pub(crate) const fn choose(self, last: Status, inner: Status) -> Status {
         match self {
             Self::Last => last,

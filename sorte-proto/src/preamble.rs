@@ -4,7 +4,7 @@ const PREAMBLE: u8 = 0x55;
 const SFD: u8 = 0xd5;
 const MOST: u8 = 7;
 
-/// Preamble and start delimiter before a frame, as the published firmware sends them.
+/// The preamble and start delimiter before a frame, as the published firmware sends them.
 ///
 /// ```text
 ///  55 55 55 55 55 55 55 D5   DISCOVERY, PARAM, DELAY_REQ of the master
@@ -24,7 +24,7 @@ pub enum Preamble {
 }
 
 impl Preamble {
-    /// The bytes, 0xD5 included.
+    /// The bytes, including 0xD5.
     pub const fn bytes(self) -> &'static [u8] {
         match self {
             Self::Long => &[0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0xd5],
@@ -33,7 +33,7 @@ impl Preamble {
         }
     }
 
-    /// From the first bit of the preamble, which is the trigger of the frame, to the capture of its start by the published
+    /// Time from the first bit of the preamble, which is the trigger of the frame, to the capture of its start by the published
     /// ports, half a byte before the end of 0xD5: 600, 280 and 120 ns. All `sof_ns` of this crate are such captures. A port
     /// that captures at another point adds the difference.
     pub const fn capture_ns(self) -> u32 {

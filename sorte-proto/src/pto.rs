@@ -53,7 +53,7 @@ impl StartTime {
         if ns >= Self::MIN.0 && ns <= Self::MAX.0 { Some(Self(ns)) } else { None }
     }
 
-    /// Returns the nearest that the wire can carry: 1 for 0, 3990 for anything above it.
+    /// Returns the nearest start time that the wire can carry: 1 for 0, and 3990 for anything above it.
     pub const fn truncate(ns: u16) -> Self {
         match Self::new(ns) {
             Some(start) => start,
@@ -190,9 +190,9 @@ impl Pto {
         }
     }
 
-    /// Creates the word for a step at `sync_ns` of a cycle (0..=3999), as closely as the wire can carry it: 0 becomes 1
-    /// because 0 means no pulse, and 3991..=3999 become 3990. The shift is +1 ns or at most -9 ns and does not accumulate,
-    /// as long as the caller keeps the exact time for its next step.
+    /// Creates the word for a step at `sync_ns` of a cycle (0..=3999), as exactly as the wire can carry it: 0 becomes 1
+    /// because 0 means no pulse, and 3991..=3999 become 3990. The shift is between -9 ns and +1 ns; it does not accumulate as
+    /// long as the caller keeps the exact time for its next step.
     ///
     /// # Errors
     /// [`OutOfRange`] above 3999.
@@ -223,7 +223,7 @@ impl Pto {
         }
     }
 
-    /// DIR level the word asks for; `None` for driver off, which leaves DIR as it is.
+    /// DIR level that the word asks for; `None` for driver off, which leaves DIR as it is.
     pub const fn direction(self) -> Option<Direction> {
         match self {
             Self::NoPulse { direction } | Self::Pulse { direction, .. } => Some(direction),
@@ -232,7 +232,7 @@ impl Pto {
         }
     }
 
-    /// Whether the driver is on: in every word but one.
+    /// Whether the driver is on, which is so for every word but one.
     pub const fn driver_enabled(self) -> bool {
         !matches!(self, Self::DriverOff)
     }

@@ -6,8 +6,8 @@
 ///      nibble                         (unused)
 /// ```
 ///
-/// The nibble is sent as the published firmware sends it, which is not what its header file lists; no receiver looks
-/// at it, and neither does this crate. Every byte is a `Status` and converts back to itself.
+/// The type nibble is sent as the published firmware sends it, which is not what its header file lists; no receiver evaluates
+/// it, and neither does this crate. Every byte is a `Status` and converts back to itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -15,7 +15,7 @@ pub struct Status(u8);
 
 bitflags::bitflags! {
     impl Status: u8 {
-        /// The frame has passed the last device; in a device frame: the sender is the last device.
+        /// The frame has passed the last device; in a device frame, the sender is the last device.
         const LAST = 1 << 0;
         /// Defined by the vendor, never used.
         const DONE = 1 << 1;
@@ -55,7 +55,7 @@ impl Status {
         self.0 >> 4
     }
 
-    /// Returns what a device adds to the STATUS byte that it writes or passes on.
+    /// Returns the bits that a device adds to a STATUS byte that it writes or passes on.
     pub(crate) const fn of_device(last: bool, error: bool) -> Self {
         Self(last as u8 | (error as u8) << 2)
     }

@@ -4,11 +4,11 @@ use crate::frame_type::FrameType;
 use crate::place::Place;
 use crate::status::Status;
 
-/// From the trigger of a SYNC frame to the capture of its start at the receiver, without the cable: 280 ns, which is
+/// Time from the trigger of a SYNC frame to the capture of its start at the receiver, without the cable: 280 ns, which is
 /// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
 pub(crate) const TRIGGER_TO_CAPTURE_NS: u32 = 280;
 
-/// Trigger of the master frame in its cycle, of the first device's frame, and of the first SYNC frame, in ns.
+/// When the master frame, the first device's frame and the first SYNC frame are triggered within their periods, in ns.
 pub const TRIGGER_NS: u32 = 500;
 
 /// The delay that one device adds to a SYNC frame besides the cable: 320 ns until its port starts to send, and 35 ns
@@ -68,7 +68,7 @@ impl<'a> SyncView<'a> {
     }
 }
 
-/// As the values.
+/// Returns the values of the frame.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
 impl serde::Serialize for SyncView<'_> {
@@ -150,9 +150,9 @@ impl Sync {
 
     /// Returns the full delay from the master, for lines longer than 65,535 ns. **An extension of this crate, not TI's.**
     ///
-    /// The master sends SYNC at 500 ns of each period of `period_ns`, and both times of the frame grow by the same hops, so
-    /// the time stamp reveals what the delay field lost when it wrapped. `None` if no delay below 600 us fits, or if the
-    /// period is such that several could.
+    /// The master sends SYNC at 500 ns of each period of `period_ns`, and both times of the frame grow by the same hops, so the
+    /// time stamp reveals the bits that the delay field lost when it wrapped. `None` if no delay below 600 us fits, or if
+    /// several could with this period.
     pub fn long_delay_ns(&self, period_ns: u32) -> Option<u32> {
         let since_sof = self.time_stamp_ns.checked_sub(TRIGGER_NS.saturating_add(TRIGGER_TO_CAPTURE_NS))?;
         let fits = |delay: &u32| since_sof.checked_sub(*delay).and_then(|sent| sent.checked_rem(period_ns)) == Some(0);

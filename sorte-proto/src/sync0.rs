@@ -1,7 +1,7 @@
 //! Step pulses from PTO words: the interrupt handler that programs the SYNC0 output of the IEP timer.
 //!
 //! The IEP counts 0, 5, .. 3995 ns and starts again. A compare event CMP1 starts the SYNC0 unit: `START + 1` ticks of
-//! 5 ns later the output rises and stays high for 2000 ns. It does so once. Then it must be armed again by writing
+//! 5 ns later the output rises and stays high for 2000 ns. It does this once. Then it must be armed again by writing
 //! SYNC_CTRL, which also cuts a pulse that is still high. Three events call the handler:
 //!
 //! ```text
@@ -60,25 +60,25 @@ pub const CMP_CFG_IDLE: u16 = 0x103;
 const CMP1_ENABLED: u16 = 1 << 2;
 const CMP6_ENABLED: u16 = 1 << 7;
 
-/// A pulse that ends at or after this time overlaps the next cycle, as the machine sees it.
+/// A pulse that ends at or after this time overlaps the next cycle, according to the state machine.
 const OVERLAP_NS: u16 = 3390;
 /// The lossless machine does not place CMP6 before this time: CMP0's handler must have enabled it.
 const EARLIEST_CMP6_NS: u16 = 600;
 
-/// Which handler.
+/// The handler to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Variant {
-    /// That of the published device, with its losses.
+    /// The handler of the published device, which loses steps.
     Published,
-    /// That of this crate.
+    /// The handler of this crate.
     #[default]
     Lossless,
 }
 
-/// Flags between the events, with the names and bits of the published status word. Its bits 4 to 6 are the events
+/// Flags between the events, with the names and bits of the published status word. Bits 4 to 6 of that word are the events
 /// themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -94,7 +94,7 @@ bitflags::bitflags! {
         const DELAYED_CMP6_ACTIVATED = 1 << 3;
         /// The pulse ordered last ends in the cycle after its own.
         const SYNC_PULSE_OVERLAP = 1 << 7;
-        /// So does the pulse programmed last.
+        /// The pulse programmed last ends in the cycle after its own.
         const PREV_SYNC_PULSE_OVERLAP = 1 << 8;
     }
 }
@@ -144,7 +144,7 @@ servowire_core::one_line!(Register {
 
 servowire_core::one_line!(Write { Self { register, value } => "{} = {}", register, value; });
 
-/// The writes that come first.
+/// The writes that are made first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Prelude {
@@ -182,7 +182,7 @@ pub struct Writes {
 }
 
 impl Writes {
-    /// An event without a write.
+    /// The writes of an event that has none.
     pub(crate) const NONE: Self =
         Self { prelude: Prelude::Nothing, program: Program::Nothing, first_cfg: 0, start: 0, cmp6: 0, cmp1: 0, cfg: 0 };
 }
@@ -255,7 +255,7 @@ impl Sync0 {
         Self { variant, flags: Flags::empty(), pto: 0, ticks: 0, new6: 0, cfg: CMP_CFG_IDLE }
     }
 
-    /// Which machine it is.
+    /// The variant of the handler.
     pub const fn variant(&self) -> Variant {
         self.variant
     }

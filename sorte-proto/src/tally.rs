@@ -12,7 +12,7 @@ pub struct Tally {
     pub stale: u32,
 }
 
-/// What may be wrong with a frame of the exchange whose checks are right, or which is missing.
+/// The faults of a frame of the exchange whose checks are right, or which is missing.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Fault {
     Missed,

@@ -36,11 +36,12 @@ pub const fn published_send_time_ns(address: DeviceAddress) -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Slots {
-    /// [`published_send_time_ns`], by the address alone: for four devices, with up to 123 ns of cable before each at 4 us.
+    /// [`published_send_time_ns`], which depends on the address alone: enough for four devices at 4 us, with up to 123 ns of
+    /// cable before each.
     #[default]
     Published,
-    /// Back to back at the master, whatever the cables: device `a` sends at `first_ns + (a - 1) x slot_ns` less its delay from the
-    /// master, which SYNC tells it.
+    /// Back to back at the master, whatever the cables: device `a` sends at `first_ns + (a - 1) x slot_ns` less its delay from
+    /// the master, which it gets from SYNC.
     Raster {
         /// When the first device's frame begins at the master, in ns of the cycle. With 500 and the first line delay that device
         /// sends at 500 ns: the comment in the published source omits the line delay, which would make all frames that much
@@ -89,16 +90,16 @@ servowire_core::one_line!(Slots {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Timing<'a> {
-    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last value applies to all devices after it. Empty: no
-    /// delay.
+    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last value applies to all devices after it. If this is
+    /// empty, there is no delay.
     pub line_delays_ns: &'a [u16],
-    /// Devices, 0..=254.
+    /// Number of devices, 0..=254.
     pub devices: u8,
     /// Output bytes in the master frame: 4 for each device, or 16 always.
     pub output_len: u16,
     /// Payload of each device frame: 3 in the reference design.
     pub payload_len: u16,
-    /// When the devices send; `None`: by the rule, with this line's first cable and payload.
+    /// When the devices send; `None` for the rule, with this line's first cable and payload.
     pub slots: Option<Slots>,
     /// Rms jitter of each port that a frame passes, in ps.
     pub jitter_ps: u32,
@@ -160,8 +161,8 @@ impl Budget {
     }
 
     /// Returns whether all devices act on the data of the same frame: their new-data event CMP7 comes before the first of
-    /// them has the whole frame, or after the last has. Two devices with 8 output bytes and CMP7 at 2000 ns act one cycle
-    /// apart; with 16 output bytes that cannot happen.
+    /// them has received the whole frame, or after the last one has. Two devices with 8 output bytes and CMP7 at 2000 ns act
+    /// one cycle apart; with 16 output bytes that cannot happen.
     pub const fn same_cycle(self, cmp7_ns: u32) -> bool {
         cmp7_ns < self.master_frame_at_first_ns || self.master_frame_at_last_ns < cmp7_ns
     }
@@ -199,7 +200,8 @@ impl Timing<'_> {
         delays.get(index).or(delays.last()).copied().map_or(0, u32::from)
     }
 
-    /// The devices and the time of a frame from the master to each, in ns: the cables and the devices between.
+    /// Returns the devices, each with the time that a frame takes from the master to it, in ns: over the cables and the devices
+    /// between.
     fn ways(&self) -> impl Iterator<Item = (DeviceAddress, u32)> + '_ {
         let addresses = (1..=self.devices.min(DeviceAddress::MAX.get())).filter_map(DeviceAddress::new);
         addresses.scan(0_u32, |way, address| {
@@ -225,7 +227,7 @@ impl Timing<'_> {
         Some(self.slots().send_ns(address, way))
     }
 
-    /// Preamble 2, header 2, CRC 1, time stamp 2.
+    /// 2 bytes of preamble, 2 of header, 1 of CRC, 2 of time stamp.
     const fn master_frame_bytes(&self) -> u32 {
         (self.output_len as u32).saturating_add(7)
     }
@@ -234,7 +236,7 @@ impl Timing<'_> {
         TRIGGER_NS.saturating_add(self.master_frame_bytes().saturating_mul(BYTE_NS))
     }
 
-    /// Returns when a frame that a device sends at `send_ns` has ended at the master.
+    /// Returns the end, at the master, of a frame that a device sends at `send_ns`.
     const fn end_ns(&self, send_ns: i64, way_ns: u32) -> i64 {
         send_ns.saturating_add(way_ns as i64).saturating_add(self.device_frame_ns() as i64)
     }
@@ -256,8 +258,8 @@ impl Timing<'_> {
         }
     }
 
-    /// Returns the smallest gap between two device frames, in ns, at which the frames of device `address` and the one
-    /// before it do not meet on their way. Each of the ports they pass adds its jitter to each frame, and six sigma of the
+    /// Returns the smallest gap between two device frames, in ns, at which the frames of device `address` and of the one before
+    /// it do not collide on the way. Each of the ports they pass adds its jitter to each frame, and six sigma of the
     /// difference must fit into the gap.
     pub(crate) fn least_gap_ns(&self, address: DeviceAddress) -> u32 {
         let jitter = u64::from(self.jitter_ps);
@@ -270,19 +272,19 @@ impl Timing<'_> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Misfit {
-    /// The first device for which it does not.
+    /// The first device that does not fit.
     pub device: u8,
     /// What does not fit.
     pub limit: Limit,
-    /// What this device needs, in ns: of the cycle; of the gap before its frame; of the time before the cycle begins.
+    /// What this device needs, in ns: the length of the cycle, the gap before its frame, or the time before the cycle begins.
     pub needs_ns: u32,
     /// What is available, in ns. A gap below 0: the frame begins before the previous one has ended.
     pub has_ns: i32,
 }
 
 impl Timing<'_> {
-    /// Returns the first device for which a cycle of `cycle_ns` is too short, whose frame comes too close to the one
-    /// before, or which would have to send before its cycle; in the order of the addresses.
+    /// Returns the first device for which a cycle of `cycle_ns` is too short, whose frame comes too close to the one before, or
+    /// which would have to send before its cycle. The devices are checked in the order of their addresses.
     pub fn misfit(&self, cycle_ns: u32) -> Option<Misfit> {
         let (slots, sent_ns) = (self.slots(), self.master_sent_ns());
         let mut line_free = None;
@@ -313,8 +315,8 @@ impl Timing<'_> {
     }
 
     /// Returns the shortest cycle that is a whole number of periods of the step pulse generator (4 us), in ns. A step word
-    /// applies to the second period after the cycle that brought it, so a longer cycle means fewer steps a second, not
-    /// longer pulses.
+    /// applies to the second period after the cycle that brought it, so a longer cycle means fewer steps per second, not longer
+    /// pulses.
     pub fn cnc_cycle_ns(&self) -> u32 {
         self.budget().min_cycle_ns().max(1).div_ceil(CNC_CYCLE_NS).saturating_mul(CNC_CYCLE_NS)
     }

@@ -8,13 +8,13 @@ use crate::status::Status;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Transit {
-    /// Bytes so far.
+    /// Number of bytes so far.
     at: u16,
     /// Bytes before this one pass unchanged and need no inspection.
     quiet: u16,
     /// DA, SA, TYPE and STATUS as received.
     head: [u8; 4],
-    /// Over all bytes, the FCS too.
+    /// The check over all bytes, including the FCS.
     received: RunningFcs,
     /// The last four bytes.
     trailer: u32,
@@ -23,7 +23,7 @@ pub(crate) struct Transit {
 impl Transit {
     pub(crate) const START: Self = Self { at: 0, quiet: 0, head: [0; 4], received: RunningFcs::START, trailer: 0 };
 
-    /// Takes a byte of a quiet stretch; returns `false` and takes nothing outside of one.
+    /// Takes a byte that needs no inspection; returns `false` and takes nothing if the byte needs it.
     #[inline]
     pub(crate) fn passes(&mut self, byte: u8) -> bool {
         let quiet = self.at < self.quiet;
@@ -57,7 +57,7 @@ impl Transit {
         at
     }
 
-    /// Bytes so far.
+    /// Number of bytes so far.
     pub(crate) const fn len(&self) -> u16 {
         self.at
     }
@@ -77,7 +77,7 @@ impl Transit {
         Status::from_bits_retain(status)
     }
 
-    /// Whether DA and TYPE are such that a device rewrites the frame. Known once the third byte has come.
+    /// Whether a device rewrites a frame with this DA and TYPE. Known once the third byte has come.
     pub(crate) const fn is_for_all(&self, frame_type: FrameType) -> bool {
         let [da, _, code, _] = self.head;
         da == MULTICAST && code == frame_type.code()

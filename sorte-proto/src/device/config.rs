@@ -1,4 +1,4 @@
-//! Settings and counters of a device.
+//! The settings and counters of a device.
 
 use super::heard::PortId;
 use crate::clock::AVERAGE;
@@ -8,28 +8,28 @@ use crate::line_delay::DelayModel;
 use crate::tally::Tally;
 use crate::timing::Slots;
 
-/// What a device is.
+/// The settings of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Config {
-    /// Its process data.
+    /// Lengths of its process data.
     pub lengths: Entry,
-    /// Output bytes of the master frame; `None`: the number that DISCOVERY counted.
+    /// Number of output bytes in the master frame; `None` for the number that DISCOVERY counted.
     pub output_len: Option<u16>,
-    /// Cycle of the IO exchange in ns; `None`: as PARAM says. The published device runs at 4000 whatever PARAM says, and its
-    /// master says 10,000.
+    /// Cycle of the IO exchange in ns; `None` for the cycle in PARAM. The published device runs at 4000 whatever PARAM says,
+    /// and its master says 10,000.
     pub cycle_ns: Option<u32>,
     /// When it sends its own frame: must be the same at the master and at every device.
     pub slots: Slots,
-    /// How long before its time [`Action::Send`](super::Action::Send) is returned, in ns: the time that the port needs to
+    /// How long before the send time [`Action::Send`](super::Action::Send) is returned, in ns: the time that the port needs to
     /// take the frame.
     pub lead_ns: u32,
     /// Longest time from the end of a frame of the exchange until it is handed over, in ns. After that the frame counts as
     /// lost.
     pub hand_over_ns: u32,
-    /// How far from its time a master frame of the exchange may begin, and how far its time stamp may be off, in ns.
+    /// How far from its expected time a master frame of the exchange may begin, and how far its time stamp may be off, in ns.
     pub window_ns: u16,
     /// Accepts DISCOVERY frames until the first PARAM, for a master that repeats the last DISCOVERY, see
     /// [`master::Config::patient_discovery`](crate::master::Config::patient_discovery). An extension of this crate.
@@ -45,7 +45,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// Creates the settings of the reference design. Time-outs, windows and `lead_ns` are this crate's; the published
+    /// Creates the settings of the reference design. Time-outs, windows and `lead_ns` are chosen by this crate; the published
     /// device has none.
     pub const fn new() -> Self {
         Self {
@@ -96,9 +96,9 @@ pub struct Counters {
     pub crc_errors: u64,
     /// Frames refused for another reason.
     pub format_errors: u64,
-    /// How often it went back to IDLE.
+    /// How many times the device went back to IDLE.
     pub retrains: u64,
-    /// Master frames of the exchange that were missing, came twice, or came at the wrong time.
+    /// Master frames of the exchange that were missing, came twice or came at the wrong time.
     pub master: Tally,
     /// Of these, at [`PortId::A`].
     pub a: PortCounters,

@@ -1,4 +1,4 @@
-//! The IO exchange: which master frames count, when the device sends its own frame, and when it gives up.
+//! The IO exchange: which master frames are accepted, when the device sends its own frame, and when it gives up.
 
 use super::heard::{Action, FrameTimes, Output};
 use super::machine::Device;
@@ -15,14 +15,14 @@ use crate::timing::{BYTE_NS, TRIGGER_NS};
 
 /// Bytes of a master frame on the wire in addition to its output bytes: preamble 2, header 2, CRC 1, time stamp 2.
 const WIRE_BYTES: u32 = 7;
-/// How often a device in the start-up must be polled, in ns.
+/// Longest time between two polls of a device during start-up, in ns.
 const START_UP_POLL_NS: u32 = 1_000_000;
 /// Maximum number of cycles closed in one call.
 const AT_ONCE: u8 = 64;
-/// Address that stands for the master in an error.
+/// The address used for the master in an error.
 const MASTER: u8 = 0;
 
-/// A cycle that has ended; `lost`: its data are missing although the device was running.
+/// A cycle that has ended; `lost` if its data are missing although the device was running.
 struct Closed {
     cycle: u64,
     lost: bool,
@@ -51,7 +51,7 @@ impl Device {
 
     /// Returns what to do now. Call it again at once after any action but [`Action::Wait`], and after each frame heard.
     ///
-    /// `counter_ns`: the device's counter; `now_ns`: a free-running clock for the time-outs.
+    /// `counter_ns` is the device's counter; `now_ns` is a free-running clock for the time-outs.
     pub fn poll(&mut self, counter_ns: u32, now_ns: u64) -> Action {
         let state = self.state();
         if matches!(state, State::Idle | State::Diag | State::Error) {
@@ -89,7 +89,7 @@ impl Device {
         Action::Wait { until_ns: counter_ns }
     }
 
-    /// Closes the awaited cycle. `None`: the device has waited for too many frames and starts again.
+    /// Closes the awaited cycle. `None` if the device has waited for too many frames and starts again.
     fn close_cycle(&mut self) -> Option<Closed> {
         let raster = self.raster.as_mut()?;
         let (cycle, received, good, running) = (raster.awaited().number, raster.received, raster.good, raster.running);
@@ -109,8 +109,8 @@ impl Device {
     }
 
     /// Takes a frame of the IO exchange from the port that faces the master; frames at the other port just pass through. A
-    /// frame belongs to this cycle, and is accepted, only if its checks are right, it began at the expected time, and its
-    /// time stamp is the one of this cycle. Each cycle has one.
+    /// frame belongs to this cycle, and is accepted, only if its checks are right, it began at the expected time, and its time
+    /// stamp is that of this cycle. Each cycle has one such frame.
     ///
     /// # Errors
     /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::OutsideWindow`], [`Error::CycleOver`],
@@ -142,8 +142,8 @@ impl Device {
         Ok(Output { data, cycle, trigger_ns, reference_ns: view.reference_ns(delay_ns), correction })
     }
 
-    /// Finds the cycle of a frame by its time, and by its time stamp, which nothing else checks. `view`: `None` for a
-    /// damaged frame, of which only the time can be judged.
+    /// Finds the cycle of a frame by its time, and by its time stamp, which nothing else checks. `view` is `None` for a damaged
+    /// frame, of which only the time can be judged.
     fn arrive(&mut self, times: FrameTimes, view: Option<MasterFrameView<'_>>) -> Result<(), Error> {
         let Some(raster) = &mut self.raster else { return Err(Error::WrongState) };
         let (ahead, off_ns) = raster.place(times.sof_ns);
@@ -203,8 +203,8 @@ impl Device {
         self.error = true;
     }
 
-    /// Returns the device's frame of the IO exchange for an [`Action::Send`]; an error is reported once. `None` before the
-    /// first master frame of the exchange: on a long line the answer to the last SYNC is still on its way.
+    /// Returns the device's frame of the IO exchange for an [`Action::Send`]; each error is reported in one frame only.
+    /// `None` before the first master frame of the exchange: on a long line the answer to the last SYNC is still on its way.
     pub fn answer<const P: usize>(&mut self, payload: [u8; P]) -> Option<DeviceFrame<P>> {
         let (State::Exchange, Some(place)) = (self.state(), self.assignment) else { return None };
         if !self.raster?.running {

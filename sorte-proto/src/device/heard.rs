@@ -26,13 +26,13 @@ impl PortId {
     }
 }
 
-/// Where a frame goes.
+/// Where a frame is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Path {
-    /// It leaves through the other port.
+    /// The frame leaves through the other port.
     Forward,
-    /// It leaves through the port at which it came in.
+    /// The frame leaves through the port at which it came in.
     Reflect,
     /// Nowhere.
     Absorb,
@@ -57,9 +57,9 @@ pub struct FrameTimes {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use = "the correction and the delay request are left to the caller"]
 pub struct Reaction {
-    /// Where it goes.
+    /// Where the frame is sent.
     pub path: Path,
-    /// Whether it was good, and if not, why it was not used.
+    /// Whether the frame was good, and if not, why it was not used.
     pub result: Result<(), Error>,
     /// Delay request to send on the reverse port; the last device sends none.
     pub trigger: Trigger,
@@ -71,10 +71,10 @@ pub struct Reaction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Output<'a> {
-    /// Its output bytes.
+    /// The device's output bytes.
     pub data: &'a [u8],
-    /// The cycle that they belong to: 0 begins 10 us after the last SYNC frame. A long line's master sends its first frame
-    /// in a later one, and it numbers the cycles that it sends.
+    /// The cycle to which they belong: cycle 0 begins 10 us after the last SYNC frame. On a long line the master sends its
+    /// first frame in a later cycle, and it numbers only the cycles in which it sends.
     pub cycle: u64,
     /// The common time at which the master began to send them, in ns modulo 2^32.
     pub trigger_ns: u32,
@@ -112,7 +112,7 @@ pub enum Action {
     Send {
         /// The cycle in which it is sent.
         cycle: u64,
-        /// When it is sent; this time has not passed.
+        /// When the frame has to be sent; this time has not passed.
         at_ns: u32,
     },
     /// No good master frame has come in this cycle, and none will.
@@ -128,7 +128,7 @@ pub enum Action {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HeardSync {
-    /// The frame as it came.
+    /// The frame as received.
     pub sync: Sync,
     /// The device's counter at its start, in ns.
     pub sof_ns: u32,

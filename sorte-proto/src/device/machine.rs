@@ -26,7 +26,7 @@ pub struct Device {
     pub(super) a: Port,
     pub(super) b: Port,
     pub(super) counters: Counters,
-    /// Bits for the next STATUS byte that the device writes.
+    /// Bits to add to the next STATUS byte that the device writes.
     pub(super) error: bool,
     pub(super) assignment: Option<Assignment>,
     pub(super) output_total: Option<u16>,
@@ -129,8 +129,7 @@ impl Device {
 
     /// The line to the next device in ns, once it is measured; 0 for a last device.
     ///
-    /// # Errors
-    /// [`Error::ImplausibleRoundTrip`]; with 0 ns if round trips are missing.
+    /// # Errors [`Error::ImplausibleRoundTrip`], which carries 0 ns if round trips are missing.
     pub const fn line_delay_next_ns(&self) -> Result<u16, Error> {
         if self.is_last() {
             return Ok(0);
@@ -149,7 +148,7 @@ impl Device {
         self.last_sync.map(|last| last.sof_ns.wrapping_add(10_000))
     }
 
-    /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
+    /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master announces the period of its
     /// SYNC frames, see [`Sync::long_delay_ns`](crate::Sync::long_delay_ns).
     pub fn delay_ns(&self) -> Option<u32> {
         let HeardSync { sync, .. } = self.last_sync?;
@@ -216,7 +215,7 @@ impl Device {
         Passage::new(rewriter, self.path(port), handler.state, idle_last)
     }
 
-    /// Bits that it sets in a STATUS byte written now.
+    /// Returns the bits that the device sets in a STATUS byte written now.
     const fn adds(&self) -> Status {
         Status::of_device(self.is_last(), self.error)
     }
@@ -289,7 +288,7 @@ impl Device {
         reaction
     }
 
-    /// Takes a whole start-up frame heard at `port` and rewrites it as it has to be sent on.
+    /// Takes a whole start-up frame heard at `port` and rewrites it for forwarding.
     pub fn hear(&mut self, port: PortId, frame: &mut [u8], times: FrameTimes) -> Reaction {
         let mut passage = self.passage(port);
         for byte in frame.iter_mut() {

@@ -1,10 +1,10 @@
-//! What the ports do with frames in each state, and the state that only the host ends.
+//! What the ports do with frames in each state, and the state that only the host can end.
 
 use super::heard::PortId;
 use super::machine::Device;
 use super::port::{PortFlags, State};
 
-/// What a port of the published hardware does with the frames that come in. It changes at the end of a frame.
+/// What a port of the published hardware does with the frames that come in. The mode changes at the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Forwarding {
@@ -12,7 +12,7 @@ pub enum Forwarding {
     Auto,
     /// Cut-through: byte by byte through a [`Passage`](super::Passage), which rewrites.
     Rewrite,
-    /// The hardware sends them back through the port at which they came in.
+    /// Reflection: the hardware sends the frames back through the port at which they came in.
     Reflect,
     /// Nothing passes; the host sends its delay requests through this port.
     HostSend,
@@ -32,7 +32,7 @@ impl Device {
     /// | IOEX | auto | time-triggered, then auto | time-triggered |
     /// | DIAG, ERROR | auto | auto | reflect |
     ///
-    /// A last device sends what it rewrites back out of the same port, see [`Passage::path`](super::Passage::path).
+    /// The last device sends what it rewrites back out of the same port, see [`Passage::path`](super::Passage::path).
     pub fn forwarding(&self, port: PortId) -> Forwarding {
         let handler = self.port(port);
         let last = handler.flags.contains(PortFlags::LAST_DEVICE);
@@ -48,8 +48,8 @@ impl Device {
         }
     }
 
-    /// Takes the device out of service: in [`State::Error`] it lets frames pass and is silent itself until
-    /// [`reset`](Self::reset). The published device has the state and never enters it.
+    /// Takes the device out of service: in [`State::Error`] it lets frames pass and sends nothing itself until
+    /// [`reset`](Self::reset). The published device has this state but never enters it.
     pub fn enter_error(&mut self) {
         for port in [PortId::A, PortId::B] {
             self.port_mut(port).enter(State::Error);

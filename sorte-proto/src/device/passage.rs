@@ -13,7 +13,7 @@ pub struct Passage {
     path: Path,
     /// State of the port when the frame began.
     pub(super) began_in: State,
-    /// A last device in IDLE sends back DISCOVERY and nothing else.
+    /// The last device, in IDLE: it sends back DISCOVERY and nothing else.
     only_discovery: bool,
 }
 
@@ -28,9 +28,9 @@ impl Passage {
         self.rewriter.byte(byte)
     }
 
-    /// Where the frame goes. It is known before the first byte, but for a last device in IDLE, which sends back
-    /// DISCOVERY only: `None` there until the third byte has come. The published device begins to send four bytes after it
-    /// begins to receive, so its FIFO allows for that.
+    /// Where the frame is sent. This is known before the first byte, except in a last device in IDLE, which sends back only
+    /// DISCOVERY: there it is `None` until the third byte has come. The published device begins to send four bytes after it
+    /// begins to receive, so its FIFO leaves time for that.
     pub const fn path(&self) -> Option<Path> {
         if !self.only_discovery {
             return Some(self.path);

@@ -22,7 +22,7 @@ servowire_core::codes! {
         Sync = 4 => "SYNC",
         /// The IO exchange.
         Exchange = 5 => "IOEX",
-        /// Diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
+        /// Diagnosis. The published firmware has the code but does nothing in this state; this crate never enters it.
         Diag = 6 => "DIAG",
         /// Out of service until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
         Error = 7 => "ERROR",
@@ -30,7 +30,7 @@ servowire_core::codes! {
 }
 
 impl State {
-    /// Whether this is the head of a frame that the state acts on.
+    /// Whether this is the head of a frame on which the state acts.
     pub(super) fn waits_for(self, [da, _, code, _]: [u8; 4]) -> bool {
         da == MULTICAST && self.frame_type().is_some_and(|t| t.code() == code)
     }
@@ -57,7 +57,7 @@ bitflags::bitflags! {
         const LAST_DEVICE = 1 << 0;
         /// MASTER_PORT: this port faces the master.
         const MASTER_PORT = 1 << 1;
-        /// IGNORE_TO_EOF: the frame has been looked at; its rest is of no interest.
+        /// IGNORE_TO_EOF: the head has been examined; the rest of the frame is ignored.
         const IGNORE_TO_EOF = 1 << 2;
         /// SWITCH_PORT_CONFIG: the state has changed, so the forwarding has to change at the end of the frame.
         const SWITCH_PORT_CONFIG = 1 << 3;
@@ -69,39 +69,39 @@ bitflags::bitflags! {
 servowire_core::show_flags!(PortFlags);
 
 servowire_core::codes! {
-    /// Measurement that a delay request on the master port starts on the other port.
+    /// The measurement on the other port that a delay request on the master port starts.
     #[derive(Default)]
     pub enum Trigger: u8 {
         /// None.
         #[default]
         None = 0 => "none",
-        /// One of the sixteen.
+        /// One of the sixteen requests.
         Normal = 1 => "normal",
-        /// The last; its request carries STATE_CHANGE.
+        /// The last of them, which carries STATE_CHANGE.
         Last = 2 => "last",
     }
 }
 
-/// What a handler learnt from the head of a frame.
+/// What a handler learned from the head of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Seen {
     /// The frame is sent on with changes.
     pub modifies: bool,
-    /// Measurement to start.
+    /// The measurement to start.
     pub trigger: Trigger,
 }
 
-/// Handler of one port.
+/// The handler of one port.
 ///
 /// ```text
 ///  IDLE --DISCOVERY--> DISCOVERY --STATE_CHANGE--> PARAM --STATE_CHANGE--> LINE_DELAY
 ///                                                   IOEX <--STATE_CHANGE-- SYNC <--+ STATE_CHANGE
 /// ```
 ///
-/// The state changes with the head of the frame; forwarding changes at its end. A frame of another TYPE or with
-/// another DA than the state waits for is ignored.
+/// The state changes with the head of the frame; forwarding changes at its end. A frame whose TYPE or DA is not the one that
+/// the state waits for is ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -152,7 +152,7 @@ impl Port {
         seen
     }
 
-    /// Learns from the first DISCOVERY which way the master is. The last device handles even this one.
+    /// Learns from the first DISCOVERY in which direction the master is. The last device handles even this first one.
     fn first(&mut self, status: Status) -> Seen {
         if !status.contains(Status::LAST) {
             self.flags |= PortFlags::MASTER_PORT;

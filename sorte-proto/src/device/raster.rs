@@ -3,9 +3,10 @@
 
 use crate::sync::TRIGGER_NS;
 
-/// From the first bit of a frame of the exchange to the capture of its start: 3.5 byte times and 4 of preamble less than SYNC has.
+/// From the first bit of a frame of the exchange to the capture of its start: 3.5 byte times, minus the 4 byte times by which
+/// its preamble is shorter than that of SYNC.
 const CAPTURE_NS: u32 = crate::preamble::Preamble::Short.capture_ns();
-/// Cycles outside of this make no sense, in ns; the differences of 32-bit times stay unambiguous.
+/// The range of cycles that make sense, in ns; within it, differences of 32-bit times are unambiguous.
 const SHORTEST_NS: u32 = 1000;
 const LONGEST_NS: u32 = 1_000_000_000;
 
@@ -24,7 +25,7 @@ impl Start {
     }
 }
 
-/// What is due next.
+/// The event that is due next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Due {
     Nothing {
@@ -41,11 +42,11 @@ pub(super) enum Due {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Raster {
     cycle_ns: u32,
-    /// From the start of a cycle to the capture of its master frame here.
+    /// From the start of a cycle to the capture of its master frame at this device.
     arrives_ns: u32,
     /// From the start of a cycle until its master frame can no longer be handed over.
     closes_ns: u32,
-    /// From the start of a cycle to the device's own frame, and how long before that the frame is handed out.
+    /// From the start of a cycle to the device's own frame, and how long before that the send action is returned.
     sends_ns: Option<u32>,
     lead_ns: u32,
     /// The cycle that begins next, the one whose master frame is awaited, and the one in which the device next sends its
@@ -53,14 +54,14 @@ pub(super) struct Raster {
     begins: Start,
     awaited: Start,
     sends: Start,
-    /// What the awaited cycle has brought.
+    /// What has come in the awaited cycle.
     pub(super) received: bool,
     pub(super) good: bool,
     /// A master frame of this exchange has come, so the device may send.
     pub(super) running: bool,
 }
 
-/// What a raster is made of.
+/// The parameters of a raster.
 #[expect(clippy::struct_field_names, reason = "times, all of them")]
 pub(super) struct Plan {
     /// Common time at the start of cycle 0.
@@ -120,7 +121,7 @@ impl Raster {
         self.awaited.ns.wrapping_add(TRIGGER_NS)
     }
 
-    /// When the capture of the awaited frame is expected.
+    /// When the awaited frame is expected to be captured.
     pub(super) const fn expected_ns(&self) -> u32 {
         self.awaited.ns.wrapping_add(self.arrives_ns)
     }
@@ -151,8 +152,8 @@ impl Raster {
         }
     }
 
-    /// What comes next. Takes the next event: the following call returns the one after it. No cycle and no frame of the
-    /// device is handed out after its time.
+    /// The next event. Takes the next event; the following call returns the one after it. No cycle and no frame of the
+    /// device is returned after its time.
     pub(super) fn next(&mut self, now_ns: u32) -> Due {
         let closes = self.awaited.ns.wrapping_add(self.closes_ns);
         // What has passed is left out.
@@ -187,7 +188,7 @@ impl Raster {
         Due::Send(sent)
     }
 
-    /// Returns how many times of a raster that starts at `at_ns` are not after now.
+    /// Returns how many points of a raster that starts at `at_ns` are not later than now.
     fn passed(&self, now_ns: u32, at_ns: u32) -> u32 {
         match u32::try_from(since(now_ns, at_ns)) {
             Ok(late) => late.checked_div(self.cycle_ns).unwrap_or_default().saturating_add(1),

@@ -7,7 +7,7 @@ use crate::frame_type::FrameType;
 use crate::preamble::strip_preamble;
 use crate::status::Status;
 
-/// The shortest frame that a network card sends or hands over, without FCS.
+/// Length of the shortest frame that a network card sends or delivers, without FCS.
 const CARD_LEN: usize = 60;
 
 /// What most likely went wrong.
@@ -28,7 +28,7 @@ pub enum Cause {
     FcsMissingAndPadded,
     /// The end is missing.
     Cut {
-        /// This many bytes.
+        /// Number of missing bytes.
         missing: u16,
     },
     /// Every bit is inverted.
@@ -37,9 +37,9 @@ pub enum Cause {
     StartUpFrame,
     /// This is a sound frame of the IO exchange.
     ExchangeFrame,
-    /// This is no frame of SORTE: an ordinary Ethernet frame, for example.
+    /// This is not a SORTE frame, but for example an ordinary Ethernet frame.
     NotSorte,
-    /// Everything is right but the check: single bits are wrong.
+    /// Everything except the check is right: single bits are wrong.
     Disturbed,
 }
 
@@ -58,7 +58,7 @@ servowire_core::one_line!(Cause {
 
 type Diagnosis<'a> = (Option<Cause>, Option<Frame<'a>>);
 
-/// Undoes the usual mistakes one by one; the first that gives a sound frame is the cause.
+/// Undoes the usual mistakes one by one; the first one whose removal yields a sound frame is the cause.
 pub(super) fn of(during: During, bytes: &[u8], error: Error) -> Diagnosis<'_> {
     if let Ok(frame) = strip_preamble(bytes).and_then(|frame| Frame::parse(during, frame)) {
         return (Some(Cause::PreambleLeft), Some(frame));
@@ -122,7 +122,7 @@ fn is_inverted(bytes: &[u8]) -> bool {
     running.is_whole() && matches!(bytes, [0, ..]) && bytes.len() >= LongFrame::OVERHEAD
 }
 
-/// A CRC-8 alone is right by chance too often, so STATUS has to be what a master or a device sends, too.
+/// A CRC-8 alone matches by chance too often, so STATUS must also be one that a master or a device sends.
 fn exchange_frame(bytes: &[u8]) -> Option<Frame<'_>> {
     let frame = Frame::parse(During::Exchange, bytes).ok()?;
     let usual = match frame {

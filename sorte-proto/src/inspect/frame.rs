@@ -104,7 +104,7 @@ impl<'a> Frame<'a> {
     }
 
     /// The slices of the four axes, if it is a master frame whose output bytes may be those of the CNC machine: four bytes for
-    /// each of at most four devices. Nothing in the frame says so.
+    /// each of at most four devices. Nothing in the frame says whether they are.
     pub fn cnc_slices(&self) -> Option<impl Iterator<Item = Slice> + 'a> {
         match self {
             Self::Master(frame) if frame.output().len() % 4 == 0 && frame.output().len() <= 16 => {

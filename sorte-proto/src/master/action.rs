@@ -1,4 +1,4 @@
-//! What the master wants done.
+//! What the master asks the caller to do.
 
 use crate::delay_req::DelayReq;
 use crate::discovery::Discovery;
@@ -15,7 +15,7 @@ use crate::sync::Sync;
 pub enum Outgoing {
     /// DISCOVERY; see [`Discovery::request`].
     Discovery {
-        /// Whether it is the last of its phase.
+        /// Whether it is the last frame of its phase.
         place: Place,
     },
     /// PARAM
@@ -61,21 +61,21 @@ fn put(into: &mut [u8], frame: &[u8]) -> Result<usize, Error> {
 pub enum Action {
     /// Nothing to do before `until_ns`, unless something comes.
     Wait {
-        /// `u64::MAX`: until link and enable are present.
+        /// `u64::MAX` until link and enable are present.
         until_ns: u64,
     },
     /// Send a start-up frame.
     Send {
-        /// When to trigger it; not before the time of the poll.
+        /// When to trigger it; never before the time of the poll.
         at_ns: u64,
         /// Which.
         frame: Outgoing,
     },
     /// Send the master frame of a cycle, see [`Master::emit_into`](super::Master::emit_into).
     Exchange {
-        /// When to trigger it; not before the time of the poll.
+        /// When to trigger it; never before the time of the poll.
         at_ns: u64,
-        /// Low 16 bits of the master's time then.
+        /// Low 16 bits of the master's time at the trigger.
         time_stamp: u16,
         /// Number of the cycle, from 0.
         cycle: u64,

@@ -20,20 +20,20 @@ use crate::timing::{Limit, Misfit, TRIGGER_NS, Timing};
 
 /// From the first bit of a device frame to the capture of its start.
 const CAPTURE_NS: u32 = Preamble::Short.capture_ns();
-/// The most that the published measurement of a line delay loses in a hop and back, in ns.
+/// The most that the published measurement of a line delay loses on a hop, there and back, in ns.
 const LOST_NS: u64 = 16;
 
 impl Master {
     /// Takes a frame whose start was captured at `sof_ns`, see [`Preamble::capture_ns`]: a start-up frame that has come
     /// back, or a device's frame of the IO exchange. Use its payload only if this function accepts it: its checks must be
-    /// right, it must have begun at the time of its device in a cycle that is open, and it must be the first in that cycle.
+    /// right, it must have begun at its device's time in a cycle that is open, and it must be the device's first in that cycle.
     ///
     /// # Errors
     /// The reason for the refusal: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
     /// began before the frame that it would answer; [`Error::OutsideWindow`], [`Error::CycleOver`] and [`Error::Doubled`], which
     /// [`tally`](Master::tally) counts for each device; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer,
-    /// [`Error::TopologyChanged`], and an answer to the last SYNC that tells that the line does not fit or that a device is
-    /// not in step take the master back to IDLE; any other refused frame is ignored.
+    /// [`Error::TopologyChanged`], and an answer to the last SYNC which shows that the line does not fit or that a device is not
+    /// in step take the master back to IDLE; any other refused frame is ignored.
     pub fn hear<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<Heard<'a>, Error> {
         let result = match self.state {
             State::Idle | State::Error => return Err(Error::WrongState),
@@ -80,8 +80,8 @@ impl Master {
         Ok((view, cycle))
     }
 
-    /// Returns the cycle that a frame belongs to by its time, whichever is open now; `None` for one that the host has
-    /// skipped. Each cycle has one frame of each device.
+    /// Returns the cycle to which a frame belongs by its time, whether or not it is open; `None` for a cycle that the host has
+    /// skipped. Each cycle has one frame from each device.
     fn cycle_of(&mut self, address: DeviceAddress, sof_ns: u64) -> Result<Option<u64>, Error> {
         let Cycles { present, before, hop_ns, .. } = &mut self.cycles;
         let Some(present) = present else { return Err(Error::WrongState) };
@@ -148,7 +148,7 @@ impl Master {
         Ok(())
     }
 
-    /// A frame is answered once, and the one with STATE_CHANGE by one that has it too.
+    /// A frame is answered once, and the answer to a frame with STATE_CHANGE has STATE_CHANGE too.
     fn param_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let answer = ParamView::parse(frame)?;
         self.is_fresh(sof_ns)?;
@@ -160,7 +160,7 @@ impl Master {
         Ok(())
     }
 
-    /// The vendor defines DELAY_RESP and sends the request back instead: a response tells nothing.
+    /// The vendor defines DELAY_RESP but sends the request back instead: a response carries no information.
     fn delay_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let frame = LongFrame::parse(frame)?;
         if frame.frame_type() == FrameType::DelayResp {
@@ -175,7 +175,7 @@ impl Master {
         Ok(())
     }
 
-    /// Both times have grown by the same hops, so the answer tells how far the last device is.
+    /// Both times have grown by the same hops, so the answer shows how far away the last device is.
     fn sync_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let answer = Sync::parse(frame)?;
         let last_sent = self.frame >= self.config.sync_frames;
@@ -222,7 +222,7 @@ impl Master {
     }
 }
 
-/// Why a line is not started.
+/// Returns the reason why the line must not be started.
 const fn refusal(Misfit { device, limit, needs_ns, has_ns }: Misfit) -> Error {
     match limit {
         Limit::MasterFrame | Limit::DeviceFrames => Error::CycleTooShort { device, needs_ns },

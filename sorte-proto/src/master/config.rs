@@ -11,12 +11,12 @@ servowire_core::codes! {
     #[derive(Default)]
     #[non_exhaustive]
     pub enum State: u8 {
-        /// Waits for link and enable, or until the pause after a failure has passed.
+        /// Waits for link and enable, or until the pause after a failure has ended.
         #[default]
         Idle = 0 => "IDLE",
         /// Counts the devices.
         Discovery = 1 => "DISCOVERY",
-        /// Sends them the parameters.
+        /// Sends the parameters to the devices.
         Param = 2 => "PARAM",
         /// Measures the line to the first device.
         LineDelay = 3 => "LINE_DELAY",
@@ -29,23 +29,23 @@ servowire_core::codes! {
     }
 }
 
-/// How a master behaves. The counts are those of the published image; the time-outs are this crate's.
+/// How a master behaves. The counts are those of the published image; the time-outs are chosen by this crate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Config {
-    /// DISCOVERY frames, at least 2: devices take part from the second onwards.
+    /// Number of DISCOVERY frames, at least 2: devices take part from the second one onwards.
     pub discovery_frames: u16,
     /// A damaged answer to DISCOVERY does not end the phase: frames are sent until two answers in a row report the same
-    /// line, then the last one is sent until it comes back whole. The devices need
+    /// line, then the last frame is sent until it comes back whole. The devices need
     /// [`device::Config::patient_discovery`](crate::device::Config::patient_discovery) too: a published device that has
     /// received the last frame lets its repetitions pass without being counted. An extension of this crate; the published
     /// master starts again.
     pub patient_discovery: bool,
     /// Maximum number of DISCOVERY frames, if the master is patient.
     pub discovery_tries: u16,
-    /// PARAM frames that must be answered.
+    /// Number of PARAM frames that must be answered.
     pub param_frames: u16,
     /// SYNC frames.
     pub sync_frames: u16,
@@ -57,39 +57,40 @@ pub struct Config {
     pub cycle_ns: u32,
     /// Longest time that a delay request or the last SYNC frame may take to come back, in ns.
     pub answer_timeout_ns: u64,
-    /// PARAM frames in a row that may remain unanswered.
+    /// Number of PARAM frames in a row that may remain unanswered.
     pub param_tries: u16,
     /// Pause after a failure in ns, so that the devices' start-up states time out.
     pub restart_pause_ns: u64,
-    /// How long before its time a frame is handed out, in ns: the time that the port needs to take it, if it sends at a set
-    /// time by itself. With 0 a frame is to be sent when it is handed out.
+    /// How long before its send time a frame is returned, in ns: the time that the port needs to take it, if the port sends
+    /// at a set time by itself. With 0, a frame is to be sent as soon as it is returned.
     pub lead_ns: u32,
-    /// Devices that DISCOVERY must find.
+    /// Number of devices that DISCOVERY must find.
     pub min_devices: u8,
-    /// Minimum number of output bytes of the master frame; 16 keeps all axes in the same cycle whatever their number.
+    /// Minimum number of output bytes of the master frame; 16 keeps all axes in the same cycle however many there are.
     pub min_output_len: u16,
     /// Payload bytes of a device frame.
     pub payload_len: u8,
-    /// Parameters sent to the devices. The published master says 10 us and exchanges every 4 us; here both are the cycle.
+    /// Parameters sent to the devices. The published master says 10 us and exchanges every 4 us; here both use the same cycle.
     pub parameters: Parameters,
     /// When the devices send: must be the same as at the devices.
     pub slots: Slots,
     /// Rms jitter of each port of the line, in ps.
     pub jitter_ps: u32,
-    /// How far from its time a device frame may begin, in ns; 16 ns more for each device that it passes, which the published
-    /// measurement of the line loses. The published send times depend on the cables, and the master knows their mean only.
+    /// How far from its expected time a device frame may begin, in ns. For each device that it passes, 16 ns are added to cover
+    /// what the published measurement of the line loses. The published send times depend on the cables, of which the master
+    /// knows only the mean.
     pub window_ns: u16,
     /// How the line to the first device is measured.
     pub delay_model: DelayModel,
-    /// Cycles in a row with a damaged device frame that make the master restart; 0: never.
+    /// Number of cycles in a row with a damaged device frame after which the master restarts; 0 for never.
     pub retrain_crc_errors: u8,
-    /// Cycles in a row with a missing device frame that make the master restart; 0: never.
+    /// Number of cycles in a row with a missing device frame after which the master restarts; 0 for never.
     pub retrain_timing_errors: u8,
-    /// Cycles of the IO exchange in which the axes can come to rest before the master restarts; 0: it restarts at once, and
-    /// running motors stop dead.
+    /// Number of cycles of the IO exchange in which the axes can come to rest before the master restarts; with 0 it restarts at
+    /// once, and running motors stop dead.
     pub stop_cycles: u32,
-    /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in
-    /// [`State::Error`]; 0: it retries for ever.
+    /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in [`State::Error`];
+    /// with 0 it retries for ever.
     pub max_failures: u16,
     /// The line may be longer than the delay field of SYNC can express: an extension of this crate, see
     /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master then sends its SYNC period in PARAM.
@@ -184,7 +185,7 @@ pub struct Counters {
     pub format_errors: u64,
     /// Device frames with the ERROR bit: a device has seen a wrong checksum.
     pub device_errors: u64,
-    /// How often it went back to IDLE.
+    /// How many times the master went back to IDLE.
     pub retrains: u64,
     /// Cycles of the IO exchange that were skipped because [`Master::poll`](super::Master::poll) was called after their
     /// time.

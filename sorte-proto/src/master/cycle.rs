@@ -1,4 +1,4 @@
-//! What the cycles of the IO exchange have brought.
+//! The frames that came in the cycles of the IO exchange.
 
 use crate::discovery::MAX_DEVICES;
 use crate::tally::Tally;
@@ -23,7 +23,7 @@ impl Cycle {
         Self { number, trigger_ns, seen: [0; 4], damaged: false, disorderly: false }
     }
 
-    /// Marks the device as having answered; returns whether it had not before.
+    /// Marks the device as having answered; returns whether this was its first answer.
     pub(super) fn mark(&mut self, address: u8) -> bool {
         let new = !self.has(address);
         if let Some(word) = self.seen.get_mut(usize::from(address >> 6)) {
@@ -36,7 +36,7 @@ impl Cycle {
         self.seen.get(usize::from(address >> 6)).is_some_and(|word| word >> (address & 63) & 1 == 1)
     }
 
-    /// Devices seen: a fast check that none is missing.
+    /// Number of devices seen, for a fast check that none is missing.
     pub(super) const fn count(&self) -> u32 {
         let [a, b, c, d] = self.seen;
         // At most 256.
@@ -48,18 +48,18 @@ impl Cycle {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Cycles {
-    /// The cycle handed out last, and the one before it while its frames may still come.
+    /// The cycle returned last, and the one before it while its frames may still come.
     pub(super) present: Option<Cycle>,
     pub(super) before: Option<Cycle>,
-    /// The first cycle of this exchange, in which the devices are silent.
+    /// This is the first cycle of the exchange, in which the devices are silent.
     pub(super) first: Option<u64>,
-    /// The last closed cycle had a fault: the next master frame says so.
+    /// The last closed cycle had a fault: the next master frame reports it.
     pub(super) fault: bool,
     pub(super) damaged_in_a_row: u8,
     pub(super) silent_in_a_row: u8,
     /// From the trigger of a master frame to the end of the last device frame, in ns.
     pub(super) end_ns: u32,
-    /// From one device to the next, the mean of the line, in ns.
+    /// Time from one device to the next, averaged over the line, in ns.
     pub(super) hop_ns: u32,
 }
 

@@ -13,7 +13,7 @@ pub enum Heard<'a> {
     Device {
         /// The frame.
         frame: DeviceFrameView<'a>,
-        /// The cycle that it belongs to by its time; `None`: a cycle that the host has skipped.
+        /// The cycle to which it belongs by its time; `None` for a cycle that the host has skipped.
         cycle: Option<u64>,
         /// Capture of its start, in ns.
         sof_ns: u64,
@@ -34,7 +34,7 @@ impl<'a> Heard<'a> {
         }
     }
 
-    /// Returns what a control loop may use of it; nothing ([`Evidence::NEVER`]) if it is not a device's frame. The caller
+    /// Returns the evidence in it for a control loop; [`Evidence::NEVER`] if it is not a device's frame. The caller
     /// has to know that the line carries positions.
     pub fn evidence(self, positions: Positions) -> Evidence {
         match self {

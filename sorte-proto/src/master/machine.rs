@@ -18,10 +18,10 @@ use crate::sync::Sync;
 use crate::tally::{Fault, Tally};
 use crate::timing::TRIGGER_NS;
 
-/// From the last SYNC frame to the first of the exchange, as in the published master: 10 us to its cycle zero, and 500 ns.
+/// Time from the last SYNC frame to the first frame of the exchange, as in the published master: 10 us to cycle 0, plus 500 ns.
 const SYNC_TO_EXCHANGE_NS: u64 = 10_500;
-/// Answers to DISCOVERY that must report the same line before the last one is sent: devices take part from the second
-/// onwards.
+/// Number of answers to DISCOVERY that must report the same line before the last frame is sent: devices take part from the
+/// second onwards.
 pub(super) const AGREED: u8 = 2;
 /// When the answer to the last SYNC frame is first checked.
 const LOOK_NS: u64 = 5000;
@@ -43,7 +43,7 @@ pub struct Master {
     /// PARAM: answers still needed, and frames without an answer.
     pub(super) remaining: u16,
     pub(super) unanswered: u16,
-    /// Capture of the start of the start-up frame sent last.
+    /// When the start of the start-up frame sent last was captured.
     pub(super) sent_ns: u64,
     /// PARAM, LINE_DELAY: its answer is still to come.
     pub(super) asking: bool,
@@ -53,10 +53,10 @@ pub struct Master {
     pub(super) agreed: u8,
     /// SYNC: time stamp of the frame sent last.
     pub(super) sync_stamp_ns: u32,
-    /// Where the master's time is 0.
+    /// The instant at which the master's time is 0.
     pub(super) epoch_ns: u64,
     pub(super) pending: Option<Error>,
-    /// Why the axes are being stopped, and cycles left for it.
+    /// Why the axes are being stopped, and the number of cycles left for it.
     pub(super) stopping: Option<(Error, u32)>,
     pub(super) failures: u16,
     pub(super) good_cycles: u16,
@@ -123,7 +123,7 @@ impl Master {
         &self.line
     }
 
-    /// Where the master's time, which SYNC gives to the devices, is 0.
+    /// The instant at which the master's time, which SYNC distributes to the devices, is 0.
     pub const fn epoch_ns(&self) -> u64 {
         self.epoch_ns
     }
@@ -183,8 +183,8 @@ impl Master {
 
     /// Returns what to do now. Call it again at once after any action but [`Action::Wait`], and when something has come.
     ///
-    /// No time in an action has passed: a master that is polled too late skips cycles and stays in their raster. A
-    /// frame is handed out [`Config::lead_ns`] before its time.
+    /// No time in an action is in the past: a master that is polled too late skips cycles but keeps to their raster. A frame is
+    /// returned [`Config::lead_ns`] before its time.
     pub fn poll(&mut self, now_ns: u64) -> Action {
         let lead_ns = u64::from(self.config.lead_ns);
         match self.plan(now_ns.saturating_add(lead_ns)) {
@@ -226,8 +226,8 @@ impl Master {
         }
     }
 
-    /// Reports that the request handed out last began at `sof_ns`, as captured by the port. Round trips count from there.
-    /// If a port does not report it, they count from the point at which a request triggered on time would have been
+    /// Reports that the request returned last began at `sof_ns`, as captured by the port. Round trips are measured from there.
+    /// If a port does not report it, they are measured from the point at which a request triggered on time would have been
     /// captured.
     pub const fn sent(&mut self, sof_ns: u64) {
         if matches!(self.state, State::LineDelay) && self.asking {
@@ -309,7 +309,7 @@ impl Master {
         self.plan(now_ns)
     }
 
-    /// What the devices are told: with a long line, the period of the SYNC frames in ticks of 5 ns too.
+    /// The parameters sent to the devices; on a long line they include the period of the SYNC frames in ticks of 5 ns.
     const fn parameters(&self) -> Parameters {
         let told = self.config.parameters;
         if self.config.long_line { Parameters { sync_cycle: self.config.sync_period_ns / 5, ..told } } else { told }
@@ -337,7 +337,7 @@ impl Master {
         self.plan(now_ns)
     }
 
-    /// Advances to the first time of the raster of `period_ns` that has not passed; returns how many have.
+    /// Advances to the first point of the raster of `period_ns` that has not passed; returns how many points have passed.
     fn catch_up(&mut self, now_ns: u64, period_ns: u32) -> u64 {
         let period = u64::from(period_ns.max(1));
         let late = now_ns.saturating_sub(self.next_ns).div_ceil(period);
@@ -397,8 +397,8 @@ impl Master {
         Action::Exchange { at_ns, time_stamp: u16::from_le_bytes([low, high]), cycle, stop: self.stopping.is_some() }
     }
 
-    /// The next cycle is about to begin: the frames of the one before it are all there, or on their way if the host asks early.
-    /// Those of the one before that cannot come any more.
+    /// The next cycle is about to begin: the frames of the previous one have all come, or are on their way if the host asks
+    /// early. Those of the cycle before that can no longer come.
     fn close_cycles(&mut self, now_ns: u64) -> Result<(), Error> {
         let asked_ns = now_ns.saturating_sub(self.config.lead_ns.into());
         let mut result = Ok(());
