@@ -51,9 +51,9 @@ servowire_core::codes! {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Codes {
-    /// What bytes 4-7 mean.
+    /// The meaning of bytes 4-7.
     pub cyclic: CyclicCode,
-    /// What bytes 8-15 mean.
+    /// The meaning of bytes 8-15.
     pub noncyclic: NonCyclicCode,
 }
 
@@ -136,8 +136,9 @@ impl Code {
 
     /// Returns whether both codes are defined and may be combined.
     ///
-    /// It is certain that alarm does not go with NOP, and that profile goes with PP only. For the rest, the marks in the
-    /// vendor's mode tables could not be read, so this is a working rule: with NOP only 00h, otherwise every defined code.
+    /// It is certain that alarm cannot be combined with NOP, and profile only with PP. For the rest, the marks in the vendor's
+    /// mode tables were unreadable, so this is a working rule: with NOP only 00h is allowed, with the other cyclic codes every
+    /// defined code.
     pub const fn is_allowed(self) -> bool {
         match self.codes() {
             Ok(Codes { cyclic: CyclicCode::Nop, noncyclic }) => matches!(noncyclic, NonCyclicCode::Normal),

@@ -80,14 +80,14 @@ impl<'a> CommandBlock<'a> {
 
     /// Returns whether this block makes its drive switch the servo off.
     ///
-    /// Servo_On is 0, **and** the code is one with which the drive looks at Servo_On. A NOP is not: a block of
-    /// zeros leaves the servo as it is. Nor is a block that the drive refuses for its code.
+    /// That is so if Servo_On is 0 **and** the code is one for which the drive evaluates Servo_On. A NOP does not do that: a
+    /// block of zeros leaves the servo as it is. Nor does a block that the drive refuses for its code.
     pub const fn is_servo_off(self) -> bool {
         !self.control().contains(ControlBits::SERVO_ON) && self.obeys_control()
     }
 
-    /// Returns whether a drive certainly takes Control_Bits from this block: its codes may be combined ([`Code::is_allowed`])
-    /// and are not the NOP command.
+    /// Returns whether a drive certainly evaluates the Control_Bits of this block: its codes may be combined
+    /// ([`Code::is_allowed`]) and are not the NOP command.
     pub const fn obeys_control(self) -> bool {
         self.code().is_allowed() && self.code().get() != Code::NOP.get()
     }
@@ -154,7 +154,7 @@ pub struct Command {
     pub update_counter: UpdateCounter,
     /// TMG_CNT: `false` outside the inter-axis full-synchronous mode.
     pub tmg_cnt: bool,
-    /// The meaning of Command_Data1.
+    /// Selects the meaning of Command_Data1.
     pub cyclic: CyclicCode,
     /// Servo_On and the other control bits.
     pub control: ControlBits,

@@ -1,7 +1,7 @@
 //! The drive's side: what a simulator or a test bench runs.
 //!
-//! [`Drive`] answers commands block by block and moves a simple axis; 32 of them make a ring. [`check`] alone is the part
-//! of it that checks header, codes and sub block.
+//! [`Drive`] answers commands block by block and moves a simple axis; up to 32 of them make a ring. [`check`] is the part of it
+//! that checks header, codes and sub block, for use on its own.
 
 mod behaviour;
 mod check;

@@ -4,7 +4,7 @@ use crate::error::ErrorClass;
 
 /// Why the actual position of a drive must not be used.
 ///
-/// Blocks carry no checksum: a flipped bit of the position itself cannot be seen.
+/// Blocks carry no checksum: a flipped bit in the position itself cannot be detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

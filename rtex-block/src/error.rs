@@ -1,5 +1,5 @@
 servowire_core::errors! {
-    /// Why a block was refused.
+    /// The reason why a block was refused.
     ///
     /// Checks are made in the order of the variants; the first that fails is reported, and nothing is decoded.
     /// `strict` decoding goes through all of them, lenient decoding stops before [`CodePair`](Self::CodePair).
@@ -12,7 +12,7 @@ servowire_core::errors! {
             /// Bytes that a block has: 16 or 32.
             want: u16,
         },
-        /// The slice is longer than a block, which must fill it exactly.
+        /// The slice is longer than a block; it must be exactly one block.
         #[error("{got} bytes, a block has {want}")]
         TooLong = 2 {
             /// Bytes received; 65535 for more.
@@ -69,7 +69,7 @@ servowire_core::errors! {
         Reserved = 10 {
             /// Index of the first faulty byte in the block, 0..=31.
             byte: u8,
-            /// Those of its reserved bits that are 1.
+            /// The reserved bits of this byte that are 1.
             bits: u8,
         },
         /// A `nom` combinator of the caller refused the input.
@@ -80,14 +80,14 @@ servowire_core::errors! {
 
 servowire_core::nom_error!(Error);
 
-/// Kept out of the good path: otherwise its stores would be executed, without effect, for every good block.
+/// It is kept out of the good path, where its stores would otherwise be executed, to no effect, for every good block.
 #[cold]
 #[inline(never)]
 pub(crate) const fn wrong_direction(byte0: u8) -> Error {
     Error::Direction { byte0 }
 }
 
-/// Returns the error for `got` bytes in place of a block of `want`.
+/// Returns the error for `got` bytes where a block has `want`.
 #[cold]
 #[expect(clippy::cast_possible_truncation, reason = "compared before")]
 pub(crate) const fn wrong_length(got: usize, want: u16) -> Error {

@@ -28,13 +28,13 @@ impl ErrorCode {
     /// 0034h: feed-forward value out of range; the drive keeps the old one.
     pub const FEED_FORWARD: Self = Self(0x0034);
 
-    /// Returns whether the drive has discarded the whole block and continues with the previous one: 0011h, 0012h, 0021h. No
-    /// request in the block was refused for its content. SX-DSV02310, "Command error".
+    /// Returns whether the drive has discarded the whole block and continues with the previous one: this is so for 0011h, 0012h
+    /// and 0021h. Then no request in the block was refused for its contents. SX-DSV02310, "Command error".
     pub const fn discards_block(self) -> bool {
         matches!(self, Self::MAC_ID | Self::DIRECTION | Self::CYCLIC_CODE)
     }
 
-    /// Returns what the number means; `None` if that is not confirmed.
+    /// Returns the meaning of the number; `None` if it is not confirmed.
     const fn meaning(self) -> Option<&'static str> {
         Some(match self {
             Self::MAC_ID => "MAC-ID is not the drive's",
@@ -60,7 +60,7 @@ impl fmt::Display for ErrorCode {
     }
 }
 
-/// An alarm number as the drive shows it: main code, point, sub code.
+/// An alarm number, displayed as on the drive: main code, point, sub code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -19,9 +19,9 @@ pub struct Tolerated {
 }
 
 impl Tolerated {
-    /// No flags: an alarm is a doubt.
+    /// Tolerates no flags: an alarm is a doubt.
     pub const NOTHING: Self = Self { status: StatusFlags::empty() };
-    /// An alarm: for displaying where a stopped axis stands.
+    /// Tolerates an alarm, for displaying the position of a stopped axis.
     pub const ALARM: Self = Self::NOTHING.status(StatusFlags::ALARM);
 
     /// Tolerates these flags, replacing those set before.
@@ -78,8 +78,8 @@ impl Sample {
         }
     }
 
-    /// When the block was heard, in ns. It is not documented how long before that the drive measured. SX-DSV02310, "Update
-    /// timing".
+    /// When the block was heard, in ns. How long before that the drive measured the position is not documented. SX-DSV02310,
+    /// "Update timing".
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns
     }
@@ -91,7 +91,7 @@ servowire_core::one_line!(Sample {
     Self { position, rates: None, sampled_ns } => "position {} at {} ns", position, sampled_ns;
 });
 
-/// What is known about the actual position of a drive. It is judged at the moment of use, because it ages until then.
+/// What is known about the actual position of a drive. The position is judged at the moment of use, because it ages until then.
 ///
 /// ```
 /// use rtex_block::{Doubt, Evidence, Policy, Response};
@@ -114,7 +114,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Before the first good block.
+    /// The evidence before the first good block.
     pub const NEVER: Self = Self { sample: None, status: StatusFlags::empty(), refused: None };
 
     /// Creates the evidence of a response whose counter echo was first heard at `sampled_ns`. A master gets it from

@@ -1,6 +1,7 @@
-//! How every flag set of the crate is declared.
+//! Declares the flag sets of the crate.
 
-/// A struct over a number with named bits: `bitflags` and the traits that each set has. Serde takes named bits only.
+/// Declares a struct over a number with named bits: `bitflags`, and the traits that every set has. Serde accepts only named
+/// bits.
 macro_rules! flag_set {
     ($(#[$meta:meta])* pub struct $name:ident($bits:ty) { $($(#[$($doc:tt)*])* $constant:ident = $value:expr;)* }) => {
         $(#[$meta])*

@@ -36,9 +36,9 @@ impl UpdateCounter {
 /// │ C/R │  counter │         MAC-ID         │   C/R: 0 command, 1 response
 /// └─────┴──────────┴────────────────────────┘
 /// ```
-/// In a response the counter is Update_Counter_Echo, and the MAC-ID is Actual_MAC-ID: not an echo but what
-/// the drive read from its switches. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command
-/// header" and "Response header".
+/// In a response the counter is Update_Counter_Echo, and the MAC-ID is Actual_MAC-ID: not an echo but the address that the
+/// drive read from its switches. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command header" and
+/// "Response header".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

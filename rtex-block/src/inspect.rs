@@ -58,7 +58,7 @@ servowire_core::one_line!(Cause {
     Self::OtherSize => "the size is neither 16 nor 32 bytes";
 });
 
-/// Something that the reader of a valid block should know.
+/// A remark on a valid block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -141,8 +141,8 @@ pub struct Change {
     pub before: Option<Value>,
 }
 
-/// A command of 32 bytes: two codes, bytes 2, 3, 9 and 10, Sub_Chk and the sub code, byte 16. A response: a code, six bytes
-/// of an error answer, five of a refused sub-command.
+/// The largest number of faults in a command of 32 bytes: two codes, bytes 2, 3, 9 and 10, Sub_Chk and the sub code, byte 16.
+/// The largest number of faults in a response: a code, six bytes of an error answer, five of a refused sub-command.
 const MOST_FINDINGS: usize = 12;
 
 impl Report {
@@ -156,12 +156,12 @@ impl Report {
         self.message.is_some()
     }
 
-    /// The fault that strict decoding reports: the first of them.
+    /// The fault that strict decoding reports, which is the first one.
     pub const fn error(&self) -> Option<Error> {
         self.error
     }
 
-    /// Every fault of the block, in the order of the checks: each as if the previous ones were corrected.
+    /// All faults of the block, in the order of the checks; each is found as if the previous ones were corrected.
     pub fn errors(&self) -> impl Iterator<Item = Error> {
         self.errors.into_iter().flatten()
     }
@@ -213,7 +213,7 @@ impl Report {
         self.fields.iter()
     }
 
-    /// Returns what the reader should know.
+    /// Returns the remarks on a valid block.
     pub fn notes(&self) -> impl Iterator<Item = Note> {
         self.notes.into_iter().flatten()
     }
@@ -302,7 +302,7 @@ fn errors(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
     found
 }
 
-/// Changes the bits that an error names, so that the check passes, and changes the layout only if necessary.
+/// Changes the bits that an error names so that the check passes; changes the layout only if necessary.
 fn mend(block: &mut [u8], error: Error) -> bool {
     let (byte, clear, set) = match error {
         Error::Reserved { byte, bits } => (byte, bits, 0),

@@ -49,6 +49,6 @@ pub use status::StatusFlags;
 pub use sub::{Command32, Response32, SubCode, SubCommand, SubResponse};
 pub use type_code::{Nibble, Pr, TypeCode};
 
-/// Step of tests that run through 16 bits: all values, fewer under Miri.
+/// The step of tests that run through all 16-bit values; larger under Miri.
 #[cfg(test)]
 pub(crate) const STRIDE: usize = if cfg!(miri) { 251 } else { 1 };

@@ -1,8 +1,8 @@
 //! The controller's side: everything that has to happen around the blocks, with no input or output of its own.
 //!
-//! The pieces work alone or together. [`Ring`] joins the axes: it takes the responses of all drives once per update period
-//! and returns the commands of the next. [`Master`] adds the phases, the watchdog and the memory of the ASIC, [`Run`] the
-//! common jobs. Limits are counted in update periods, ages in ns of the clock.
+//! The pieces can be used alone or together. [`Ring`] joins the axes: it takes the responses of all drives once per update
+//! period and returns the commands of the next. [`Master`] adds the phases, the watchdog and the memory of the ASIC; [`Run`]
+//! adds the common jobs. Limits are counted in update periods, ages in ns of the clock.
 
 mod axis;
 mod check;

@@ -33,7 +33,7 @@ pub struct Arguments {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum NonCyclicCommand {
-    /// 0h: no request.
+    /// 0h: the normal command, without a request.
     Normal {
         /// Bytes 8-11, free.
         command_data2: i32,
@@ -69,7 +69,7 @@ pub enum NonCyclicCommand {
         latch_sel1: Nibble,
         /// Byte 11: type code of the monitor value wanted.
         monitor_sel: u8,
-        /// Bytes 12-15: TSPD, unit by Pr7.25.
+        /// Bytes 12-15: TSPD, in the unit set by Pr7.25.
         target_speed: i32,
     },
     /// Ah: reads a monitor value; it is refreshed in every exchange while the command is held.
@@ -105,7 +105,7 @@ impl NonCyclicCommand {
         }
     }
 
-    /// Puts a feed-forward into bytes 12-15, unless it is 0 or the command needs them itself.
+    /// Puts a feed-forward into bytes 12-15, unless it is 0 or the command uses them itself.
     #[must_use]
     pub fn with_feed_forward(self, value: i32) -> Self {
         if value == 0 || self.needs_data3() {

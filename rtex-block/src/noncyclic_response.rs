@@ -35,8 +35,8 @@ impl Results {
         self.data.to_le_bytes()
     }
 
-    /// Alarm and warning of an alarm answer: byte 12 main code, 13 sub code, 14-15 warning code. (When attributes
-    /// were asked for, the four bytes carry those instead.)
+    /// Alarm and warning of an alarm answer: byte 12 main code, 13 sub code, 14-15 warning code. (If attributes were requested,
+    /// the four bytes carry those instead.)
     pub const fn alarm(&self) -> AlarmAndWarning {
         let [main, sub, low, high] = self.data.to_le_bytes();
         AlarmAndWarning { alarm: Alarm { main, sub }, warning: u16::from_le_bytes([low, high]) }
@@ -69,7 +69,7 @@ servowire_core::one_line!(AlarmAndWarning { Self { alarm, warning } => "{} warni
 
 /// The non-cyclic half of a response, bytes 8-15.
 ///
-/// Its layout depends on CMD_Error first, and only then on the echo of the non-cyclic code.
+/// Its layout depends first on CMD_Error and only then on the echo of the non-cyclic code.
 /// SX-DSV02310, chapter 6; System Design Guide for Master, "Profile position response".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -287,7 +287,7 @@ impl fmt::Display for NonCyclicResponse {
     }
 }
 
-/// Writes the flags after a blank, if any is set.
+/// Writes a space and the flags, if any is set.
 fn suffix(f: &mut fmt::Formatter<'_>, flags: &(impl fmt::Display + bitflags::Flags)) -> fmt::Result {
     if flags.is_empty() { Ok(()) } else { write!(f, " {flags}") }
 }

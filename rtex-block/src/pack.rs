@@ -10,12 +10,12 @@
 //! ```
 //!
 //! A host has to ensure three things itself. The memory of the ASIC must not be cached; a write buffer must be emptied
-//! before the ASIC is told to continue; and on a host whose addresses count 16-bit units (TMS320F28388), every address of
-//! the ASIC, which the vendor gives in bytes, is halved. System Design Guide for Master, notes on the host.
+//! before the ASIC is told to continue; and on a host whose addresses count 16-bit units (TMS320F28388), every address of the
+//! ASIC, which the vendor states in bytes, has to be halved. System Design Guide for Master, notes on the host.
 //!
-//! The words are written to memory of the caller, for one block or for a whole ring.
+//! The words are written to the caller's memory, for one block or for a whole ring.
 
-/// The words and the bytes do not have the same size.
+/// The words and the bytes differ in size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

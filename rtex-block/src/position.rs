@@ -47,27 +47,29 @@ impl From<Gear> for (u32, u32) {
     }
 }
 
-/// Largest rate of command pulses after the electronic gear, pulses per second.
+/// Largest rate of command pulses after the electronic gear, in pulses per second.
 pub const MAX_PULSES_PER_S: u32 = 400_000_000;
 
 /// Returns the largest step of the command position in an update period, command units, rounded down.
 ///
 /// A larger step raises alarm Err27.4. So does a step above the over-speed level of the drive, which is usually lower.
-/// At gear 1/1 and 0.5 ms it is 200 000. SX-DSV02310, "Command error protection".
+/// At gear 1/1 and 0.5 ms the largest step is 200 000. SX-DSV02310, "Command error protection".
 pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
     let (pulses, per_unit) = limit(update_ns, gear);
     quotient(pulses, per_unit)
 }
 
-/// The limit as a ratio, 400 M pulse/s x update_ns / 1e9 being update_ns x 2/5: at most 65 bits, and 35 that are never 0.
+/// The limit as a ratio, because 400 M pulse/s x update_ns / 1e9 is update_ns x 2/5: a numerator of at most 65 bits, and a
+/// denominator of at most 35 bits that is never 0.
 const fn limit(update_ns: u32, gear: Gear) -> (u128, u64) {
     let pulses = (update_ns as u128).wrapping_mul(2).wrapping_mul(gear.denominator as u128);
     (pulses, (gear.numerator as u64).wrapping_mul(5))
 }
 
-/// Of at most 65 bits by 2 and more, and by no more than 2^63; `u32::MAX` where it is larger.
+/// Divides a number of at most 65 bits by a divisor of 2 to 2^63; returns `u32::MAX` if the quotient is larger.
 ///
-/// Bit by bit, once for an axis: the divisions of the compiler's library take 1.4 KiB of a Cortex-M4's flash.
+/// The division is made bit by bit, once per axis, because the divisions of the compiler's library take 1.4 KiB of a
+/// Cortex-M4's flash.
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "clamped just before")]
 const fn quotient(dividend: u128, divisor: u64) -> u32 {
@@ -95,8 +97,8 @@ pub(crate) const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
 /// Returns the largest torque command in 0.1 % of rated, rounded down, from the parameters of a linear drive: `peak` is
 /// Pr9.07 (peak current) and `rated` Pr9.06 (rated current, r.m.s.), both in 0.1 A. `None` if `rated` is 0.
 ///
-/// 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is lost in the available text; it
-/// follows from the ratio of a peak to an r.m.s. value.
+/// The formula is 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is missing in the available
+/// text, but follows from the ratio of a peak to an r.m.s. value.
 pub fn max_torque(peak: u16, rated: u16) -> Option<u32> {
     let thousandfold = u128::from(peak).saturating_mul(1_000);
     let squared = thousandfold.saturating_mul(thousandfold);

@@ -110,10 +110,10 @@ impl<'a> ResponseBlock<'a> {
     }
 }
 
-/// A response as values, one for one with the 128 bits: `emit` after `parse` gives back the same bytes.
+/// A response as values, which correspond one to one to the 128 bits: `emit` after `parse` returns the same bytes.
 ///
-/// Bytes 8-15 stay two words, as in the cyclic case; [`noncyclic`](Self::noncyclic) reads them by
-/// CMD_Error and code.
+/// Bytes 8-15 stay two words, as with the normal command; [`noncyclic`](Self::noncyclic) reads them according to CMD_Error and
+/// code.
 ///
 /// ```
 /// use rtex_block::*;
@@ -155,7 +155,7 @@ impl Response {
     }
 
     /// Replaces bytes 8-15, for a simulated drive. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by
-    /// every other value, whose layout must be the one of [`code`](Self::code).
+    /// every other value, whose layout must be that of [`code`](Self::code).
     ///
     /// ```
     /// use rtex_block::{ErrorCode, NonCyclicResponse, Response};

@@ -1,6 +1,6 @@
 //! `nom` streaming parsers for logs in which blocks follow each other without anything between them.
 //!
-//! Each takes one block from the front and leaves the rest; `Incomplete` says how many bytes are missing. They
+//! Each takes one block from the front of the input and leaves the rest; `Incomplete` says how many bytes are missing. They
 //! decode leniently, like the `parse` functions they call.
 
 use nom::error::{FromExternalError, ParseError};

@@ -226,7 +226,7 @@ impl Command32 {
     }
 }
 
-/// A response of the 32-byte mode, one for one with the 256 bits.
+/// A response of the 32-byte mode, whose values correspond one to one to the 256 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

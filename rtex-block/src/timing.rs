@@ -47,11 +47,11 @@ impl Periods {
         A6nParameters { pr7_20: -1, pr7_21: self.communications(), pr7_91: self.com_ns }
     }
 
-    /// Returns by how many communication periods new commands are sent late, if the exchange that writes them ends `end_ns`
+    /// Returns by how many communication periods new commands are sent too late, if the exchange that writes them ends `end_ns`
     /// after the start of the frame that began its update period (the falling edge of XSYNC).
     ///
-    /// 0 as long as the exchange ends before the next frame starts. A frame in progress at the falling edge of XSYNC delays
-    /// the switch of the memory banks, so anything later waits for one more frame. System Design Guide for Master, "2
+    /// Returns 0 as long as the exchange ends before the next frame starts. A frame in progress at the falling edge of XSYNC
+    /// delays the switch of the memory banks, so anything later waits for one more frame. System Design Guide for Master, "2
     /// communications per calculation".
     pub const fn frames_late(&self, end_ns: u32) -> u32 {
         match end_ns.checked_div(self.com_ns) {
@@ -69,7 +69,7 @@ impl Periods {
 
     /// Returns the pair that an A6N drive uses with these parameters; `None` if the guide's table does not list it.
     ///
-    /// Not listed does not mean known to be bad. Pr7.91 is evaluated only if Pr7.20 is -1 (inferred; the table
+    /// A pair that is not listed is not necessarily bad. Pr7.91 is evaluated only if Pr7.20 is -1 (inferred; the table
     /// gives Pr7.20 = 3 and 6 without it).
     pub fn from_a6n(pr7_20: i32, pr7_21: i32, pr7_91: Option<i64>) -> Option<Self> {
         let com_ns = match (pr7_20, pr7_21) {
@@ -108,7 +108,7 @@ pub const A5NL: [(i32, i32, Periods); 4] = [
     (0, 2, Periods::of(83_333, 2, false)),
 ];
 
-/// What sets the pace.
+/// The timer that sets the pace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -116,8 +116,8 @@ pub enum TimerSystem {
     /// A timer of the host drives XTXTIM at the communication period and, divided, the NC interrupt at the update
     /// period. The receive interrupt (XINTRX) switches the memory bank and has priority **above** the NC interrupt.
     External,
-    /// The ASIC's own timer; the NC interrupt comes from XSYNC at the start of transmission. The receive interrupt,
-    /// if used, clears a watchdog and has priority **below** it.
+    /// The ASIC's own timer; the NC interrupt comes from XSYNC at the start of transmission. The receive interrupt, if used,
+    /// clears a watchdog and has priority **below** the NC interrupt.
     Internal,
 }
 
@@ -149,11 +149,10 @@ pub fn timer_reload(timer_hz: u32, period_ns: u32) -> Option<u32> {
     u32::try_from(scaled.checked_div(NS_PER_S)?.checked_sub(1)?).ok()
 }
 
-/// An estimate of how long a frame takes, as a straight line through two points.
+/// An estimate of the time that a frame takes, as a straight line through two points.
 ///
-/// The guide publishes about 11 us with one axis and about 300 us with 32; everything between is an assumption,
-/// the vendor's own limits of axes per period are not known, and blocks of 32 bytes take longer. Use measured times if you
-/// have any.
+/// The guide publishes about 11 us with one axis and about 300 us with 32; everything between is an assumption, the vendor's
+/// own limits for axes per period are not known, and blocks of 32 bytes take longer. Use measured times if you have them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -165,11 +164,11 @@ pub struct FrameTime {
 }
 
 impl FrameTime {
-    /// The guide's two figures.
+    /// The two figures of the guide.
     pub const GUIDE: Self = Self { one_ns: 11_000, full_ns: 300_000 };
     /// Axes on a full ring.
     const FULL: u32 = 32;
-    /// Steps from one axis to a full ring.
+    /// Number of steps from one axis to a full ring.
     const STEPS: u64 = 31;
 
     /// Returns the estimated time with `axes` axes, ns, rounded; `axes` is limited to 1 to 32.
@@ -179,7 +178,7 @@ impl FrameTime {
         u64::from(self.one_ns).saturating_add(rise.checked_div(2 * Self::STEPS).unwrap_or(0))
     }
 
-    /// Returns how many axes fit a communication period by this line, at most 32; 0 if not even one does.
+    /// Returns how many axes fit into a communication period according to this line, at most 32; 0 if not even one does.
     pub fn axes_within(self, com_ns: u32) -> u32 {
         let Some(room) = com_ns.checked_sub(self.one_ns) else { return 0 };
         let steps = u64::from(room).saturating_mul(Self::STEPS).checked_div(self.rise()).unwrap_or(u64::MAX);

@@ -8,8 +8,8 @@ use core::fmt;
 servowire_core::number! {
     /// Type_Code of the commands with the common layout, 12 bits.
     ///
-    /// Codes up to FFh are the new ones and work in the sub block too; longer ones are the conventional
-    /// (A4N-compatible) codes and belong to the main block. SX-DSV02310, "System ID command".
+    /// Codes up to FFh are the new ones and work in the sub block too; longer ones are the conventional (A4N-compatible) codes
+    /// and work only in the main block. SX-DSV02310, "System ID command".
     pub struct TypeCode(u16, 12);
 }
 
@@ -54,7 +54,7 @@ pub mod system_id {
 
     /// Vendor name.
     pub const VENDOR_NAME: TypeCode = TypeCode::truncate(0x01);
-    /// Kind of device, one of a table of characters: `1` servo, `2` stepping, ...
+    /// Kind of device, a character from a table: `1` servo, `2` stepping, ...
     pub const DEVICE_TYPE: TypeCode = TypeCode::truncate(0x05);
     /// Model name of the drive.
     pub const MODEL: TypeCode = TypeCode::truncate(0x12);
@@ -69,7 +69,7 @@ pub mod system_id {
     /// Model of the external scale.
     pub const SCALE_MODEL_ID: TypeCode = TypeCode::truncate(0x32);
 
-    /// Returns the conventional code for the same text: 10h times the new one. Only for the codes above.
+    /// Returns the conventional code for the same text: 10h times the new one. This holds only for the codes above.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
         match code.get() {
             0x01 | 0x05 | 0x12..=0x15 | 0x31 | 0x32 => Some(TypeCode::truncate(code.get() << 4)),
@@ -165,7 +165,7 @@ pub mod monitor {
     /// Overload ratio, 0.1 %.
     pub const OVERLOAD: TypeCode = TypeCode::truncate(0x12);
 
-    /// Returns the conventional code for the same value: 100h more. The codes 07h to 0Ch have none.
+    /// Returns the conventional code for the same value: 100h more. The codes 07h to 0Ch have no conventional code.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
         match code.get() {
             0x01 | 0x02 | 0x04..=0x06 | 0x11 | 0x12 => Some(TypeCode::truncate(code.get() | 0x100)),
@@ -200,9 +200,9 @@ pub mod monitor {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Pr {
-    /// Number before the point.
+    /// The number before the point.
     pub class: u8,
-    /// Number after the point.
+    /// The number after the point.
     pub number: u8,
 }
 

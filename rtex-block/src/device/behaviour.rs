@@ -11,9 +11,9 @@ flag_set! {
         SETS_POSITION_WHILE_ON = 1 << 2;
         /// Most parameters take effect only after a reset of type 011h or 001h.
         PARAMETERS_AFTER_RESET = 1 << 3;
-        /// Homing_Complete is 1 from power-up on, if this is set before the first exchange.
+        /// If this is set before the first exchange, Homing_Complete is 1 from power-up.
         HOMED_AT_START = 1 << 4;
-        /// In_Position is 1 during the standstill before a profile motion, and during the motion too.
+        /// In_Position is 1 while the axis is at rest before a profile motion, and also during the motion.
         ALWAYS_IN_POSITION = 1 << 5;
         /// WNG is set in every answer.
         WARNS = 1 << 6;
@@ -30,7 +30,7 @@ flag_set! {
     }
 }
 
-/// How impolite a modelled drive is. A new behaviour is polite: it does everything as soon as it can.
+/// How awkwardly a modelled drive behaves. A new behaviour is polite: the drive does everything as soon as it can.
 ///
 /// Each setting is allowed by the available documents or left open by them, so a master must cope with any combination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,19 +39,18 @@ flag_set! {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
-    /// Exchanges by which everything but the counter echo is later than necessary, 0..=3.
+    /// Number of exchanges by which everything but the counter echo is later than necessary, 0..=3.
     pub echo_lag: u8,
-    /// Update periods from the start of a profile motion to In_Progress = 1; the axis is at rest until then.
+    /// Number of update periods from the start of a profile motion to In_Progress = 1; the axis is at rest until then.
     pub in_progress_late: u16,
-    /// Update periods for which Servo_Active stays 1 after Servo_On went to 0.
+    /// Number of update periods for which Servo_Active stays 1 after Servo_On went to 0.
     pub servo_off_late: u16,
-    /// Answers to a new request that still carry type code and index of the request before it.
+    /// Number of answers to a new request that still carry type code and index of the previous request.
     pub stale_answers: u16,
-    /// Exchanges by which each bit of byte 2 of the Status_Flags is shown later than it becomes true, bit 0 first (In_Position)
-    /// and bit 7
-    /// last (Servo_Active), 0..=15 each.
+    /// Number of exchanges by which each bit of byte 2 of the Status_Flags is shown late, bit 0 first (In_Position) and bit
+    /// 7 last (Servo_Active), 0..=15 each.
     pub status_late: [u8; 8],
-    /// Exchanges by which Latch_Comp1 and 2 are shown later than they become true, 0..=15.
+    /// Number of exchanges by which Latch_Comp1 and 2 are shown late, 0..=15.
     pub latch_late: u8,
     /// Its other quirks.
     pub quirks: Quirks,

@@ -40,8 +40,9 @@ impl Verdict {
 /// Makes the checks of a drive with address `mac_id`, in this order: C/R (0012h), MAC-ID (0011h), cyclic code (0021h),
 /// non-cyclic code (0022h); in 32-byte mode also Sub_Chk (0012h) and the sub-command code (0022h).
 ///
-/// Errors and alarms are those of SX-DSV02310, "Command error"; the order of several faults is not documented; this crate
-/// has chosen it. A block of the wrong size cannot happen on the ring; it counts as not addressed to this drive.
+/// Errors and alarms are those of SX-DSV02310, "Command error"; the order in which several faults are reported is not
+/// documented and was chosen for this crate. A block of the wrong size cannot occur on the ring; it is treated as not
+/// addressed to this drive.
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
     let &[byte0, byte1, ..] = bytes else { return Verdict::discard(WRONG_MAC_ID, ERR86_0) };
     let len = match size {

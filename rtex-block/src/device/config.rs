@@ -64,11 +64,11 @@ pub struct DriveConfig {
     pub update_ns: u32,
     /// Communication periods in an update period, 1 or 2.
     pub communications: u8,
-    /// Exchanges until the drive is synchronised to the communication.
+    /// Number of exchanges until the drive is synchronised to the communication.
     pub sync_exchanges: u16,
-    /// Update periods from Servo_On to Servo_Active.
+    /// Number of update periods from Servo_On to Servo_Active.
     pub servo_on_updates: u16,
-    /// Exchanges for which a parameter write or a reset is busy.
+    /// Number of exchanges for which a parameter write or a reset is busy.
     pub busy_exchanges: u16,
     /// Consecutive faulty receptions that raise Err86.0 or Err86.1 (the vendor's time is not known).
     pub fault_limit: u16,
@@ -86,9 +86,9 @@ pub struct DriveConfig {
     pub in_position: u32,
     /// Near window of profile motion, command units.
     pub near: u32,
-    /// Attributes that it reports for every alarm.
+    /// The attributes that it reports for every alarm.
     pub alarm_attributes: i32,
-    /// Distance of the origin from the point where homing starts, command units.
+    /// Distance from the point where homing starts to the origin, in command units.
     pub homing_distance: i32,
     /// The codes that are not confirmed.
     pub codes: OpenCodes,

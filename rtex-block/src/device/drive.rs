@@ -31,8 +31,8 @@ const HOMING_SPEED: i64 = 1_000_000;
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or cyclic code
 /// are discarded and the previous command stays in force; if that lasts, the drive raises Err86.
 ///
-/// It shares neither constants nor code with the master: blocks are read and written byte by byte. Its [`Behaviour`] says
-/// how late, forgetful and literal it is, and its [`Fault`] what goes wrong. The motor follows its command position as a
+/// It shares neither constants nor code with the master: blocks are read and written byte by byte. Its [`Behaviour`] says how
+/// late, forgetful and literal it is, and its [`Fault`] says what goes wrong. The motor follows its command position as a
 /// first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -53,10 +53,10 @@ pub struct Drive {
     sub_feed_forward: [i32; 2],
     /// Byte 3 of a response.
     inputs: u8,
-    /// Byte 2 of the responses, and Latch_Comp, as they would have been without lateness; the latest first.
+    /// Byte 2 of the responses, and Latch_Comp, as they would have been without delay; the latest first.
     shown: [u8; 16],
     comp: [u8; 16],
-    /// Latch_Comp as the next response will show it.
+    /// Latch_Comp as in the next response.
     latched: u8,
     /// The command in force: cyclic code, Control_Bits, Command_Data1.
     cyclic: u8,
@@ -65,11 +65,11 @@ pub struct Drive {
     target_speed: i32,
     /// What the next response echoes.
     echo: u8,
-    /// Byte 1 of the last block taken; a discarded block does not count.
+    /// Byte 1 of the last block taken; discarded blocks are not included.
     taken: u8,
     error: Option<u16>,
     job: Option<Job>,
-    /// The request before, whose echoes linger, and for how many answers.
+    /// The previous request, whose echoes linger, and the number of answers for which they do.
     stale: Option<(Request, u16)>,
     sub: Sub,
     /// The response sent last.
@@ -271,14 +271,14 @@ impl Drive {
         }
     }
 
-    /// Servo_Ready: main power, no alarm, synchronised.
+    /// Servo_Ready: main power is on, there is no alarm, and the drive is synchronised.
     const fn is_ready(&self) -> bool {
         !matches!(self.fault, Fault::NoMainPower | Fault::EmergencyStop)
             && self.alarm.is_none()
             && self.exchanges >= self.config.sync_exchanges
     }
 
-    /// Byte 2 as it is.
+    /// Byte 2 without delay.
     fn status(&self) -> u8 {
         let progress = self.motion.in_progress();
         let settled = self.motion.deviation().unsigned_abs() <= self.config.in_position;
@@ -295,7 +295,7 @@ impl Drive {
         set.into_iter().fold(0, |all, (flag, on)| if on { all | flag } else { all })
     }
 
-    /// Byte 2 as this response shows it: each bit is delayed by its own number of exchanges.
+    /// Byte 2 as shown in this response: each bit is delayed by its own number of exchanges.
     fn shown(&mut self) -> u8 {
         let (now, comp) = (self.status(), self.latch_flags());
         for (past, new) in [(&mut self.shown, now), (&mut self.comp, comp)] {
@@ -431,7 +431,8 @@ impl Drive {
         }
     }
 
-    /// The counter adds 1 in every update period; with two communications in it every value comes twice.
+    /// Checks that the counter advances by 1 in every update period; with two communications per period, every value comes
+    /// twice.
     fn supervise(&mut self, counter: u8) {
         let last = self.counter.replace(counter);
         let allowed = self.config.communications.saturating_sub(1);

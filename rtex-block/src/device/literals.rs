@@ -1,4 +1,4 @@
-//! The numbers on the wire, written a second time: the drive shares none with the master.
+//! The numbers on the wire, defined a second time: the drive shares none with the master.
 
 /// Cyclic codes, bits 6-4 of byte 1.
 pub(super) const NOP: u8 = 0;
@@ -7,7 +7,7 @@ pub(super) const CP: u8 = 2;
 pub(super) const CV: u8 = 3;
 pub(super) const CT: u8 = 4;
 
-/// Non-cyclic codes that are defined, and those of them that the sub block knows.
+/// The non-cyclic codes that are defined, and those that are also valid in the sub block.
 pub(super) const NON_CYCLIC: [u8; 8] = [0, 1, 2, 4, 5, 6, 7, 10];
 pub(super) const NORMAL: u8 = 0;
 pub(super) const RESET: u8 = 1;
@@ -62,7 +62,7 @@ pub(super) const MSPD: u16 = 0x0c;
 pub(super) const REGENERATIVE_LOAD: u16 = 0x11;
 pub(super) const OVERLOAD: u16 = 0x12;
 
-/// Texts by the new and the conventional type code.
+/// The texts by the new type codes and by the conventional ones.
 pub(super) const TEXTS: [(u16, u16, &[u8]); 8] = [
     (0x01, 0x010, b"Panasonic"),
     (0x05, 0x050, b"1"),
@@ -74,7 +74,7 @@ pub(super) const TEXTS: [(u16, u16, &[u8]); 8] = [
     (0x32, 0x320, b"SCALE MODEL"),
 ];
 
-/// Control bits that the drive evaluates, byte 2 in bits 7-0.
+/// The control bits that the drive evaluates, byte 2 in bits 7-0.
 pub(super) const SERVO_ON: u16 = 0x0080;
 pub(super) const PAUSE: u16 = 0x2000;
 pub(super) const SMOOTH_STOP: u16 = 0x4000;

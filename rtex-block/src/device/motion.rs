@@ -3,7 +3,7 @@ use super::profile::{Generator, Ramp};
 
 /// Largest torque, 0.1 % of rated.
 pub(super) const MAX_TORQUE: i32 = 3_000;
-/// Torque that changes the speed by one unit an update period, per update period; a model constant.
+/// The torque that changes the speed by one unit per update period in each update period; a constant of the model.
 const TORQUE_PER_STEP: i32 = 2;
 
 /// What the motor is doing.
@@ -12,7 +12,7 @@ const TORQUE_PER_STEP: i32 = 2;
 pub(super) enum Power {
     /// Not energised, at rest.
     Off,
-    /// Servo_On was seen.
+    /// Servo_On was received; not yet energised.
     SwitchingOn { left: u16 },
     /// Energised.
     On,
@@ -42,7 +42,7 @@ pub(super) struct Motion {
     pub(super) actual: i32,
     /// IPOS.
     pub(super) command: i32,
-    /// Steps of the last update period.
+    /// The step made in the last update period.
     pub(super) actual_step: i32,
     pub(super) command_step: i32,
     /// TRQ, 0.1 %.
@@ -90,7 +90,7 @@ impl Motion {
         self.start_in = late;
     }
 
-    /// Moves by the drive itself; the model does so in an instant.
+    /// Makes the homing move, which the drive controls by itself; the model starts without delay.
     pub(super) const fn home(&mut self, distance: i32) {
         self.start(Generator::new(distance), 0);
     }
@@ -234,7 +234,7 @@ impl Motion {
     }
 }
 
-/// Whether a step makes more than 400 000 000 pulses in a second after the electronic gear.
+/// Whether a step amounts to more than 400 000 000 pulses per second after the electronic gear.
 fn is_too_large(step: i32, config: &DriveConfig) -> bool {
     let (pulses, units) = config.gear.into();
     let rate = u128::from(step.unsigned_abs()).saturating_mul(pulses.into()).saturating_mul(1_000_000_000);

@@ -57,7 +57,7 @@ impl Parameters {
         self.0.iter().find(|parameter| parameter.pr == pr).map_or(0, |parameter| parameter.value)
     }
 
-    /// Parameters of a class, the high byte of `pr`; `None` if there is no such class.
+    /// Number of parameters in the class given by the high byte of `pr`; `None` if there is no such class.
     pub(super) fn count(pr: u16) -> Option<i32> {
         let [class, _] = pr.to_be_bytes();
         let all = Self::DEFAULT.0.into_iter().filter(|parameter| parameter.pr.to_be_bytes()[0] == class).count();

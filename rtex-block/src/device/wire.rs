@@ -11,7 +11,8 @@ pub(super) struct Request {
 }
 
 impl Request {
-    /// Homing and profile have a type code of 8 bits and flags beside it; the other codes have a type code of 12 bits.
+    /// Homing and profile commands have a type code of 8 bits and flags next to it; the other commands have a type code of
+    /// 12 bits.
     const fn is_short(&self) -> bool {
         matches!(self.code, HOMING | PROFILE)
     }
@@ -26,7 +27,7 @@ impl Request {
         u16::from_le_bytes([low, high])
     }
 
-    /// Of homing and profile.
+    /// The flags of homing and profile commands.
     pub(super) const fn monitor_sel(&self) -> u8 {
         let [_, _, _, monitor_sel, ..] = self.bytes;
         monitor_sel
@@ -37,7 +38,7 @@ impl Request {
         i32::from_le_bytes([a, b, c, d])
     }
 
-    /// The same command for a different object.
+    /// Returns the same command for a different object.
     pub(super) const fn other(mut self, by_index: bool) -> Self {
         if by_index {
             self.bytes[2] ^= 1;

@@ -26,7 +26,8 @@ pub struct LogAnalysis {
 }
 
 impl LogAnalysis {
-    /// Starts a log. `update_ns` is the update period, if it is known; it and `gear` give the limit of the position step.
+    /// Starts a log. `update_ns` is the update period, if it is known; together with `gear` it determines the limit of the
+    /// position step.
     pub const fn new(update_ns: Option<u32>, gear: Gear) -> Self {
         let max_step = match update_ns {
             Some(update_ns) => Some(max_step(update_ns, gear)),

@@ -45,11 +45,11 @@ pub struct Axis {
     /// Largest step of the command position.
     max_step: u32,
     state: AxisState,
-    /// Update periods left in the present state.
+    /// Number of update periods left in the present state.
     left: u32,
     /// Category of the stop in progress.
     category: StopCategory,
-    /// The request of the caller: the mode, and the position, speed or torque in it.
+    /// What the caller has requested: the mode, and the position, speed or torque in it.
     mode: ActiveCode,
     setpoint: i32,
     /// The content of the last block.
@@ -57,7 +57,7 @@ pub struct Axis {
     evidence: Evidence,
     watch: EchoWatch,
     arrival: Arrival,
-    /// Update periods without an exchange before the last one.
+    /// Number of update periods without an exchange before the last one.
     missed: u8,
     /// The low half of the end of the last update period, ns.
     heard_ns: u32,
@@ -67,12 +67,12 @@ pub struct Axis {
     counters: Counters,
     /// Why the last block was refused; `None` after a good one.
     last_refusal: Option<Error>,
-    /// Consecutive responses with CMD_Error.
+    /// Number of consecutive responses with CMD_Error.
     refused: u16,
-    /// Responses with Servo_Active = 1 since the servo was commanded off.
+    /// Number of responses with Servo_Active = 1 since the servo was commanded off.
     active_off: u32,
-    /// Responses on time with Servo_Active = 0 since the servo was last switched off, one after another; enough, if it never was
-    /// on.
+    /// Number of consecutive responses on time with Servo_Active = 0 since the servo was last switched off; as many as are
+    /// needed if it never was on.
     passive: u8,
     disobeys: bool,
     main: Main,
@@ -87,14 +87,15 @@ struct Wire {
     mode: ActiveCode,
     /// Command_Data1.
     value: i32,
-    /// In CP with the servo on, the step from the previous value to this one; in another mode, the distance moved by the
-    /// motor since the last block.
+    /// In CP with the servo on, the step from the previous value to this one; otherwise, the distance that the motor has moved
+    /// since the last block.
     step: i32,
     /// Servo_On.
     on: bool,
 }
 
-/// Missed update periods after which a motor stands that got no new command position: the most that are counted.
+/// Number of missed update periods after which a motor without a new command position is at rest; no more than these are
+/// counted.
 const MANY: u8 = 3;
 
 impl Axis {
@@ -149,7 +150,7 @@ impl Axis {
         self.state
     }
 
-    /// Returns when the block of the last update period came, by its counter echo.
+    /// Returns whether the block of the last update period was on time, by its counter echo.
     pub const fn arrival(&self) -> Arrival {
         self.arrival
     }
@@ -290,14 +291,14 @@ impl Axis {
         self.evidence.last().sampled_ns().saturating_add(self.config.update_ns.into())
     }
 
-    /// Whether the last update period has brought a position that is known to be of that period.
+    /// Whether the last update period brought a position that is known to be from that period.
     pub(super) const fn is_current(&self) -> bool {
         matches!(self.arrival, Arrival::OnTime) && self.missed == 0
     }
 
     /// Returns the number of update periods without an exchange since the last one, by the clock; at most three, because
-    /// the counter goes no further. It does not matter whether it was more than four seconds: by then no block is on time,
-    /// or has been for a long time.
+    /// the counter goes no further. Whether the gap was longer than four seconds does not matter: by then no block is on time,
+    /// or none has been for a long time.
     #[expect(clippy::cast_possible_truncation, reason = "the difference counts")]
     fn missed(&mut self, end_ns: u64) -> u8 {
         let gap_ns = (end_ns as u32).wrapping_sub(self.heard_ns);
@@ -306,7 +307,7 @@ impl Axis {
         if gap_ns <= most_ns { 0 } else { self.after_gap(gap_ns.wrapping_sub(most_ns)) }
     }
 
-    /// Takes note of a gap between two exchanges, which is so much longer than the longest one between two neighbours.
+    /// Takes note of a gap between two exchanges that is `over_ns` longer than the longest one between neighbouring exchanges.
     #[cold]
     fn after_gap(&mut self, over_ns: u32) -> u8 {
         let missed = periods(over_ns, self.config.update_ns);

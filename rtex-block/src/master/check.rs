@@ -16,9 +16,9 @@ pub struct Expected {
     pub size: BlockSize,
     /// The drive.
     pub mac_id: MacId,
-    /// Counter of the command last sent.
+    /// The counter of the command last sent.
     pub update_counter: UpdateCounter,
-    /// Code of the command last sent.
+    /// The code of the command last sent.
     pub code: Code,
 }
 
@@ -52,7 +52,7 @@ servowire_core::one_line!(Acknowledgement {
 pub struct Checked {
     /// The response.
     pub response: Response,
-    /// What it says.
+    /// What the response says.
     pub acknowledgement: Acknowledgement,
 }
 

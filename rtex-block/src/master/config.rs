@@ -14,8 +14,8 @@ use crate::position::Gear;
 pub struct Limits {
     /// Number of update periods without a block on time that counts as a time-out.
     pub echo: NonZeroU16,
-    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed: the
-    /// main power may be switched on at any time.
+    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready. `None` unless changed,
+    /// because the main power may be switched on at any time.
     pub ready: Option<u32>,
     /// From Servo_On to Servo_Active.
     pub active: u32,
@@ -25,8 +25,8 @@ pub struct Limits {
     pub answer: u32,
     /// For a controlled deceleration ([`StopCategory::One`] and [`Two`](StopCategory::Two)).
     pub stop: u32,
-    /// Consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. A single one may come
-    /// from a damaged frame, in which case the drive keeps the previous command.
+    /// Number of consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. A single one
+    /// may come from a damaged frame, in which case the drive keeps the previous command.
     pub command_errors: NonZeroU16,
 }
 
@@ -75,7 +75,7 @@ pub struct AxisConfig {
     pub mac_id: MacId,
     /// Its mode when it is switched on; [`Axis::set_mode`](super::Axis::set_mode) changes it.
     pub mode: ActiveCode,
-    /// Update period, ns: for the limit of the position step.
+    /// Update period in ns, for the limit of the position step.
     pub update_ns: u32,
     /// Time limits.
     pub limits: Limits,

@@ -14,7 +14,7 @@ pub enum Turn {
 /// Update_Counter of the master.
 ///
 /// Invalid data (00h) are sent with counter 0, and the first valid block has 1. Then the counter adds 1 modulo 4 in every
-/// update period, even if nothing else changes; otherwise drives do not take the commands. With two communication periods
+/// update period, even if nothing else changes; otherwise drives do not accept the commands. With two communication periods
 /// in an update period the same block is sent twice. SX-DSV02310, "Update counter".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -2,24 +2,24 @@ use core::num::NonZeroU16;
 
 use crate::header::UpdateCounter;
 
-/// Values of the counter. A block that is this many periods old has the echo of a new one, so anything that must not be
-/// taken from an old block waits for this many new ones.
+/// Number of values of the counter. A block that is this many periods old has the echo of a new one, so anything that must not
+/// come from an old block waits for this many new ones.
 pub(super) const TURN: u8 = 4;
 
-/// When a block came, by its counter echo.
+/// Whether a block came on time, by its counter echo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Arrival {
-    /// With the expected echo: as many counters behind the last one sent as in every exchange of this system.
+    /// The block has the expected echo, which is as far behind the last counter sent as in every exchange of this system.
     OnTime,
-    /// With the echo of the previous block: no frame came, or the drive has stopped.
+    /// The block has the echo of the previous one: no frame came, or the drive has stopped.
     Repeated,
-    /// With the echo of another period: the answer is late or belongs to the next frame, or the wrong bank was read.
+    /// The block has the echo of another period: the answer is late or belongs to the next frame, or the wrong bank was read.
     OffTime {
         /// Difference from the echoed counter to the last one sent, modulo 4.
         lag: u8,
     },
-    /// No block, or one that was refused.
+    /// No block came, or it was refused.
     Missing,
 }
 
@@ -30,31 +30,31 @@ servowire_core::one_line!(Arrival {
     Self::Missing => "no block";
 });
 
-/// Judges every block by its counter echo, and notices that no block comes on time.
+/// Judges every block by its counter echo, and notices if no block comes on time.
 ///
 /// The lag from the counter sent to the echo read is the same in every exchange of a system; it is learned from the first
-/// block, and learned again from a whole turn of the counter as long as the servo is off. A block with a different lag
-/// belongs to a different frame. The first block may itself be late if periods without a block came before it: in that case
-/// its lag is not relied on until a whole turn has had it.
+/// block, and learned again from a whole turn of the counter as long as the servo is off. A block with a different lag comes
+/// from a different frame. The first block may itself be late if there were periods without a block before it; its lag is
+/// then not relied on until it has been the same for a whole turn.
 ///
-/// `limit` consecutive samples without a block on time trip the watch, and it
-/// stays tripped: then command servo-off to **all** axes ([`ServoOff`](super::ServoOff)). The vendor does not give the
-/// time, so the caller sets the limit. System Design Guide for Master, "Time-out by the counter echo".
+/// `limit` consecutive samples without a block on time trip the watch, and it stays tripped; then command servo-off to
+/// **all** axes ([`ServoOff`](super::ServoOff)). The vendor does not state the time, so the caller sets the limit. System
+/// Design Guide for Master, "Time-out by the counter echo".
 ///
-/// Two traps: sampling every communication period when two of them make an update period sees every value twice
-/// (the limit must be 2 or more then), and sampling every fourth update period always sees the same value.
+/// There are two traps: if two communication periods make an update period, sampling in every communication period yields every
+/// value twice (the limit must then be 2 or more), and sampling in every fourth update period always yields the same value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EchoWatch {
     limit: NonZeroU16,
-    /// Samples since the last one on time.
+    /// Number of samples since the last one on time.
     updates: u16,
     last: Option<UpdateCounter>,
     lag: Option<u8>,
-    /// A different lag that was seen, and how often in a row.
+    /// A different lag that was seen, and how many times in a row.
     other: u8,
     seen: u8,
-    /// Blocks that have had the lag.
+    /// Number of blocks that have had the lag.
     sure: u8,
 }
 
@@ -64,7 +64,7 @@ impl EchoWatch {
         Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0, sure: 0 }
     }
 
-    /// Takes a sample if the counter sent is not known; `None` if the update period brought no block from the drive, which
+    /// Takes a sample without knowing the counter sent; `None` if the update period brought no block from the drive, which
     /// counts as unchanged. Returns whether the watch has tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
         let is_new = echo.is_some() && echo != self.last;
@@ -73,8 +73,8 @@ impl EchoWatch {
         self.is_tripped()
     }
 
-    /// Takes the echo that came after `sent`; `missed`: update periods without an exchange before it; `learns`: the servo
-    /// is off.
+    /// Takes the echo that came after `sent`; `missed` is the number of update periods without an exchange before it; `learns`
+    /// is set if the servo is off.
     pub(super) fn judge(
         &mut self,
         sent: UpdateCounter,
@@ -139,14 +139,14 @@ impl EchoWatch {
         self.last = Some(echo);
     }
 
-    /// Restarts the limit. This does not make a block that was already in the memory new, and the lag is still that of the
-    /// system.
+    /// Restarts the limit. A block that was already in the memory does not become new by this, and the lag of the system is
+    /// kept.
     pub const fn reset(&mut self) {
         self.updates = 0;
     }
 }
 
-/// Notices that receptions have stopped, if the receive interrupt (XINTRX) is used.
+/// Notices if receptions stop, for systems that use the receive interrupt (XINTRX).
 ///
 /// Its handler calls [`frame_received`](Self::frame_received), the NC interrupt [`tick`](Self::tick). In the internal-timer system the
 /// receive interrupt must have the lower priority of the two, in the external-timer system the higher. System Design
@@ -164,7 +164,7 @@ impl ReceiveWatchdog {
         Self { limit, ticks: 0 }
     }
 
-    /// Reports that a frame was received. A watchdog that has tripped stays so.
+    /// Reports that a frame was received. A watchdog that has tripped stays tripped.
     pub(super) const fn frame_received(&mut self) {
         if !self.is_tripped() {
             self.ticks = 0;

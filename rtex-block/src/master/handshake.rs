@@ -21,9 +21,9 @@ use crate::type_code::TypeCode;
 ///                      else                          done
 ///  go back to the normal command (0h)
 /// ```
-/// Going back is needed before the same command is *executed* again; a monitor value is refreshed while the
+/// The handshake must go back before the same command can be *executed* again; a monitor value is refreshed while the
 /// command is held, so [`receive`](Self::receive) may still be called after `Done`. The rules follow from the meaning of the
-/// flags in SX-DSV02310; the matching of echoes is this crate's interpretation.
+/// flags in SX-DSV02310; how echoes are matched is this crate's interpretation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Handshake {
@@ -66,7 +66,7 @@ impl Handshake {
         self.request
     }
 
-    /// Update periods until it times out.
+    /// Number of update periods until it times out.
     pub const fn left(&self) -> u32 {
         self.left
     }

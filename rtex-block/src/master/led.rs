@@ -13,7 +13,7 @@ pub enum Led {
     Red,
 }
 
-/// A pattern over time.
+/// A pattern of the LED over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -24,11 +24,11 @@ pub enum Pattern {
     Flashing(Led),
 }
 
-/// Patterns without a fault, by phase.
+/// The patterns without a fault, by phase.
 ///
 /// In the guide's table the text "flashing green" is in the row of PH_PREPARE, and the rows of PH_WAITING and PH_START are
-/// blank; this crate reads it as one cell over the three rows. The other possible reading has PH_WAITING dark and
-/// PH_PREPARE and PH_START flashing.
+/// blank; this crate reads it as one cell over the three rows. In the other possible reading, PH_WAITING is dark, and
+/// PH_PREPARE and PH_START flash.
 const BY_PHASE: [(ControlPhase, Pattern); 5] = [
     (ControlPhase::Init, Pattern::Steady(Led::Off)),
     (ControlPhase::Waiting, Pattern::Flashing(Led::Green)),
@@ -40,8 +40,8 @@ const BY_PHASE: [(ControlPhase, Pattern); 5] = [
 /// Half of a flashing period, ms.
 const HALF_MS: u64 = 500;
 
-/// Returns the pattern of a state. A fault is shown in any phase: a time-out flashing red, slaves that do not match the
-/// table steady red.
+/// Returns the pattern of a state. A fault is shown in any phase: a time-out by flashing red, slaves that do not match the
+/// table by steady red.
 pub fn pattern(phase: ControlPhase, fault: Option<ControlError>) -> Pattern {
     match fault {
         Some(ControlError::Timeout) => Pattern::Flashing(Led::Red),

@@ -12,7 +12,7 @@ pub enum Asic {
     RingConfig,
     /// The ring is closed.
     Ready,
-    /// Cyclic transmission. Only now the transmit-timing input (XTXTIM) counts.
+    /// Cyclic transmission. Only in this state is the transmit-timing input (XTXTIM) used.
     Running,
 }
 
@@ -34,7 +34,7 @@ servowire_core::codes! {
     }
 }
 
-/// Why the phases stop.
+/// Why the phases have stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -52,7 +52,7 @@ servowire_core::one_line!(ControlError {
 
 impl core::error::Error for ControlError {}
 
-/// The inputs of a step.
+/// The inputs to a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -77,8 +77,8 @@ pub struct Inputs {
 ///   RING-CONFIG  (else fault)    data written
 /// ```
 /// A step makes at most one transition, never back, and none once there is an error. The names of the phases
-/// and the two errors are from the System Design Guide for Master; its figures of the transitions were not available, so
-/// the conditions are this crate's interpretation.
+/// and the two errors are from the System Design Guide for Master; its diagrams of the transitions were not available, so the
+/// conditions are this crate's interpretation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PhaseControl {

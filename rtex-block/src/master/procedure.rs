@@ -1,8 +1,8 @@
 //! Procedures of several requests: texts, parameters, alarms, homing, latch.
 //!
-//! Call `start` of a procedure, and then `receive` once in every update period after the exchange, until it is done or
-//! failed; it stays so until it is restarted. It sends its requests through its axis, so nothing else may send requests
-//! meanwhile. The caller supplies type codes that no available document confirms.
+//! Call `start` of a procedure, and then `receive` once in every update period after the exchange, until it is done or has
+//! failed; it stays in that state until it is restarted. It sends its requests through its axis, so nothing else may send
+//! requests meanwhile. The caller supplies type codes that no available document confirms.
 
 mod alarms;
 mod ask;

@@ -26,7 +26,7 @@ pub enum MoveStage {
 
 /// The end of a profile motion: In_Progress went from 1 to 0, so the drive no longer generates position commands.
 ///
-/// That is not the arrival of the motor: it may still be on its way to the last command position.
+/// This is not the arrival of the motor, which may still be on its way to the last command position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -63,9 +63,9 @@ impl ProfileMove {
     /// Creates a motion to `target_position` (absolute or relative, by the type code), unit of the speed by Pr7.25; the
     /// drive has `limit` update periods to get ready and to set In_Progress.
     ///
-    /// A motion of zero length may never set it, and then fails as [`NotStarted`](Failure::NotStarted). That In_Progress
-    /// may come later than the first echo of 17h is inferred: the vendor does not say when it rises. Before a relative
-    /// motion, read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
+    /// A motion of zero length may never set it, in which case it fails with [`NotStarted`](Failure::NotStarted). That
+    /// In_Progress may come later than the first echo of 17h is inferred: the vendor does not say when it rises. Before a
+    /// relative motion, read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
     pub const fn new(mac_id: MacId, type_code: u8, target_position: i32, target_speed: i32, limit: u32) -> Self {
         Self {
             mac_id,
@@ -111,17 +111,17 @@ impl ProfileMove {
         }
     }
 
-    /// Returns its state.
+    /// Returns the state of the motion.
     pub(super) const fn progress(&self) -> Progress<CommandEnded> {
         self.progress
     }
 
-    /// Its progress while it is pending.
+    /// The progress of the motion while it is pending.
     pub const fn stage(&self) -> MoveStage {
         self.stage
     }
 
-    /// Returns whether In_Progress was 1 and the end has not come.
+    /// Returns whether In_Progress was 1 and the motion has not ended.
     pub const fn is_moving(&self) -> bool {
         matches!(self.stage, MoveStage::Moving)
     }
@@ -131,13 +131,13 @@ impl ProfileMove {
         self.flags
     }
 
-    /// Monitor_Data of the last answer: the value chosen by Monitor_Sel. LPOS1 counts once Latch_Comp1 is set.
+    /// Monitor_Data of the last answer: the value chosen by Monitor_Sel. LPOS1 is valid once Latch_Comp1 is set.
     pub const fn monitor_data(&self) -> i32 {
         self.monitor_data
     }
 
-    /// Ends the motion for this reason, or because the servo is off, and for no other: at once or, if the drive `slows`
-    /// down, together with In_Progress. An end that is not `confirmed` was one of this kind.
+    /// Ends the motion for this reason, or because the servo is off, and for no other reason: at once or, if the drive `slows`
+    /// down, when In_Progress ends. An end that is not `confirmed` counts as an end of this kind.
     pub(super) fn break_off(&mut self, reason: Option<StopReason>, confirmed: bool, slows: bool) {
         match self.progress {
             Progress::Pending { .. } if slows => self.broken = self.broken.or(reason),
@@ -147,7 +147,7 @@ impl ProfileMove {
         }
     }
 
-    /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
+    /// Takes the result of one update period: the drive's response, `None` if there was none or it was refused.
     pub fn receive(&mut self, response: Option<&Response>) -> Progress<CommandEnded> {
         match (self.stage, response.filter(|response| response.mac_id == self.mac_id)) {
             (MoveStage::Preparing, Some(r))
@@ -187,7 +187,8 @@ impl ProfileMove {
         }
     }
 
-    /// CMD_Error refuses the start. During the motion it is the effect of one damaged frame: the drive keeps moving.
+    /// A CMD_Error at the start refuses the motion. During the motion it is the effect of one damaged frame, and the drive
+    /// keeps moving.
     fn refuse(&mut self, response: &Response) {
         if let (MoveStage::Starting, NonCyclicResponse::CommandError(code)) = (self.stage, response.noncyclic()) {
             self.fail(Failure::CommandError(code));

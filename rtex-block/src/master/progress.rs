@@ -12,7 +12,7 @@ use crate::type_code::Pr;
 pub enum Progress<T> {
     /// Not finished.
     Pending {
-        /// Remaining update periods until it fails for lack of an answer.
+        /// Number of update periods left until it fails for lack of an answer.
         left: u32,
     },
     /// Finished.
@@ -47,14 +47,14 @@ impl<T> Progress<T> {
         }
     }
 
-    /// Returns whether it continues.
+    /// Returns whether it is still pending.
     pub const fn is_pending(&self) -> bool {
         matches!(self, Self::Pending { .. })
     }
 }
 
 impl<T: Copy> Progress<T> {
-    /// Returns how it ended, if it did.
+    /// Returns how it ended; `None` while it is pending.
     pub(super) const fn ended(&self) -> Option<Self> {
         if self.is_pending() { None } else { Some(*self) }
     }
@@ -69,10 +69,10 @@ pub enum Failure {
     Execution,
     /// CMD_Error: the command was not accepted.
     CommandError(ErrorCode),
-    /// No answer within the caller's limit. It is not known whether the drive has executed the command.
+    /// No answer came within the caller's limit. It is not known whether the drive has executed the command.
     TimedOut,
-    /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may still
-    /// start.
+    /// The drive answered the start of a profile motion but did not set In_Progress within the caller's limit. The motion may
+    /// still start.
     NotStarted,
     /// The servo was switched off, or was not on.
     ServoOff,

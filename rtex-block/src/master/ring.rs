@@ -20,7 +20,7 @@ pub struct Ring<const N: usize> {
     fellows: Fellows,
 }
 
-/// What the axes of a ring learn about each other, for rings whose axes are stored elsewhere than in a [`Ring`].
+/// Passes failures between the axes of a ring, for axes that are not stored in a [`Ring`].
 ///
 /// In every update period each axis is [looked at](Self::look) after it has heard its block, and then
 /// each is [told](Self::tell), before it transmits.
@@ -29,7 +29,7 @@ pub struct Ring<const N: usize> {
 pub struct Fellows {
     failed: Option<u8>,
     timed_out: bool,
-    /// An axis has failed by itself: it was not stopped on request or with others.
+    /// An axis has failed by itself, rather than having been stopped on request or with others.
     faulty: bool,
 }
 
@@ -39,12 +39,12 @@ impl Fellows {
         Self { failed: None, timed_out: false, faulty: false }
     }
 
-    /// Begins a round of looking.
+    /// Begins a round, in which each axis is looked at.
     pub const fn begin(&mut self) {
         self.timed_out = false;
     }
 
-    /// Examines the axis at a place of the ring.
+    /// Looks at the axis at a place of the ring.
     pub const fn look(&mut self, place: u8, axis: &Axis) {
         if let AxisState::Stopped(reason) = axis.state() {
             if self.failed.is_none() {
@@ -92,9 +92,9 @@ impl core::error::Error for SameMacId {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RingFailure {
-    /// Its place in the ring.
+    /// The place of the axis in the ring.
     pub place: u8,
-    /// Why it stopped.
+    /// Why the axis stopped.
     pub reason: StopReason,
 }
 

@@ -20,7 +20,7 @@ pub enum Ended<E> {
     Line(E),
     /// An axis has stopped.
     Ring(RingFailure),
-    /// An axis does not become ready: it reports an alarm.
+    /// An axis does not become ready because it reports an alarm.
     Alarm {
         /// Its place in the ring.
         place: u8,
@@ -55,8 +55,8 @@ impl<E: core::fmt::Display> core::fmt::Display for Ended<E> {
 impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for Ended<E> {}
 
 /// Keeps a ring in step and does common jobs on it, one at a time: for the start-up of a machine, for tests and for tools.
-/// Each call returns when its job is done, and the other axes hold their set-points meanwhile; a program that moves
-/// several axes at once keeps its [procedures](super::procedure) itself and calls [`update`](Self::update).
+/// Each call returns when its job is done, and the other axes hold their set-points meanwhile; a program that moves several
+/// axes at once runs the [procedures](super::procedure) itself and calls [`update`](Self::update).
 ///
 /// ```
 /// use rtex_block::device::{Drive, DriveConfig, OpenCodes};
@@ -94,7 +94,7 @@ impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for Ended<E> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Run<const N: usize> {
-    /// Why an exchange fails.
+    /// Why an exchange failed.
     type Error;
 
     /// The ring.
@@ -102,8 +102,7 @@ pub trait Run<const N: usize> {
 
     /// Waits for the next update period and makes its exchange; returns when the period began, in ns.
     ///
-    /// # Errors
-    /// Those of the line.
+    /// # Errors The errors of the line.
     fn update(&mut self) -> Result<u64, Self::Error>;
 
     /// Lets this many update periods pass.
@@ -114,7 +113,7 @@ pub trait Run<const N: usize> {
         (0..updates).try_for_each(|_| step(self).map(|_| ()))
     }
 
-    /// Runs update periods until `done`; `None`: without a limit.
+    /// Runs update periods until `done`; a limit of `None` means no limit.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Limit`]
@@ -172,7 +171,7 @@ pub trait Run<const N: usize> {
         }
     }
 
-    /// Asks the drive at `place` for something.
+    /// Sends a request to the drive at `place` and waits for its answer.
     ///
     /// # Errors
     /// As [`procedure`](Self::procedure).
@@ -204,8 +203,8 @@ pub trait Run<const N: usize> {
         }
     }
 
-    /// Follows cyclic positions from any source, in CP. For the instant of each update period and the place of an axis,
-    /// `position` returns where the axis has to be, or `None` at the end of its motion. Ends when all motions have ended.
+    /// Follows cyclic positions from any source, in CP. `position` is called with the instant of an update period and the place
+    /// of an axis; it returns where the axis has to be, or `None` at the end of its motion. Ends when all motions have ended.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Setpoint`]
@@ -226,7 +225,7 @@ pub trait Run<const N: usize> {
     }
 }
 
-/// Makes one update period; an axis that has stopped ends the job.
+/// Runs one update period; an axis that has stopped ends the job.
 fn step<const N: usize, R: Run<N> + ?Sized>(run: &mut R) -> Result<u64, Ended<R::Error>> {
     let now_ns = run.update().map_err(Ended::Line)?;
     match run.ring_mut().failure() {

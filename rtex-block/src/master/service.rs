@@ -26,13 +26,13 @@ pub struct MasterConfig {
     pub size: BlockSize,
     /// Communication and update period.
     pub periods: Periods,
-    /// What sets the pace.
+    /// The timer that sets the pace.
     pub timer: TimerSystem,
-    /// Update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the vendor's
-    /// number is not known).
+    /// Number of update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the
+    /// vendor's number is not known).
     pub invalid: u32,
-    /// Update periods without [`Master::frame_received`] that count as a time-out; `None` if the receive interrupt is not
-    /// used.
+    /// Number of update periods without [`Master::frame_received`] that count as a time-out; `None` if the receive interrupt
+    /// is not used.
     pub watchdog: Option<NonZeroU16>,
 }
 
@@ -162,8 +162,7 @@ impl<const N: usize> Master<N> {
         &self.ring
     }
 
-    /// Returns the ring, for set-points, requests, switching on and off. Its [`update`](Ring::update) belongs to the
-    /// exchange.
+    /// Returns the ring, for set-points, requests, switching on and off. Leave its [`update`](Ring::update) to the exchange.
     pub const fn ring_mut(&mut self) -> &mut Ring<N> {
         &mut self.ring
     }
@@ -192,8 +191,8 @@ impl<const N: usize> Master<N> {
         commands
     }
 
-    /// Makes the exchange over memory of bytes, or of 16- or 32-bit words packed as [`pack`](crate::pack) says, heard until
-    /// `end_ns`: the blocks of all axes follow one another, in the order of the axes.
+    /// Makes the exchange over memory of bytes, or of 16- or 32-bit words packed as described in [`pack`](crate::pack), heard
+    /// until `end_ns`: the blocks of all axes follow one another, in the order of the axes.
     ///
     /// # Errors [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written.
     pub fn exchange_words<W: Word>(&mut self, rx: &[W], tx: &mut [W], end_ns: u64) -> Result<(), SizeMismatch> {

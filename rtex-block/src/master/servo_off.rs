@@ -19,7 +19,7 @@ servowire_core::codes! {
 }
 
 impl ActiveCode {
-    /// As a cyclic code.
+    /// Returns the cyclic code.
     pub const fn cyclic(self) -> CyclicCode {
         match self {
             Self::ProfilePosition => CyclicCode::ProfilePosition,
@@ -32,9 +32,9 @@ impl ActiveCode {
 
 /// A command that switches a servo off, regardless of what the drive did before.
 ///
-/// A block of zeros does not: its code is NOP, with which a drive ignores Servo_On and continues with the previous command.
-/// A value of this type always has Servo_On = 0 and the code of one of the drive's modes, so send one of these to each axis
-/// instead of clearing the transmit memory. SX-DSV02310, "NOP command".
+/// A block of zeros does not do that: its code is NOP, with which a drive ignores Servo_On and continues with the previous
+/// command. A value of this type always has Servo_On = 0 and the code of one of the drive's modes, so send one of these to
+/// each axis instead of clearing the transmit memory. SX-DSV02310, "NOP command".
 ///
 /// ```
 /// use rtex_block::{Command, CommandBlock, ControlBits, CyclicCode, MacId, UpdateCounter, master::ServoOff};
@@ -70,7 +70,7 @@ impl ServoOff {
         }))
     }
 
-    /// As a command.
+    /// Returns the servo-off as a command.
     pub const fn command(&self) -> &Command {
         &self.0
     }

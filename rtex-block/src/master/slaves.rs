@@ -2,8 +2,8 @@ use crate::header::MacId;
 
 /// One entry of the slave information table.
 ///
-/// The name of the error implies that it holds the MAC-ID and the kind of slave. The vendor's layout and its values of the
-/// kind could not be read, so the kind is a plain number that is only compared.
+/// The name of the error implies that the entry holds the MAC-ID and the kind of slave. The vendor's layout and its codes for
+/// the kind could not be read, so the kind is a plain number that is only compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -9,7 +9,7 @@ use crate::header::MacId;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum StopReason {
-    /// No block has come on time for the limit: the echo of the counter does not change, or is that of other periods.
+    /// No block has come on time for the limit: the counter echo does not change, or is that of other periods.
     EchoTimeout,
     /// No block came on time because the blocks in this place come from the drive with this address: the axes are not
     /// listed in the order of the ring, or the drive's switches are set wrong.
@@ -34,10 +34,10 @@ pub enum StopReason {
     CommandError(ErrorCode),
     /// Another axis failed.
     OtherAxis {
-        /// Its place in the ring.
+        /// The place of that axis in the ring.
         place: u8,
     },
-    /// The caller stopped it.
+    /// The caller stopped the axis.
     Requested,
     /// A homing did not end in time, so the axis was stopped.
     HomingTimeout,
@@ -69,12 +69,12 @@ servowire_core::one_line!(StopReason {
 
 impl core::error::Error for StopReason {}
 
-/// State of an axis. Servo_On is 1 in `SwitchingOn` (from the first update period that brings a position), `On`, `Stopping` and
-/// `Held`, and in no other state.
+/// State of an axis. Servo_On is 1 only in `SwitchingOn` (from the first update period that brings a position), `On`,
+/// `Stopping` and `Held`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AxisState {
-    /// Waiting for Servo_Ready, and for Servo_Active = 0 as in `SwitchingOff`; Servo_On = 0.
+    /// Servo_On = 0, waiting for Servo_Ready, and for Servo_Active = 0 as in `SwitchingOff`.
     Starting,
     /// Ready, Servo_On = 0.
     Off,
@@ -87,8 +87,8 @@ pub enum AxisState {
     /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not
     /// accepted.
     Held(StopReason),
-    /// Servo_On = 0, waiting for Servo_Active = 0 for more than a turn of the counter: until then a drive may report the activity
-    /// of before.
+    /// Servo_On = 0, waiting for Servo_Active = 0 for more than a turn of the counter: until then a drive may still report its
+    /// earlier activity.
     SwitchingOff,
     /// Servo_On = 0 until [`Axis::clear`](super::Axis::clear).
     Stopped(StopReason),
@@ -117,15 +117,16 @@ servowire_core::one_line!(AxisState {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SwitchOnError {
-    /// Its servo is not off; carries the present state.
+    /// The servo of the axis is not off; carries the present state.
     State(AxisState),
-    /// This update period brought no position: no good block, or one that was not on time.
+    /// This update period brought no position: there was no good block, or it was not on time.
     OldPosition,
     /// The drive reports an alarm.
     Alarm,
     /// Servo_Ready is 0.
     NotReady,
-    /// A request is pending that changes the position or the state of the drive, or positions from before it may still come.
+    /// A request is pending that changes the position or the state of the drive, or positions from before such a request may
+    /// still come.
     Busy,
 }
 
@@ -139,11 +140,11 @@ servowire_core::one_line!(SwitchOnError {
 
 impl core::error::Error for SwitchOnError {}
 
-/// An axis of a ring that cannot be switched on, so no axis is switched on.
+/// An axis of a ring cannot be switched on, so no axis is switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RingSwitchOnError {
-    /// Its place in the ring.
+    /// The place of that axis in the ring.
     pub place: u8,
     /// Why.
     pub error: SwitchOnError,
@@ -153,7 +154,7 @@ servowire_core::one_line!(RingSwitchOnError { Self { place, error } => "axis {}:
 
 impl core::error::Error for RingSwitchOnError {}
 
-/// A set-point or a mode that an axis does not accept; it keeps the previous one.
+/// Why an axis does not accept a set-point or a mode; it keeps the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -186,7 +187,7 @@ pub enum SetpointError {
     NotStanding,
 }
 
-/// A request that an axis does not send.
+/// Why an axis does not send a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -195,12 +196,12 @@ pub enum AskError {
     /// Another request or a profile motion is in progress, or its last echoes are still due.
     #[error("another request or a profile motion is under way")]
     Busy,
-    /// The normal command has no answer, and a profile motion must be started with
+    /// This is not a request: the normal command has no answer, and a profile motion must be started with
     /// [`Axis::start_move`](super::Axis::start_move).
     #[error("no request that is answered")]
     NotARequest,
-    /// A reset, or setting a position, with the servo on: the drive would lose its state, or the set-point would stay in
-    /// the old coordinates and make a jump. In CP this includes any homing type whose meaning is not known.
+    /// The request is a reset or sets a position, and the servo is on: the drive would lose its state, or the set-point would
+    /// stay in the old coordinates and jump. In CP this includes any homing type whose meaning is not known.
     #[error("not while the servo is on")]
     ServoOn,
 }

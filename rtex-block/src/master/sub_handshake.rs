@@ -15,8 +15,8 @@ pub struct SubHandshake {
 }
 
 impl SubHandshake {
-    /// Asks for `code` (system ID or monitor); it times out after `limit` responses without an answer. `None` for the
-    /// normal sub-command, which has no answer.
+    /// Creates a request for `code` (system ID or monitor), which times out after `limit` responses without an answer.
+    /// `None` for the normal sub-command, which has no answer.
     pub const fn new(code: SubCode, type_code: u8, index: u16, limit: u32) -> Option<Self> {
         match code {
             SubCode::Normal => None,

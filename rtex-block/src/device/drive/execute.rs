@@ -105,7 +105,7 @@ impl Drive {
         self.latched & LATCH_COMP1 | if near { NEAR } else { 0 }
     }
 
-    /// Takes Command_Data3 as feed-forward, unless the command needs it itself. In that case, and if the new value is
+    /// Takes Command_Data3 as feed-forward, unless the command uses it itself. In that case, and if the new value is
     /// refused, the old feed-forward stays.
     fn feed(&mut self, request: &Request) -> Result<(), u16> {
         let own = match (request.code, request.type_code()) {
@@ -274,7 +274,7 @@ pub(super) fn text(code: u16, index: u16) -> Result<i32, u16> {
     Ok(group.iter().take(4).rev().fold(0, |word, character| word << 8 | i32::from(*character)))
 }
 
-/// Whether the master is holding a command rather than making a new request. Target speed and feed-forward may change
+/// Whether the master still holds the same command rather than making a new request. Target speed and feed-forward may change
 /// meanwhile.
 fn is_same(old: &Request, new: &Request) -> bool {
     let same = old.code == new.code && old.type_code() == new.type_code();

@@ -11,14 +11,14 @@ use crate::header::{MacId, UpdateCounter};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum LogFinding {
-    /// The echo of the counter has not changed for more than the two communications that an update period can have.
+    /// The counter echo has not changed for more than the two communications that an update period can have.
     EchoStands {
-        /// Responses in a row with the same echo.
+        /// Number of responses in a row with the same echo.
         responses: u32,
     },
-    /// The echo of the counter had not changed for longer than that, and counts again.
+    /// The counter echo had not changed for longer than that, and now counts again.
     EchoGoesOn {
-        /// Responses in a row with the same echo.
+        /// Number of responses in a row with the same echo.
         responses: u32,
     },
     /// The counter of the commands neither advanced by one nor stayed the same for the second communication of an update
@@ -29,27 +29,27 @@ pub enum LogFinding {
         /// Now.
         to: UpdateCounter,
     },
-    /// The code of the commands has come back, but later than one command after it was sent.
+    /// The code of the commands has come back, but more than one command after it was sent.
     CodeLate {
-        /// Responses from the first command with this code to its echo.
+        /// Number of responses from the first command with this code to its echo.
         responses: u32,
     },
     /// A step of the command position above 400 M pulses per second after the electronic gear: Err27.4.
     PositionStep {
-        /// The step, command units.
+        /// The step, in command units.
         step: i32,
-        /// The largest permitted, command units.
+        /// The largest permitted step, in command units.
         max: u32,
     },
     /// A request was answered.
     Answered {
-        /// Responses from the first command with the request to the first answer without Busy.
+        /// Number of responses from the first command with the request to the first answer without Busy.
         responses: u32,
-        /// Number of these with Busy.
+        /// Number of these that had Busy.
         busy: u32,
     },
-    /// An alarm command with Index 0 was answered with another index. Only reading the attributes does that: bytes 12-15
-    /// are neither alarm nor warning.
+    /// An alarm command with Index 0 was answered with another index. Only a request for the attributes is answered like this:
+    /// bytes 12-15 are neither alarm nor warning.
     Attributes {
         /// Index_Echo: the present alarm.
         alarm: u16,
@@ -60,20 +60,20 @@ pub enum LogFinding {
     GivenUp {
         /// The code of the request.
         code: Code,
-        /// Responses since the first command with it.
+        /// Number of responses since the first command with it.
         responses: u32,
-        /// Number of these with Busy.
+        /// Number of these that had Busy.
         busy: u32,
     },
     /// The drive has answered before but not to the last commands, for more than the two communications that an update
     /// period can have.
     NoAnswer {
-        /// Commands without an answer.
+        /// Number of commands without an answer.
         commands: u32,
     },
     /// The drive was silent for longer than that, and answers again.
     AnswersAgain {
-        /// Commands without an answer.
+        /// Number of commands without an answer.
         commands: u32,
     },
     /// Commands were sent to this drive, and it never answered.
@@ -85,13 +85,13 @@ pub enum LogFinding {
 }
 
 servowire_core::codes! {
-    /// Something a drive did that needs attention.
+    /// Something in the behaviour of a drive that needs attention.
     pub enum Trouble: u8 {
-        /// It reported an alarm.
+        /// The drive reported an alarm.
         Alarm = 1 => "reported an alarm",
-        /// Its counter echo did not change: the communication, or the drive, had stopped.
+        /// The counter echo did not change: the communication, or the drive, had stopped.
         EchoStood = 2 => "sent a counter echo that stood still",
-        /// It did not answer.
+        /// The drive did not answer.
         Silence = 3 => "did not answer",
     }
 }
@@ -113,30 +113,30 @@ pub struct DriveTrouble {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Unfinished {
-    /// The echo of the counter does not change.
+    /// The counter echo does not change.
     Echo {
-        /// Responses in a row with the same echo.
+        /// Number of responses in a row with the same echo.
         responses: u32,
     },
     /// The drive does not answer.
     Silence {
-        /// Commands without an answer.
+        /// Number of commands without an answer.
         commands: u32,
     },
     /// A request is not answered.
     Request {
         /// The code of the request.
         code: Code,
-        /// Responses since the first command with it.
+        /// Number of responses since the first command with it.
         responses: u32,
-        /// Number of these with Busy.
+        /// Number of these that had Busy.
         busy: u32,
     },
     /// The code of the commands has not come back.
     Code {
         /// The code.
         code: Code,
-        /// Responses since the first command with it.
+        /// Number of responses since the first command with it.
         responses: u32,
     },
 }

@@ -17,12 +17,12 @@ pub struct LogShape {
 }
 
 impl LogShape {
-    /// Guesses the size, byte order and beginning with which most of the blocks make sense. `None` if nothing makes sense,
-    /// or if fewer than four blocks follow the NOPs from before the start. NOPs look alike in every shape, so pass more of
+    /// Guesses the block size, byte order and starting offset with which most of the blocks make sense. `None` if nothing
+    /// makes sense, or if fewer than four blocks follow the leading NOPs. NOPs look alike in every shape, so pass more of
     /// the log in that case.
     ///
-    /// In a log of 32-byte blocks every second piece of 16 bytes is a sub block: a command's begins with 80h, 82h or 8Ah, which
-    /// read as a main block would be a response of drive 0, 2 or 10.
+    /// In a log of 32-byte blocks, every second piece of 16 bytes is a sub block. That of a command begins with 80h, 82h or
+    /// 8Ah, which, read as a main block, would be a response of drive 0, 2 or 10.
     pub fn guess(bytes: &[u8]) -> Option<Self> {
         let shapes = || {
             let sizes = [BlockSize::Bytes16, BlockSize::Bytes32];
@@ -44,7 +44,8 @@ impl LogShape {
         Self::best(shifted.filter(explains_more), bytes, 900)
     }
 
-    /// Returns the first of those that score best, with a score of at least `least`; a larger size only if it explains more.
+    /// Returns the first of the best-scoring shapes with a score of at least `least`; a larger size wins only if it explains
+    /// more.
     fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
         let mut best: Option<(Self, usize)> = None;
         for shape in shapes {
@@ -67,7 +68,7 @@ impl LogShape {
         good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
     }
 
-    /// Returns the sound blocks, including NOPs, in thousandths of all.
+    /// Returns the share of sound blocks, including NOPs, in thousandths.
     fn sound(self, bytes: &[u8]) -> usize {
         let blocks = || bytes.get(self.skip..).unwrap_or_default().chunks_exact(self.size.bytes());
         let good = blocks().filter(|block| self.is_sound(block)).count();
@@ -101,12 +102,12 @@ impl LogShape {
         turned
     }
 
-    /// Code 00h: nothing else in the block is sure to mean anything.
+    /// Code 00h: nothing else in the block is certain to have a meaning.
     fn is_nop(self, block: &[u8]) -> bool {
         self.turned(block).get(1).is_some_and(|byte1| byte1 & 0x7f == 0)
     }
 
-    /// Whether a block of this shape could come from an encoder.
+    /// Whether an encoder could have written a block of this shape.
     fn is_sound(self, block: &[u8]) -> bool {
         self.turned(block).get(..self.size.bytes()).is_some_and(|turned| strict(turned).is_ok())
     }

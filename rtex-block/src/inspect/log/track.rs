@@ -23,7 +23,7 @@ type Request = (Code, [u8; 3]);
 pub(super) struct Track {
     pub(super) commands: u32,
     pub(super) responses: u32,
-    /// Commands since the last response.
+    /// Number of commands since the last response.
     pub(super) unanswered: u32,
     counter: Option<UpdateCounter>,
     sent_twice: bool,
@@ -32,13 +32,13 @@ pub(super) struct Track {
     same: u32,
     stands: bool,
     position: Option<i32>,
-    /// The code of the commands, and the responses since it was first sent; `None` once it has come back.
+    /// The code of the commands, and the number of responses since it was first sent; `None` once it has come back.
     code: Option<Code>,
     awaited: Option<u32>,
     /// The pending request and, until it is answered, the number of responses and of busy responses.
     request: Option<Request>,
     open: Option<(u32, u32)>,
-    /// Whether at any time Alarm was 1, the echo did not change, and commands had no answer.
+    /// Whether, at any time, Alarm was 1; whether the echo did not change; and whether commands had no answer.
     pub(super) alarmed: bool,
     pub(super) stood: bool,
     pub(super) fell_silent: bool,
@@ -73,7 +73,7 @@ impl Track {
         (from.next() != to).then_some(LogFinding::CounterJumps { from, to })
     }
 
-    /// The command position. Without Servo_On the drive does not follow it.
+    /// Takes the command position. Without Servo_On, the drive does not follow it.
     pub(super) fn go(&mut self, block: CommandBlock<'_>, limit: Option<u32>) -> Option<LogFinding> {
         let at = (block.code().cyclic() == Some(CyclicCode::CyclicPosition)).then(|| block.command_data1());
         let last = core::mem::replace(&mut self.position, at);
@@ -99,7 +99,7 @@ impl Track {
         (responses > NORMAL).then_some(LogFinding::GivenUp { code, responses, busy })
     }
 
-    /// Takes the counter of a response. Before the start, counters stay at 0.
+    /// Takes the counter of a response. Before the start, the counters stay at 0.
     pub(super) fn echo(&mut self, echo: UpdateCounter) -> Option<LogFinding> {
         if self.echo.replace(echo) == Some(echo) {
             self.same = self.same.saturating_add(1);
@@ -150,7 +150,7 @@ impl Track {
         (results.index != 0).then_some(LogFinding::Attributes { alarm: results.index, bits })
     }
 
-    /// What is still in progress at the end; a pending request says more than its code.
+    /// Returns what is still in progress at the end; a pending request is reported rather than its code.
     pub(super) fn unfinished(&self) -> [Option<Unfinished>; 3] {
         let echo = (self.stands && self.same > NORMAL).then_some(Unfinished::Echo { responses: self.same });
         let silent = self.responses > 0 && self.unanswered > NORMAL;

@@ -7,9 +7,9 @@ use crate::master::sub_handshake::SubHandshake;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::sub::SubResponse;
 
-/// Number of blocks for which the normal code has come back. A whole turn of the counter lies between two requests, so an
-/// old block cannot be taken for the answer to the next one: echoes distinguish requests of one kind by their index, not by
-/// their data.
+/// Number of blocks for which the echo has been the normal code. A whole turn of the counter lies between two requests, so an
+/// old block cannot be mistaken for the answer to the next request: echoes distinguish requests of one kind by their index, not
+/// by their data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Quiet(u8);
@@ -18,13 +18,13 @@ impl Quiet {
     /// Restarts the count at the end of a request or a motion.
     pub(super) const BROKEN: Self = Self(0);
 
-    /// Whether the normal code has come back for a whole turn.
+    /// Whether the echo has been the normal code for a whole turn.
     #[inline]
     pub(super) const fn is_kept(self) -> bool {
         self.0 >= TURN
     }
 
-    /// Takes a block on time, with the normal code or another one.
+    /// Takes a block that is on time, with the normal code or another one.
     #[inline]
     pub(super) const fn hear(&mut self, is_normal: bool) {
         if !self.is_kept() {
@@ -33,7 +33,7 @@ impl Quiet {
     }
 }
 
-/// A request in one block: it is pending, or its outcome has not been taken.
+/// A request in one half of the block: it is pending, or its outcome has not been taken yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Slot<H, T> {

@@ -18,7 +18,8 @@ use crate::status::StatusFlags;
 use crate::sub::{SubCode, SubCommand, SubResponse};
 use crate::type_code::{Nibble, TypeCode, homing};
 
-/// Resets, and the homing types that set a position. `unknown`: the other homing types too, except the one that reads.
+/// Whether the request is a reset, or a homing type that sets a position. With `unknown`, this includes the other homing types,
+/// except the one that only reads.
 const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
     match request {
         NonCyclicCommand::Reset(_) => true,
@@ -31,7 +32,7 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
     }
 }
 
-/// The drive continues with the previous block, so this is no answer: the request is in the next block again, and may
+/// The drive continues with the previous block, so this is not an answer: the request is in the next block again, and may
 /// already be in progress.
 fn is_thrown_away(response: &Response) -> bool {
     response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
@@ -43,7 +44,7 @@ impl Axis {
     /// Between two requests the normal command is sent until it has come back for a whole turn of the counter, so that an
     /// old block cannot be taken for the answer to the next request. Until then the axis is busy.
     ///
-    /// A homing type that is not confirmed may give the axis new coordinates. In CP the set-point would stay in the old
+    /// A homing type that is not confirmed may set new coordinates. In CP the set-point would stay in the old
     /// ones, so such a type is refused there with the servo on; for latches use [`ask_latch`](Self::ask_latch).
     ///
     /// # Errors [`AskError`]; nothing is sent.
@@ -53,8 +54,8 @@ impl Axis {
         self.begin(handshake.ok_or(AskError::NotARequest)?, servo_off)
     }
 
-    /// Sends a homing command of the latch mode, in any mode and with the servo on or off. `type_code` arms the latches, or
-    /// disarms them, or reads their state ([`homing::LATCH_STATE`]); it must be one that leaves the coordinates alone. The
+    /// Sends a homing command of the latch mode, in any mode and with the servo on or off. `type_code` arms the latches,
+    /// disarms them or reads their state ([`homing::LATCH_STATE`]); it must be one that leaves the coordinates alone. The
     /// other arguments are Latch_Sel1, Latch_Sel2 and Monitor_Sel. SX-DSV02310, "Latch mode".
     ///
     /// # Errors
@@ -140,7 +141,7 @@ impl Axis {
         Ok(())
     }
 
-    /// Requests and profile motion.
+    /// Handles requests and profile motion.
     pub(super) fn serve(&mut self, on_time: Option<&Response>) {
         let response = on_time.filter(|response| !is_thrown_away(response));
         if let Some(response) = response {
@@ -177,7 +178,7 @@ impl Axis {
         }
     }
 
-    /// The sub-command; a drive that answers without sub block leaves it pending.
+    /// Handles the sub-command; it stays pending if the drive answers without a sub block.
     pub(super) fn serve_sub(&mut self, response: Option<&SubResponse>) {
         let response = response.filter(|sub| !sub.error_code().is_some_and(ErrorCode::discards_block));
         if let Some(response) = response {

@@ -28,11 +28,11 @@ impl Axis {
     }
 
     /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0; if the mode
-    /// returns to that of the last block, it is the set-point in that block.
+    /// returns to that of the last block, it is the set-point of that block.
     ///
     /// With the servo on the axis must be at rest: the actual position is one or two update periods old when it becomes the
     /// command position. If the next update period brings no position, the axis does not change to CP and stays in its mode.
-    /// A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
+    /// A drive that cannot change to the mode answers CMD_Error, which stops the axis once the limit is reached.
     ///
     /// # Errors
     /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] between off and on and during
@@ -66,8 +66,8 @@ impl Axis {
         Ok(())
     }
 
-    /// Begins CP, which was asked for and is not yet sent, at the position of this update period. Without one the axis stays in
-    /// the mode of the last block.
+    /// Begins CP, which was requested and has not been sent yet, at the position of this update period. Without one the axis
+    /// stays in the mode of the last block.
     #[cold]
     pub(super) fn begin_positions(&mut self) {
         if self.is_current() {
@@ -95,9 +95,9 @@ impl Axis {
         self.control = control.difference(ControlBits::SERVO_ON);
     }
 
-    /// Sets Command_Data3 for commands that do not need it themselves: velocity or torque feed-forward by Pr7.35, as long
-    /// as the servo is on. With Pr7.35 = 0 it must stay 0, or the drive answers 0032h. While a command needs bytes 12-15
-    /// itself (homing types 21h and 22h, parameter write, profile motion) the drive keeps the last value.
+    /// Sets Command_Data3 for commands that do not use it themselves: velocity or torque feed-forward by Pr7.35, as long
+    /// as the servo is on. With Pr7.35 = 0 it must stay 0, or the drive answers 0032h. While a command uses bytes 12-15 itself
+    /// (homing types 21h and 22h, parameter write, profile motion) the drive keeps the last value.
     ///
     /// # Errors
     /// [`SetpointError::NotOn`]
@@ -204,9 +204,9 @@ impl Axis {
         self.profile.as_ref()
     }
 
-    /// Returns the progress of the profile motion; once the motion has ended, returns its end and forgets it. It is done
-    /// when the axis has stayed on for a turn of the counter after In_Progress went to 0: the reason why a motion was
-    /// aborted may appear after that.
+    /// Returns the progress of the profile motion; once the motion has ended, returns its end and forgets it. It is done when
+    /// the axis has stayed on for a turn of the counter after In_Progress went to 0, because the reason for an abort may appear
+    /// later than that.
     pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let progress = self.profile?.progress();
         if matches!(progress, Progress::Done { .. }) && !self.main.quiet.is_kept() {

@@ -13,7 +13,7 @@ impl Axis {
         self.stop_for(StopReason::Requested, category);
     }
 
-    /// Servo off until [`clear`](Self::clear). The first reason is kept.
+    /// The axis stays stopped, with the servo off, until [`clear`](Self::clear). The first reason is kept.
     pub(in crate::master) fn fail(&mut self, reason: StopReason) {
         if !matches!(self.state, AxisState::Stopped(_)) {
             self.enter(AxisState::Stopped(reason), 0);
@@ -46,8 +46,8 @@ impl Axis {
         }
     }
 
-    /// Leaves `Stopped`, after which the axis waits for Servo_Ready again with the servo off, or `Held`, after which it is
-    /// on again.
+    /// Leaves `Stopped`, after which the axis waits for Servo_Ready again with the servo off; or leaves `Held`, after which it
+    /// is on again.
     pub fn clear(&mut self) {
         match self.state {
             AxisState::Held(_) => self.enter(AxisState::On, 0),
@@ -92,7 +92,7 @@ impl Axis {
         }
     }
 
-    /// Returns whether the deceleration is known, if the host makes it.
+    /// Returns whether the deceleration is known, in case the host makes it.
     const fn can_slow_down(&self) -> bool {
         match self.mode {
             ActiveCode::CyclicPosition | ActiveCode::CyclicVelocity => self.config.deceleration > 0,
@@ -123,7 +123,7 @@ impl Axis {
         matches!(self.state, AxisState::On | AxisState::Stopping(_) | AxisState::Held(_))
     }
 
-    /// Returns the set-point of an axis that does not move by command.
+    /// Returns the set-point of an axis that is not commanded to move.
     pub(super) fn rest(&mut self) {
         self.setpoint = if self.mode == ActiveCode::CyclicPosition { self.evidence.last().position() } else { 0 };
     }

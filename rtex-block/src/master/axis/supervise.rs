@@ -13,8 +13,8 @@ use crate::status::StatusFlags;
 const READY_OR_ACTIVE: StatusFlags = StatusFlags::SERVO_READY.union(StatusFlags::SERVO_ACTIVE);
 
 impl Axis {
-    /// Checks silence, refusals, alarm, readiness, activity, and the limit of the state. An alarm counts in any block of
-    /// the drive, everything else only in one that is on time.
+    /// Checks for silence, refusals and alarms, and checks readiness, activity and the limit of the state. An alarm counts
+    /// in any block of the drive, everything else only in one that is on time.
     pub(super) fn supervise(&mut self, response: Option<&Response>, on_time: Option<&Response>) {
         if self.watch.is_tripped() {
             self.fail(self.silence());
@@ -35,7 +35,7 @@ impl Axis {
         self.watch.is_tripped()
     }
 
-    /// Whether the communication with its drive has failed, even if the axis was stopped for another reason before.
+    /// Whether the communication with the drive has failed, even if the axis was stopped for another reason before.
     pub(in crate::master) const fn has_lost_its_drive(&self) -> bool {
         self.is_silent() || matches!(self.state(), AxisState::Stopped(reason) if reason.is_communication())
     }
@@ -66,7 +66,7 @@ impl Axis {
         }
     }
 
-    /// Checks alarm, readiness and activity by the state.
+    /// Checks alarm, readiness and activity according to the state.
     fn follow(&mut self, status: StatusFlags) {
         let [alarm, ready, active] =
             [StatusFlags::ALARM, StatusFlags::SERVO_READY, StatusFlags::SERVO_ACTIVE].map(|flag| status.contains(flag));

@@ -24,7 +24,7 @@ procedure!(AlarmHistory<'a>, ());
 
 impl<'a> AlarmHistory<'a> {
     /// Creates the procedure. `type_code` is that of the history in the drive's manual, with an index that counts from 1;
-    /// `entries` is filled from the latest alarm. Main and sub code 0 are an empty entry.
+    /// `entries` is filled from the latest alarm. Main and sub code 0 mean an empty entry.
     pub const fn new(type_code: TypeCode, entries: &'a mut [Alarm]) -> Self {
         Self { ask: Ask::NEW, type_code, entries, place: 0, end: None }
     }
@@ -52,13 +52,13 @@ impl<'a> AlarmHistory<'a> {
 
 /// The attributes of the present alarm, as the drive sent them.
 ///
-/// Whether the alarm can be cleared is one of them. The drive's manual says which bit; the available pages of SX-DSV02310
-/// give neither the bit nor the packing of an alarm number into an index.
+/// One of them says whether the alarm can be cleared. The drive's manual says which bit; the available pages of SX-DSV02310
+/// state neither the bit nor the packing of an alarm number into an index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Attributes {
-    /// Index_Echo: the alarm they belong to.
+    /// Index_Echo: the alarm to which they belong.
     pub alarm: u16,
     /// Bytes 12-15, byte 12 in bits 7-0.
     pub bits: u32,
@@ -82,7 +82,7 @@ impl Attributes {
 }
 
 /// How the attributes of an alarm say that it can be cleared. The available documents do not say, so take it from the
-/// drive's manual. An empty mask says nothing: by it no alarm is clearable.
+/// drive's manual. An empty mask says nothing, so no alarm counts as clearable with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -93,8 +93,8 @@ pub enum ClearableIf {
     Unset(u32),
 }
 
-/// Reads the attributes of the present alarm (Index 0). A drive without an alarm refuses the request, or answers as its
-/// manual says.
+/// Reads the attributes of the present alarm (Index 0). A drive without an alarm refuses the request or answers as described in
+/// its manual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlarmAttributes {
@@ -139,10 +139,11 @@ pub enum Clearing {
     NotClearable,
 }
 
-/// Clears the alarm and checks whether it is gone: this answers "can this alarm be cleared?" without any knowledge of
+/// Clears the alarm and checks whether it is gone, which shows whether the alarm can be cleared without any knowledge of
 /// attributes.
 ///
-/// The command is sent once. The Alarm flag of the blocks received after its answer decides, not the answer alone.
+/// The command is sent once. The outcome depends on the Alarm flag in the blocks received after the answer, not on the answer
+/// alone.
 /// [`Failure::CommandError`]: the drive does not know the type code, which says nothing about the alarm.
 /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all.
 ///
@@ -154,7 +155,7 @@ pub struct ClearAlarm {
     type_code: TypeCode,
     limit: u32,
     left: u32,
-    /// Good blocks up to the last call.
+    /// Number of good blocks up to the last call.
     good: Option<u64>,
     /// The answer to the command, once it is known.
     answer: Option<Result<(), Failure>>,
@@ -202,7 +203,7 @@ impl ClearAlarm {
         Progress::Pending { left: self.left }
     }
 
-    /// Alarm is 1, or nothing is known about it; `accepted`: although the drive says that it has cleared it.
+    /// Alarm is 1, or nothing is known about it; `accepted` if the drive nevertheless says that it has cleared the alarm.
     const fn wait(&mut self, accepted: bool) -> Progress<Clearing> {
         match self.left.checked_sub(1) {
             Some(left) => {

@@ -6,7 +6,7 @@ use crate::master::state::AskError;
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 
-/// What a [runner](crate::master::Run) runs: the inherent methods of a procedure, which have the same names.
+/// What a [runner](crate::master::Run) runs; it forwards to the inherent methods of a procedure, which have the same names.
 pub trait Procedure {
     /// The value that it produces.
     type Value;
@@ -18,8 +18,8 @@ pub trait Procedure {
     fn receive(&mut self, axis: &mut Axis) -> Progress<Self::Value>;
 }
 
-/// One request of a procedure: sent as soon as the axis accepts it; then its answer is awaited. Both waits have the limit
-/// of an answer.
+/// One request of a procedure: it is sent as soon as the axis accepts it, and then its answer is awaited. Both waits are
+/// limited to the time allowed for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Ask {
@@ -72,8 +72,8 @@ macro_rules! procedure {
                 self.receive(axis)
             }
 
-            /// Continues the procedure; call it after the exchange of every later update period. Once done or failed, it
-            /// stays so.
+            /// Continues the procedure; call it after the exchange of every later update period. Once it is done or has failed,
+            /// it stays in that state.
             pub fn receive(&mut self, axis: &mut $crate::master::Axis) -> $crate::master::Progress<$value> {
                 let progress = match self.end {
                     Some(end) => end,

@@ -22,18 +22,18 @@ pub(super) const fn command(type_code: u8, setting_data: i32) -> NonCyclicComman
     }
 }
 
-/// Sets a position of the drive (homing types 21h and 22h), once, and reads it back. Only with the servo off.
+/// Sets a position of the drive (homing types 21h and 22h), once, and reads it back. This works only with the servo off.
 ///
 /// `Done` carries the position as read back: a released motor may have turned since. The command is never sent twice. If its
-/// answer does not come, the position read back decides: `Done` if it equals the one to be set, otherwise
-/// [`Failure::TimedOut`], and the effect is not known.
+/// answer does not come, the outcome depends on the position read back: `Done` if it equals the one to be set, otherwise
+/// [`Failure::TimedOut`], in which case the effect is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SetPosition {
     ask: Ask,
     type_code: u8,
     position: i32,
-    /// The command was answered, or not within its limit.
+    /// Whether the command was answered, or its limit has passed.
     set: Option<Result<(), Failure>>,
     end: Option<Progress<i32>>,
 }
@@ -84,15 +84,15 @@ impl SetPosition {
 
 /// Homing by the drive: the command with the caller's type code, and then the end of the drive's motion.
 ///
-/// Only in PP, where the drive generates the position command. In CP the host generates it: the drive would adopt new
-/// coordinates between two set-points, and the next set-point, still in the old ones, would be a jump by the whole offset.
-/// In CV and CT the drive generates no position command, so In_Progress tells nothing. The available documents do not say
-/// how a drive homes in these modes.
+/// This works only in PP, where the drive generates the position command. In CP the host generates it: the drive would adopt
+/// new coordinates between two set-points, and the next set-point, still in the old ones, would be a jump by the whole
+/// offset. In CV and CT the drive generates no position command, so In_Progress carries no information. The available
+/// documents do not say how a drive homes in these modes.
 ///
-/// `Done` when Homing_Complete is 1 and In_Progress is 0 for a turn of the counter, the axis on all the time, and at least
-/// one of the two has been different since the command was sent: Homing_Complete may be left from an earlier homing. If the
-/// homing is aborted, it fails for the reason that stopped the axis. If it does not end in time, the axis is stopped
-/// (category 1) for [`HomingTimeout`](StopReason::HomingTimeout). The command is never sent twice.
+/// `Done` when Homing_Complete is 1 and In_Progress is 0 for a turn of the counter, the axis has been on all the time, and
+/// at least one of the two has been different since the command was sent, because Homing_Complete may be left from an
+/// earlier homing. If the homing is aborted, it fails for the reason that stopped the axis. If it does not end in time, the
+/// axis is stopped (category 1) for [`HomingTimeout`](StopReason::HomingTimeout). The command is never sent twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Home {
@@ -104,7 +104,7 @@ pub struct Home {
     /// Homing_Complete was 0 or In_Progress was 1, so the present value of Homing_Complete is not left from an earlier
     /// homing.
     fresh: bool,
-    /// Number of blocks on time that show standstill before it begins, and that show its end.
+    /// Number of blocks on time that show the axis at rest before the homing begins, and number that show its end.
     blocks: u8,
     end: Option<Progress<()>>,
 }
@@ -113,7 +113,7 @@ procedure!(Home, ());
 
 impl Home {
     /// Creates a homing of this type. The drive has `limit` update periods after it has accepted the command; a motion
-    /// before it has as many to end.
+    /// before it has as many in which to end.
     pub const fn new(type_code: u8, limit: u32) -> Self {
         let ask = Ask::NEW;
         Self { ask, type_code, limit, left: limit, accepted: false, fresh: false, blocks: 0, end: None }
@@ -160,7 +160,7 @@ impl Home {
         self.wait(axis)
     }
 
-    /// Number of consecutive blocks on time of which this is true.
+    /// Number of consecutive blocks on time for which this is true.
     fn for_a_turn(&mut self, axis: &Axis, is_so: bool) -> u8 {
         if axis.arrival() == Arrival::OnTime {
             self.blocks = if is_so { self.blocks.saturating_add(1) } else { 0 };

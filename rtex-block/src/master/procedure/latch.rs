@@ -25,7 +25,7 @@ pub struct Caught {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Stage {
-    /// The state is read (50h): a latch that is complete now was so before arming.
+    /// The state is being read (50h): a latch that is complete now was complete before arming.
     Before,
     Arming,
     Watching,
@@ -33,8 +33,8 @@ enum Stage {
 
 /// Arms latch 1, latch 2 or both, and waits for their positions. SX-DSV02310, "Latch mode".
 ///
-/// The state is read (type 50h) before arming, and repeatedly afterwards. A position counts only with its Latch_Comp,
-/// and only if that was 0 before arming or at any time since: a position left from an earlier latch is not the answer.
+/// The state is read (type 50h) before arming, and repeatedly afterwards. A position is accepted only with its Latch_Comp, and
+/// only if that was 0 before arming or at any time since: a position left from an earlier latch is not the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latch {
@@ -45,7 +45,7 @@ pub struct Latch {
     limit: u32,
     left: u32,
     stage: Stage,
-    /// Latch_Comp was seen at 0, so a 1 is not left from an earlier latch.
+    /// Latch_Comp was 0 at some time, so a 1 is not left from an earlier latch.
     fresh: [bool; 2],
     caught: [Option<i32>; 2],
     end: Option<Progress<Caught>>,
@@ -126,7 +126,7 @@ impl Latch {
         self.wanted.get(place) == Some(&true) && self.caught.get(place) == Some(&None)
     }
 
-    /// Takes an answer with `data` of the latch at `place`.
+    /// Takes an answer that holds the `data` of the latch at `place`.
     fn read(&mut self, latch: LatchFlags, place: usize, data: i32) {
         if self.stage == Stage::Watching {
             let mut latches = self.caught.iter_mut().zip(COMP).zip(self.fresh);

@@ -64,10 +64,10 @@ const fn request(type_code: TypeCode, pr: Pr, data: i32) -> NonCyclicCommand {
 }
 
 /// Writes a list of parameters and reads each one back to compare it. Nothing is written twice: if the answer to a write is
-/// missing, the value that is read back decides.
+/// missing, the outcome depends on the value that is read back.
 ///
 /// Writing is not storing: a value that must survive a power cycle is stored with a separate command, and some parameters
-/// take effect only after a reset. [`Failure::Differs`] names the parameter that did not take its value; after any other
+/// take effect only after a reset. [`Failure::Differs`] names the parameter that did not accept its value; after any other
 /// failure the parameter at [`place`](Self::place) may have the old or the new value.
 #[derive(Debug)]
 pub struct Restore<'a> {

@@ -8,16 +8,16 @@ use crate::master::servo_off::ActiveCode;
 use crate::master::state::{AskError, AxisState, SetpointError};
 use crate::type_code::homing;
 
-/// Sets the actual position (21h) of an axis in CP **with the servo on**: the end of a homing that the host moves, towards a switch
-/// or a latch.
+/// Sets the actual position (21h) of an axis in CP **with the servo on**: the last part of a homing in which the host moves the
+/// axis, towards a switch or a latch.
 ///
 /// This is dangerous because the drive adopts new coordinates while the motor is energised: a command position in the old
 /// ones would be a jump by the whole offset. So the axis must be at rest. It changes to CV at speed 0, in which no position
 /// is commanded, and returns to CP at the position in the new coordinates. In between only the speed loop holds the motor:
 /// do not use it for an axis that gravity can move. The available documents do not say whether a drive accepts the command
 /// with the servo on. If it does not, the procedure fails with [`Failure::Execution`] or [`Failure::CommandError`], and the
-/// axis is in CP again. After [`Failure::TimedOut`] the effect is not known; the command position is the actual one even
-/// so. The command is never sent twice.
+/// axis is in CP again. After [`Failure::TimedOut`] the effect is not known; the command position still equals the actual one.
+/// The command is never sent twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RebaseWithServoOn {
@@ -33,8 +33,8 @@ pub struct RebaseWithServoOn {
 procedure!(RebaseWithServoOn, i32);
 
 impl RebaseWithServoOn {
-    /// Creates the procedure that makes the present position `position`, command units; each change of the mode has `limit`
-    /// update periods.
+    /// Creates the procedure that makes the present position `position`, command units; each change of the mode may take
+    /// `limit` update periods.
     pub const fn new(position: i32, limit: u32) -> Self {
         Self { ask: Ask::NEW, position, limit, left: limit, answer: None, end: None }
     }

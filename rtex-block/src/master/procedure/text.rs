@@ -33,7 +33,7 @@ impl Text {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// Whether nothing can follow: the group had a NUL, or there is no room.
+    /// Whether nothing can follow, because the group had a NUL or there is no more room.
     fn append(&mut self, group: [u8; 4]) -> bool {
         let text = system_id::text(&group);
         let free = self.bytes.iter_mut().skip(self.len.into());
