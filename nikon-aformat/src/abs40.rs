@@ -78,7 +78,7 @@ impl Abs40 {
         Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) }
     }
 
-    /// The 72 line bits of the response to the command in `expected`.
+    /// Takes the 72 line bits of the response to the command in `expected`.
     ///
     /// ```
     /// use nikon_aformat::{Abs40, BitOrder, Command, EncoderAddress, EncoderStatus, Expected, Layout, U40};
@@ -117,7 +117,7 @@ const fn low_byte(word: u32) -> u8 {
     word as u8
 }
 
-/// Returns why a response is refused; off the hot path.
+/// Returns why a response is refused; kept off the hot path.
 #[cold]
 #[inline(never)]
 fn line_refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> Error {

@@ -109,18 +109,18 @@ servowire_core::listed!(Addresses { |addresses| addresses.iter() => "{}" });
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
-    /// No good response, and none was requested.
+    /// No good response came, and none was requested.
     NotAsked,
-    /// One good response.
+    /// One good response came.
     Good(Response),
-    /// A good response from an address that was not requested.
+    /// A good response came from an address that was not requested.
     Extra(Response),
-    /// Two or more good responses: two encoders have the same address, or one has been given the wrong address.
+    /// Two or more good responses came: two encoders have the same address, or one has been given the wrong address.
     Duplicate {
-        /// The first one.
+        /// The first of them.
         first: Response,
     },
-    /// No good response. If damaged responses came, one of them may have come from this encoder: see [`Bus::damaged`].
+    /// No good response came. If damaged responses came, one of them may have come from this encoder: see [`Bus::damaged`].
     Missing,
 }
 
@@ -284,7 +284,7 @@ impl Bus {
         self.damaged
     }
 
-    /// How many fewer responses, good or not, arrived than were requested: this many never started.
+    /// The number of requested responses minus the number that arrived, good or not: this many never started.
     pub const fn not_started(&self) -> u8 {
         self.asked.len().saturating_sub(self.arrived())
     }

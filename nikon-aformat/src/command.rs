@@ -29,7 +29,7 @@ servowire_core::codes! {
         ClearMultiturn = 9 => "CLEAR_MULTITURN",
         /// Clears alarms and turns. Takes effect after eight requests in succession.
         ClearStatusMultiturn = 10 => "CLEAR_STATUS_MULTITURN",
-        /// Gives the only encoder on the line the address in EA. Takes effect after eight requests in succession.
+        /// Assigns the address in EA to the only encoder on the line. Takes effect after eight requests in succession.
         SetAddress1 = 11 => "SET_ADDRESS_1",
         /// Makes the present position the single-turn zero. **Shifts the commutation angle of the motor.** Takes effect after
         /// eight requests in succession.
@@ -48,7 +48,7 @@ servowire_core::codes! {
         IdWrite1 = 18 => "ID_WRITE_1",
         /// Writes the identification code of the only encoder on the line, whatever its address.
         IdWrite2 = 19 => "ID_WRITE_2",
-        /// Gives the encoder with a certain identification code the address in EA; all others stay silent.
+        /// Assigns the address in EA to the encoder with a certain identification code; all others stay silent.
         SetAddress2 = 20 => "SET_ADDRESS_2",
         /// Reads the low 17 bits of the position, the shortest response.
         Abs17 = 21 => "ABS17",

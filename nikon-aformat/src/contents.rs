@@ -7,8 +7,8 @@ use crate::layout::{DELIMITER, FRAME_BITS, MAX_FRAMES, START};
 /// of the first word. Everything after the last frame is 0.
 pub(crate) type Contents = [u32; 3];
 
-/// A response of `FRAMES` frames. Because the compiler knows the number, every mask and every shift is a constant and there is
-/// no loop, so it is equally fast at any optimisation level.
+/// A response of `FRAMES` frames. Because the number is known at compile time, every mask and shift is a constant and there is
+/// no loop, so the code is equally fast at any optimisation level.
 struct Of<const FRAMES: usize>;
 
 impl<const FRAMES: usize> Of<FRAMES> {
@@ -60,7 +60,7 @@ impl<const FRAMES: usize> Of<FRAMES> {
         }
     }
 
-    /// Computes the CRC-8 over all frames, check field included: 0 if it is right.
+    /// Computes the CRC-8 over all frames, including the check field; the result is 0 if the check field is right.
     #[inline(always)]
     fn crc([p0, p1, p2]: Contents) -> u32 {
         let two = four_bytes(0, p0);
@@ -142,27 +142,27 @@ pub(crate) const fn together([c0, c1, c2, c3, c4, c5]: [u16; MAX_FRAMES as usize
     [pair(c0 as u32, c1 as u32), pair(c2 as u32, c3 as u32), pair(c4 as u32, c5 as u32)]
 }
 
-/// Packs the low 16 bits of both.
+/// Packs the low 16 bits of both words.
 #[inline(always)]
 const fn pair(first: u32, second: u32) -> u32 {
     first & 0xffff | second << 16
 }
 
-/// Returns the register four bytes later.
+/// Returns the register after four more bytes.
 #[inline(always)]
 fn four_bytes(register: u8, pair: u32) -> u8 {
     let [b0, b1, b2, b3] = pair.to_le_bytes();
     next(next(next(next(register ^ b0) ^ b1) ^ b2) ^ b3)
 }
 
-/// Returns the register two bytes later.
+/// Returns the register after two more bytes.
 #[inline(always)]
 fn two_bytes(register: u8, pair: u32) -> u8 {
     let [b0, b1, ..] = pair.to_le_bytes();
     next(next(register ^ b0) ^ b1)
 }
 
-/// A number in the words of a 32-bit core.
+/// A number as words of a 32-bit core.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
 const fn quarters(bits: u128) -> [u32; 4] {

@@ -14,7 +14,7 @@ pub(crate) fn mirrored(bytes: &[u8]) -> u8 {
     TABLE.checksum(bytes)
 }
 
-/// Returns the register eight bits later.
+/// Returns the register after eight more bits.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "a byte indexes 256 entries")]
 pub(crate) fn next(register: u8) -> u8 {
@@ -22,7 +22,7 @@ pub(crate) fn next(register: u8) -> u8 {
     table[usize::from(register)]
 }
 
-/// Returns the register 16 content bits later, the first line bit in bit 0.
+/// Returns the register after 16 more content bits, the first line bit in bit 0.
 #[inline(always)]
 pub(crate) fn next_word(register: u8, content: u16) -> u8 {
     let [low, high] = content.to_le_bytes();

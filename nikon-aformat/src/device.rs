@@ -56,7 +56,7 @@ const MAX_FRAME_GAP_NS: u32 = 20_000;
 /// How long an encoder is busy with a write, an address setting or a reset: the longest time of "Nikon Protocol Design".
 const BUSY_NS: u32 = 30_000_000;
 
-/// The frames of another encoder's response follow each other within this many bits.
+/// The largest distance, in bits, between frames of another encoder's response.
 const RESPONSE_PAUSE_BITS: u32 = 4;
 
 /// The values that the resets of an encoder have set to 0.
@@ -64,9 +64,9 @@ const RESPONSE_PAUSE_BITS: u32 = 4;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Zero {
-    /// The single-turn position that counts as 0.
+    /// The single-turn position to be reported as 0.
     pub single_turn: u32,
-    /// The turn that counts as 0.
+    /// The turn to be reported as 0.
     pub turns: u32,
 }
 
@@ -79,7 +79,7 @@ pub struct Device<const BANKS: usize> {
     id: EncoderId,
     single_turn: u32,
     turns: u32,
-    /// Subtracted from the position.
+    /// The zeros, which are subtracted from the position.
     zero: Zero,
     velocity: i32,
     acceleration: i16,
@@ -96,7 +96,7 @@ pub struct Device<const BANKS: usize> {
     repeats: u8,
     received: [RequestFrame; Frames::MAX],
     len: u8,
-    /// Frames that follow without a longer pause than this, in ns from delimiter to delimiter, are not judged.
+    /// Frames that follow within this time are not judged; it is counted in ns from delimiter to delimiter.
     deaf_ns: Option<u32>,
     last_frame_ns: u64,
 }
@@ -176,7 +176,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.pm_alm = pm_alm;
     }
 
-    /// Starts the cause of these alarms, which sets them.
+    /// Starts the cause of these alarms, which sets the alarms.
     pub const fn raise_alarms(&mut self, alarms: Alm) {
         self.causes = self.causes.union(alarms);
         self.alm = self.alm.union(alarms);
@@ -198,7 +198,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.fault = fault;
     }
 
-    /// Returns the alarms as the encoder would answer them at `now_ns`.
+    /// Returns the alarms that the encoder would report at `now_ns`.
     pub const fn alm(&self, now_ns: u64) -> Alm {
         if self.memory.is_busy(now_ns) { self.alm.union(Alm::MEMBUSY) } else { self.alm.difference(Alm::MEMBUSY) }
     }
@@ -276,7 +276,7 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
-    /// The rest of a damaged request is not judged, and the count of a reset restarts.
+    /// Handles damage: the rest of a damaged request is not judged, and the count of a reset restarts.
     fn misheard(&mut self) {
         self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS));
         if self.behaviour.restart == Restart::Any {
@@ -380,7 +380,7 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
-    /// Counts how many times the same request came in succession.
+    /// Counts how many times the same request has come in succession.
     fn count(&mut self, request: Request) {
         if self.behaviour.restart == Restart::Own && !self.is_meant(request) {
             return;

@@ -13,8 +13,8 @@ pub enum Doubt {
         /// Distance to the instant of sampling, in ns.
         age_ns: u64,
     },
-    /// The response carries no position, only its upper bits, less than a turn of this encoder or, if turns are used, fewer bits
-    /// of them than it counts.
+    /// The response carries no position, only its upper bits, or less than a turn of this encoder; or, if turns are used, it
+    /// carries fewer bits of them than the encoder counts.
     Absent,
     /// Bits are set above the widths of the encoder: another encoder, or a wrong [`Resolution`](crate::Resolution).
     UpperBits {

@@ -140,7 +140,7 @@ servowire_core::errors! {
             tries: u16,
         },
         /// A plain reset was interrupted before the eighth response. It is not known whether it was done: requests that the
-        /// encoder had counted before may have completed the eight. All eight have to be sent again.
+        /// encoder had counted before may have completed the eight. All eight requests have to be sent again.
         #[error("no response to the reset after {done} good responses of 8: it is not known whether it was done")]
         Interrupted = 19 {
             /// Good responses in succession so far.
@@ -163,7 +163,7 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 25,
-        /// Two sound responses came to a request that one encoder answers, and it is not known which one is its answer.
+        /// Two sound responses came to a request that one encoder answers, and it is not known which one is the answer.
         #[error("two responses came to one request")]
         TwoResponses = 26,
         /// The settings of the line leave no time for a response: nothing may be sent.

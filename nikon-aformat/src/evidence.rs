@@ -12,9 +12,10 @@ servowire_core::shaft_evidence! {
     /// What an encoder has reported about its position, and when it was sampled. It is judged where it is used, by
     /// [`at`](Self::at).
     ///
-    /// The receiver of the response creates it with [`Exchange::evidence`](crate::master::Exchange::evidence), which checks what
-    /// does not depend on the user: what the response carries and whether it fits the widths. The user of the position, perhaps
-    /// in an interrupt of another priority with an [`EvidenceCell`] in between, decides how old it may be and what is tolerable.
+    /// The receiver of the response creates it with [`Exchange::evidence`](crate::master::Exchange::evidence), which checks
+    /// what does not depend on the user: what the response carries and whether it fits the widths. The user of the position,
+    /// perhaps in an interrupt of another priority with an [`EvidenceCell`] in between, decides how old it may be and what
+    /// to tolerate.
     ///
     /// ```
     /// use nikon_aformat::{
@@ -95,7 +96,7 @@ impl Evidence {
         self
     }
 
-    /// Returns why it must not be used; off the hot path.
+    /// Returns why the position must not be used; kept off the hot path.
     #[cold]
     #[inline(never)]
     const fn doubt(&self, now_ns: u64, policy: Policy) -> Doubt {

@@ -12,8 +12,8 @@ pub(crate) const SYNC_CODE: u8 = 4;
 
 /// What is known about a response before it arrives: its layout, the command, the address, the arguments that it repeats.
 ///
-/// [`Request::expected`](crate::Request::expected) creates it from a request; [`Expected::new`] serves captures whose request is
-/// not at hand.
+/// [`Request::expected`](crate::Request::expected) creates it from a request; [`Expected::new`] is for captures whose
+/// request is not available.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Expected {
@@ -86,17 +86,17 @@ impl Expected {
         Self { layout, command, ea: None, echo: Echo::None, mask, value }
     }
 
-    /// Expects the same from this address only.
+    /// Expects the same, but only from this address.
     pub const fn from_address(self, ea: EncoderAddress) -> Self {
         Self { ea: Some(ea), mask: self.mask | EA, value: self.value & !EA | (ea.get() as u16) << 3, ..self }
     }
 
-    /// Expects the same from any address.
+    /// Expects the same, but from any address.
     pub const fn any_address(self) -> Self {
         Self { ea: None, mask: self.mask & !EA, value: self.value & !EA, ..self }
     }
 
-    /// Expects the same with these arguments repeated.
+    /// Expects the same, with these arguments repeated.
     pub const fn echoing(self, echo: Echo) -> Self {
         Self { echo, ..self }
     }
@@ -122,14 +122,14 @@ impl Expected {
         self.layout.frames()
     }
 
-    /// Returns the known bits of the first frame that are wrong.
+    /// Returns those known bits of the first frame that are wrong.
     #[inline(always)]
     pub(crate) const fn differs(&self, [first, ..]: Contents) -> u32 {
         first & self.mask as u32 ^ self.value as u32
     }
 
-    /// Returns the content bits, if the CRC-8 leaves no remainder and the known bits of the first frame are right: one branch
-    /// for both.
+    /// Returns the content bits, if the CRC-8 leaves no remainder and the known bits of the first frame are right; both are
+    /// tested in one branch.
     #[inline(always)]
     pub(crate) const fn fitting(&self, contents: Contents, crc: u32) -> Option<Contents> {
         if crc | self.differs(contents) == 0 { Some(contents) } else { None }
@@ -147,7 +147,7 @@ impl Expected {
             && raw.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
     }
 
-    /// Returns why a response is refused that is not sound or does not fit; off the hot path.
+    /// Returns why a response is refused that is not sound or does not fit; kept off the hot path.
     #[cold]
     pub(crate) fn refusal(&self, raw: &RawResponse) -> Error {
         let want = self.layout.line_bits();

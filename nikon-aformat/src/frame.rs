@@ -193,13 +193,13 @@ pub(crate) const fn pack(content: [u16; MAX_FRAMES as usize]) -> u128 {
         | (c5 as u128) << 91
 }
 
-/// [`Error::Truncated`] with numbers that easily fit.
+/// [`Error::Truncated`] with numbers that are known to fit.
 pub(crate) fn truncated(got: u32, want: u32) -> Error {
     let narrow = |bits| u16::try_from(bits).unwrap_or(u16::MAX);
     Error::Truncated { got: narrow(got), want: narrow(want) }
 }
 
-/// Returns why a line does not hold `frames` frames; off the hot path.
+/// Returns why a line does not hold `frames` frames; kept off the hot path.
 #[cold]
 pub(crate) fn framing(line: Window, frames: u8) -> Error {
     let bits = u32::from(frames).wrapping_mul(FRAME_BITS);

@@ -6,7 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-/// Sweeps are thinned out under an interpreter.
+/// Test sweeps are thinned out under an interpreter.
 #[cfg(test)]
 const STRIDE: usize = if cfg!(miri) { 97 } else { 1 };
 

@@ -1,4 +1,4 @@
-//! All reasons against using a position, as bits of one word, so that one mask says which are tolerated.
+//! The reasons against using a position, as bits of one word, so that one mask says which are tolerated.
 //!
 //! ```text
 //!  30      29 ... 24  23     22          21      20        19 ... 16  15 ... 0
@@ -9,13 +9,13 @@ use crate::status::{Alm, EncoderStatus};
 
 /// The response carries fewer bits of the turns than the encoder counts.
 pub(crate) const NO_TURNS: u32 = 1 << 20;
-/// The response does not even carry a whole turn.
+/// The response carries less than a whole turn.
 pub(crate) const ABSENT: u32 = 1 << 21;
-/// Bits are set above the widths. The single turn holds the width.
+/// Bits are set above the widths. The width of the single turn.
 pub(crate) const UPPER_BITS: u32 = 1 << 22;
 /// There was no response.
 pub(crate) const NEVER: u32 = 1 << 23;
-/// One bit stood for all status bits.
+/// A single bit stands for all status bits.
 pub(crate) const SUMMED: u32 = 1 << 30;
 
 /// The reasons against using a position.

@@ -16,7 +16,7 @@ number! {
 }
 
 number! {
-    /// The 40 bits of ABS40: single turn below, turns above.
+    /// The 40 bits of ABS40: the single-turn position in the low bits, the turns above it.
     // Aligned as the other fields of a response, which is a quarter smaller by that.
     #[repr(Rust, packed(4))]
     pub struct U40(u64, 40);
@@ -87,7 +87,7 @@ impl EncoderAddress {
         Self::truncate(7),
     ];
 
-    /// Address 0, which a single encoder has as delivered.
+    /// Address 0, the factory setting of a single encoder.
     pub const ZERO: Self = Self::truncate(0);
 }
 

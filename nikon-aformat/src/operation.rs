@@ -2,7 +2,7 @@ use crate::command::{Command, Version};
 use crate::frame::FrameCode;
 use crate::number::{EncoderId, U19, UserAddress};
 
-/// The commands that take no argument, each an operation of the same name, in one list; the others have their arguments.
+/// Lists the commands that take no argument, each as an operation of the same name; the others carry their arguments.
 macro_rules! operations {
     ($($plain:ident)+) => {
         /// A command with its arguments. See [`Command`] for what each does.
@@ -35,7 +35,7 @@ macro_rules! operations {
                 /// The new code.
                 id: EncoderId,
             },
-            /// Gives the encoder with this identification code the address in EA.
+            /// Assigns the address in EA to the encoder with this identification code.
             SetAddress2 {
                 /// The identification code of the encoder concerned.
                 id: EncoderId,

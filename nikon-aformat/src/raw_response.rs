@@ -141,7 +141,7 @@ impl RawResponse {
     }
 }
 
-/// The content bits as bytes, the first on the line in bit 0 of the first.
+/// The content bits as bytes, the first on the line in bit 0 of the first byte.
 const fn bytes(contents: [u16; MAX_FRAMES as usize]) -> [u8; 2 * MAX_FRAMES as usize] {
     let [c0, c1, c2, c3, c4, c5] = contents;
     let ([a, b], [c, d], [e, f]) = (c0.to_le_bytes(), c1.to_le_bytes(), c2.to_le_bytes());

@@ -1,7 +1,7 @@
 //! Reception of responses from a sampled line: oversampled, or as a plain bit stream at any bit offset.
 //!
 //! Every start bit is searched for separately and the clock is recovered from every edge, so a rate error accumulates only over
-//! one frame of 18 bits. Over six frames of 108 bits, one per cent would already amount to more than a bit.
+//! one frame of 18 bits. Over the 108 bits of six frames, one per cent would already amount to more than a bit.
 //!
 //! The frames of a response follow each other without idle bits, and five idle bits or more separate two responses. A frame that
 //! begins one or more bits late has lost its start bit, and its response is refused.
@@ -113,7 +113,7 @@ impl LineReceiver {
         }
     }
 
-    /// Samples taken so far, which is the index of the next one.
+    /// Number of samples taken so far, which is the index of the next one.
     pub const fn position(&self) -> u64 {
         self.receiver.position()
     }

@@ -98,7 +98,7 @@ impl Request {
         }
     }
 
-    /// Decodes received frames as an encoder does. Frames after the request are ignored.
+    /// Decodes received frames, as an encoder does. Frames after the request are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::FrameCode`], [`Error::UnknownCommand`]; [`Error::AddressRange`] for a write to

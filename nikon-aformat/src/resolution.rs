@@ -24,7 +24,7 @@ pub struct Resolution {
 }
 
 impl Default for Resolution {
-    /// Returns 20 + 16 bits, version 3.0, with responses as in version 2.1.
+    /// The resolution of 20 + 16 bits, version 3.0, with responses as in version 2.1.
     fn default() -> Self {
         Self { st_bits: 20, mt_bits: 16, version: Version::V3_0, ..Self::NARROWEST }
     }
@@ -161,7 +161,7 @@ impl Resolution {
     }
 }
 
-/// A resolution in its serialised form.
+/// The serialised form of a resolution.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {

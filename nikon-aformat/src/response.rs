@@ -40,7 +40,7 @@ pub struct Response {
     pub body: Body,
 }
 
-/// What follows the address of a response.
+/// The part of a response after the address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -292,7 +292,7 @@ impl Response {
     }
 }
 
-/// Returns why a response is refused; off the hot path.
+/// Returns why a response is refused; kept off the hot path.
 #[cold]
 #[inline(never)]
 pub(crate) fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {

@@ -99,8 +99,8 @@ impl BitRate {
         self.bits_ns(layout.line_bits())
     }
 
-    /// Line time of a request of one frame, `encoders` responses and the gaps between them, in ns, rounded up. The
-    /// turn-around of the encoders and the cable (5 ns per metre each way) come on top.
+    /// Line time of a request of one frame, `encoders` responses and the gaps between them, in ns, rounded up. The turn-around
+    /// of the encoders and the delay of the cable (5 ns per metre each way) have to be added.
     pub const fn transaction_ns(self, layout: Layout, encoders: u8) -> u32 {
         let bits = layout.line_bits().wrapping_mul(encoders as u32).wrapping_add(FRAME_BITS);
         let gaps = (encoders as u32).saturating_sub(1);

@@ -25,9 +25,9 @@ impl Tolerated {
     #[cfg(test)]
     pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
-    /// The faults that one drive tolerates when turns are not used: an encoder without its battery shows BATT. The turns are
-    /// then not judged, and the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be
-    /// wrong or that something is about to fail.
+    /// The faults that one maker's drive tolerates when turns are not used, because an encoder without its battery shows
+    /// BATT. The turns are then not judged, and the [`Sample`](crate::Sample) does not have them. Everything else means that
+    /// the position may be wrong or that something is about to fail.
     pub const SINGLE_TURN: Self = Self(NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
 
     /// Also tolerates these status bits.
@@ -48,7 +48,7 @@ impl Tolerated {
         marks & OBJECTIONS & !self.0
     }
 
-    /// Returns whether turns are not used, so that they may be anything, or missing.
+    /// Returns whether turns are not used, so that they may be wrong or missing.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
         self.0 & NO_TURNS != 0
@@ -64,7 +64,7 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// What is tolerated, in its serialised form.
+/// The serialised form of what is tolerated.
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[cfg(any(feature = "serde", feature = "arbitrary"))]

@@ -41,7 +41,7 @@ pub enum Multiturn {
 pub enum Battery {
     /// There is no battery.
     None,
-    /// By its own line.
+    /// By a line of its own.
     Separate,
     /// By a line shared by several encoders.
     Common,

@@ -5,8 +5,8 @@
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
-    /// Time from the last delimiter of a request to the first start bit of the response, in ns. Default 2800, as one vendor's
-    /// simulated encoder waits.
+    /// Time from the last delimiter of a request to the first start bit of the response, in ns. Default 2800, the time that one
+    /// vendor's simulated encoder waits.
     pub response_delay_ns: u32,
     /// What ES0 shows in the first response to an EEPROM read. Default [`FirstRead::Busy`].
     pub first_read: FirstRead,

@@ -54,7 +54,7 @@ impl<const BANKS: usize> Memory<BANKS> {
         None
     }
 
-    /// Writes unless the memory is busy.
+    /// Writes, unless the memory is busy.
     pub(super) fn write(&mut self, bank: u8, address: u8, data: u16, now_ns: u64) {
         if self.is_busy(now_ns) || !Self::has(bank) {
             return;

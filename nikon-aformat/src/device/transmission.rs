@@ -45,7 +45,7 @@ pub struct Transmission {
 }
 
 impl Transmission {
-    /// Returns the whole frames of the line as a receiver on their grid sees them, the fault included: a wrong start bit or
+    /// Returns the whole frames of the line as a receiver on their grid sees them, including the fault: a wrong start bit or
     /// delimiter makes a framing error.
     #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
     pub fn units(&self) -> Units {

@@ -1,6 +1,6 @@
-/// Tells when a readout that is repeated at a fixed period is due (continuous mode).
+/// Determines when a readout that is repeated at a fixed period is due (continuous mode).
 ///
-/// The grid does not move: a late start does not shift the starts after it, and missed starts are counted but not made up for.
+/// The time grid is fixed: a late start does not shift the following ones, and missed starts are counted but not made up for.
 ///
 /// ```
 /// use nikon_aformat::master::{Cycle, Line};

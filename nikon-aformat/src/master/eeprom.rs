@@ -25,7 +25,7 @@ pub(super) fn is_busy(response: Response) -> bool {
     response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY))
 }
 
-/// Returns the alarms of a response to STATUS from this encoder; nothing else is an answer to it.
+/// Returns the alarms of a response to STATUS from this encoder; nothing else counts as an answer to it.
 pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) -> Result<(Response, Alm), Error> {
     let response = outcome?;
     match (response.command(), response.alm()) {
@@ -36,11 +36,12 @@ pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) ->
 
 /// Reads one EEPROM word.
 ///
-/// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
-/// whole request is sent again, and the data of the second response are used if ES0 is clear in it. If a read was abandoned, by
-/// this controller before a restart or by another one, it is not known which response is the first: the response to the next
-/// request then has the data of the old read, and the response after it is undetermined. A busy memory does not start a read
-/// either. So another address is read first, until ES0 is clear: at the beginning and after a response that is missing or refused.
+/// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So
+/// the whole request is sent again, and the data of the second response are used if its ES0 is clear. If a read was
+/// abandoned, by this controller before a restart or by another one, it is not known which response is the first: the
+/// response to the next request then has the data of the old read, and the response after it is undetermined. A busy memory
+/// does not start a read either. So another address is read first, until ES0 is clear: at the beginning and after a response
+/// that is missing or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromRead {
@@ -48,7 +49,7 @@ pub struct EepromRead {
     polling: Polling,
     /// The data of the first response are never used.
     discard_first: bool,
-    /// The caller knows that no read of this address was abandoned and that the memory is not busy.
+    /// Set if the caller knows that no read of this address was abandoned and that the memory is not busy.
     known: bool,
     started: bool,
     next: Next,
@@ -56,11 +57,11 @@ pub struct EepromRead {
     end: Option<Step<u16>>,
 }
 
-/// Which response comes next.
+/// Which response is expected next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Next {
-    /// The response for another address.
+    /// The response to the read of another address.
     Other,
     First,
     Second,
@@ -96,8 +97,9 @@ impl EepromRead {
         Self { polling, ..self }
     }
 
-    /// Begins with the address itself, if it is known that no read of it was abandoned and that the memory is not busy: this
-    /// takes two requests instead of three or four. This setting is dropped once a read has failed or was restarted before its end.
+    /// Begins with the address itself, which takes two requests instead of three or four. Use this only if it is known that no
+    /// read of the address was abandoned and that the memory is not busy. This setting is dropped once a read has failed or was
+    /// restarted before its end.
     pub const fn knowing_that_none_was_broken_off(self) -> Self {
         Self { known: true, ..self }
     }

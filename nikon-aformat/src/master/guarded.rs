@@ -14,7 +14,7 @@ use crate::timing::REQUEST_GAP_NS;
 /// to be clear too, so that afterwards it refers to this preset.
 ///
 /// `Done` rests on the eight responses. An encoder that hears something else in between, such as noise at its end of the line,
-/// may restart its count and answer all the same. If a wrong zero is dangerous, compare the position before and after.
+/// may restart its count and still answer. If a wrong zero is dangerous, compare the position before and after.
 ///
 /// | it ends with | the encoder |
 /// |---|---|
@@ -23,7 +23,7 @@ use crate::timing::REQUEST_GAP_NS;
 /// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::NoResponse`] and other faults of the first response | was not asked to |
 /// | [`Error::EffectUnknown`] | may have done it; it may be busy until `ready_ns` |
 ///
-/// So it may follow any history: an abandoned attempt, a controller that has restarted.
+/// It may therefore follow any history, such as an abandoned attempt or a controller that has restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardedReset {

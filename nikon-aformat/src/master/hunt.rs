@@ -18,12 +18,12 @@ pub(super) struct Hunt {
     /// End of the request.
     from_ns: u64,
     contents: [u16; RawResponse::MAX_FRAMES],
-    /// The earliest time at which each began.
+    /// The earliest time at which each frame began.
     begun_ns: [u64; RawResponse::MAX_FRAMES],
     got: usize,
-    /// End of the last one, by its time stamp.
+    /// End of the last frame, by its time stamp.
     end_ns: u64,
-    /// How many of the first frames belong to a valid response of this encoder that was already reported.
+    /// How many of the oldest frames belong to a valid response of this encoder that was already reported.
     given: usize,
     giver: EncoderAddress,
 }
@@ -37,12 +37,12 @@ pub(super) struct Found {
     pub(super) began_ns: u64,
     /// Its last delimiter, by the time stamps.
     pub(super) end_ns: u64,
-    /// It begins inside a response of this encoder that was already reported, and nothing began after that one: that one had
-    /// lost frames, and its CRC-8 was right by chance.
+    /// It begins inside a response of this encoder that was already reported, and nothing began after that response: the
+    /// earlier one had lost frames, and its CRC-8 was right by chance.
     pub(super) instead_of: Option<EncoderAddress>,
 }
 
-/// Frames that are handed over together: `None` for one whose delimiter read 0.
+/// Frames that are handed over together; `None` for a frame whose delimiter read 0.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block<'a> {
     pub(super) frames: &'a [Option<u16>],
@@ -51,7 +51,7 @@ pub(super) struct Block<'a> {
 }
 
 impl Hunt {
-    /// Creates a hunt in which anything that began before `from_ns` is not an answer.
+    /// Creates a hunt in which anything that began before `from_ns` is not taken as an answer.
     pub(super) const fn new(from_ns: u64) -> Self {
         Self {
             from_ns,
@@ -106,7 +106,7 @@ impl Hunt {
         }
     }
 
-    /// Judges the frames once there are as many as a response has; the last one has index `at` in its block.
+    /// Judges the frames once there are as many as a response has; the last of them has index `at` in its block.
     fn judge(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
         let [first, ..] = self.contents;
         let [begun_ns, ..] = self.begun_ns;
@@ -132,7 +132,7 @@ impl Hunt {
 
     /// Returns whether a sound response begins inside the frames at hand and continues in the block. If so, the first of these
     /// frames has lost those that followed it, and the CRC-8 is right by chance. This is not so if the next response begins
-    /// right after the frames at hand, as on a line that lost nothing: then the other one is a coincidence, which a shaft at
+    /// right after the frames at hand, as on a line that lost nothing: then the inner one is a coincidence, which a shaft at
     /// rest repeats for ever.
     fn is_overtaken(&self, expected: &Expected, times: &Times<'_>, at: usize) -> bool {
         let next = at.saturating_add(1);
@@ -193,7 +193,7 @@ impl Hunt {
         self.clear();
     }
 
-    /// Drops the response that was already reported, because nothing more follows it.
+    /// Drops the response that was already reported, because nothing further belongs to it.
     fn forget_given(&mut self) {
         while self.given != 0 {
             self.drop_first();
@@ -235,8 +235,8 @@ impl Times<'_> {
     }
 
     /// The earliest start of a frame with `left` frames between it and the end of the block, if these belong to the same
-    /// response. Idle time between them does not count: had they begun so much earlier, they would have met the request on the
-    /// line.
+    /// response. Idle time between them is ignored: if they had begun that much earlier, they would have collided with the
+    /// request.
     fn begun_of_tail(&self, left: usize) -> u64 {
         let frames = self.frames_ns(left.saturating_add(1));
         self.block.end_ns.saturating_sub(frames.saturating_add(self.line.early_ns()))

@@ -98,8 +98,8 @@ impl Line {
             .saturating_add(self.latency_budget_ns())
     }
 
-    /// When the last answer to a multi-response request will have ended, in ns: these addresses have been heard, the last one
-    /// until `end_ns`, and every other address up to [`highest`](Self::highest) may still have its turn.
+    /// Returns when the last answer to a multi-response request will have ended, in ns, if these addresses have been heard, the
+    /// last one until `end_ns`, and every other address up to [`highest`](Self::highest) may still have its turn.
     pub(super) const fn silent_ns(&self, expected: &Expected, heard: Addresses, end_ns: u64) -> u64 {
         let others = Addresses::first(self.highest.get().saturating_add(1)).without(heard).len();
         if others == 0 {
@@ -121,7 +121,7 @@ impl Line {
         self.request_ns(request).saturating_add(self.answered_ns(expected))
     }
 
-    /// Shortest period in which a request can be repeated even if nobody answers, in ns: the longest transaction plus
+    /// Shortest period in which a request can be repeated even if no encoder answers, in ns: the longest transaction plus
     /// [`request_gap_ns`](Self::request_gap_ns).
     pub const fn min_cycle_ns(&self, request: Request, expected: &Expected) -> u32 {
         self.longest_ns(request, expected).saturating_add(self.request_gap_ns)
@@ -132,7 +132,7 @@ impl Line {
         self.rate.bits_ns(FRAME_BITS) as u64
     }
 
-    /// How much later than the end of the request a frame has to begin by its time stamp to be an answer for certain, in ns.
+    /// How much later than the end of the request a frame has to begin, by its time stamp, to be certainly an answer, in ns.
     pub(super) const fn early_ns(&self) -> u64 {
         (if self.turn_around_ns > self.latency_budget_ns() { self.turn_around_ns } else { self.latency_budget_ns() })
             as u64

@@ -14,8 +14,8 @@ use crate::timing::{REQUEST_GAP_NS, WRITE_BUSY_NS};
 /// Every response has to be good: if one is missing or refused, the encoder may not have received the request, and the count
 /// would restart. The reset is not repeated on its own; [`start`](Self::start) begins again with the first request.
 ///
-/// The encoder counts requests, not procedures: seven from an interrupted reset and one more make eight. So no failure proves
-/// that nothing was done. Use [`GuardedReset`](super::GuardedReset), which restarts the count before it begins.
+/// The encoder counts requests, not procedures: seven from an interrupted reset and one more make eight. So a failure never
+/// proves that nothing was done. Use [`GuardedReset`](super::GuardedReset), which restarts the count before it begins.
 ///
 /// Release 9.2 of the AM243x Motor Control SDK sends the command a ninth time, which later releases call a defect. The effect
 /// shows in the response to the next request, here STATUS.
@@ -29,7 +29,7 @@ pub struct Reset {
 }
 
 impl Reset {
-    /// Requests in a sequence.
+    /// The number of requests in a sequence.
     pub const REQUESTS: u8 = 8;
 
     /// Clears the alarms of one encoder (command 8).
@@ -47,7 +47,7 @@ impl Reset {
         Self::of(ea, Operation::ClearStatusMultiturn)
     }
 
-    /// Gives the only encoder on the line the address `new` (command 11).
+    /// Assigns the address `new` to the only encoder on the line (command 11).
     ///
     /// EA carries the new address, because there is no other field for it; no document says so.
     pub const fn set_address_of_the_only_encoder(new: EncoderAddress) -> Self {
@@ -91,7 +91,8 @@ impl Reset {
         ///
         /// Fails with [`Error::Interrupted`] if one of the first seven responses does not come, and with
         /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
-        /// It also fails with the latter if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR.
+        /// It also fails with the latter if MEMERR is set in the status after commands 11 and 12, whose effect is kept in the
+        /// EEPROM.
         Response
     }
 

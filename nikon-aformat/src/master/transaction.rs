@@ -22,7 +22,8 @@ pub struct Exchange {
     pub response: Response,
     /// The earliest instant of sampling, in ns: the end of the request. Its age counts from here.
     pub sampled_ns: u64,
-    /// The latest instant of sampling, in ns: the first start bit of the response; late by at most [`Line::latency_budget_ns`].
+    /// The latest instant of sampling, in ns: the first start bit of the response; it may be late by up to
+    /// [`Line::latency_budget_ns`].
     pub began_ns: u64,
 }
 
@@ -53,12 +54,12 @@ pub struct Transmission {
 ///
 /// It ends with the first response that passes all checks and began after the request had left the line. Responses refused
 /// meanwhile do not end it: the answer may still come. When no answer can arrive any more, it fails with the fault of the first
-/// refused response; the line is then free. A transaction that is done or has failed stays so.
+/// refused response; the line is then free. A transaction that is done or has failed stays in that state.
 ///
 /// Hand over what was received before calling [`poll`](Self::poll). For a multi-response request it takes the first response;
 /// [`BusTransaction`] takes all of them.
 ///
-/// The own request, if the receiver hears it, needs no setting: its sync code is not that of a response.
+/// If the receiver hears the master's own request, no setting is needed for that: its sync code is not that of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
@@ -95,9 +96,9 @@ impl Transaction {
 
     /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `start_ns`.
     ///
-    /// A request that encoders of this version do not understand fails at once with
-    /// [`Error::UnsupportedInVersion`], and so does one on a line whose settings leave no time for a response, with
-    /// [`Error::Line`]. Such a request must not be sent.
+    /// A request that encoders of this version do not understand fails at once with [`Error::UnsupportedInVersion`]; if the
+    /// settings of the line leave no time for a response, it fails at once with [`Error::Line`]. Such a request must not be
+    /// sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         Self::begun(request, resolution, line, start_ns)
     }
@@ -107,7 +108,7 @@ impl Transaction {
         *self = Self::begun(request, resolution, line, start_ns);
     }
 
-    /// Inlined, so that it is created in its final place.
+    /// It is inlined, so that the transaction is created in its final place.
     #[inline(always)]
     fn begun(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
@@ -173,7 +174,7 @@ impl Transaction {
         self.outcome()
     }
 
-    /// Returns the state of the transaction at `now_ns`; it fails if no answer can arrive any more.
+    /// Returns the state of the transaction at `now_ns`; it fails once no answer can arrive any more.
     pub fn poll(&mut self, now_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() && now_ns > self.until_ns {
             let Self { hunt, expected, refused, .. } = self;
@@ -198,7 +199,7 @@ impl Transaction {
         self.end.as_ref()
     }
 
-    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
+    /// When to poll it while it is pending, and when the line is free afterwards, in ns.
     pub const fn until_ns(&self) -> u64 {
         if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.ready_ns }
     }
@@ -228,8 +229,8 @@ pub struct BusTransaction {
 }
 
 impl BusTransaction {
-    /// Creates a transaction that asks nobody, as a place for [`restart`](Self::restart). It counts as one that has ended, and
-    /// its line is free at any time.
+    /// Creates a transaction that requests nothing, as a place for [`restart`](Self::restart). It counts as one that has
+    /// ended, and its line is free at any time.
     #[inline]
     pub const fn idle() -> Self {
         let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
@@ -265,7 +266,7 @@ impl BusTransaction {
         *self = Self::begun(request, resolution, asked, line, start_ns);
     }
 
-    /// Inlined, so that it is created in its final place.
+    /// It is inlined, so that the transaction is created in its final place.
     #[inline(always)]
     fn begun(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
@@ -342,7 +343,7 @@ impl BusTransaction {
         self.outcome()
     }
 
-    /// Returns the state of the transaction at `now_ns`; it ends if no answer can arrive any more.
+    /// Returns the state of the transaction at `now_ns`; it ends once no answer can arrive any more.
     pub fn poll(&mut self, now_ns: u64) -> Progress<()> {
         if !self.ended && now_ns > self.until_ns {
             let Self { hunt, expected, bus, .. } = self;
@@ -369,7 +370,7 @@ impl BusTransaction {
         }
     }
 
-    /// Returns how it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) tells which
+    /// Returns how it ended; `None` while it is pending. A missing answer is not a failure: [`bus`](Self::bus) says which
     /// encoders did not answer.
     pub const fn outcome(&self) -> Option<Result<(), Error>> {
         match (self.refused, self.ended) {
@@ -379,7 +380,7 @@ impl BusTransaction {
         }
     }
 
-    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
+    /// When to poll it while it is pending, and when the line is free afterwards, in ns.
     pub const fn until_ns(&self) -> u64 {
         if self.ended { self.ready_ns } else { self.until_ns.saturating_add(1) }
     }
@@ -397,7 +398,7 @@ impl BusTransaction {
     }
 }
 
-/// The request of a transaction that asks nobody.
+/// The request of a transaction that requests nothing.
 const NOTHING: Request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
 
 /// Returns why a request must not be sent.

@@ -11,10 +11,10 @@ use crate::status::Alm;
 
 /// A [`Write`] that ends as done, not done, or with an unknown effect.
 ///
-/// 1. STATUS, until ES0 is clear: a busy encoder repeats the arguments and does nothing. MEMERR must be clear, so that
-///    afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
+/// 1. STATUS is read until ES0 is clear, because a busy encoder repeats the arguments and does nothing. MEMERR must be
+///    clear, so that afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
 ///    If an encoder is chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
-/// 2. The write, **once**, 30 ms, STATUS. MEMERR must still be clear.
+/// 2. The write is sent **once**; after 30 ms STATUS is read. MEMERR must still be clear.
 /// 3. What was written is read back, even if the response to the write is missing.
 ///
 /// | it ends with | the encoder |
@@ -31,7 +31,7 @@ pub struct VerifiedWrite {
     /// The encoder to ask for the status.
     ea: EncoderAddress,
     phase: Phase,
-    /// MEMERR is set, perhaps since before.
+    /// MEMERR is set; it may have been set before.
     doubtful: bool,
     tries: u16,
     end: Option<Step<()>>,
@@ -118,7 +118,7 @@ impl VerifiedWrite {
         Step::Send { request: self.write.request(), not_before_ns }
     }
 
-    /// Returns whether the address of the encoder is unknown beforehand.
+    /// Returns whether the address of the encoder is not known in advance.
     const fn is_chosen_by_id(&self) -> bool {
         matches!(self.write.request().operation, Operation::SetAddress2 { .. })
     }
@@ -212,7 +212,7 @@ fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
     }
 }
 
-/// Returns which encoder to ask so that the count of a reset restarts, and whether it answers with this address.
+/// Returns the encoder to ask, so that the count of a reset restarts, and whether it answers with this address.
 pub(super) const fn apart(request: Request) -> (Request, Option<EncoderAddress>) {
     match request.operation {
         // The address of the only encoder is not known.

@@ -48,7 +48,7 @@ impl Write {
         Self::of(EncoderAddress::ZERO, Operation::IdWrite2 { id })
     }
 
-    /// Gives the encoder with the identification code `id` the address `new` (command 20).
+    /// Assigns the address `new` to the encoder with the identification code `id` (command 20).
     pub const fn address(id: EncoderId, new: EncoderAddress) -> Self {
         Self::of(new, Operation::SetAddress2 { id })
     }
@@ -70,7 +70,7 @@ impl Write {
         Step::Send { request: self.request, not_before_ns: now_ns }
     }
 
-    /// What is written, and to which address.
+    /// The request: what is written, and where.
     pub const fn request(&self) -> Request {
         self.request
     }
@@ -78,9 +78,9 @@ impl Write {
     servowire_core::receive! {
         /// The value is the response to STATUS.
         ///
-        /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with [`Error::EffectUnknown`] if no
-        /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set, by this write or since
-        /// before.
+        /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with
+        /// [`Error::EffectUnknown`] if no response to this write or no status comes, and with [`Error::MemoryFault`] if
+        /// MEMERR is set, by this write or earlier.
         Response
     }
 
