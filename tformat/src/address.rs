@@ -27,7 +27,7 @@ impl Page {
     /// Pages of Tamagawa's encoders.
     pub const COUNT: u8 = 6;
 
-    /// Returns page and address of the byte `index` of a memory of `pages` pages; `None` after its end.
+    /// Returns the page and address of byte `index` in a memory of `pages` pages; `None` after its end.
     pub const fn locate(index: u16, pages: u8) -> Option<(Self, Address)> {
         let [page, above] = (index / Self::LEN).to_le_bytes();
         let [offset, _] = (index % Self::LEN).to_le_bytes();
@@ -53,12 +53,12 @@ pub struct Adf(u8);
 impl Adf {
     const BUSY: u8 = 0x80;
 
-    /// Creates the field from any byte; every byte is a valid address field.
+    /// Creates the field from a byte; every byte is a valid address field.
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
     }
 
-    /// Creates the field of an address with the busy flag 0, as a master sends it.
+    /// Creates the field for an address with the busy flag 0, as a master sends it.
     pub const fn of(address: Address) -> Self {
         Self(address.get())
     }

@@ -23,7 +23,7 @@ servowire_core::codes! {
         Idle = 0 => "IDLE",
         /// 01: the request is being sent.
         TransmitData = 1 => "TRANSMIT_DATA",
-        /// 10: the request has been sent, the response has not begun.
+        /// 10: the request has been sent and the response has not begun.
         WaitForStart = 2 => "WAIT_FOR_START",
         /// 11: the response is being received.
         ReceiveData = 3 => "RECEIVE_DATA",
@@ -152,7 +152,7 @@ pub struct Outputs {
 ///
 /// The response passes a synchroniser of two cycles, so a bit is sampled d + 2 cycles after its edge.
 ///
-/// The design assumes, as does this model, that START_OPERATION comes only in IDLE and never together with an edge.
+/// Like the design, this model assumes that START_OPERATION comes only in IDLE and never together with an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tile {
@@ -165,7 +165,7 @@ pub struct Tile {
     counter1: u16,
     match2: u16,
     transmit_enable: bool,
-    /// The response as the edge detector sees it: the values of this cycle and the one before.
+    /// The response as seen by the edge detector: the values in this cycle and in the one before.
     seen: bool,
     seen_before: bool,
 }

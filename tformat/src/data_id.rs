@@ -144,7 +144,7 @@ pub struct ControlField(u8);
 servowire_core::one_line!(ControlField { Self(cf) => "CF {:02X}h", cf; });
 
 impl ControlField {
-    /// Returns the control field of a data ID code; only the four low bits of `code` count.
+    /// Returns the control field of a data ID code; only the four low bits of `code` are used.
     pub const fn compose(code: u8) -> Self {
         let id = code & 0xf;
         let parity = (id ^ id >> 1 ^ id >> 2 ^ id >> 3) & 1;

@@ -59,7 +59,7 @@ pub enum Fault {
     },
     /// The response ends after this many fields.
     CutAfter {
-        /// Fields that are sent, 1 or more.
+        /// Number of fields that are sent, 1 or more.
         fields: u8,
     },
     /// The response's check field is inverted.
@@ -72,7 +72,7 @@ pub enum Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// The fields as a UART sends them. A fault in a start bit or delimiter shows only in [`line`](Self::line).
+    /// The fields, as a UART sends them. A fault in a start bit or delimiter shows only in [`line`](Self::line).
     pub frame: Frame,
     /// The line bits.
     pub line: Window,
@@ -110,7 +110,7 @@ pub struct Device<const PAGES: usize> {
     last_reset_end_ns: u64,
     received: [u8; 4],
     len: u8,
-    /// A request has been judged and no pause has followed since.
+    /// A request has been judged, and no pause has come since.
     deaf: bool,
     last_byte_ns: u64,
     bits: Receiver,
@@ -168,7 +168,7 @@ impl<const PAGES: usize> Device<PAGES> {
         self.abm = abm;
     }
 
-    /// Starts the cause of these alarms, which sets them.
+    /// Starts the cause of these alarms, which sets the alarms.
     pub const fn raise_alarms(&mut self, alarms: Almc) {
         self.causes = self.causes.union(alarms);
         self.almc = self.almc.union(alarms);
@@ -185,17 +185,18 @@ impl<const PAGES: usize> Device<PAGES> {
         self.fault = fault;
     }
 
-    /// Returns the error byte as the encoder would answer it now.
+    /// Returns the error byte that the encoder would send now.
     pub const fn almc(&self) -> Almc {
         self.almc
     }
 
-    /// Returns ABS as the encoder would answer it now: relative to the zero that ID 8 set, in the width that the encoder ID names.
+    /// Returns the ABS that the encoder would send now: relative to the zero set by ID 8, in the width that the encoder ID
+    /// names.
     pub const fn abs(&self) -> Abs {
         self.single_turn()
     }
 
-    /// Returns ABM as the encoder would answer it now.
+    /// Returns the ABM that the encoder would send now.
     pub const fn abm(&self) -> Abm {
         self.abm
     }
@@ -285,7 +286,7 @@ impl<const PAGES: usize> Device<PAGES> {
         self.field(field, end_ns)
     }
 
-    /// At most one bit in ten ends a field, so that work is kept out of the path of the other bits.
+    /// Handles the end of a field. It is kept out of the path of the other bits, because at most one bit in ten ends a field.
     #[inline(never)]
     fn field(&mut self, field: Field, end_ns: u64) -> Option<Transmission> {
         let [byte, _] = field.content.to_le_bytes();
@@ -302,7 +303,7 @@ impl<const PAGES: usize> Device<PAGES> {
         self.unless_silent(response, now_ns)
     }
 
-    /// An encoder that is made silent, or that is busy, sends nothing.
+    /// An encoder that is set to be silent, or that is busy, sends nothing.
     fn unless_silent(&self, response: Response, now_ns: u64) -> Option<Response> {
         // The request that completes the ten is still answered.
         let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
@@ -332,7 +333,7 @@ impl<const PAGES: usize> Device<PAGES> {
         if self.behaviour.leaves_status_zero { StatusField::empty() } else { StatusField::of_alarms(self.almc) }
     }
 
-    /// Returns ABS relative to the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
+    /// Returns ABS relative to the zero set by ID 8, in the width that the encoder ID names (24 bits for an unknown ID).
     const fn single_turn(&self) -> Abs {
         let bits = match Resolution::from_enid(self.enid) {
             Some(hint) => hint.resolution.abs_bits(),
@@ -351,7 +352,7 @@ impl<const PAGES: usize> Device<PAGES> {
         Response::ReadAll(self.all_data(self.sf().union(damage)))
     }
 
-    /// Ten equal reset requests in a row, 40 us apart or more, take effect.
+    /// Counts a reset request: ten equal ones in a row, at least 40 us apart, take effect.
     fn count_resets(&mut self, id: DataId, now_ns: u64) {
         if !matches!(id, DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors) {
             if self.behaviour.others_restart_count {

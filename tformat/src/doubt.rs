@@ -15,7 +15,7 @@ pub enum Doubt {
         /// Distance to the instant of sampling, in ns.
         age_ns: u64,
     },
-    /// The response carries no such position: it answers ID 2 or an EEPROM request, or turns are wanted and it has only ABS.
+    /// The response carries no such position: it answers ID 2 or an EEPROM request, or turns are used and it carries only ABS.
     #[error("the response carries no such position")]
     Absent,
     /// Information bits of SF are set, although they are always 0: the fields are not where they should be.
@@ -30,8 +30,9 @@ pub enum Doubt {
         /// The status.
         sf: StatusField,
     },
-    /// The response says that it comes from an encoder with another number of single-turn bits. Not checked if
-    /// [`Resolution::with_upper_bits_ignored`](crate::Resolution::with_upper_bits_ignored) says that the encoder has its own rules.
+    /// According to its ENID, the response comes from an encoder with another number of single-turn bits. Not checked if
+    /// [`Resolution::with_upper_bits_ignored`](crate::Resolution::with_upper_bits_ignored) says that the encoder has its own
+    /// rules.
     #[error("the encoder calls itself {enid:#04x}, the resolution has {abs_bits} single-turn bits")]
     OtherEncoder {
         /// ENID of the response.
@@ -44,7 +45,7 @@ pub enum Doubt {
     UpperBits {
         /// The 24-bit field.
         value: u32,
-        /// The set bits of the field that must be 0.
+        /// The bits of the field that are set but must be 0.
         excess: u32,
     },
     /// The encoder reports errors that are not tolerated.

@@ -105,7 +105,7 @@ servowire_core::errors! {
         /// No response within the time-out.
         #[error("{}", if *.echo { "only our own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
         NoResponse = 13 {
-            /// Whether the master's own request was received, in which case the line works but nobody answers.
+            /// Whether the master's own request was received, in which case the line works but no encoder answers.
             echo: bool,
         },
         /// The EEPROM stayed busy or the encoder did not accept a value, after all tries.
@@ -119,13 +119,13 @@ servowire_core::errors! {
         NotDone = 15 {
             /// Number of requests sent.
             sent: u8,
-            /// How it failed.
+            /// How the operation failed.
             because: ErrorClass,
         },
         /// It is not known whether the operation was done. Read back what can be read before trying again.
         #[error("it is not known whether it was done: {because}")]
         EffectUnknown = 16 {
-            /// How it failed.
+            /// How the operation failed.
             because: ErrorClass,
         },
         /// A data field has bits set above the width of the encoder: the wrong resolution, or a damaged frame.
@@ -133,7 +133,7 @@ servowire_core::errors! {
         UpperBits = 17 {
             /// The 24-bit field.
             value: u32,
-            /// Those of its bits that must be 0.
+            /// The bits of the field that are set but must be 0.
             excess: u32,
         },
         /// A `nom` combinator of the caller refused the input.

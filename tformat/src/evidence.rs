@@ -89,7 +89,7 @@ impl Evidence {
         marks
     }
 
-    /// Returns why it must not be used; off the hot path.
+    /// Returns why the position must not be used; kept off the hot path.
     #[cold]
     #[inline(never)]
     #[expect(clippy::cast_sign_loss, reason = "a field that was stored there")]
@@ -120,7 +120,7 @@ impl Evidence {
     }
 }
 
-/// Returns the doubt about a field that is wider than the encoder's.
+/// Returns the doubt about a field that is wider than the encoder's data.
 const fn upper_bits(value: u32, bits: u32) -> Doubt {
     Doubt::UpperBits { value, excess: value & u32::MAX.wrapping_shl(bits) }
 }

@@ -49,7 +49,7 @@ impl Frame {
     /// A frame without fields, which never occurs on a line.
     pub(crate) const NONE: Self = Self { bytes: [0; Self::MAX_FIELDS], len: 0 };
 
-    /// Creates a frame of 1 field.
+    /// Creates a frame of one field.
     pub(crate) const fn of1(a: u8) -> Self {
         Self { bytes: [a, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], len: 1 }
     }
@@ -82,12 +82,12 @@ impl Frame {
         Some(frame)
     }
 
-    /// The data bytes as a UART sends and receives them, in line order.
+    /// The data bytes, as a UART sends and receives them, in line order.
     pub fn as_bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
     }
 
-    /// Returns all eleven bytes: the data bytes, then zeros. This is a copy of constant length, for firmware.
+    /// Returns all eleven bytes: the data bytes, then zeros. This copies a constant length, which suits firmware.
     pub const fn to_array(self) -> [u8; Self::MAX_FIELDS] {
         self.bytes
     }
@@ -257,12 +257,12 @@ pub(crate) fn load(bytes: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> u128
     }
 }
 
-/// The number of fields, as an error reports it.
+/// The number of fields, as used in an error.
 pub(crate) fn count(bytes: &[u8]) -> u16 {
     u16::try_from(bytes.len()).unwrap_or(u16::MAX)
 }
 
-/// Names the first framing fault in a line that should hold `fields` fields; off the hot path.
+/// Names the first framing fault in a line that should hold `fields` fields; kept off the hot path.
 #[cold]
 pub(crate) fn framing(line: Window, fields: u8) -> Error {
     for field in 0..fields {

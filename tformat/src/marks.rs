@@ -1,4 +1,4 @@
-//! All reasons against using a position, as bits of one word, so that one mask says which are tolerated.
+//! The reasons against using a position, as bits of one word, so that one mask says which are tolerated.
 //!
 //! ```text
 //!  31 ... 27  26 ... 22  21 20  19 18  17 ... 14  13     12          11             10      9           8         7 ... 0
@@ -9,13 +9,13 @@ use crate::status::{Almc, StatusField};
 
 /// The response carries no turns, and the encoder has them.
 pub(crate) const NO_TURNS: u32 = 1 << 8;
-/// ABM has bits above its width. The turns hold the raw field.
+/// ABM has bits above its width. The turns carry the raw field.
 pub(crate) const WIDE_TURNS: u32 = 1 << 9;
 /// There is no ABS.
 pub(crate) const ABSENT: u32 = 1 << 10;
-/// ENID contradicts the resolution. The single turn holds ENID.
+/// ENID contradicts the resolution. The single turn carries ENID.
 pub(crate) const OTHER_ENCODER: u32 = 1 << 11;
-/// ABS has bits above its width. The single turn holds the raw field.
+/// ABS has bits above its width. The single turn carries the raw field.
 pub(crate) const UPPER_BITS: u32 = 1 << 12;
 /// There was no response.
 pub(crate) const NEVER: u32 = 1 << 13;

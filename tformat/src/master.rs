@@ -1,4 +1,4 @@
-//! The controller's side as state machines without I/O. You tell them what arrived and what time it is, and they say what to do
+//! The controller's side as state machines without I/O. You tell them what arrived and what time it is; they say what to do
 //! next. Time is a count of nanoseconds from any origin.
 //!
 //! * [`Transaction`] handles one request and its response: time-outs, echoes, late interrupts, all checks.

@@ -89,7 +89,7 @@ servowire_core::one_line!(Memory { Self { adf, edf } => "ADF {} EDF {:02X}h", ad
 pub(crate) const CF3: u8 = DataId::ReadAll.control_field().get();
 
 impl AllData {
-    /// Fields of the response.
+    /// Number of fields of the response.
     pub const FIELDS: usize = 11;
 
     /// Decodes the response to ID 3 from the start of UART bytes; bytes after it are ignored.
@@ -156,7 +156,7 @@ impl AllData {
     }
 }
 
-/// Returns whether eleven fields are an ID 3 frame with a good check field: the whole good path in four loads.
+/// Returns whether eleven fields are an ID 3 frame with a good check field: four loads are the whole good path.
 pub(crate) const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10] = *b;
     let sum = u32::from_le_bytes([b0, b1, b2, b3])
@@ -166,7 +166,7 @@ pub(crate) const fn is_sound(b: &[u8; AllData::FIELDS]) -> bool {
     (sum ^ sum >> 8) & 0xff == 0 && b0 == CF3
 }
 
-/// Returns the error that an unrequested ID 3 frame stands for.
+/// Returns the error that an unrequested ID 3 frame means.
 #[cold]
 fn rejection(bytes: &[u8]) -> Error {
     match AllData::parse(bytes) {
@@ -175,7 +175,7 @@ fn rejection(bytes: &[u8]) -> Error {
     }
 }
 
-/// Returns why the line bits of a response to ID 3 are refused; off the hot path.
+/// Returns why the line bits of a response to ID 3 are refused; kept off the hot path.
 ///
 /// It takes the bits rather than the fields, so that the good path need not store the fields.
 #[cold]
@@ -187,7 +187,8 @@ fn line_refusal(line: u128) -> Error {
     }
 }
 
-/// Returns why a response to `id` is refused: by its control field, length or check field, in this order. Off the hot path.
+/// Returns why a response to `id` is refused: by its control field, length or check field, in this order. Kept off the hot
+/// path.
 #[cold]
 #[inline(never)]
 pub(crate) fn refusal(id: DataId, bytes: &[u8]) -> Error {

@@ -56,7 +56,7 @@ impl Request {
         Self::WriteEeprom { adf: Adf::of(address), edf }
     }
 
-    /// Derives a request that the response would fit, for tools that did not see the request.
+    /// Derives a request that would match the response, for tools that did not see the request.
     ///
     /// An EEPROM response repeats address and data; missing fields count as 0.
     ///
@@ -192,7 +192,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Every single-bit flip is refused by the check that covers its field.
+    /// Every flipped bit is refused by the check that covers its field.
     #[test]
     fn single_flips_and_truncations() {
         for request in every(0x35, 0xc6) {

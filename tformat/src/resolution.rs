@@ -30,15 +30,15 @@ pub struct Resolution {
 
 servowire_core::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + {} bits", abs_bits, abm_bits; });
 
-/// What an encoder ID suggests.
+/// The widths that an encoder ID suggests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Hint {
     /// The widths.
     pub resolution: Resolution,
-    /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they follow from the rule that
-    /// all known IDs follow.
+    /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they are derived from the rule
+    /// that all known IDs follow.
     pub documented: bool,
 }
 
@@ -98,8 +98,8 @@ impl Resolution {
     /// | 0x14 | 20 | 16 | not documented: the same rule |
     /// | 0x18 | 24 | 16 | not documented: the same rule |
     ///
-    /// `None` for all other IDs. A model name proves nothing: TIDM-1011 states 24 bits for the TS5700N8501, a widely used motor
-    /// controller 17.
+    /// `None` for all other IDs. A model name proves nothing: for the TS5700N8501, TIDM-1011 states 24 bits and a widely used
+    /// motor controller 17.
     pub const fn from_enid(enid: u8) -> Option<Hint> {
         let (abm_bits, documented) = match enid {
             0x0b => (13, true),
@@ -212,7 +212,7 @@ const fn sign_extend(value: u32, bits: u8) -> i32 {
     (value.wrapping_shl(unused) as i32).wrapping_shr(unused)
 }
 
-/// A resolution in its serialised form. The number of pages may be missing; it is then six.
+/// The serialised form of a resolution. The number of pages may be missing, in which case it is six.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Widths {

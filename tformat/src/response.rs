@@ -171,7 +171,7 @@ impl Response {
         }
     }
 
-    /// Creates a response from four checked fields; what it repeats of an EEPROM request is not checked yet.
+    /// Creates a response from four checked fields; whether it matches an EEPROM request is not checked yet.
     #[inline]
     fn of4(request: Request, [_, first, second, _]: [u8; 4]) -> Result<Self, Error> {
         let memory = Memory { adf: Adf::from_bits(first), edf: second };
@@ -212,13 +212,13 @@ const fn six_fields(cf: u8, sf: StatusField, [d0, d1, d2]: [u8; 3]) -> [u8; 6] {
     [cf, sf, d0, d1, d2, cf ^ sf ^ d0 ^ d1 ^ d2]
 }
 
-/// Returns how many fields the response to a request for `id` has if it begins with `cf`: an ID 3 frame that was not requested
+/// Returns how many fields the response to a request for `id` has if it begins with `cf`; an ID 3 frame that was not requested
 /// is the encoder's refusal.
 const fn expected_fields(id: DataId, cf: u8) -> u8 {
     if cf == CF3 { DataId::ReadAll.response_fields() } else { id.response_fields() }
 }
 
-/// Returns why line bits are refused; off the hot path. Line bits that are sound after all are returned as the response.
+/// Returns why line bits are refused; kept off the hot path. If the line bits turn out to be sound, the response is returned.
 #[cold]
 #[inline(never)]
 fn line_refusal(request: Request, line: Window) -> Result<Response, Error> {

@@ -12,7 +12,7 @@ use crate::response::Response;
 /// The word that keeps the transmitter idle while a response is received: ten idle bits.
 pub const SPI10_IDLE: u16 = 0x3ff;
 
-/// The largest number of 16-bit words of a transaction that matter: a refused EEPROM write, with 48 bits and an 11-field response.
+/// The largest number of 16-bit words that a transaction needs: a refused EEPROM write, with 48 bits and an 11-field response.
 pub const SPI16_MAX_WORDS: usize = 10;
 
 /// Returns the fields of a frame as 10-bit SPI words.

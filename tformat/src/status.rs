@@ -51,7 +51,7 @@ impl StatusField {
 
     /// Returns whether EA0 and EA1 agree with `almc`: EA0 = CE, EA1 = OH or ME or BE or BA.
     ///
-    /// A difference is worth a note in a diagnosis but is not an error: some compatible encoders leave SF at 0.
+    /// A difference is worth noting in a diagnosis but is not an error: some compatible encoders leave SF at 0.
     pub const fn agrees_with(self, almc: Almc) -> bool {
         let alarms = Self::EA0.union(Self::EA1);
         self.intersection(alarms).bits() == Self::of_alarms(almc).bits()
@@ -79,8 +79,8 @@ impl StatusField {
 ///       BA | BE | ME | OH | OF | CE | FS | OS
 /// ```
 ///
-/// How severe an alarm is depends on the drive: some mask the counter overflow in multi-turn use, most treat the
-/// battery alarm as a warning, and a single-turn drive ignores the battery and multi-turn bits. So nothing is decided here.
+/// How severe an alarm is depends on the drive: some mask the counter overflow in multi-turn use, most treat the battery
+/// alarm as a warning, and a single-turn drive ignores the battery and multi-turn bits. So this crate does not decide it.
 ///
 /// It is displayed as the names of the set bits: `OF BE BA`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

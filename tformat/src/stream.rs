@@ -55,7 +55,7 @@ where
     }
 }
 
-/// Returns the rest of the input after a frame of `len` fields, or the fault as `nom` reports it.
+/// Returns the rest of the input after a frame of `len` fields, or the fault as a `nom` error.
 fn finish<'a, T, E>(input: &'a [u8], frame: Result<T, Error>, len: impl Fn(&T) -> u8) -> IResult<&'a [u8], T, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,

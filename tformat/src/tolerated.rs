@@ -15,7 +15,7 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// The alarms despite which a position may be used. How severe an alarm is depends on the drive, see [`Almc`].
 ///
-/// In responses without ALMC, which are all except that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]: EA1 is
+/// In responses without ALMC, which are all except that to ID 3, EA0 stands for CE, and EA1 for any of [`Almc::IN_EA1`]; EA1 is
 /// tolerated if all of these are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
@@ -29,7 +29,8 @@ servowire_core::one_line!(Tolerated {
 impl Tolerated {
     /// Nothing.
     pub const NOTHING: Self = Self(0);
-    /// The alarms that one drive tolerates when it counts turns: an overflow of the turns is ignored, a low battery is a warning.
+    /// The alarms that one maker's drive tolerates when it counts turns: an overflow of the turns is ignored, and a low battery
+    /// is a warning.
     pub const MULTI_TURN: Self = Self::NOTHING.alarms(Almc::OF.union(Almc::BA));
     /// The alarms that the same drive tolerates when turns are not used: everything about the turns and the battery. The
     /// turns are then not judged, and the [`Sample`](crate::Sample) does not have them.
@@ -48,7 +49,7 @@ impl Tolerated {
         marks & OBJECTIONS & !self.0
     }
 
-    /// Returns whether turns are not used, so that they may be anything, or missing.
+    /// Returns whether turns are not used, so that they may be wrong or missing.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
         self.0 & NO_TURNS != 0
@@ -59,7 +60,7 @@ impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
 }
 
-/// What is tolerated, in its serialised form.
+/// The serialised form of what is tolerated.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {

@@ -4,11 +4,11 @@ use crate::crc::{check, crc};
 use crate::error::Error;
 use crate::frame::{Frame, count};
 
-/// The extension point for commands that are not Tamagawa's: encoders of other makers use private commands over the same fields,
-/// some even with control fields that break the layout.
+/// The extension point for commands that are not Tamagawa's: encoders of other makers use private commands with the same
+/// fields, some even with control fields that break the layout.
 ///
-/// Only its first byte and its lengths are known, so only these are checked: the repeated control field, the number of fields,
-/// and the check field.
+/// Only the first byte and the lengths of such a command are known, so only the repeated control field, the number of fields
+/// and the check field are checked.
 ///
 /// ```
 /// use tformat::{ControlField, VendorCommand};
@@ -74,8 +74,8 @@ impl VendorCommand {
         Frame::new(bytes.get(..len)?)
     }
 
-    /// Returns the fields of a response between control field and check field. It decodes the start of `bytes`; bytes after the
-    /// response are ignored.
+    /// Returns the fields of a response between its control field and its check field. It decodes the beginning of `bytes`;
+    /// bytes after the response are ignored.
     ///
     /// # Errors
     /// [`Error::Truncated`] without any field, [`Error::CfMismatch`], [`Error::Truncated`], [`Error::Crc`].
@@ -92,7 +92,7 @@ impl VendorCommand {
     }
 }
 
-/// A command in its serialised form.
+/// The serialised form of a command.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Lengths {

@@ -1,4 +1,4 @@
-/// The instant from which the time between two reset requests is counted. No document says which it is.
+/// The instant from which the time between two reset requests is counted. No document says which instant that is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -35,7 +35,7 @@ pub enum BusyData {
     Zeros,
     /// 0xff.
     Ones,
-    /// What the cell holds.
+    /// The contents of the cell.
     Cell,
 }
 
@@ -46,13 +46,14 @@ pub enum BusyData {
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
-    /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged.
+    /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged from a real
+    /// encoder.
     pub response_delay_ns: u32,
-    /// The instant from which the 40 us between two resets are counted.
+    /// The instant from which the 40 us between two reset requests are counted.
     pub reset_interval: Interval,
-    /// Whether another request restarts the count of resets.
+    /// Whether another request restarts the count of reset requests.
     pub others_restart_count: bool,
-    /// Whether a damaged request restarts the count of resets.
+    /// Whether a damaged request restarts the count of reset requests.
     pub damage_restarts_count: bool,
     /// Whether the response to the tenth reset shows its effect, or only the one after it.
     pub tenth_shows_effect: bool,
@@ -60,7 +61,7 @@ pub struct Behaviour {
     pub silent_while_storing: bool,
     /// Whether selecting a page keeps the memory busy like any write.
     pub page_select_is_busy: bool,
-    /// What happens if a page is selected that does not exist.
+    /// What happens if a page that does not exist is selected.
     pub absent_page: AbsentPage,
     /// The data byte of reads while the memory is busy.
     pub busy_data: BusyData,
@@ -91,8 +92,8 @@ impl Behaviour {
         }
     }
 
-    /// Returns the combination with this number, for tests that walk through them all: every switch with every other, and
-    /// response delays of 3.0, 3.2, 1.7 and 9 us. Numbers of [`NUMBERED`](Self::NUMBERED) and above start over.
+    /// Returns the combination with this number, for tests that walk through them all: every switch combined with every other,
+    /// and response delays of 3.0, 3.2, 1.7 and 9 us. Numbers from [`NUMBERED`](Self::NUMBERED) upwards start over.
     pub const fn numbered(number: u16) -> Self {
         const fn bit(number: u16, at: u32) -> bool {
             number >> at & 1 == 1

@@ -20,9 +20,9 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// Time from power-on to the first request.
+    /// The time from power-on to the first request.
     pub const POWER_ON_WAIT_NS: u64 = 1_500_000_000;
-    /// Requests at each rate.
+    /// The number of requests at each rate.
     const TRIES: u8 = 3;
 
     /// Tries 5 Mbit/s, then 2.5 Mbit/s, with the defaults of [`Line::new`].
@@ -41,7 +41,7 @@ impl Detection {
         if self.second { second } else { first }
     }
 
-    /// Returns the first request. The supply was switched on at `power_on_ns` (ns).
+    /// Returns the first request. `power_on_ns` is when the supply was switched on, in ns.
     pub const fn start(&mut self, power_on_ns: u64) -> Step<AllData> {
         *self = Self::on(self.lines);
         let not_before_ns = power_on_ns.saturating_add(Self::POWER_ON_WAIT_NS);

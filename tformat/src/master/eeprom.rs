@@ -17,21 +17,21 @@ enum Phase {
     Select,
     /// The byte is written.
     Write,
-    /// The byte is read: because it was requested, or to see what became of a write.
+    /// The byte is read, because it was requested or to find out what became of a write.
     Read,
     /// The register is read again, to confirm that the cell belonged to the page.
     CheckAfter,
 }
 
-/// What is known about a write to the page register or to the cell.
+/// The state of a write to the page register or to the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Sent {
-    /// It was not sent, or reading has shown that it was not done.
+    /// The write was not sent, or reading has shown that it was not done.
     Not,
-    /// It may have been done, and nothing that was read decides it.
+    /// The write may have been done, and nothing that was read shows whether it was.
     Unknown,
-    /// It was answered with its own data and without the busy flag.
+    /// The write was answered with its own data and without the busy flag.
     Confirmed,
 }
 
@@ -41,11 +41,12 @@ enum Sent {
 /// access; the page is selected if the register holds another one. A written byte is read back, and the access waits while
 /// the memory is busy. The result is the byte read.
 ///
-/// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, including one to
-/// the page register, the cell is read. It is written again only if it holds another value on the page that was named. A memory
-/// that reports busy is polled by reading. It ends with [`Error::EffectUnknown`] if nothing can be read after a
-/// write has been sent, or if the register then holds another page: the write may have gone there. A response for another
-/// address is refused, like a response of another kind. Once done or failed it stays so, until it is started again.
+/// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, including
+/// one to the page register, the cell is read. It is written again only if the cell of the requested page holds another
+/// value. A memory that reports busy is polled by reading. It ends with [`Error::EffectUnknown`] if nothing can be read
+/// after a write has been sent, or if the register then holds another page: the write may have gone there. A response for
+/// another address is refused, like a response of another kind. Once it is done or has failed, it stays in that state until
+/// it is restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
@@ -54,9 +55,9 @@ pub struct EepromAccess {
     write: Option<u8>,
     polling: Polling,
     phase: Phase,
-    /// Failed requests since the page was first found, or since the write was accepted.
+    /// Number of failed requests since the page was first found, or since the write was accepted.
     tries: u16,
-    /// The register has held the page.
+    /// The register has been seen to hold the page.
     on_page: bool,
     selection: Sent,
     written: Sent,
@@ -73,7 +74,7 @@ impl EepromAccess {
 
     /// Writes `data` to `address` of `page`, then reads it back.
     ///
-    /// Motor makers keep name plate and commutation data in this memory: make sure you know what is at the address.
+    /// Motor makers keep name plate and commutation data in this memory: make sure that you know what is at the address.
     pub const fn write(page: Page, address: Address, data: u8, polling: Polling) -> Self {
         Self::new(page, address, Some(data), polling)
     }
@@ -185,7 +186,7 @@ impl EepromAccess {
         }
     }
 
-    /// Judges the value that was read, which the cell of the page holds.
+    /// Judges the value that was read from the cell of the page.
     fn judge(&mut self, ready_ns: u64) -> Step<u8> {
         let Self { value, .. } = *self;
         match self.write {
@@ -197,7 +198,7 @@ impl EepromAccess {
         }
     }
 
-    /// Handles a write that evidently was not done. It is sent again unless the encoder had confirmed it.
+    /// Handles a write that evidently was not done. The write is sent again, unless the encoder had confirmed it.
     fn differs(&mut self, error: Error, confirmed: bool, again: Phase, ready_ns: u64) -> Step<u8> {
         if confirmed || self.is_given_up() {
             return self.failed(error, ready_ns);
@@ -235,7 +236,7 @@ impl EepromAccess {
         }
     }
 
-    /// Returns what the request of this phase is about.
+    /// Returns the address that the request of this phase accesses.
     const fn cell(&self) -> Address {
         match self.phase {
             Phase::CheckBefore | Phase::Select | Phase::CheckAfter => Address::PAGE_REGISTER,

@@ -24,7 +24,7 @@ pub struct Line {
     pub turn_around_ns: u32,
     /// Longest time from the end of a byte on the line to its hand-over to the master, in ns: the interrupt latency, or the
     /// duration of a DMA block plus the time after which an idle line is reported. Default just below the turn-around plus one
-    /// field, 5 599 or 2 799: an echo that late is still recognised by its time.
+    /// field, 5 599 or 2 799: an echo that comes so late is still recognised by its time.
     pub hand_over_ns: u32,
     /// Time for which the driver is enabled before the start bit of the request, in ns. Default 1 000, the minimum that one
     /// driver requires; TI's design manages with one bit.
@@ -81,9 +81,9 @@ impl Line {
     /// By how much the end time passed to the master may lie after the end of the byte on the line, in ns: slightly less than
     /// the turn-around, 1.2 us at 2.5 Mbit/s and 0.6 us at 5 Mbit/s by default.
     ///
-    /// Within it, no response is taken that began before the request had left the line or within one bit after it. A block may be
-    /// handed over at any later time, as long as the master is told when it ended. The master's own request is recognised by its
-    /// time until the turn-around and one field after its end.
+    /// If the end time is no later than that, no response is taken that began before the request had left the line or within
+    /// one bit after it. A block may be handed over at any later time, as long as the master is told when it ended. The
+    /// master's own request is recognised by its time until the turn-around and one field after its end.
     pub const fn latency_budget_ns(self) -> u32 {
         self.turn_around_ns.saturating_sub(self.rate.bit_ns())
     }

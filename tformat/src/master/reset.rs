@@ -8,9 +8,9 @@ use crate::status::StatusField;
 
 /// Runs a reset: sends the same one-field request ten times, at least 40 us apart, with no other request in between.
 ///
-/// The documents give the number and the spacing. They do not say whether the spacing counts from start to start or from the end
-/// of the response; this takes the longer one, 40 us of idle line after every response. Nor do they say whether another request
-/// or a damaged one restarts the count.
+/// The documents state the number and the spacing. They do not say whether the spacing counts from start to start or from the
+/// end of the response; this procedure uses the longer one, 40 us of idle line after every response. Nor do they say whether
+/// another request or a damaged one restarts the count.
 ///
 /// The ten requests are one operation. Clearing errors twice (ID 7) does no harm: a refused response restarts the count, and the
 /// third one ends the reset. ID 8 and ID C are **never sent again by themselves**: a refused or lost response ends them with
@@ -31,13 +31,13 @@ pub struct Reset {
 }
 
 impl Reset {
-    /// Requests in a sequence.
+    /// The number of requests in a sequence.
     pub const REQUESTS: u8 = 10;
     /// Idle line between the end of a response and the next request.
     pub const SPACING_NS: u32 = 40_000;
     /// Wait after the last response to ID 8, while the encoder stores the offset.
     pub const ZERO_WAIT_NS: u32 = 18_000_000;
-    /// Number of refused responses that ends clearing errors.
+    /// Number of refused responses after which clearing the errors ends.
     pub const MAX_REFUSED: u8 = 3;
 
     /// Clears all latched errors (ID 7). Position and turns are unchanged.
@@ -67,7 +67,7 @@ impl Reset {
         self.request.data_id()
     }
 
-    /// Valid responses in a row so far.
+    /// Number of valid responses in a row so far.
     pub const fn answered(&self) -> u8 {
         self.answered
     }
@@ -127,7 +127,7 @@ impl Reset {
     }
 }
 
-/// Returns the error for a response of another kind: the caller handed in the outcome of another request.
+/// Returns the error for a response of another kind: the caller passed in the outcome of another request.
 pub(super) fn mismatch(response: Response, request: Request) -> Error {
     let (got, want) = (response.data_id().control_field().get(), request.data_id().control_field().get());
     Error::CfMismatch { got, want }

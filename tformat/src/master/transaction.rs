@@ -16,7 +16,7 @@ pub struct Exchange {
     /// The response.
     pub response: Response,
     /// The instant of sampling by [`Line::sampling_ns`], for extrapolation: it lies between the end of the request and
-    /// the start of the response. Its age counts from here.
+    /// the start of the response. The age of the position counts from here.
     pub sampled_ns: u64,
     /// When the first start bit of the response was on the line at the latest, in ns: by then the position had been sampled.
     pub began_ns: u64,
@@ -25,7 +25,8 @@ pub struct Exchange {
 servowire_core::one_line!(Exchange { Self { response, sampled_ns, .. } => "{}, sampled at {} ns", response, sampled_ns; });
 
 impl Exchange {
-    /// Returns what it says about the position of an encoder with these widths, to be judged where it is used.
+    /// Returns what the response says about the position of an encoder with these widths, to be judged where the position is
+    /// used.
     pub const fn evidence(&self, resolution: Resolution) -> Evidence {
         Evidence::of(self.response, resolution, self.sampled_ns)
     }
@@ -47,7 +48,7 @@ pub struct Transmission {
     pub driver_off: DriverOff,
 }
 
-/// The interval in which the driver is to be disabled after a request.
+/// The interval in which the driver has to be disabled after a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DriverOff {
@@ -57,9 +58,9 @@ pub struct DriverOff {
     pub latest_ns: u64,
 }
 
-/// The state of a transaction. `ready_ns` of a failure is the end of the longest response to the request, however late within
-/// the time-out it began: eleven fields without gaps, as encoders send them. Behind a bridge that pauses between fields, also
-/// wait until the line is silent.
+/// The state of a transaction. After a failure, `ready_ns` is the end of the longest response to the request, however late
+/// within the time-out it began: eleven fields without gaps, as encoders send them. If there is a bridge that pauses between
+/// fields, also wait until the line is silent.
 pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// One request and its response, as a UART receives them: byte by byte, or in blocks.
@@ -70,16 +71,17 @@ pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 /// conclusive, by its content. Anything before or after a sound response is harmless; two sound responses in one block are
 /// [`Error::TwoResponses`].
 ///
-/// A transaction that is done or has failed stays so. Keep handing over what arrives until `ready_ns`; it is discarded.
+/// A transaction that is done or has failed stays in that state. Keep handing over what arrives until `ready_ns`; it is
+/// discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
     request: Request,
     frame: Frame,
     line: Line,
-    /// Fields of the response.
+    /// Number of fields of the response.
     fields: u8,
-    /// A field on the line.
+    /// Duration of a field on the line.
     field_ns: u32,
     start_ns: u64,
     /// The end of the request's last bit.
@@ -89,16 +91,16 @@ pub struct Transaction {
     /// The bytes that may be the response.
     received: [u8; Frame::MAX_FIELDS],
     len: u8,
-    /// Bytes of the master's own request that came back, and the first one that came back changed.
+    /// Number of bytes of the master's own request that came back, and the first one that came back changed.
     echoed: u8,
     echo_fault: Option<u8>,
-    /// Why the first run of bytes with the length of a response was not one.
+    /// Why the first run of bytes that had the length of a response was not a response.
     refused: Option<Error>,
     /// A framing error came where a response might have begun.
     broken: bool,
     /// End of the last byte.
     heard_ns: u64,
-    /// Its time-out until it ends; afterwards, when the line is free.
+    /// The time-out while the transaction is pending; afterwards, when the line is free.
     until_ns: u64,
     end: Option<Result<Exchange, Error>>,
 }
@@ -143,7 +145,8 @@ impl Transaction {
     /// Creates a transaction without request or response, as a place for [`restart`](Self::restart). It counts as one that ended
     /// with [`Error::NoResponse`], and its line is free at any time.
     ///
-    /// Nearly all of it is 0. It is a function and not a constant, so that firmware clears the memory and keeps no copy in flash.
+    /// Nearly all of its memory is 0. This is a function and not a constant, so that firmware clears the memory and keeps no
+    /// copy in flash.
     #[inline]
     pub const fn idle() -> Self {
         Self {
@@ -196,8 +199,8 @@ impl Transaction {
     /// Takes bytes that were received back to back; the delimiter of the last one ended at `end_ns` or, within the latency
     /// budget, before.
     ///
-    /// A pause within a block shifts the times of the bytes before it. Hand over separately the parts on either side of a pause
-    /// as long as the request and four fields (20 us at 2.5 Mbit/s).
+    /// A pause within a block shifts the times of the bytes before it. If a pause is as long as the request and four fields (20
+    /// us at 2.5 Mbit/s), hand over the parts before and after it separately.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
         self.push(bytes, end_ns);
         self.progress()
@@ -241,8 +244,8 @@ impl Transaction {
         }
     }
 
-    /// Sets the time by which the next field is due; a line that does not fall silent is listened to no longer than the longest
-    /// response takes.
+    /// Sets the time by which the next field is due; a line that does not fall silent is monitored for no longer than the
+    /// longest response takes.
     fn wait_longer(&mut self, end_ns: u64) {
         let Line { response_timeout_ns, field_timeout_ns, hand_over_ns, .. } = self.line;
         let fields_ns = u64::from(field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
@@ -294,7 +297,7 @@ impl Transaction {
         self.end.as_ref()
     }
 
-    /// While it is pending, when to poll it, in ns; afterwards, when the line is free.
+    /// When to poll it while it is pending, and when the line is free afterwards, in ns.
     pub const fn until_ns(&self) -> u64 {
         if self.end.is_none() { self.until_ns.saturating_add(1) } else { self.until_ns }
     }
@@ -303,7 +306,7 @@ impl Transaction {
         u64::from(self.field_ns).saturating_mul(fields as u64)
     }
 
-    /// Takes one more byte, which ended at `ended_ns` at the latest; these came after it in the same block.
+    /// Takes one more byte, which ended at `ended_ns` at the latest; the remaining bytes came after it in the same block.
     fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8]) {
         if ended_ns < self.earliest_ns {
             return self.early(byte);
@@ -380,7 +383,7 @@ impl Transaction {
         }
     }
 
-    /// Takes a valid response of this many fields. Kept out of line, because blocks and single bytes both come here.
+    /// Takes a valid response of this many fields. It is kept out of line, because blocks and single bytes both come here.
     #[inline(never)]
     fn found(&mut self, response: &Response, ended_ns: u64, fields: usize) {
         self.len = 0;
@@ -447,15 +450,15 @@ impl Transaction {
         }
     }
 
-    /// Ends with the error of what was refused, if nothing else was found.
+    /// Ends with the error of the refused bytes, if nothing else was found.
     fn refuse(&mut self) {
         if let (Some(error), None) = (self.refused, self.end) {
             self.end = Some(Err(error));
         }
     }
 
-    /// It has ended. After an error the line is free when the longest response would have ended if it had begun as late as it
-    /// may. Kept out of line, because all endings except that of a whole block come here.
+    /// The transaction has ended. After an error the line is free when the longest response would have ended if it had begun
+    /// as late as it may. It is kept out of line, because all endings except that of a whole block come here.
     #[inline(never)]
     fn finish(&mut self) {
         self.until_ns = self.heard_ns;
@@ -466,7 +469,7 @@ impl Transaction {
     }
 }
 
-/// Returns whether a response, or a refusal, came whole.
+/// Returns whether a complete response or refusal has come.
 const fn is_sound(outcome: &Result<Response, Error>) -> bool {
     matches!(outcome, Ok(_) | Err(Error::Rejected { .. }))
 }
@@ -474,7 +477,7 @@ const fn is_sound(outcome: &Result<Response, Error>) -> bool {
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
 /// Decodes everything that a UART received since the request began, with the receiver always on: the master's own request, then
-/// the response. For buffers without times; bytes after the response are ignored.
+/// the response. It is for buffers without times; bytes after the response are ignored.
 ///
 /// # Errors
 /// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;

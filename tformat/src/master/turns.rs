@@ -11,19 +11,20 @@ use crate::response::Response;
 /// [`Reset::clear_turns_and_lose_multi_turn_reference`].
 ///
 /// The vendors' documents say that the effect is to be confirmed by reading, and specify no wait after ID C. This uses the only
-/// storage time that any of them states, so that a count that is updated late is not taken for one that was not reset.
+/// storage time that any of them states, so that a count that is updated late is not mistaken for one that was not reset.
 ///
-/// A shaft at rest on the boundary of a turn may count a turn more or less when it trembles. `tolerance` says how many turns are
-/// allowed: 1 in general, 0 if the shaft is known to rest elsewhere. The result is the count read afterwards, within the tolerance
-/// of 0. Otherwise it ends with
+/// A shaft at rest on the boundary of a turn may count a turn more or less if it vibrates. `tolerance` says how many turns
+/// are allowed: 1 in general, 0 if the shaft is known to rest elsewhere. The result is the count read afterwards, within the
+/// tolerance of 0. Otherwise it ends with
 ///
 /// * [`Error::NotDone`]: the count is what it was before;
 /// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it is inconclusive: it was at or near 0 before, or is
-///   now neither there nor where it was;
+///   now neither at 0 nor what it was;
 /// * the error of the exchange, if the count could not be read before: nothing was sent.
 ///
 /// The result is judged only by the two counts, so the procedure may follow any history. ID C is sent at most ten times. A
-/// procedure that is done or has failed stays so until it is restarted. Read ID 3 to see whether the errors are gone.
+/// procedure that is done or has failed stays in that state until it is restarted. Read ID 3 to see whether the errors are
+/// gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MultiTurnZero {

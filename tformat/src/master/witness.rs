@@ -17,8 +17,8 @@ enum Phase {
     After(Result<(), ErrorClass>),
 }
 
-/// A reset that sets a value to 0, between two readings that show what became of the value. The number of requests sent and
-/// answered proves nothing: the encoder may have counted some before, or have restarted.
+/// A reset that sets a value to 0, between two readings of the value that show its effect. The number of requests sent and
+/// answered proves nothing: the encoder may have counted earlier ones, or may have restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Witness {
@@ -77,8 +77,8 @@ impl Witness {
         }
     }
 
-    /// Takes the next step of the reset, and begins the second reading however the reset ends: 18 ms later, the time for which
-    /// an encoder may be storing.
+    /// Takes the next step of the reset. However the reset ends, begins the second reading 18 ms later, because an encoder may
+    /// be storing for that long.
     fn act<T>(&mut self, step: Step<SingleTurn>, ready_ns: u64) -> Step<T> {
         let act = match step {
             Step::Send { request, not_before_ns } => {
@@ -113,7 +113,7 @@ impl Witness {
         Step::Failed { error, ready_ns }
     }
 
-    /// Returns what the value after the requests says about them.
+    /// Returns what the value after the requests shows about their effect.
     fn judge(&self, act: Result<(), ErrorClass>, now: u32, near: impl Fn(u32, u32) -> bool) -> Result<(), Error> {
         let because = act.err().unwrap_or(ErrorClass::DataMismatch);
         let unmoved = near(self.before, now);

@@ -15,12 +15,12 @@ use crate::response::Response;
 ///
 /// * [`Error::NotDone`]: the position is what it was before;
 /// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it is inconclusive: it was at zero before, or is
-///   now neither there nor where it was;
+///   now neither at zero nor where it was;
 /// * the error of the exchange, if the position could not be read before: nothing was sent.
 ///
 /// The result is judged by the two positions alone, so the procedure may follow any history: an abandoned attempt, a controller
-/// that has restarted, another master. ID 8 is sent at most ten times. A procedure that is done or has failed stays so until it
-/// is restarted.
+/// that has restarted, another master. ID 8 is sent at most ten times. A procedure that is done or has failed stays in that
+/// state until it is restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SingleTurnZero {
