@@ -1,8 +1,8 @@
 use crate::Window;
 
-/// The most likely cause of damage to a refused message, as far as the line alone can show it.
+/// The most likely cause of damage to a refused message, insofar as the line alone can show it.
 ///
-/// [`Search::find`] returns it; a protocol crate adds the causes that only its protocol knows.
+/// [`Search::find`] returns it; a protocol crate adds the causes that only its protocol can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -24,7 +24,7 @@ pub enum Cause {
     HalfRate,
     /// The line stays at 0: short circuit, driver stuck, or no supply.
     StuckLow,
-    /// The line stays at 1: nobody answers.
+    /// The line stays at 1: no encoder answers.
     StuckHigh,
     /// Only a check fails: single bits were disturbed.
     Disturbed,
@@ -56,7 +56,7 @@ impl Cause {
     }
 }
 
-/// Undoes the usual mistakes one by one, to find the mistake without which a refused message is valid.
+/// Undoes the usual mistakes one by one, to find the one whose removal makes a refused message valid.
 ///
 /// ```
 /// use nrz_line::{Cause, Search, Window};
@@ -72,13 +72,13 @@ impl Cause {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Search {
-    /// Our own request, if it can come back.
+    /// The master's own request, if it can come back.
     pub sent: Option<Window>,
     /// The maximum number of idle bits to look for before a message. Default 0.
     pub late_bits: u8,
     /// The maximum number of missing bits to look for at the beginning of a message; they are filled with 0. Default 0.
     pub early_bits: u8,
-    /// A message that begins late is filled up with idle line to this length. Default 0: it is not filled up.
+    /// A message that begins late is extended to this length with idle line. Default 0: it is not extended.
     pub complete_to: u32,
 }
 
@@ -105,8 +105,8 @@ impl Search {
         with_complete_to: complete_to, u32;
     }
 
-    /// Returns the first mistake without which `decode` accepts the line, in the order: inverted, other bit order, own echo,
-    /// half the rate, late, early, and finally an echo followed by nothing.
+    /// Returns the first mistake whose removal makes `decode` accept the line, in this order: inverted, other bit order, own
+    /// echo, half the rate, late, early, and finally an echo followed by nothing.
     pub fn find<T>(&self, line: Window, decode: impl Fn(Window) -> Option<T>) -> Option<Found<T>> {
         let after_echo = self.after_echo(line);
         let attempts = [
@@ -126,7 +126,7 @@ impl Search {
         after_echo.filter(|rest| rest.is_empty()).map(|_| Found { cause: Cause::OnlyEcho, message: None })
     }
 
-    /// Returns what follows the master's own request and the idle line after it; nothing is left if nobody answers.
+    /// Returns what follows the master's own request and the idle line after it; nothing is left if no encoder answers.
     fn after_echo(&self, line: Window) -> Option<Window> {
         let sent = self.sent?;
         let rest = line.skip(sent.len())?;
@@ -135,7 +135,7 @@ impl Search {
         if same { rest.skip(rest.bits().trailing_ones().min(rest.len())) } else { None }
     }
 
-    /// Returns the message from some bits later, or with the bits restored that are missing at its start.
+    /// Returns the message starting some bits later, or with the missing bits at its start filled in.
     fn shifted<T>(&self, line: Window, decode: impl Fn(Window) -> Option<T>) -> Option<Found<T>> {
         let found = |bits: i8, message| Found { cause: Cause::Shifted { bits }, message: Some(message) };
         for bits in 1..=self.late_bits.min(i8::MAX.unsigned_abs()) {

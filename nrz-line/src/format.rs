@@ -18,16 +18,16 @@ pub struct Format {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FormatError {
-    /// 2 or 3 samples leave no room to find an edge; above 80 the limits below are not proved.
+    /// 2 or 3 samples leave no room to find an edge; above 80, the limits below are not proved.
     #[error("{got} samples per bit: only 1 (a plain bit stream) or 4 to 80 are possible")]
     SamplesPerBit {
-        /// The requested number.
+        /// The number that was requested.
         got: u32,
     },
-    /// Fields carry a byte or a 16-bit word.
+    /// Only 8 and 16 content bits are supported, a byte or a 16-bit word.
     #[error("{got} content bits: only 8 or 16 are possible")]
     ContentBits {
-        /// The requested number.
+        /// The number that was requested.
         got: u32,
     },
 }

@@ -30,10 +30,10 @@ pub struct Receiver {
     format: Format,
     /// Level of the last sample: 0 or 1.
     level: u32,
-    /// The content bits taken so far, shifted in from the top behind a mark that reaches bit 0 when only the delimiter is
-    /// missing; or [`IDLE`], or [`START`].
+    /// The content bits taken so far, shifted in from the top behind a mark that reaches bit 0 when only the delimiter is left;
+    /// or [`IDLE`], or [`START`].
     bits: u32,
-    /// Samples until the middle of the next bit, 1 or more; on an idle line, until the origin moves next.
+    /// Number of samples until the middle of the next bit, 1 or more; on an idle line, until the origin is moved next.
     left: u32,
     /// Index of the sample after that middle, counted from the origin.
     next: u32,
@@ -44,17 +44,18 @@ pub struct Receiver {
     spikes: u32,
 }
 
-/// The [bits](Receiver::bits) while no field is on the line. Odd like [`START`] and like complete content with its mark: a
-/// single test detects everything that is not an ordinary bit. Bits 1 and 2 are 0 in complete content.
+/// The [bits](Receiver::bits) while no field is on the line. It is odd, like [`START`] and like complete content with its mark,
+/// so a single test detects everything that is not an ordinary bit. Bits 1 and 2 are 0 in complete content.
 const IDLE: u32 = 0b101;
 
 /// The [bits](Receiver::bits) before the middle of the start bit.
 const START: u32 = 0b011;
 
-/// Samples after which the origin moves on an idle line.
+/// Number of samples after which the origin is moved on an idle line.
 const LONG: u32 = 0x4000_0000;
 
-/// Samples after which the origin moves if a field does not end, for example on a line that carries something else.
+/// Number of samples after which the origin is moved if a field does not end, for example on a line that carries something
+/// else.
 const NEAR: u32 = 0x7fff_ffff;
 
 impl Receiver {
@@ -68,7 +69,7 @@ impl Receiver {
         self.format
     }
 
-    /// Samples taken so far, which is the index of the next one.
+    /// Number of samples taken so far, which is the index of the next one.
     pub const fn position(&self) -> u64 {
         self.origin.wrapping_add(self.here() as u64)
     }
@@ -146,8 +147,8 @@ impl Receiver {
         None
     }
 
-    /// Takes up to `len` samples of `word`, starting at bit 0. It stops at a middle that does not belong to an ordinary bit,
-    /// where `left` is 0. Returns how many it took.
+    /// Takes up to `len` samples of `word`, from bit 0 upwards. It stops at the middle of anything but an ordinary bit, where
+    /// `left` is 0. Returns how many it took.
     #[inline]
     const fn scan(&mut self, word: u32, len: u32) -> u32 {
         let (half, period) = (self.format.middle(), self.format.samples_per_bit());
@@ -216,7 +217,7 @@ impl Receiver {
         self.next.wrapping_sub(self.left)
     }
 
-    /// The next sample has another level: a field begins, or the clock restarts.
+    /// Handles a change of level at the next sample: a field begins, or the clock restarts.
     #[inline]
     const fn edge(&mut self, level: u32) {
         self.level = level;

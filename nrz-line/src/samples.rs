@@ -6,7 +6,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Samples {
-    /// The oldest sample in bit 0, and copies of the youngest above the last one.
+    /// The oldest sample in bit 0, with copies of the newest one above it.
     low: u32,
     high: u32,
     len: u32,
@@ -28,7 +28,7 @@ impl Samples {
         Self { low: (word & 0xffff_ffff) as u32, high: (word >> 32) as u32, len }
     }
 
-    /// Samples that remain.
+    /// Number of samples that remain.
     pub const fn len(self) -> u32 {
         self.len
     }

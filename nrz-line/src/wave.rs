@@ -1,7 +1,7 @@
 /// The instants at which the bits of a transmitter begin, in samples of a receiver whose clock differs.
 ///
-/// The picture that a logic analyser or an oversampling receiver takes of a line: for simulated
-/// lines, rendered captures and tolerance tests.
+/// This is the line as seen by a logic analyser or an oversampling receiver, for simulated lines, rendered captures and
+/// tolerance tests.
 ///
 /// ```
 /// use nrz_line::Wave;

@@ -22,11 +22,11 @@ pub struct Window {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("window of {len} bits at bit {offset} does not fit: {available} bits there, 128 at most")]
 pub struct OutOfBounds {
-    /// First requested bit, counted from the start of the buffer.
+    /// The first requested bit, counted from the start of the buffer.
     pub offset: usize,
     /// Number of requested bits.
     pub len: u32,
-    /// Bits that the buffer holds from `offset`.
+    /// Number of bits that the buffer holds from `offset`.
     pub available: usize,
 }
 
@@ -100,8 +100,8 @@ impl Window {
         Self { bits: !self.bits & Self::mask(self.len), len: self.len }
     }
 
-    /// Returns the same line with the bits of each byte in the other order, as if it had been packed in one order and read in the
-    /// other. Bits after the last whole byte are what the other order finds there: padding, read as 0.
+    /// Returns the same line with the bits of each byte in the other order, as if it had been packed in one order and read
+    /// in the other. Bits after the last whole byte become what the other order finds there, which is padding, read as 0.
     pub const fn reordered(self) -> Self {
         Self { bits: self.bits.swap_bytes().reverse_bits() & Self::mask(self.len), len: self.len }
     }
@@ -119,8 +119,8 @@ impl Window {
         Self { bits, len: self.len.div_ceil(2) }
     }
 
-    /// Returns the window followed by idle line (1) up to `len` bits; unchanged if it is already that long. `None` if `len` exceeds
-    /// [`Self::MAX_LEN`].
+    /// Returns the window extended to `len` bits with idle line (1); unchanged if it is already that long. `None` if `len`
+    /// exceeds [`Self::MAX_LEN`].
     pub const fn padded(self, len: u32) -> Option<Self> {
         if self.len >= len {
             return Some(self);
