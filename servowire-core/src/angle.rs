@@ -30,9 +30,9 @@ impl Angle {
         self.0
     }
 
-    /// Creates an angle from the count of an encoder and its counts per turn, rounded down to 2^-32 turn. If the counts per turn
-    /// are a power of two, the result is exact and takes no division. Whole turns are dropped. With 0 counts per turn the angle
-    /// is 0.
+    /// Creates an angle from the count of an encoder and its counts per turn, rounded down to 2^-32 turn. If the counts per
+    /// turn are a power of two, the result is exact and needs no division. Whole turns are dropped. With 0 counts per turn
+    /// the angle is 0.
     pub const fn from_counts(counts: u32, counts_per_turn: u32) -> Self {
         if counts_per_turn.is_power_of_two() {
             // A shift by 32, of one count per turn, leaves nothing: every count is whole turns.
@@ -72,7 +72,7 @@ impl Angle {
     }
 }
 
-/// Returns the lower half.
+/// Returns the lower half of the number.
 #[expect(clippy::cast_possible_truncation, reason = "what is above is whole turns")]
 const fn low(bits: u64) -> u32 {
     bits as u32
@@ -85,7 +85,7 @@ const fn low(bits: u64) -> u32 {
 pub enum Sense {
     /// Up.
     Up,
-    /// Down: the encoder is mounted the other way round, or two phases are swapped.
+    /// The count goes down: the encoder is mounted the other way round, or two phases are swapped.
     Down,
 }
 

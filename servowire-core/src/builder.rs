@@ -1,5 +1,5 @@
-/// Writes a `with_` method for each field of a settings struct that has defaults. The method takes the value as its argument, or
-/// sets the one value named here.
+/// Writes a `with_` method for each field of a settings struct that has defaults. The method takes the value as its
+/// argument, or sets a single fixed value.
 ///
 /// ```
 /// #[derive(Default)]

@@ -3,7 +3,7 @@ use core::marker::PhantomData;
 use crate::feedback::{Feedback, Policy};
 use crate::four_slots::FourSlots;
 
-/// What can travel through a [`Cell`]: its fields, packed into `W` words.
+/// A value that can pass through a [`Cell`], its fields packed into `W` words.
 pub trait Words<const W: usize>: Sized {
     /// Packs the value into words.
     fn to_words(&self) -> [u32; W];
@@ -17,8 +17,9 @@ pub trait Words<const W: usize>: Sized {
 /// other, and they may run on one core or two.
 ///
 /// Neither end ever waits, retries or disables interrupts, and the cell needs only loads and stores of 32 bits, which a
-/// Cortex-M0+ has. A value that is read is whole. It is never older than the value read before, and no older than the last value
-/// that was stored completely. It takes 4 × `W` + 2 words of memory. The order of all loads and stores is model-checked.
+/// Cortex-M0+ has. A value that is read is whole. It is never older than the value read before it, and never older than the
+/// last value that was stored completely. It takes 4 × `W` + 2 words of memory. The order of all loads and stores is
+/// model-checked.
 ///
 /// [`split`](Self::split) returns the two ends, once. If the cell is `'static`, they may be moved to where they are used,
 /// including an interrupt: take the cell from `cortex_m::singleton!` or a `StaticCell`, and hand one end to the interrupt before
@@ -76,7 +77,7 @@ impl<F: Feedback + Words<W>, const W: usize> Cell<F, W> {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// Returns the two ends. The cell keeps what it holds.
+    /// Returns the two ends. The cell keeps its contents.
     pub const fn split(&mut self) -> (Writer<'_, F, W>, Reader<'_, F, W>) {
         let slots = &self.slots;
         (Writer { slots, evidence: PhantomData }, Reader { slots, evidence: PhantomData })
@@ -111,8 +112,7 @@ pub struct Reader<'a, F, const W: usize> {
 impl<F: Feedback + Words<W>, const W: usize> Reader<'_, F, W> {
     /// Returns the value of the newest evidence, if it may be used at this time.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     #[inline]
     pub fn at(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<F::Sample, F::Doubt> {
         self.latest().at(now_ns, policy)

@@ -1,6 +1,6 @@
 use core::fmt::Debug;
 
-/// The kind of an error, which counters count and statistics list. [`errors!`](crate::errors) makes one for each crate.
+/// The kind of an error, which counters count and statistics list. [`errors!`](crate::errors) declares one for each crate.
 pub trait Class: Copy + Eq + Debug + 'static {
     /// All classes, in the order of the checks.
     const ALL: &'static [Self];
@@ -8,7 +8,7 @@ pub trait Class: Copy + Eq + Debug + 'static {
     /// Index in [`ALL`](Self::ALL), from 0.
     fn index(self) -> usize;
 
-    /// The name in `snake_case`, as logs and test vectors spell it.
+    /// The name in `snake_case`, as used in logs and test vectors.
     fn name(self) -> &'static str;
 
     /// The number used in logs and in other languages: 1 or more, never changed.

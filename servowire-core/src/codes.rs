@@ -1,6 +1,6 @@
 /// Declares an enum whose variants are codes of a wire or of a register.
 ///
-/// Each has `ALL`, `code()`, `from_code()`, which returns `None` for a code without a meaning, and `name()`, the vendor's word,
+/// Each has `ALL`, `code()`, `from_code()`, which returns `None` for a code without a meaning, and `name()`, the vendor's name,
 /// which `Display` prints.
 ///
 /// ```

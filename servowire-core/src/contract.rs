@@ -13,7 +13,7 @@ pub trait Machine {
     type Unit: ?Sized;
     /// The result of the exchange.
     type Value;
-    /// Why the exchange fails.
+    /// Why the exchange failed.
     type Error;
 
     /// Returns what is to be sent.
@@ -40,7 +40,7 @@ pub trait Procedure {
     type Response;
     /// The result of the procedure.
     type Value;
-    /// Why it, or one of its exchanges, fails.
+    /// Why the procedure, or one of its exchanges, failed.
     type Error;
 
     /// Restarts the procedure at `now_ns`.
@@ -118,15 +118,15 @@ macro_rules! procedures {
     };
 }
 
-/// Writes the inherent method `receive` of a procedure that has a field `end` and a method `next` that does the work. Once the
-/// procedure has ended, it stays ended, whatever it receives.
+/// Writes the inherent method `receive` of a procedure that has a field `end` and a method `next` that does the work. A
+/// procedure that has ended stays ended, whatever it receives.
 ///
 /// `servowire_core::receive! { SingleTurn }`
 #[macro_export]
 macro_rules! receive {
     ($(#[$more:meta])* $value:ty) => {
-        /// Takes the outcome of a transaction; the line is free from `ready_ns`. A procedure that is done or has failed stays so
-        /// until it is restarted.
+        /// Takes the outcome of a transaction; the line is free from `ready_ns`. A procedure that is done or has failed
+        /// stays in that state until it is restarted.
         ///
         $(#[$more])*
         pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<$value> {

@@ -27,22 +27,22 @@ impl<const N: usize> Counters<N> {
         }
     }
 
-    /// Transactions with a valid answer.
+    /// Number of transactions with a valid answer.
     pub const fn good(&self) -> u64 {
         self.good
     }
 
-    /// Transactions that failed in this way.
+    /// Number of transactions that failed in this way.
     pub fn of(&self, class: impl Class) -> u64 {
         self.errors.get(class.index()).copied().unwrap_or(0)
     }
 
-    /// Transactions that failed.
+    /// Number of transactions that failed.
     pub fn errors(&self) -> u64 {
         self.errors.iter().fold(0, |sum, n| sum.saturating_add(*n))
     }
 
-    /// Failed transactions per million; 0 before the first transaction.
+    /// Number of failed transactions per million; 0 before the first transaction.
     pub fn errors_per_million(&self) -> u32 {
         let errors = self.errors();
         let all = errors.saturating_add(self.good);

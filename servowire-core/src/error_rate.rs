@@ -1,6 +1,6 @@
 /// A leaky bucket: errors fill it, good transactions drain it, and while it is above its limit the line must not be used.
 ///
-/// One error in a hundred thousand transactions is normal for a drive; three in a row are a broken cable. With a
+/// One error in a hundred thousand transactions is normal for a drive; three in a row mean a broken cable. With a
 /// `weight` of 100 and a `limit` of 250 the third error in a row is too many, and so is any rate above one in 101.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -26,7 +26,7 @@ impl ErrorRate {
         self.is_exceeded()
     }
 
-    /// The level of the bucket.
+    /// The present level of the bucket.
     pub const fn level(&self) -> u32 {
         self.level
     }

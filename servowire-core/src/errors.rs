@@ -98,7 +98,7 @@ macro_rules! errors {
             /// All classes, in the order in which [`Error`] declares them.
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
 
-            /// The name in `snake_case`, as logs and test vectors spell it.
+            /// The name in `snake_case`, as used in logs and test vectors.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => {
@@ -108,7 +108,7 @@ macro_rules! errors {
                 }
             }
 
-            /// The number that stands for this class in logs and in other languages: 1 or more, and never changed.
+            /// The number of this class in logs and in other languages: 1 or more, and never changed.
             pub const fn number(self) -> u8 {
                 self as u8
             }
@@ -171,8 +171,8 @@ macro_rules! errors {
     };
 }
 
-/// Makes an error the error type of `nom` parsers. The error needs a variant `Combinator` without fields, which is returned when
-/// a combinator of the caller refuses the input.
+/// Makes an error usable as the error type of `nom` parsers. The error needs a variant `Combinator` without fields, which is
+/// returned when a combinator of the caller refuses the input.
 ///
 /// ```
 /// servowire_core::errors! {

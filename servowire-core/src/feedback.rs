@@ -1,6 +1,6 @@
 /// What a policy can tolerate: status bits and alarms that a drive can live with; `()` for a protocol that has none.
 pub trait Tolerance: Copy {
-    /// Nothing: every alarm is a doubt.
+    /// Tolerates nothing: every alarm is a doubt.
     const NOTHING: Self;
 }
 
@@ -65,7 +65,7 @@ impl<T: Tolerance> Policy<T> {
         }
     }
 
-    /// Kept out of line, so that the ordinary case takes no detour.
+    /// It is kept out of line, to keep the ordinary case straight.
     #[cold]
     const fn check_ahead(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
         self.within(sampled_ns.abs_diff(now_ns))
@@ -76,7 +76,8 @@ impl<T: Tolerance> Policy<T> {
     }
 }
 
-/// Evidence of a position, speed or torque. It is judged where it is used, not where it was received, because it ages in between.
+/// Evidence of a position, speed or torque. It is judged where it is used, not where it is received, because it ages in
+/// between.
 ///
 /// Protocol crates implement it by forwarding to an inherent `const fn at`, so a control loop is written the same way for all of
 /// them:
@@ -129,8 +130,7 @@ pub trait Feedback: Copy {
 
     /// Returns the value, if it may be used at this time.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     fn at(&self, now_ns: u64, policy: Policy<Self::Tolerated>) -> Result<Self::Sample, Self::Doubt>;
 }
 

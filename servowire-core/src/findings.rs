@@ -3,7 +3,7 @@ use core::marker::PhantomData;
 
 use crate::Class;
 
-/// A set of error classes: everything that an inspection found wrong with a frame. Up to 64 classes.
+/// A set of error classes: everything that an inspection has found wrong with a frame. Up to 64 classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Findings<C> {
     bits: u64,
@@ -97,9 +97,9 @@ impl<'de, C: Class + serde::Deserialize<'de>> serde::Deserialize<'de> for Findin
     }
 }
 
-/// Declares what all inspections of a serial line have in common: `Findings`, a `Cause` that may lie in the line, and for
-/// `Report`, which has the fields `error`, `findings` and `cause`, the getters and the text for a person. The arms named here
-/// come after those for a fault.
+/// Declares what all inspections of a serial line have in common: `Findings`, a `Cause` that may lie in the line, and, for a
+/// `Report` with the fields `error`, `findings` and `cause`, the getters and the text for a reader. The arms passed to it come
+/// after those for a fault.
 ///
 /// `servowire_core::report! { Self { response: Some(response), .. } => "sound: {}", response; }`
 #[macro_export]

@@ -1,18 +1,18 @@
 //! Passes words from one writer to one reader, wait-free for both, with loads and stores alone: Simpson's four slots.
 //!
-//! H. R. Simpson, "Four-slot fully asynchronous communication mechanism", IEE Proceedings 137 E 1 (1990). There are two pairs of
-//! two slots. The writer avoids the pair that the reader has announced, and within a pair it avoids the newest slot. What
-//! Simpson keeps in two variables of the writer (newest pair, newest slot of each pair) is one word here, stored once per value,
-//! so the reader never sees one without the other.
+//! H. R. Simpson, "Four-slot fully asynchronous communication mechanism", IEE Proceedings 137 E 1 (1990). There are two
+//! pairs of two slots. The writer avoids the pair that the reader has announced, and within a pair it avoids the newest
+//! slot. What Simpson keeps in two variables of the writer (newest pair, newest slot of each pair) is a single word here,
+//! stored once per value, so the reader never sees one without the other.
 //!
 //! Why this holds, in whatever order two cores see each other's stores:
 //!
 //! * A reading is never older than the one before it, nor older than the last complete value: both loads of a reading are of
 //!   `control` alone, and the loads of one variable never go back.
 //! * No slot is read while it is written. The reader in pair p at its slot i has announced p, passed `Chooses`, and seen in
-//!   `control` that i is the newest of p. The writer comes back to this slot with the second value that it puts into p after
-//!   that. The reader had not seen the first one, so the reader's `Chooses` came before the writer's
-//!   `Begins` of the second, and the writer sees p announced: it takes the other pair. If it sees a later announcement instead,
+//!   `control` that i is the newest of p. The writer returns to this slot only with the second value that it puts into p after
+//!   that. The reader had not seen the first of them, so the reader's `Chooses` came before the writer's `Begins` of the
+//!   second; the writer therefore sees p announced and takes the other pair. If it sees a later announcement instead,
 //!   that one was made after `Announces`, when the slot had been read, and the writer writes after `Writes`.
 //! * A slot is whole: it is written before `Publishes` and read after `Reads`.
 
@@ -31,11 +31,11 @@ use model::{AtomicU32, Word, fence};
 #[cfg(not(all(test, loom)))]
 type Word = AtomicU32;
 
-/// `control` before the first value.
+/// The value of `control` before the first value is stored.
 const NOTHING: u32 = 0;
 /// Set in `control` from the first value onwards.
 const SOMETHING: u32 = 1;
-/// In `control`: the newest pair. A pair is named by its first slot, 0 or 2.
+/// The newest pair, in `control`. A pair is named by its first slot, 0 or 2.
 const PAIR: u32 = 2;
 /// Bits of `control` below the newest slot of pair 0; the newest slot of pair 2 lies two bits higher.
 const NEWEST: u32 = 2;
@@ -45,17 +45,17 @@ const SLOT: u32 = 3;
 /// The barriers that keep the loads and stores of one end in order as seen by the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Barrier {
-    /// The writer: the previous value is visible to the reader before the writer looks which pair is announced.
+    /// Writer: the previous value is visible to the reader before the writer looks which pair is announced.
     Begins,
-    /// The writer looks which pair is announced before it writes into the other one.
+    /// Writer: it looks which pair is announced before it writes into the other one.
     Writes,
-    /// The slot is written before it becomes the newest.
+    /// Writer: the slot is written before it becomes the newest.
     Publishes,
-    /// The reader: the previous slot has been read before another pair is announced.
+    /// Reader: the previous slot has been read before another pair is announced.
     Announces,
-    /// The pair is announced before the reader looks for the newest slot in it.
+    /// Reader: the pair is announced before the reader looks for the newest slot in it.
     Chooses,
-    /// The newest slot is known before it is read.
+    /// Reader: the newest slot is known before it is read.
     Reads,
 }
 
@@ -104,9 +104,9 @@ fn load<const N: usize>(from: &[Word; N]) -> [u32; N] {
 
 /// Four slots of `W` and `E` words. One end calls [`put`](Self::put), the other [`get`](Self::get).
 pub(crate) struct FourSlots<const W: usize, const E: usize> {
-    /// Stored by the writer alone.
+    /// Stored only by the writer.
     control: AtomicU32,
-    /// The pair that the reader is in; stored by the reader alone.
+    /// The pair that the reader is in; stored only by the reader.
     announced: AtomicU32,
     slots: [Slot<W, E>; 4],
 }
@@ -119,7 +119,7 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         Self { control, announced: AtomicU32::new(0), slots: [const { Slot::new() }; 4] }
     }
 
-    /// Stores a value. Only ever called by one writer.
+    /// Stores a value. Only one writer may call this.
     pub(crate) fn put(&self, value: &Value<W, E>) {
         let control = self.control.load(Ordering::Relaxed);
         let slot = self.free(control);
@@ -141,7 +141,7 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         pair | (!newest(control, pair) & 1)
     }
 
-    /// Returns the newest value; `None` before the first one. Only ever called by one reader.
+    /// Returns the newest value; `None` before the first one. Only one reader may call this.
     #[inline]
     pub(crate) fn get(&self) -> Option<Value<W, E>> {
         let control = self.control.load(Ordering::Relaxed);
@@ -180,8 +180,8 @@ fn fence(barrier: Barrier) {
 mod tests {
     use super::*;
 
-    /// Slots that a reader may be in are left alone, whatever pairs it announced before: the announced pair, and in the other
-    /// pair the newest slot, which a reader enters if it announces late.
+    /// The writer leaves alone every slot that a reader may be in, whatever pairs it announced before: the announced pair and,
+    /// in the other pair, the newest slot, which a reader enters if it announces late.
     #[test]
     fn the_writer_keeps_off_the_slot_of_the_reader() {
         for announcements in 0_u32..256 {

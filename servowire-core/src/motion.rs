@@ -35,7 +35,7 @@ impl Acceleration {
     }
 }
 
-/// Times of this length or more are too long: 2.1 s.
+/// Times from this length upwards are too long: 2.1 s.
 const TOO_LONG_NS: u32 = 1 << 31;
 
 /// The motion of a shaft at its last sample, from the last two.
@@ -55,13 +55,13 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Words that a motion is packed into.
+    /// Number of words into which a motion is packed.
     pub(crate) const WORDS: usize = 7;
 
     /// The state before the first sample and after a doubtful one.
     pub(crate) const UNKNOWN: Self = Self::standing(Angle::ZERO, 0, 0);
 
-    /// Starts with a sample that has none before it.
+    /// Starts with a sample that has no predecessor.
     const fn standing(angle: Angle, sampled_ns: u64, count: u32) -> Self {
         Self { angle, sampled_ns, span_ns: 0, speed: 0, speed_error: 0, count }
     }
@@ -74,11 +74,11 @@ impl Motion {
 
     /// Returns where the shaft is now, or was shortly before the sample, extrapolated from the last angle with the last mean speed.
     ///
-    /// The bound holds for every motion within the largest acceleration. Let a be the acceleration, s the time between the last
-    /// two samples and t the time since the last one. In the last sample the shaft is off by up to one count; the mean
-    /// speed is off by up to a count per s; in the last sample the speed differs from the mean one by up to a·s/2; from there
-    /// the shaft departs by up to a·t²/2. Together: one count · (1 + t/s) + a·t·(s + t)/2. If the speed is not known, or either
-    /// time exceeds 2.1 s, the bound is half a turn.
+    /// The bound holds for every motion within the largest acceleration. Let a be the acceleration, s the time between the
+    /// last two samples and t the time since the last one. In the last sample the shaft is off by up to one count; the mean
+    /// speed is off by up to a count per s; at the last sample the speed differs from the mean speed by up to a·s/2; from
+    /// there the shaft deviates by up to a·t²/2. In total: one count · (1 + t/s) + a·t·(s + t)/2. If the speed is not known,
+    /// or either time exceeds 2.1 s, the bound is half a turn.
     ///
     /// The instants of both samples are taken as exact: an error in them is multiplied by the speed.
     pub fn at(&self, now_ns: u64, max_acceleration: Acceleration) -> Estimate {
@@ -120,7 +120,7 @@ impl Motion {
     }
 }
 
-/// Returns the full product: one instruction of a Cortex-M4.
+/// Returns the full product, which takes one instruction on a Cortex-M4.
 const fn times(a: u32, b: u32) -> u64 {
     (a as u64).wrapping_mul(b as u64)
 }
@@ -130,7 +130,7 @@ const fn low(bits: u64) -> u32 {
     bits as u32
 }
 
-/// Derives [`Motion`] from successive samples. It belongs to the writer, because it divides.
+/// Derives [`Motion`] from successive samples. The writer runs it, because it divides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tracker {

@@ -1,13 +1,13 @@
 /// The state of a procedure.
 ///
-/// `T` is its result, `E` why it failed. Both `Done` and `Failed` say when the line is free for the next request: until then an
-/// abandoned answer may still be arriving, or the encoder may still be busy.
+/// `T` is its result, `E` the reason why it failed. Both `Done` and `Failed` say when the line is free for the next request:
+/// until then an abandoned answer may still be arriving, or the encoder may still be busy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Progress<T, E> {
-    /// Not finished. Poll at this time if nothing is received earlier.
+    /// The procedure has not finished. Poll at this time if nothing is received earlier.
     Pending {
         /// When the wait ends, in ns.
         until_ns: u64,
@@ -30,8 +30,8 @@ pub enum Progress<T, E> {
 
 /// What a procedure of several transactions (a reset, an EEPROM access or a detection by the master) asks for next.
 ///
-/// `R` is the request, `T` the result of the procedure, `E` why it fails. Hand the outcome of each transaction to the procedure
-/// unchanged, refused answers included; the procedure decides whether to try again.
+/// `R` is the request, `T` the result of the procedure, `E` the reason why it failed. Hand the outcome of each transaction
+/// to the procedure unchanged, refused answers included; the procedure decides whether to try again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -72,7 +72,7 @@ impl<R, T, E> Step<R, T, E> {
 }
 
 impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
-    /// Returns how the procedure ended, done or failed; `None` if there is something to send.
+    /// Returns how the procedure ended, done or failed; `None` if there is still something to send.
     pub const fn ended(&self) -> Option<Self> {
         if matches!(self, Self::Send { .. }) { None } else { Some(*self) }
     }
@@ -85,7 +85,7 @@ impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
 pub struct Polling {
     /// Time from the end of one answer to the next request, in ns.
     pub interval_ns: u32,
-    /// Requests without success after which the access fails; 0 counts as 1.
+    /// Number of unsuccessful requests after which the access fails; 0 counts as 1.
     pub max_tries: u16,
 }
 

@@ -1,12 +1,12 @@
 /// A number that does not fit its field.
 ///
-/// It refuses only numbers passed in by a caller; a wrong number from the wire is an `Error` of the crate.
+/// This error refuses only numbers passed in by a caller; a wrong number from the wire is an `Error` of the crate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("{got} is out of range, the limit is {max}")]
 pub struct OutOfRange {
-    /// The number, or the nearest that an `i64` can hold.
+    /// The number, or the nearest one that an `i64` can hold.
     pub got: i64,
     /// The limit that it exceeds: the largest value, or the smallest if the number lies below it.
     pub max: i64,

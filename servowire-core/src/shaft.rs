@@ -79,8 +79,8 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftCell<F, W> {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// Returns the two ends, as [`Cell::split`](crate::Cell::split) does. The cell keeps what it holds; the next sample counts
-    /// as a first one.
+    /// Returns the two ends, as [`Cell::split`](crate::Cell::split) does. The cell keeps its contents; the next sample counts as
+    /// a first one.
     pub const fn split(&mut self, tracker: Tracker) -> (ShaftWriter<'_, F, W>, ShaftReader<'_, F, W>) {
         let slots = &self.slots;
         (ShaftWriter { slots, tracker, evidence: PhantomData }, ShaftReader { slots, evidence: PhantomData })
@@ -125,8 +125,7 @@ pub struct ShaftReader<'a, F, const W: usize> {
 impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     /// Returns the value of the newest evidence, if it may be used at this time.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     #[inline]
     pub fn at(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<F::Sample, F::Doubt> {
         self.latest().at(now_ns, policy)
@@ -134,8 +133,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 
     /// Returns the speed and the mechanical angle, if the newest evidence may be used at this time.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     #[inline]
     pub fn motion(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<Motion, F::Doubt> {
         let (evidence, motion) = self.newest();
@@ -145,8 +143,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     /// Returns the electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
     /// tolerate; if the speed is not known, the bound is half a turn.
     ///
-    /// # Errors
-    /// Why it must not be used.
+    /// # Errors The reason why it must not be used.
     #[inline]
     pub fn angle(
         &mut self,
@@ -176,11 +173,12 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 
 /// Declares `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` for a protocol whose encoders count turns.
 ///
-/// All reasons against using a position are bits of one word of marks, so one mask says which are tolerated. The protocol
-/// defines what the marks mean. It has in scope its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
-/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it implements `Evidence::doubt`, which names the reason against
-/// using a position. The fields are private to the module that calls this macro, so nothing else can create a sample. The last
-/// argument is the serialised name of the field for the width of the single turn.
+/// The reasons against using a position are bits of one word of marks, so that one mask says which are tolerated. The
+/// protocol defines what the marks mean. The calling module has in scope its own `Policy`, `Tolerated` (with
+/// `objects_to(marks)` and `ignores_turns()`), `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it implements
+/// `Evidence::doubt`, which names the reason against using a position. The fields are private to the module that calls this
+/// macro, so nothing else can create a sample. The last argument is the serialised name of the field for the width of the
+/// single turn.
 #[macro_export]
 macro_rules! shaft_evidence {
     ($(#[$about:meta])* Evidence, $bits:ident) => {
@@ -270,7 +268,8 @@ macro_rules! shaft_evidence {
 
         /// A position that may be used, and when it was sampled: from [`Evidence::at`].
         ///
-        /// It has turns if the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be anything, so they are left out.
+        /// It has turns only if the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be wrong, so they are left
+        /// out.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize))]
         pub struct Sample {
@@ -287,7 +286,8 @@ macro_rules! shaft_evidence {
         });
 
         impl Sample {
-            /// When it was sampled, in ns by the clock of the master, as reported by the exchange. Its age counts from here.
+            /// When it was sampled, in ns by the clock of the master, as reported by the exchange. The age of the position
+            /// counts from here.
             pub const fn sampled_ns(self) -> u64 {
                 self.sampled_ns
             }
@@ -307,7 +307,7 @@ macro_rules! shaft_evidence {
                 self.turns
             }
 
-            /// Both parts in counts, turns times the counts of a turn plus the single turn, if the policy judged the turns.
+            /// Both parts as counts, if the policy judged the turns: the turns times the counts per turn, plus the single turn.
             pub const fn counts(self) -> Option<i64> {
                 match self.turns {
                     Some(turns) => Some((turns as i64).wrapping_shl(self.$bits as u32) | self.single_turn as i64),

@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// Writes names separated by a space, which is how the crates print a set: `OF BE BA`, or `-` for the empty set.
+/// Writes names separated by a space, as the crates print a set: `OF BE BA`, or `-` for the empty set.
 pub fn write_names<'a>(f: &mut fmt::Formatter<'_>, names: impl IntoIterator<Item = &'a str>) -> fmt::Result {
     let mut names = names.into_iter();
     f.write_str(names.next().unwrap_or("-"))?;
@@ -62,7 +62,7 @@ macro_rules! show_flags {
 }
 
 /// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, for a value that is a list: each
-/// item by the same format string, separated by a space, or `-` for none. Firmware then needs no `core::fmt`.
+/// item with the same format string, separated by spaces, or `-` for an empty list. Firmware then needs no `core::fmt`.
 ///
 /// ```
 /// pub struct Frames(Vec<u16>);
@@ -104,8 +104,8 @@ macro_rules! listed {
     };
 }
 
-/// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, by the same format strings, one
-/// for each pattern of the value: the words are the same on a host and in a log, and firmware needs no `core::fmt`.
+/// Implements `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, from the same format strings, one
+/// for each pattern of the value: the text is the same on a host and in a log, and firmware needs no `core::fmt`.
 ///
 /// ```
 /// pub enum Level {

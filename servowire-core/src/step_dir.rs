@@ -34,7 +34,7 @@ impl Direction {
     }
 }
 
-/// The command to a motor for one cycle: everything that a PTO word says.
+/// The command to a motor for one cycle, with everything that a PTO word says.
 ///
 /// | command | PTO word (TIDEP0061, section 2.4.2) |
 /// |---|---|
@@ -65,7 +65,7 @@ pub enum Command {
     },
 }
 
-/// `pulse forward at 1000 ns`.
+/// Displayed as `pulse forward at 1000 ns`.
 impl fmt::Display for Command {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,4 +1,4 @@
-//! Functions that the `nom` parsers of the crates share.
+//! Functions used by the `nom` parsers of all crates.
 
 use core::num::NonZeroUsize;
 
@@ -13,7 +13,7 @@ where
     Err::Error(E::from_external_error(input, ErrorKind::Verify, error))
 }
 
-/// Returns `Incomplete` with the number of missing bytes (or bits); 0 stands for an unknown number.
+/// Returns `Incomplete` with the number of missing bytes (or bits); 0 means that the number is unknown.
 pub const fn missing<E>(count: usize) -> Err<E> {
     Err::Incomplete(match NonZeroUsize::new(count) {
         Some(count) => Needed::Size(count),

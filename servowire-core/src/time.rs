@@ -14,27 +14,27 @@ pub use rate::{MAX_TICK_NS, MIN_TICK_HZ, TickRate};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ClockError {
-    /// Its tick is longer than [`MAX_TICK_NS`].
+    /// The tick of the clock is longer than [`MAX_TICK_NS`].
     #[error("a clock of {hz} Hz is too coarse, the limit is {limit_hz} Hz")]
     TooCoarse {
-        /// The requested rate.
+        /// The rate that was requested.
         hz: u32,
-        /// The lowest rate that will do, [`MIN_TICK_HZ`].
+        /// The lowest permitted rate, [`MIN_TICK_HZ`].
         limit_hz: u32,
     },
     /// A reading lies before the last one: the clock was set back or reset, or its counter was not read for too long.
     #[error("the clock went back by {by_ns} ns")]
     Backwards {
-        /// By how much, in ns.
+        /// How far it lies before the last one, in ns.
         by_ns: u64,
     },
     /// More time has passed since the last reading than can have passed.
     #[error("the clock jumped ahead by {by_ns} ns")]
     Ahead {
-        /// From the last reading to this one, in ns.
+        /// Time from the last reading to this one, in ns.
         by_ns: u64,
     },
-    /// It returns the same reading again and again.
+    /// The clock returns the same reading again and again.
     #[error("the clock stands still")]
     Stopped,
 }

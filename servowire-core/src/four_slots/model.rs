@@ -1,5 +1,5 @@
 //! Checks with `loom` every interleaving of a writer and a reader, and every order in which their stores can be seen: `.ci/run
-//! loom`. Also checks that the model sees faults: each barrier is left out once.
+//! loom`. Also checks that the model detects faults, by leaving out each barrier once.
 
 use core::cell::Cell;
 use std::panic::catch_unwind;
@@ -24,8 +24,9 @@ pub(super) fn fence(barrier: Barrier) {
     }
 }
 
-/// A word of a slot. If it is watched, every load has to be ordered with every store, as if it were not atomic. This finds
-/// faults that the values do not show, because in the model no load sees a store from its future, as it may on a processor.
+/// A word of a slot. If the word is watched, every load has to be ordered with respect to every store, as if the word were not
+/// atomic. This finds faults that the values do not reveal: on a processor a load may see a store from its future, but not in
+/// the model.
 pub(super) struct Word {
     value: AtomicU32,
     access: UnsafeCell<()>,
@@ -58,12 +59,12 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
     }
 }
 
-/// Value number `n`.
+/// Returns value number `n`.
 fn value(n: u32) -> ([u32; 1], [u32; 1]) {
     ([n], [!n])
 }
 
-/// Writes values 1 to 4 against this number of readings, with four preemptions at most.
+/// Runs a writer of the values 1 to 4 against this number of readings, with at most four preemptions.
 fn explore(gets: u32) {
     let mut builder = Builder::new();
     builder.preemption_bound = Some(4);

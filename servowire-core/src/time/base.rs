@@ -30,7 +30,7 @@ use super::{ClockError, TickRate};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeBase<const BITS: u32> {
-    /// The time at which `ticks` was 0, modulo 2^64.
+    /// The time when `ticks` was 0, modulo 2^64.
     base_ns: u64,
     /// The ticks at the last reading; their low bits are the counter.
     ticks: u32,
@@ -91,7 +91,7 @@ impl<const BITS: u32> TimeBase<BITS> {
         self.base_ns = now_ns.wrapping_sub(self.rate.low_ns(self.ticks));
     }
 
-    /// Kept out of line: it is rare, and its operands would fill the registers of a Cortex-M0+ in every reading.
+    /// It is kept out of line, because it is rare, and its operands would occupy registers of a Cortex-M0+ in every reading.
     #[cold]
     #[inline(never)]
     const fn wrap(&mut self) {

@@ -21,7 +21,7 @@ use super::ClockError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCheck {
     last_ns: u64,
-    /// The reading that was last repeated, and how often.
+    /// The reading that was last repeated, and how many times.
     stood_ns: u64,
     looks: u32,
     max_looks: u32,

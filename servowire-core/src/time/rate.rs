@@ -1,7 +1,7 @@
 use super::ClockError;
 
 /// The longest tick that a clock may have, ns: an encoder answers 3 us after its request, and a field lasts 2 us at 5 Mbit/s. A
-/// slower clock cannot tell one field from the next.
+/// slower clock cannot distinguish one field from the next.
 pub const MAX_TICK_NS: u32 = 1_000;
 
 /// The lowest rate of a clock, Hz: ticks of [`MAX_TICK_NS`].
@@ -10,7 +10,7 @@ pub const MIN_TICK_HZ: u32 = NS_PER_S / MAX_TICK_NS;
 const NS_PER_S: u32 = 1_000_000_000;
 
 /// ARMv6-M (Cortex-M0+) has no multiplication of 32 by 32 bits to 64 and calls a 64-by-64 function for it. It has no
-/// compare-and-swap either, and a crate can test for that.
+/// compare-and-swap either, which a crate can test for.
 const MULTIPLIES_TO_32_BITS: bool = cfg!(all(target_arch = "arm", not(target_has_atomic = "32")));
 
 /// How fast a clock counts, as the length of its tick: whole nanoseconds and a fraction of 32 bits.
@@ -133,7 +133,7 @@ impl TickRate {
     }
 }
 
-/// The low and the high word.
+/// Returns the low and the high word.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "the words are what is wanted")]
 const fn words(value: u64) -> [u32; 2] {
