@@ -5,8 +5,9 @@ pub(crate) mod fugit;
 
 use servowire_core::{ClockError, TickRate, TimeBase};
 
-/// The number of looks at a clock that has stopped: some 30 ms on a fast processor, 0.3 s on a slow one. Within a tick of 1 us a
-/// processor makes a hundred, but the timer of an emulator can stand still for thousands while its host is busy.
+/// The number of looks after which a clock counts as stopped: some 30 ms on a fast processor, 0.3 s on a slow one. Within a
+/// tick of 1 us a processor makes a hundred looks, but the timer of an emulator can stand still for thousands of them while
+/// its host is busy.
 #[cfg(any(feature = "nikon", feature = "rtex", feature = "tformat"))]
 pub(crate) const MAX_LOOKS: u32 = 200_000;
 
@@ -15,13 +16,12 @@ pub(crate) const MAX_LOOKS: u32 = 200_000;
 /// Its tick has to be 1 us or shorter, preferably a fraction of that, because an encoder answers 3 us after its request. A
 /// [`CounterClock`] over a cycle counter or a timer is a clock, and so is every closure that returns nanoseconds.
 ///
-/// The drivers check every reading: a clock that goes back, is ahead by more than a second within a call, or returns the same
-/// reading 200,000 times ends the call with [`Error::Clock`](crate::Error::Clock).
+/// The drivers check every reading: a clock that goes backwards, jumps ahead by more than a second within a call, or returns
+/// the same reading 200,000 times ends the call with [`Error::Clock`](crate::Error::Clock).
 pub trait Clock {
     /// Returns the time in nanoseconds from any origin; it never goes backwards.
     ///
-    /// # Errors
-    /// What the clock itself has detected.
+    /// # Errors A fault that the clock itself has detected.
     fn now_ns(&mut self) -> Result<u64, ClockError>;
 }
 
@@ -77,12 +77,13 @@ impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
 #[cfg(feature = "async")]
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
-    /// Ends after this many ns, rather later than earlier. The driver then asks the clock for the time: a wait that ended too
-    /// early is followed by another, and a clock that does not advance ends the call.
+    /// Waits for this many ns; it should end late rather than early. The driver then reads the clock: a wait
+    /// that ended too early is
+    /// followed by another, and a clock that does not advance ends the call.
     async fn wait_ns(&mut self, ns: u64);
 }
 
-/// A clock, and a delay to wait with.
+/// A clock, and a delay for waiting.
 #[cfg(feature = "async")]
 #[derive(Debug, Clone, Copy)]
 pub struct WithDelay<C, D> {

@@ -4,7 +4,7 @@ use embedded_hal::digital::OutputPin;
 
 /// How the driver of the RS-485 transceiver is switched.
 pub trait Direction {
-    /// Why switching failed.
+    /// Why the switching failed.
     type Error;
     /// Switches the line driver on, before the first bit.
     ///
@@ -40,7 +40,7 @@ impl Direction for Automatic {
     }
 }
 
-/// How inaccurately software switches the line driver in the worst case. The numbers depend on the board, the HAL and the
+/// The worst-case inaccuracy with which software switches the line driver. The numbers depend on the board, the HAL and the
 /// executor, which a library cannot know, so none of them has a default.
 ///
 /// The driver has to be switched off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
@@ -51,9 +51,9 @@ impl Direction for Automatic {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Worst {
-    /// Time from the return of `write` to the start bit on the line, in ns: a UART waits for its next bit clock (up to 400 ns at
-    /// 2.5 Mbit/s), a buffered one for its interrupt, one with DMA for its set-up. Add the time by which a request lasts longer
-    /// if the rate is too slow: 1 % of four fields is 160 ns. If it is understated, requests are cut off.
+    /// Time from the return of `write` to the start bit on the line, in ns: a UART waits for its next bit clock (up to 400
+    /// ns at 2.5 Mbit/s), a buffered one for its interrupt, one with DMA for its set-up. If the rate is too low, add the
+    /// time by which a request lasts longer: 1 % of four fields is 160 ns. If it is understated, requests are cut off.
     pub uart_start_ns: u32,
     /// Time from the instant at which the pin should switch until it does, in ns: the duration of interrupts served meanwhile,
     /// for futures the latency of the executor and its timer, and the latency of the pin. If it is understated, the driver is
@@ -78,7 +78,7 @@ pub struct PinTooSlow {
 
 #[cfg(feature = "tformat")]
 impl Worst {
-    /// Checks that the window is long enough for it.
+    /// Checks that the window is long enough for the pin.
     pub(crate) fn check(self, window_ns: u32) -> Result<(), PinTooSlow> {
         let clock_ns = self.clock_ns.saturating_mul(2);
         let needed_ns = self.uart_start_ns.saturating_add(self.wake_ns).saturating_add(clock_ns);
@@ -133,8 +133,8 @@ impl<P: OutputPin> Direction for DirectionPin<P> {
     }
 }
 
-/// The line driver, and whether it may be on, as before the first call, after a future was forgotten, and after the pin reported
-/// an error.
+/// The line driver, and whether it may be on, which is possible before the first call, after a future was forgotten, and after
+/// the pin reported an error.
 #[derive(Debug)]
 pub(crate) struct Switch<D> {
     direction: D,
@@ -196,7 +196,7 @@ impl<D: Direction> Switch<D> {
 pub(crate) struct Guard<'a, D: Direction>(&'a mut Switch<D>);
 
 impl<D: Direction> Guard<'_, D> {
-    /// Switches the driver off and returns whether that succeeded; if not, it is tried once more.
+    /// Switches the driver off and returns whether that succeeded; if not, it tries once more.
     pub(crate) fn receive(self) -> Result<(), D::Error> {
         self.0.off()
     }
@@ -213,7 +213,7 @@ impl<D: Direction> Drop for Guard<'_, D> {
 mod tests {
     use super::*;
 
-    /// Four bits are 1,600 ns at 2.5 Mbit/s. A clock counts twice.
+    /// Four bits are 1,600 ns at 2.5 Mbit/s. The clock tick counts twice.
     #[test]
     fn what_is_missing_is_said() {
         let worst = |uart_start_ns, wake_ns, clock_ns| Worst { uart_start_ns, wake_ns, clock_ns };

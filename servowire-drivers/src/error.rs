@@ -7,8 +7,8 @@ use crate::PinTooSlow;
 ///
 /// [`Infallible`]: core::convert::Infallible
 ///
-/// After any of these errors the next call begins with a clean line: it waits until nobody can still be transmitting and
-/// discards what has arrived.
+/// After any of these errors the next call begins with a clean line: it waits until no other station can still be transmitting
+/// and discards what has arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,13 +28,13 @@ pub enum Error<IO, PIN, P, D> {
     /// than [`Worst`](crate::Worst) allows.
     #[error("the line driver went off up to {by_ns} ns too late")]
     DriverLate {
-        /// By how much in the worst case, in ns.
+        /// How much later in the worst case, in ns.
         by_ns: u64,
     },
     /// The port no longer takes or returns anything.
     #[error("the port is closed")]
     Closed,
-    /// Somebody is transmitting without a pause; nothing was sent.
+    /// Another station is transmitting without a pause; nothing was sent.
     #[error("the line does not go quiet")]
     NeverQuiet,
     /// The clock has stopped, was set back or has jumped; it is not known whether a request that had begun took effect.

@@ -5,8 +5,8 @@ use servowire_core::Ended;
 use crate::quiet::Line;
 use crate::{Clock, Error};
 
-/// Converts an exchange to what a procedure is told: a fault of the port counts as a lost answer, and the procedure decides what
-/// that means. Any other error outside the protocol ends the procedure.
+/// Converts the result of an exchange to the outcome that a procedure receives: a fault of the port counts as a lost answer,
+/// and the procedure decides what that means. Any other error outside the protocol ends the procedure.
 pub(crate) fn ended<T, IO, PIN, P, D>(
     exchanged: Result<T, Error<IO, PIN, P, D>>,
     lost: P,

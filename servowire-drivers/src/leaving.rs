@@ -1,9 +1,9 @@
-//! Tracks when the last bit of a request leaves, as far as software can know it; without I/O.
+//! Tracks when the last bit of a request leaves, as exactly as software can know it; without I/O.
 
 use crate::Worst;
 
-/// The two times between which the fields handed to a UART so far end. A closer estimate is impossible, because it is not known
-/// how long the processor was elsewhere before the UART took a byte, nor how long the UART then waited.
+/// The earliest and the latest end of the fields handed to a UART so far. A closer estimate is impossible, because it is not
+/// known how long the processor was elsewhere before the UART took a byte, nor how long the UART then waited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leaving {
     worst: Worst,
@@ -26,9 +26,9 @@ impl Leaving {
 
     /// Notes that a `write`, which had begun by the reading `before_ns` and ended by `after_ns`, has taken this many fields.
     ///
-    /// The first `write` is not asked to take more than one field. It waits for nothing, so whatever time it took may have
-    /// passed before the UART had the field, and nothing else would keep the last bit of a request of one field from being
-    /// cut off. A later `write` that took a field time or more has waited for room.
+    /// The first `write` is given no more than one field. It need not wait, so all the time it took may have passed before the
+    /// UART had the field; without this assumption, the last bit of a one-field request could be cut off. A later `write` that
+    /// took a field time or more has waited for room.
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64, after_ns: u64) {
         let fields_ns = self.field_ns.saturating_mul(fields as u64);
         let waited = self.ends.is_some() && after_ns.saturating_sub(before_ns) >= self.field_ns;
@@ -42,8 +42,8 @@ impl Leaving {
         });
     }
 
-    /// The reading at which to switch the driver off: in the middle of the time in which it is neither too early nor too late,
-    /// or if there is none, rather too late than too early.
+    /// The reading at which to switch the driver off: in the middle of the time in which it is neither too early nor too late
+    /// or, if there is no such time, rather too late than too early.
     pub(crate) fn off_ns(&self) -> Option<u64> {
         let Ends { earliest_ns, latest_ns } = self.ends?;
         let slack_ns = u64::from(self.worst.wake_ns).saturating_add(self.worst.clock_ns.into());
@@ -61,7 +61,7 @@ impl Leaving {
         after_ns.saturating_sub(before_ns) > self.window_ns
     }
 
-    /// By how much the driver may have been switched off too late, if it was off by the reading `now_ns`.
+    /// Returns how much too late the driver may have been switched off, if it was off by the reading `now_ns`.
     pub(crate) fn late_ns(&self, now_ns: u64) -> u64 {
         let latest_ns = self.ends.map_or(u64::MAX, |ends| ends.earliest_ns.saturating_add(self.window_ns));
         now_ns.saturating_add(self.worst.clock_ns.into()).saturating_sub(latest_ns)

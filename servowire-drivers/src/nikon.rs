@@ -62,5 +62,5 @@ const fn silence_ns(line: Line) -> u32 {
     line.rate.bits_ns(FRAME_BITS).saturating_mul(2)
 }
 
-/// How a procedure is told of a lost answer.
+/// The error that tells a procedure of a lost answer.
 const LOST: Error = Error::NoResponse;

@@ -5,7 +5,7 @@ use servowire_core::{ClockCheck, ClockError};
 use crate::Clock;
 use crate::clock::MAX_LOOKS;
 
-/// No processor is busy elsewhere for this long within a call: a clock that says so has jumped.
+/// No processor is busy elsewhere for this long within a call: a clock that shows such a gap has jumped.
 const MAX_AWAY_NS: u64 = 1_000_000_000;
 
 /// How long a driver waits for a line that does not become quiet.
@@ -19,10 +19,10 @@ const CLOCK_FAULTS: u32 = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Line {
     check: ClockCheck,
-    /// Somebody may be transmitting until then.
+    /// Another station may be transmitting until this time.
     ready_ns: u64,
-    /// How long somebody may be transmitting after a request that is being handed over, or was being handed over when its call
-    /// ended.
+    /// How long another station may be transmitting after a request that is being handed over, or was being handed over when
+    /// its call ended.
     leaving_ns: Option<u64>,
     /// How long the line has to be silent after unexpected data.
     silence_ns: u64,
@@ -33,7 +33,7 @@ pub(crate) struct Line {
 /// What to do before a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Settle {
-    /// Discard what arrives, and look again at this time at the latest.
+    /// Discard what arrives, and look again no later than this time.
     Until(u64),
     /// Send.
     Quiet,
@@ -53,8 +53,8 @@ pub(crate) struct Settling {
 }
 
 impl Line {
-    /// Creates the state of a line about which nothing is known yet: a request may just have been sent, and somebody may be
-    /// transmitting for `unknown_ns` after it.
+    /// Creates the state of a line about which nothing is known yet: a request may just have been sent, and another station may
+    /// be transmitting for `unknown_ns` after it.
     pub(crate) const fn new(silence_ns: u32, unknown_ns: u64) -> Self {
         let check = ClockCheck::new(MAX_LOOKS);
         Self { check, ready_ns: 0, leaving_ns: Some(unknown_ns), silence_ns: silence_ns as u64, shifted: false }
@@ -81,7 +81,7 @@ impl Line {
     }
 
     /// Reads the clock for the first time in a call of a user, when it is not known how long ago the last reading was. A second
-    /// reading like this in one call would take a clock that has jumped for time that has passed.
+    /// reading like this in one call would mistake a jump of the clock for time that has passed.
     pub(crate) fn first_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         self.look(clock, ClockCheck::check)
     }
@@ -132,10 +132,10 @@ impl Line {
     }
 
     /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock was set back or has jumped
-    /// since the request began, none of that time has passed for certain; a clock that has stopped has been looked at for longer.
+    /// since the request began, it is not certain that any of that time has passed; if the clock has stopped, looking at it has
+    /// taken longer than that.
     ///
-    /// # Errors
-    /// The first fault of the clock; the time has passed all the same.
+    /// # Errors The first fault of the clock; the time has passed even so.
     #[cfg(feature = "tformat")]
     pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) -> Result<(), ClockError> {
         let mut told = Ok(());
@@ -156,7 +156,7 @@ impl Line {
     }
 
     /// Call before the first byte of a request; it may keep the line busy for `longest_ns` after it leaves. After a fault or a
-    /// dropped future this remains in force until the next call, because nobody has read the clock.
+    /// dropped future this remains in force until the next call, because the clock has not been read since.
     pub(crate) const fn begin(&mut self, longest_ns: u64) {
         self.leaving_ns = Some(longest_ns);
         self.shifted = false;
@@ -230,7 +230,7 @@ pub(crate) struct Heard<T> {
     pub(crate) now_ns: u64,
 }
 
-/// Looks until there is something, at the latest until `until_ns`. Anything that arrived while the clock was read is not late.
+/// Looks until something has arrived, but no later than `until_ns`. Anything that arrived while the clock was read is not late.
 #[inline(always)]
 pub(crate) fn spin<T>(
     line: &mut Line,

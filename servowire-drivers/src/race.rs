@@ -1,4 +1,4 @@
-//! Waits for futures: for a time, or for the earlier of two futures, the first of which is polled first.
+//! Waits for a time, or for whichever of two futures ends earlier; the first one is polled first.
 
 use core::future::{Future, poll_fn};
 use core::pin::pin;

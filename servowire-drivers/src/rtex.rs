@@ -13,7 +13,7 @@
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
-//! internal-timer system the ASIC switches it at XSYNC if the exchange is late. Half of the blocks would then be of another
+//! internal-timer system the ASIC switches it at XSYNC if the exchange is late. Half of the blocks would then come from another
 //! frame. The counter echoes of one frame are equal, so the exchange compares those of what it has read, reads one block
 //! again, looks at [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails
 //! again, each axis takes its block only if it is on time ([`Arrival`](rtex_block::master::Arrival)); if two frames have the
@@ -44,7 +44,7 @@ pub use port::{Port, Word};
 /// Why a call to a [`Driver`] failed.
 pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
 
-/// Words of the longest block, on a bus of bytes.
+/// Number of words in the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
 /// How many times an exchange reads the blocks if the bank is switched meanwhile.
 const READS: u8 = 2;
@@ -61,8 +61,8 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 pub struct Exchanged {
     /// Number of communication periods by which the commands are late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
-    /// The blocks were never of one frame, however often they were read, or the echo of a drive has stopped: those that are not
-    /// on time were not taken.
+    /// The blocks were never all of one frame, however often they were read, or the echo of a drive has stopped; blocks that
+    /// were not on time were not taken.
     pub torn: bool,
 }
 
@@ -85,7 +85,7 @@ pub struct Driver<'r, P, C, const N: usize> {
     check: ClockCheck,
     master: Master<N>,
     received: &'r FrameCount,
-    /// Frames of `received` that the master has been told of.
+    /// Number of frames of `received` that were reported to the master.
     frames: u32,
     late: u32,
     torn: u32,
@@ -131,7 +131,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.late
     }
 
-    /// Number of exchanges whose blocks were not of one frame.
+    /// Number of exchanges whose blocks did not all come from one frame.
     pub const fn torn(&self) -> u32 {
         self.torn
     }
@@ -141,8 +141,9 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.led(t_ms)
     }
 
-    /// Returns what is known about the actual position, speed and torque of the axis at `place`; nothing for a place that the
-    /// ring does not have. Its instant is the start of the frame that brought the last timely block, by the driver's clock.
+    /// Returns what is known about the actual position, speed and torque of the axis at `place`; [`Evidence::NEVER`] for a
+    /// place that the ring does not have. Its instant is the start of the frame that carried the last block on time, by the
+    /// driver's clock.
     pub fn evidence(&self, place: usize) -> Evidence {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
@@ -189,8 +190,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// it from the NC interrupt, before anything else is calculated. `began_ns` is the start of the frame that began the
     /// period, by the driver's clock: the time of the interrupt.
     ///
-    /// # Errors
-    /// [`Error::Io`] and [`Error::Clock`], the first of them; every block that could be read or written was, and the next
+    /// # Errors The first [`Error::Io`] or [`Error::Clock`]; every block that could be read or written was, and the next
     /// exchange continues.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
@@ -257,8 +257,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.check.check(self.clock.now_ns()?)
     }
 
-    /// Returns whether a block that was read has another echo by now, which means that the bank was switched in the middle of
-    /// the last block.
+    /// Returns whether a block that was read now has another echo, which means that the bank was switched in the middle of the
+    /// last block.
     fn has_changed(&mut self, heard: &[Heard; N]) -> bool {
         let echo = |heard: &Heard| heard.response().map(|response| response.update_counter_echo);
         let first = heard.iter().enumerate().find_map(|(place, heard)| Some((place, echo(heard)?)));
@@ -293,7 +293,7 @@ struct Read<P: Port, const N: usize> {
     fault: Option<Failure<P>>,
 }
 
-/// Returns as many words as a block has.
+/// Returns as many of these words as a block has.
 fn words_of<P: Port>(size: BlockSize, words: &mut [P::Word; MOST_WORDS]) -> &mut [P::Word] {
     let count = size.bytes().checked_div(P::Word::BYTES).unwrap_or(0);
     words.get_mut(..count).unwrap_or_default()

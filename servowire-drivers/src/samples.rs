@@ -1,8 +1,8 @@
 //! Support for a line without a suitable UART: an SPI or PIO that takes several samples per bit, and sends them.
 //!
-//! With MISO connected to the receiver's output, a clock that is a multiple of the bit rate, and DMA into a buffer, every SPI
-//! bit is a sample. MOSI, connected to the driver's input, sends in the same way. Where each sample lies in the buffer depends
-//! on the peripheral:
+//! If MISO is connected to the receiver's output, the SPI clock is a multiple of the bit rate, and DMA fills a buffer, every
+//! SPI bit is a sample. MOSI, connected to the driver's input, sends in the same way. Where each sample lies in the buffer
+//! depends on the peripheral:
 //!
 //! ```text
 //!  line, time ->        s0 s1 s2 s3 s4 s5 s6 s7 | s8 ...
@@ -63,12 +63,11 @@ pub(crate) fn reorder(samples: &mut [u8], order: Order) {
     }
 }
 
-/// Writes line bits as `per_bit` samples each, for a peripheral of this order. They are preceded by ones, for one bit and up to
-/// whole bytes, and followed by at least a byte of ones up to the end of a word, because the state of a data line between
-/// transfers is undefined. Switch the line driver on and off during these ones. Returns the number of bytes written.
+/// Writes line bits as `per_bit` samples each, for a peripheral of this order. They are preceded by ones, for at least one bit
+/// and up to whole bytes, and followed by at least a byte of ones up to the end of a word, because the state of a data line
+/// between transfers is undefined. Switch the line driver on and off during these ones. Returns the number of bytes written.
 ///
-/// # Errors
-/// [`TooShort`] if `out` ends earlier; it is undefined then.
+/// # Errors [`TooShort`] if `out` ends earlier; its contents are then undefined.
 pub fn write(
     bits: impl IntoIterator<Item = bool>,
     per_bit: u8,

@@ -9,7 +9,7 @@ use crate::quiet;
 use crate::{Clock, Direction, Worst};
 
 /// The line driver is on for as long as this value lives. When dropped, it waits until everything that was handed over has
-/// left, because a request whose end is cut off may be a different request.
+/// left, because a request whose end is cut off may be read as a different request.
 #[derive(Debug)]
 pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     switch: &'a mut Switch<D>,
@@ -17,23 +17,23 @@ pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     pub(crate) line: &'a mut quiet::Line,
     /// `None` if the hardware switches the driver.
     leaving: Option<Leaving>,
-    /// Fields that a `write` has been asked to take and that may be on their way.
+    /// Number of fields that were passed to a `write` and may be on their way.
     asked: usize,
     start_ns: Option<u64>,
 }
 
-/// When a request began to leave, and by how much the driver was switched off too late after it.
+/// When a request began to leave, and how much too late the driver was switched off after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Sent {
     pub(crate) start_ns: u64,
     pub(crate) late_ns: u64,
 }
 
-/// Makes sure that the line driver is off, before listening; returns the time. A future that was forgotten while its request was
-/// being sent has left the driver on; it is then not switched off before that request has left, however long ago the last look
-/// was.
+/// Makes sure that the line driver is off, before listening; returns the time. A future that was forgotten while its request
+/// was being sent has left the driver on; the driver is then not switched off before that request has left, however long ago
+/// the last look was.
 ///
-/// `looked`: what the last look at the clock gave. If that was a fault, the driver is switched off all the same.
+/// `looked` is the result of the last look at the clock. If that was a fault, the driver is switched off anyway.
 #[inline]
 pub(crate) fn off<D: Direction>(
     switch: &mut Switch<D>,
@@ -48,7 +48,7 @@ pub(crate) fn off<D: Direction>(
     Ok(waited)
 }
 
-/// Waits until no part of a request is still leaving, whenever it began; returns the time.
+/// Waits until no part of a request is still leaving, no matter when the request began; returns the time.
 #[cold]
 #[inline(never)]
 fn outlast(clock: &mut impl Clock, state: &mut quiet::Line, line: &Line) -> Result<u64, ClockError> {
@@ -98,7 +98,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         Ok(now_ns)
     }
 
-    /// Notes that the `write` begun at `before_ns` has taken this many.
+    /// Notes that the `write` begun at `before_ns` has taken this many fields.
     #[inline]
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64) -> Result<(), ClockError> {
         let after_ns = self.line.now_ns(self.clock)?;
@@ -121,7 +121,8 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         self.leaving.and_then(|leaving| leaving.off_ns())
     }
 
-    /// Ends the request, which has left: switches the driver off and returns whether that succeeded; if not, it is tried once more.
+    /// Ends the request, which has left: switches the driver off and returns whether that succeeded; if not, it tries once
+    /// more.
     #[inline]
     pub(crate) fn end(mut self) -> Result<Result<Sent, ClockError>, D::Error> {
         self.switch.off()?;

@@ -79,7 +79,7 @@ impl Sampling {
         (self.bits_per_second as u64).saturating_mul(self.format.samples_per_bit() as u64)
     }
 
-    /// Bytes of one field.
+    /// Number of bytes of samples in one field.
     fn look(&self) -> usize {
         let samples = self.format.field_bits().saturating_mul(self.format.samples_per_bit());
         usize::try_from(samples.div_ceil(8)).unwrap_or(usize::MAX)
@@ -122,7 +122,7 @@ pub enum SpiError<S, P> {
     /// A stop bit was 0.
     #[error("a stop bit is 0")]
     Framing,
-    /// Something was on the line outside the window.
+    /// There was activity on the line outside the window.
     #[error("something is on the line outside the window")]
     Noise,
     /// The clock has stopped or was set back.
@@ -151,7 +151,7 @@ enum Heard {
     Noise,
 }
 
-/// The common core of both: the buffers, and what the last transfer has sampled.
+/// The common core of both: the buffers, and the samples of the last transfer.
 #[derive(Debug)]
 struct Sampler<'b, S, D> {
     bus: S,
@@ -160,7 +160,7 @@ struct Sampler<'b, S, D> {
     tx: &'b mut [u8],
     rx: &'b mut [u8],
     receiver: Receiver,
-    /// Bytes of `rx` that were sampled, and how many of them the receiver has.
+    /// Number of bytes of `rx` that were sampled, and how many of them the receiver has taken.
     len: usize,
     at: usize,
     /// The remaining samples of the byte before `at`.
@@ -201,14 +201,14 @@ impl<'b, S, D> Sampler<'b, S, D> {
         }
     }
 
-    /// Writes the request as samples; returns the bytes of `tx`.
+    /// Writes the request as samples; returns the number of bytes of `tx`.
     fn prepare(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<usize, TooShort> {
         self.forget();
         let per_bit = u8::try_from(self.sampling.format.samples_per_bit()).unwrap_or(u8::MAX);
         write(bits, per_bit, self.sampling.order, self.tx)
     }
 
-    /// Returns `len` bytes to sample into, set so that MOSI stays 1 meanwhile.
+    /// Returns `len` bytes to sample into, preset so that MOSI stays 1 meanwhile.
     fn idle(&mut self, len: usize) -> &mut [u8] {
         self.forget();
         let len = len.min(self.rx.len());
@@ -266,7 +266,7 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
         self.sample(usize::MAX)
     }
 
-    /// Returns what has been received; if there is nothing, looks at the line.
+    /// Returns what has been received; if nothing has, looks at the line.
     fn hear(&mut self) -> Result<Option<Heard>, Fault<S, D>> {
         if let Some(field) = self.field() {
             return Ok(Some(Heard::Field(field)));

@@ -25,7 +25,7 @@ pub struct Released<U, D, C> {
     pub clock: C,
 }
 
-/// How a procedure is told of a lost answer.
+/// The error that tells a procedure of a lost answer.
 const LOST: Error = Error::NoResponse { echo: false };
 
 /// Bytes of the longest request and the longest answer together.
@@ -47,7 +47,7 @@ fn answered_ns(line: &Line, fields: u8) -> u64 {
     answered_ns.saturating_add(line.hand_over_ns.into())
 }
 
-/// Returns why there was no answer: the encoder is not to blame if the line was still driven when it began to answer.
+/// Returns why there was no answer: the encoder is not at fault if the line was still driven when it began to answer.
 fn refused<IO, PIN, D>(error: Error, late_ns: u64) -> crate::Error<IO, PIN, Error, D> {
     match late_ns {
         0 => crate::Error::Protocol(error),

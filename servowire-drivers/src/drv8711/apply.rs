@@ -1,4 +1,4 @@
-//! Writes a configuration and makes sure that it arrived.
+//! Writes a configuration and verifies it.
 
 use super::error::Error;
 use super::registers::Configuration;
@@ -36,7 +36,7 @@ const ORDER: [Register; 7] = [
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Apply {
     configuration: Configuration,
-    /// Number of registers that are written and checked.
+    /// Number of registers that have been written and checked.
     done: u8,
     /// Whether the current register has been written.
     written: bool,

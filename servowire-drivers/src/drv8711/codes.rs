@@ -30,7 +30,7 @@ impl Code for u8 {
     }
 }
 
-/// Fields of two to four bits. Each value is named after what it does, which is its only documentation.
+/// Fields of two to four bits. The name of each value says what it does and is its only documentation.
 macro_rules! values {
     ($($(#[$doc:meta])* $name:ident { $($value:ident = $code:literal $text:literal),+ $(,)? })+) => {
         $(
@@ -72,7 +72,7 @@ values! {
         Us600 = 5 "600 us", Us800 = 6 "800 us", Us1000 = 7 "1000 us",
     }
 
-    /// DECMOD: how the current decays; of two words in a name, the first is for rising and the second for falling current.
+    /// DECMOD: how the current decays; if a name has two words, the first is for rising and the second for falling current.
     DecayMode {
         Slow = 0 "slow", SlowMixed = 1 "slow/mixed", Fast = 2 "fast", Mixed = 3 "mixed",
         SlowAutoMixed = 4 "slow/auto mixed", AutoMixed = 5 "auto mixed",
@@ -101,7 +101,7 @@ values! {
 }
 
 impl IsGain {
-    /// 5, 10, 20 or 40.
+    /// The gain: 5, 10, 20 or 40.
     pub const fn factor(self) -> u8 {
         match self {
             Self::X5 => 5,

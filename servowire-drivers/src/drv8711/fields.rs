@@ -1,4 +1,4 @@
-//! The fields of every register by name, for tools that show or set raw codes.
+//! The fields of all registers by name, for tools that show or set raw codes.
 
 use super::word::Register;
 
@@ -69,7 +69,7 @@ const STATUS: [Field; 8] = [
 ];
 
 impl Register {
-    /// Its fields, lowest bit first.
+    /// The fields of the register, lowest bit first.
     pub const fn fields(self) -> &'static [Field] {
         match self {
             Self::Ctrl => &CTRL,

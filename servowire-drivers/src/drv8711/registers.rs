@@ -22,7 +22,7 @@ macro_rules! register {
 
         #[expect(clippy::indexing_slicing, reason = "the indexes are checked when this is compiled")]
         impl $name {
-            /// Which register it is.
+            /// Which register this is.
             const REGISTER: Register = Register::$name;
 
             /// The value to write.

@@ -53,12 +53,12 @@ impl Register {
         Word((self.code() as u16) << 12 | value & 0xfff)
     }
 
-    /// Returns the word that reads it. The answer comes in the same transfer.
+    /// Returns the word that reads the register. The answer comes in the same transfer.
     pub const fn read(self) -> Word {
         Word(0x8000 | (self.code() as u16) << 12)
     }
 
-    /// Checks that `read` is what a register that holds `written` may return.
+    /// Checks that `read` is a value that a register holding `written` may return.
     ///
     /// # Errors
     /// [`Error::ReadBack`]

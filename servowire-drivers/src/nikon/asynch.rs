@@ -1,5 +1,5 @@
-//! Waits by yielding to the executor. Every future may be dropped at any point: the next call waits until the line is free. It
-//! is then not known whether a request that changes the encoder took effect.
+//! Waits by yielding to the executor. Every future may be dropped at any point: the next call waits until the line is free.
+//! After a drop it is not known whether a request that changes the encoder took effect.
 
 use nikon_aformat::RequestFrame;
 use servowire_core::run_async as run;

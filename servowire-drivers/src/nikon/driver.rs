@@ -47,7 +47,7 @@ macro_rules! driver {
 
             /// Reads the position of an encoder, if it may be used now, and when it was sampled:
             /// [`read_evidence`](Self::read_evidence), judged at once by the rules of [`Evidence::at`]. The answer alone
-            /// lasts 72 bits, so the position is never younger than that.
+            /// lasts 72 bits, so the position is at least that old.
             ///
             /// # Errors
             /// [`Error`], [`Error::Doubt`] among them.
@@ -131,7 +131,7 @@ macro_rules! driver {
                 $wait!(self.run(&mut GuardedReset::new(Reset::clear_status(ea))))
             }
 
-            /// Reads the word at an address of the EEPROM (command 13). Writing is a procedure for [`run`](Self::run).
+            /// Reads the word at an address of the EEPROM (command 13). To write, pass a procedure to [`run`](Self::run).
             ///
             /// # Errors
             /// [`Error`].

@@ -11,9 +11,10 @@ use crate::race::{race, sleep};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Began {
-    /// By the interrupt.
+    /// It began with the interrupt.
     Edge,
-    /// By the clock, because the edge did not come: it was lost, or the ASIC has stopped, which the echo watch notices.
+    /// It began by the clock, because the edge did not come: it was lost, or the ASIC has stopped, which the echo watch
+    /// notices.
     Clock,
 }
 
@@ -24,14 +25,14 @@ pub enum Began {
 pub struct Period {
     /// How the period began.
     pub began: Began,
-    /// How its exchange went.
+    /// How the exchange of the period went.
     pub exchanged: Exchanged,
 }
 
 impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     /// Waits for the next falling edge of `sync` (XSYNC, or the pin of the external timer), for one and a half update periods at
     /// most, then performs the exchange. The future may be dropped while it waits; the exchange itself is one step. An edge that
-    /// comes while nobody waits is missed, and the commands of that period are sent once more.
+    /// comes while no future waits for it is missed, and the commands of that period are sent once more.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) and [`Error::Clock`](crate::Error::Clock); the next exchange continues. A fault reported
@@ -55,9 +56,9 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     }
 
     /// Returns when the period began that contains `now_ns`. An executor wakes late, and a lost edge is noticed half a period
-    /// late. So the start is derived from the grid of the previous periods; the two clocks may differ by 1/4096. The result is
-    /// rather too early than too late, because the bank is switched at the end of the period. An edge that is noticed more than
-    /// half a period late is taken for the next one.
+    /// late. So the start is derived from the grid of the previous periods; the two clocks may differ by 1/4096. If in doubt,
+    /// the result is too early rather than too late, because the bank is switched at the end of the period. An edge that is
+    /// noticed more than half a period late is mistaken for the next one.
     fn began_ns(&self, now_ns: u64, began: Began) -> u64 {
         let update_ns = u64::from(self.master().config().periods.update_ns);
         let past_ns = now_ns.saturating_sub(self.began_ns.unwrap_or(now_ns));

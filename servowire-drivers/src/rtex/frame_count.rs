@@ -1,6 +1,6 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Tells the exchange that a frame has arrived; set by the receive interrupt (XINTRX). Make it a `static` that both use.
+/// Tells the exchange that a frame has arrived; the receive interrupt (XINTRX) sets it. Make it a `static` that both use.
 ///
 /// ```
 /// use servowire_drivers::rtex::FrameCount;
@@ -31,7 +31,7 @@ impl FrameCount {
         self.frames.store(self.get().wrapping_add(1), Ordering::Release);
     }
 
-    /// Frames so far, modulo 2^32.
+    /// Number of frames so far, modulo 2^32.
     pub fn get(&self) -> u32 {
         self.frames.load(Ordering::Acquire)
     }

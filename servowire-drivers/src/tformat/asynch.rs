@@ -1,6 +1,6 @@
 //! Waits by yielding to the executor. Every future may be dropped at any point. A request that has begun is sent completely,
-//! for which the destructor waits some microseconds if software switches the line driver, and the next call waits until the
-//! line is free. It is then not known whether a request that changes the encoder took effect.
+//! for which the destructor waits some microseconds if software switches the line driver; the next call waits until the line is
+//! free. After a drop it is not known whether a request that changes the encoder took effect.
 //!
 //! The UART's `read` should have no side effects when it is dropped, as with buffered UARTs; otherwise bytes are lost, which
 //! costs the exchange in which it happens. Its `write` should take all bytes or none when it is dropped.

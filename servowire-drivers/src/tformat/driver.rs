@@ -50,15 +50,16 @@ macro_rules! driver {
                 Released { uart: self.uart, direction: self.direction.release(), clock: self.clock }
             }
 
-            /// By how much the direction pin may have been switched off too late after the last request, in ns; 0 if it was
-            /// certainly in time. If it is not 0, [`Worst`](crate::Worst) was too optimistic, or the processor was busy elsewhere.
+            /// How much too late the direction pin may have been switched off after the last request, in ns; 0 if it was
+            /// certainly in time. A value other than 0 means that [`Worst`](crate::Worst) was too optimistic or the processor
+            /// was busy elsewhere.
             pub const fn late_ns(&self) -> u64 {
                 self.late_ns
             }
 
             /// Reads the position, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
-            /// judged at once by the rules of [`Evidence::at`]. The answer alone lasts 44 us at 2.5 Mbit/s and 22 us at 5, so it
-            /// is never younger.
+            /// judged at once by the rules of [`Evidence::at`]. The answer alone lasts 44 us at 2.5 Mbit/s and 22 us at 5
+            /// Mbit/s, so the position is at least that old.
             ///
             /// # Errors
             /// [`Error`], [`Error::Doubt`] among them.
@@ -109,7 +110,8 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
             }
 
-            /// Writes a byte and reads it back (ID 6). Motor makers keep commutation data in this memory: know what you overwrite.
+            /// Writes a byte and reads it back (ID 6). Motor makers keep commutation data in this memory: make sure that you
+            /// know what you overwrite.
             ///
             /// # Errors
             /// [`Error`]; it is then not known whether the byte was written. Read it.
@@ -122,10 +124,10 @@ macro_rules! driver {
                 $wait!(self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING)))
             }
 
-            /// Finds the encoder after power-on, whether that was just now or earlier, at either rate; the driver keeps the rate
-            /// at which the encoder was found. `set_rate` sets the rate of the UART, and is also called before the first
-            /// request. Use `Detection::on([line, line])` if one rate is enough, or if the lines need other times than the
-            /// defaults.
+            /// Finds the encoder at either rate, after power-on, whether that was just now or earlier; the driver keeps the
+            /// rate at which the encoder was found. `set_rate` sets the rate of the UART, and is also called before the
+            /// first request. Use `Detection::on([line, line])` if one rate is enough, or if the lines need other times than
+            /// the defaults.
             ///
             /// # Errors
             /// [`Error`], with the error of `set_rate` as [`Error::Io`]; [`Error::PinTooSlow`] if the pin is too slow for one of
@@ -191,7 +193,7 @@ macro_rules! driver {
                 $wait!(self.exchange(looked, request))
             }
 
-            /// `looked`: what the last look at the clock gave.
+            /// `looked` is the result of the last look at the clock.
             $($asynch)? fn exchange(
                 &mut self,
                 looked: Result<u64, ClockError>,

@@ -1,10 +1,10 @@
-//! The search for an encoder as a procedure whose requests say at which rate they are sent.
+//! The search for an encoder, as a procedure whose requests carry the rate at which they are sent.
 
 use servowire_core::{Procedure, Step};
 use tformat::master::{Detection, Line};
 use tformat::{AllData, Error, Request, Response};
 
-/// A request, and the line on which it is sent.
+/// A request, and the settings of the line for it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tuned {
     pub(super) request: Request,
