@@ -63,7 +63,7 @@ pub struct Channel2Monitor {
     toggle: Option<bool>,
     /// Number of the H-frame before.
     number: Option<u32>,
-    /// H-frames since the last sound block.
+    /// Number of H-frames since the last sound block.
     frames: u32,
 }
 

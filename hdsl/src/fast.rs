@@ -11,7 +11,7 @@ use crate::evidence::{Evidence, Sample};
 
 /// The limit of speeds, in steps per frame, which keeps the sum of two in range.
 const FASTEST: i64 = 1 << 30;
-/// H-frames of a V-frame.
+/// Number of H-frames in a V-frame.
 const V_FRAME: u32 = 8;
 
 /// What the safe positions have shown so far.

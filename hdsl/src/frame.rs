@@ -25,7 +25,7 @@ pub const BIT_RATE: u32 = 9_375_000;
 pub const SAMPLES_PER_BIT: u32 = 8;
 /// Bits of a free-running H-frame.
 pub const H_FRAME_BITS: u32 = 108;
-/// H-frames of a V-frame.
+/// Number of H-frames in a V-frame.
 pub const V_FRAME: u8 = 8;
 /// Bits of the encoder's answer.
 pub const ANSWER_BITS: u32 = 61;

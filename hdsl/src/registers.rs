@@ -60,7 +60,7 @@ pub struct Registers {
 }
 
 impl Registers {
-    /// Bytes of the map.
+    /// Number of bytes in the map.
     pub const LEN: usize = 0x56;
 
     /// Creates the map as it is after power-up: the flags of a restart are set.

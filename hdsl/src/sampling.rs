@@ -125,7 +125,7 @@ pub enum EdgeRule {
 pub struct Alignment {
     /// Where to sample.
     pub index: SampleIndex,
-    /// Bits before the answer.
+    /// Number of bits before the answer.
     pub delay: Delay,
 }
 
