@@ -32,7 +32,7 @@ impl DeviceAddress {
         self.0
     }
 
-    /// Devices between the master and this one, 0..=253.
+    /// Number of devices between the master and this one, 0..=253.
     pub(crate) const fn hops_before(self) -> u8 {
         self.0.saturating_sub(1)
     }

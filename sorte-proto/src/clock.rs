@@ -1,6 +1,6 @@
 /// Time from reading the counter until the new value takes effect in the published device: 27 instructions, 135 ns.
 pub(crate) const WRITE_DELAY_NS: u32 = 135;
-/// Frames averaged for one correction.
+/// Number of frames averaged for one correction.
 pub(crate) const AVERAGE: u8 = 16;
 
 /// The correction of a device's counter. The IEP counter adds 5 per 5 ns tick, so it counts nanoseconds.

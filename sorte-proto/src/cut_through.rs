@@ -265,7 +265,7 @@ impl Rewriter {
         self.transit.len() > 3 && self.rewrites()
     }
 
-    /// Number of output bytes of all devices behind this one, if the frame is DISCOVERY.
+    /// Number of output bytes counted in the frame as it leaves the device; `None` unless it is DISCOVERY.
     pub(crate) fn output_total(&self) -> Option<u16> {
         let [_, _, o0, o1] = self.entry;
         let own = if self.rewrites() { u16::from_le_bytes([o0, o1]) } else { 0 };

@@ -23,7 +23,7 @@ pub struct DelayReq {
 }
 
 impl DelayReq {
-    /// Bytes from DA to FCS.
+    /// Number of bytes from DA to FCS.
     pub const LEN: usize = LongFrame::OVERHEAD;
 
     /// Creates the request that the master sends to the first device.

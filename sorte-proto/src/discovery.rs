@@ -15,9 +15,9 @@ const PAYLOAD: usize = 6 + TABLE;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Entry {
-    /// Bytes from the device to the master.
+    /// Number of bytes from the device to the master.
     pub input: u16,
-    /// Bytes from the master to the device.
+    /// Number of bytes from the master to the device.
     pub output: u16,
 }
 
@@ -81,19 +81,19 @@ impl<'a> DiscoveryView<'a> {
         self.frame.status()
     }
 
-    /// Devices that the frame has passed; above 254 the line is too long.
+    /// Number of devices that the frame has passed; above 254 the line is too long.
     pub const fn count(self) -> u16 {
         let [c0, c1, ..] = self.fields;
         u16::from_le_bytes([*c0, *c1])
     }
 
-    /// Input bytes of these devices.
+    /// Number of input bytes of these devices.
     pub const fn input_total(self) -> u16 {
         let [_, _, i0, i1, ..] = self.fields;
         u16::from_le_bytes([*i0, *i1])
     }
 
-    /// Output bytes of these devices.
+    /// Number of output bytes of these devices.
     pub const fn output_total(self) -> u16 {
         let [_, _, _, _, o0, o1, ..] = self.fields;
         u16::from_le_bytes([*o0, *o1])
@@ -166,11 +166,11 @@ pub struct Discovery {
     pub source: u8,
     /// STATUS.
     pub status: Status,
-    /// Devices that the frame has passed.
+    /// Number of devices that the frame has passed.
     pub count: u16,
-    /// Input bytes of these devices.
+    /// Number of input bytes of these devices.
     pub input_total: u16,
-    /// Output bytes of these devices.
+    /// Number of output bytes of these devices.
     pub output_total: u16,
     /// Entries of the devices 1 to 254.
     #[cfg_attr(feature = "serde", serde(with = "crate::table"))]
@@ -178,7 +178,7 @@ pub struct Discovery {
 }
 
 impl Discovery {
-    /// Bytes from DA to FCS.
+    /// Number of bytes from DA to FCS.
     pub const LEN: usize = PAYLOAD + LongFrame::OVERHEAD;
 
     /// Creates the frame that a master sends, with zeros where the devices will write.
@@ -248,9 +248,9 @@ impl Discovery {
 pub struct Assignment {
     /// Its place in the line.
     pub address: DeviceAddress,
-    /// Input bytes of the devices before it.
+    /// Number of input bytes of the devices before it.
     pub in_offset: u16,
-    /// Output bytes of the devices before it: where its own output bytes begin.
+    /// Number of output bytes of the devices before it: where its own output bytes begin.
     pub out_offset: u16,
 }
 
@@ -365,17 +365,17 @@ impl Network {
         answer.count() == u16::from(self.devices) && self.entries().iter().all(|entry| told.next() == Some(*entry))
     }
 
-    /// Devices in the line, 0..=254.
+    /// Number of devices in the line, 0..=254.
     pub const fn devices(&self) -> u8 {
         self.devices
     }
 
-    /// Input bytes of all devices.
+    /// Number of input bytes of all devices.
     pub const fn input_total(&self) -> u16 {
         self.input_total
     }
 
-    /// Output bytes of all devices.
+    /// Number of output bytes of all devices.
     pub const fn output_total(&self) -> u16 {
         self.output_total
     }

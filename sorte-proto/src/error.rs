@@ -11,7 +11,7 @@ servowire_core::errors! {
         Truncated = 1 {
             /// Bytes given.
             got: u16,
-            /// Bytes of a frame of this kind; 8 if the kind is not known.
+            /// Number of bytes in a frame of this kind; 8 if the kind is not known.
             want: u16,
         },
         /// The frame check sequence does not match the bytes before it.
@@ -47,7 +47,7 @@ servowire_core::errors! {
         TooLong = 6 {
             /// Bytes given.
             got: u16,
-            /// Bytes of a frame of this kind.
+            /// Number of bytes in a frame of this kind.
             want: u16,
         },
         /// The CRC-8 of an IO-exchange frame does not match.
@@ -103,9 +103,9 @@ servowire_core::errors! {
         /// The buffer to write a frame into is too small.
         #[error("buffer of {got} bytes, {want} are needed")]
         BufferTooSmall = 14 {
-            /// Bytes of the buffer.
+            /// Number of bytes in the buffer.
             got: u16,
-            /// Bytes of the frame.
+            /// Number of bytes in the frame.
             want: u16,
         },
         /// The PTO word is undefined: between 3991 and 0x7FFE, with or without bit 15, or 0xFFFF.
@@ -145,9 +145,9 @@ servowire_core::errors! {
         /// DISCOVERY found fewer devices than required.
         #[error("{got} devices answered, {want} are needed")]
         TooFewDevices = 22 {
-            /// Devices in the line.
+            /// Number of devices in the line.
             got: u8,
-            /// Devices required.
+            /// Number of devices required.
             want: u8,
         },
         /// Device frames were missing in too many consecutive cycles.
@@ -236,7 +236,7 @@ servowire_core::errors! {
         NotInSync = 36 {
             /// The largest number of devices that can have added their time.
             got: u8,
-            /// Devices that DISCOVERY found.
+            /// Number of devices that DISCOVERY found.
             want: u8,
         },
     }

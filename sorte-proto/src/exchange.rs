@@ -7,7 +7,7 @@ use crate::frame::{count, wrong_length};
 use crate::hex::Hex;
 use crate::status::Status;
 
-/// Output bytes of the published master: four devices with four bytes each.
+/// Number of output bytes of the published master: four devices with four bytes each.
 pub(crate) const STOCK_OUTPUT: usize = 16;
 /// Payload of a device frame: the DRV8711 STATUS byte and two reserved bytes.
 pub(crate) const STOCK_INPUT: usize = 3;
@@ -130,7 +130,7 @@ pub struct MasterFrame<const S: usize = STOCK_OUTPUT> {
 }
 
 impl<const S: usize> MasterFrame<S> {
-    /// Bytes from SA to the time stamp.
+    /// Number of bytes from SA to the time stamp.
     pub const LEN: usize = S.saturating_add(MasterFrameView::OVERHEAD);
 
     const fn view(&self) -> MasterFrameView<'_> {
@@ -225,7 +225,7 @@ pub struct DeviceFrame<const P: usize = STOCK_INPUT> {
 }
 
 impl<const P: usize> DeviceFrame<P> {
-    /// Bytes from SA to the CRC.
+    /// Number of bytes from SA to the CRC.
     pub const LEN: usize = P.saturating_add(DeviceFrameView::OVERHEAD);
 
     const fn view(&self) -> DeviceFrameView<'_> {
@@ -274,7 +274,7 @@ pub struct PublishedDeviceFrame {
 }
 
 impl PublishedDeviceFrame {
-    /// Bytes from SA to the CRC byte.
+    /// Number of bytes from SA to the CRC byte.
     pub const LEN: usize = 5;
 
     /// Checks length and SA; nothing covers the contents.

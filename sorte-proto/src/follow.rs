@@ -166,7 +166,7 @@ impl Follower {
         self.ordered
     }
 
-    /// Steps that are missing, according to the last good frame.
+    /// Number of steps that are missing, according to the last good frame.
     pub const fn lag(&self) -> i16 {
         match self.ordered {
             Some(ordered) => difference(self.asked, ordered),

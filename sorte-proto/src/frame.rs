@@ -28,7 +28,7 @@ pub struct LongFrame<'a> {
 }
 
 impl<'a> LongFrame<'a> {
-    /// Bytes of header and FCS.
+    /// Number of bytes in header and FCS.
     pub const OVERHEAD: usize = 8;
 
     /// Checks, in this order: at least 8 bytes, FCS, DA, TYPE, length. The bytes must be exactly one frame.

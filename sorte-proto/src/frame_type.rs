@@ -25,7 +25,7 @@ servowire_core::codes! {
 }
 
 impl FrameType {
-    /// Bytes from DA to FCS; `None` if no layout is published.
+    /// Number of bytes from DA to FCS; `None` if no layout is published.
     pub const fn frame_len(self) -> Option<usize> {
         match self {
             Self::Discovery => Some(1030),

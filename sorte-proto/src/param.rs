@@ -260,7 +260,7 @@ pub struct Param {
 }
 
 impl Param {
-    /// Bytes from DA to FCS.
+    /// Number of bytes from DA to FCS.
     pub const LEN: usize = Parameters::LEN + LongFrame::OVERHEAD;
 
     /// Creates the frame that a master sends.

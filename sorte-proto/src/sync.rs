@@ -101,7 +101,7 @@ pub struct Sync {
 }
 
 impl Sync {
-    /// Bytes from DA to FCS.
+    /// Number of bytes from DA to FCS.
     pub const LEN: usize = 6 + LongFrame::OVERHEAD;
 
     /// Creates the frame that the master sends: triggered at `trigger_ns` of its time, over a line of `line_delay_ns` to

@@ -95,9 +95,9 @@ pub struct Timing<'a> {
     pub line_delays_ns: &'a [u16],
     /// Number of devices, 0..=254.
     pub devices: u8,
-    /// Output bytes in the master frame: 4 for each device, or 16 always.
+    /// Number of output bytes in the master frame: 4 for each device, or 16 always.
     pub output_len: u16,
-    /// Payload of each device frame: 3 in the reference design.
+    /// Payload bytes of each device frame: 3 in the reference design.
     pub payload_len: u16,
     /// When the devices send; `None` for the rule, with this line's first cable and payload.
     pub slots: Option<Slots>,

@@ -36,7 +36,7 @@ pub struct Config {
     pub patient_discovery: bool,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
-    /// Frames averaged for a correction of the clock: a longer average is steadier but follows a drift more slowly.
+    /// Number of frames averaged for a correction of the clock: a longer average is steadier but follows a drift more slowly.
     pub clock_average: u8,
     /// Cycle starts without a frame that a device in IO exchange tolerates.
     pub missed_frames: u8,

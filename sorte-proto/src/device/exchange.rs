@@ -192,7 +192,7 @@ impl Device {
         }
     }
 
-    /// Cycles since the last frame.
+    /// Number of cycles since the last frame.
     pub const fn missed_frames(&self) -> u8 {
         self.missed
     }

@@ -68,7 +68,7 @@ pub struct Config {
     pub min_devices: u8,
     /// Minimum number of output bytes of the master frame; 16 keeps all axes in the same cycle however many there are.
     pub min_output_len: u16,
-    /// Payload bytes of a device frame.
+    /// Number of payload bytes in a device frame.
     pub payload_len: u8,
     /// Parameters sent to the devices. The published master says 10 us and exchanges every 4 us; here both use the same cycle.
     pub parameters: Parameters,
@@ -89,8 +89,8 @@ pub struct Config {
     /// Number of cycles of the IO exchange in which the axes can come to rest before the master restarts; with 0 it restarts at
     /// once, and running motors stop dead.
     pub stop_cycles: u32,
-    /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in [`State::Error`];
-    /// with 0 it retries for ever.
+    /// Number of failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in
+    /// [`State::Error`]; with 0 it retries for ever.
     pub max_failures: u16,
     /// The line may be longer than the delay field of SYNC can express: an extension of this crate, see
     /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master then sends its SYNC period in PARAM.

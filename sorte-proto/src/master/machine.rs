@@ -133,7 +133,7 @@ impl Master {
         self.tallies.get(usize::from(address).checked_sub(1)?).copied()
     }
 
-    /// Output bytes of the master frame.
+    /// Number of output bytes of the master frame.
     pub fn output_len(&self) -> u16 {
         self.network.output_total().max(self.config.min_output_len)
     }
