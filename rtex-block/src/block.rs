@@ -2,9 +2,9 @@
 
 use crate::error::{Error, wrong_length};
 
-/// Bytes of a block.
+/// Number of bytes in a block.
 pub const LEN: usize = 16;
-/// Bytes of a block in the 32-byte mode.
+/// Number of bytes in a block in the 32-byte mode.
 pub const LEN32: usize = 32;
 
 /// Which of the two sizes a drive is set to (by a parameter; Pr7.22 is suspected).

@@ -7,17 +7,17 @@ servowire_core::errors! {
         /// The slice is shorter than a block.
         #[error("{got} bytes, a block has {want}")]
         Truncated = 1 {
-            /// Bytes received.
+            /// Number of bytes received.
             got: u16,
-            /// Bytes that a block has: 16 or 32.
+            /// Number of bytes that a block has: 16 or 32.
             want: u16,
         },
         /// The slice is longer than a block; it must be exactly one block.
         #[error("{got} bytes, a block has {want}")]
         TooLong = 2 {
-            /// Bytes received; 65535 for more.
+            /// Number of bytes received; 65535 for more.
             got: u16,
-            /// Bytes that a block has: 16 or 32.
+            /// Number of bytes that a block has: 16 or 32.
             want: u16,
         },
         /// C/R (bit 7 of byte 0) says command where a response was expected, or the other way round.

@@ -36,7 +36,7 @@ mod sealed {
 
 /// A word of the bus: `u8`, `u16` or `u32`. The byte that goes out first is in its lowest bits, on every host.
 pub trait Word: Copy + Default + sealed::Sealed {
-    /// Bytes of a word.
+    /// Number of bytes in a word.
     const BYTES: usize;
     /// Creates a word from exactly that many bytes; 0 for any other number of bytes.
     #[doc(hidden)]

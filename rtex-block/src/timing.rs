@@ -34,7 +34,7 @@ impl Periods {
         Self { com_ns, update_ns: com_ns.wrapping_mul(per_update), internal_timer }
     }
 
-    /// Communication periods in an update period, Pr7.21.
+    /// Number of communication periods in an update period, Pr7.21.
     pub const fn communications(&self) -> u32 {
         match self.update_ns.checked_div(self.com_ns) {
             Some(n) => n,

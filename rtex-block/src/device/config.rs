@@ -62,7 +62,7 @@ pub struct DriveConfig {
     pub mac_id: MacId,
     /// Update period, ns.
     pub update_ns: u32,
-    /// Communication periods in an update period, 1 or 2.
+    /// Number of communication periods in an update period, 1 or 2.
     pub communications: u8,
     /// Number of exchanges until the drive is synchronised to the communication.
     pub sync_exchanges: u16,
@@ -70,11 +70,11 @@ pub struct DriveConfig {
     pub servo_on_updates: u16,
     /// Number of exchanges for which a parameter write or a reset is busy.
     pub busy_exchanges: u16,
-    /// Consecutive faulty receptions that raise Err86.0 or Err86.1 (the vendor's time is not known).
+    /// Number of consecutive faulty receptions that raise Err86.0 or Err86.1 (the vendor's time is not known).
     pub fault_limit: u16,
-    /// Consecutive update periods with a wrong Update_Counter that raise Err86.2 (the vendor's rule is not known).
+    /// Number of consecutive update periods with a wrong Update_Counter that raise Err86.2 (the vendor's rule is not known).
     pub counter_limit: u16,
-    /// Consecutive communication periods without a frame that raise [`OpenCodes::communication_lost`].
+    /// Number of consecutive communication periods without a frame that raise [`OpenCodes::communication_lost`].
     pub lost_limit: u16,
     /// The motor makes up 1/2^`follow` of the deviation in each update period; 0..=15.
     pub follow: u8,

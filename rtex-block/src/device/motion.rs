@@ -49,9 +49,9 @@ pub(super) struct Motion {
     pub(super) torque: i32,
     pub(super) torque_limited: bool,
     pub(super) profile: Option<Generator>,
-    /// Update periods before the motion starts and In_Progress rises.
+    /// Number of update periods before the motion starts and In_Progress rises.
     start_in: u16,
-    /// Update periods for which Servo_Active is still 1.
+    /// Number of update periods for which Servo_Active is still 1.
     says_active: u16,
 }
 

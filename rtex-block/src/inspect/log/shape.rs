@@ -12,7 +12,7 @@ pub struct LogShape {
     pub size: BlockSize,
     /// How many bytes of each word are in reversed order: 1 for none, 2 or 4.
     pub word: usize,
-    /// Bytes before the first whole block: not 0 if the log begins in the middle of one.
+    /// Number of bytes before the first whole block: not 0 if the log begins in the middle of one.
     pub skip: usize,
 }
 

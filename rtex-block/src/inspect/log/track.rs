@@ -28,7 +28,7 @@ pub(super) struct Track {
     counter: Option<UpdateCounter>,
     sent_twice: bool,
     echo: Option<UpdateCounter>,
-    /// Responses in a row with this echo, and whether this was reported.
+    /// Number of responses in a row with this echo, and whether this was reported.
     same: u32,
     stands: bool,
     position: Option<i32>,

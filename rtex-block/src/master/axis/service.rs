@@ -98,7 +98,7 @@ impl Axis {
         self.main.slot.asking().is_none() && self.main.quiet.is_kept() && !self.is_moving()
     }
 
-    /// Update periods until the present request times out; the whole limit if none is pending.
+    /// Number of update periods until the present request times out; the whole limit if none is pending.
     pub(in crate::master) const fn answer_left(&self) -> u32 {
         match self.main.slot.asking() {
             Some(handshake) => handshake.left(),
