@@ -17,7 +17,7 @@ const _: () = {
     );
 };
 
-/// Frames of the longest response.
+/// Number of frames of the longest response.
 pub(crate) const MAX_FRAMES: u32 = 6;
 
 /// What a response carries between its information field and its CRC-8.
@@ -101,7 +101,7 @@ impl Layout {
         Self::Abs40Vel,
     ];
 
-    /// Frames of the response, 2..=6.
+    /// Number of frames of the response, 2..=6.
     pub const fn frames(self) -> u8 {
         match self {
             Self::Abs17 => 2,

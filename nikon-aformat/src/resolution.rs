@@ -79,7 +79,7 @@ impl Resolution {
         self.st_bits
     }
 
-    /// Bits of the turns, 0 without a counter.
+    /// Number of bits of the turns, 0 without a counter.
     pub const fn mt_bits(self) -> u8 {
         self.mt_bits
     }

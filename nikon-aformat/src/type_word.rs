@@ -96,7 +96,7 @@ impl TypeWord {
         }
     }
 
-    /// Bits of the turns; `None` for a code without a known meaning.
+    /// Number of bits of the turns; `None` for a code without a known meaning.
     pub const fn mt_bits(self) -> Option<u8> {
         match self.multiturn() {
             Multiturn::None => Some(0),
