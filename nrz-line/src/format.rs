@@ -47,12 +47,12 @@ impl Format {
         Ok(Self { samples_per_bit, content_bits })
     }
 
-    /// Samples in one bit.
+    /// Number of samples in one bit.
     pub const fn samples_per_bit(self) -> u32 {
         self.samples_per_bit
     }
 
-    /// Content bits of one field.
+    /// Number of content bits in one field.
     pub const fn content_bits(self) -> u32 {
         self.content_bits
     }
@@ -62,7 +62,7 @@ impl Format {
         self.content_bits.saturating_add(2)
     }
 
-    /// Samples from the edge of a bit to the point where its level is taken.
+    /// Number of samples from the edge of a bit to the point where its level is taken.
     pub(crate) const fn middle(self) -> u32 {
         self.samples_per_bit >> 1
     }
