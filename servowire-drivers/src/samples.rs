@@ -35,7 +35,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// Bytes per word.
+    /// Number of bytes per word.
     const fn word(self) -> usize {
         match self {
             Self::LsbFirst8 | Self::MsbFirst8 => 1,

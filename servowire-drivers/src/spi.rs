@@ -147,7 +147,7 @@ impl<S: core::fmt::Debug, P: core::fmt::Debug> embedded_io::Error for SpiError<S
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Heard {
     Field(Field),
-    /// Samples of 0 outside the window.
+    /// There were samples of 0 outside the window.
     Noise,
 }
 
