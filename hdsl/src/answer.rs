@@ -292,7 +292,7 @@ impl Content {
     }
 }
 
-/// Returns ten bits of the line from the lowest up.
+/// Returns ten bits of the line, starting with the lowest.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "ten bits are taken")]
 const fn word(line: u64) -> Word {

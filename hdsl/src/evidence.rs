@@ -101,7 +101,8 @@ impl Sample {
         Angle::from_counts(self.bound, self.steps_per_turn)
     }
 
-    /// When the shaft was there, on the clock used for the ends of the frames: the time at which the sampling edge of its
+    /// When the shaft was at this position, on the clock used for the ends of the frames: the time at which the sampling edge of
+    /// its
     /// H-frame left the master, plus the latency set with [`Master::set_latency_ns`](crate::master::Master::set_latency_ns).
     pub const fn sampled_ns(&self) -> u64 {
         self.sampled_ns

@@ -287,7 +287,7 @@ impl FastPosition {
         self.followed = false;
     }
 
-    /// Missing words in a row up to now: ACC_ERR_CNT without its limit.
+    /// Number of missing words in a row, up to now: ACC_ERR_CNT without its limit.
     pub(crate) const fn missing_in_a_row(&self) -> u32 {
         self.in_a_row
     }

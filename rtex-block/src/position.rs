@@ -88,8 +88,8 @@ const fn quotient(dividend: u128, divisor: u64) -> u32 {
     if quotient > u32::MAX as u64 { u32::MAX } else { quotient as u32 }
 }
 
-/// Largest step of the command position in an update period at a speed, command units, rounded down: for the over-speed
-/// level of a drive, given in command units per second.
+/// Returns the largest step of the command position in an update period at a given speed, in command units, rounded down: for
+/// the over-speed level of a drive in command units per second.
 pub(crate) const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
     quotient((units_per_s as u128).wrapping_mul(update_ns as u128), 1_000_000_000)
 }

@@ -137,7 +137,7 @@ pub struct Outputs {
     pub state: State,
     /// Clock of the SPI; it idles high.
     pub clock: bool,
-    /// Whether the clock rises in this cycle, at which the SPI samples the line.
+    /// Whether the clock rises in this cycle, which makes the SPI sample the line.
     pub clock_rises: bool,
     /// Driver enable of the transceiver.
     pub transmit_enable: bool,
