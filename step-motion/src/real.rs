@@ -306,6 +306,7 @@ impl Inverse {
     }
 
     /// `x` over it in units of 2^-64; the largest number from 1 on.
+    #[inline(never)]
     pub(super) const fn of(self, x: u64) -> u64 {
         let quotient = high(x, self.per);
         if quotient == 0 {

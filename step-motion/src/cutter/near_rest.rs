@@ -3,7 +3,7 @@
 use crate::real::high;
 
 /// How many steps behind a rest are known by a root.
-const KNOWN: usize = 32;
+const KNOWN: usize = 24;
 
 /// Roots of 1, 3, 5 and so on, in 2^-60.
 type Roots = [u64; KNOWN];

@@ -223,6 +223,7 @@ impl Part {
     }
 
     /// A time on the clock, in 2^-32 ticks.
+    #[inline(never)]
     pub(super) fn tick(&self, time: u64) -> i128 {
         let since = if self.lasts.exponent() < 64 { self.ticks(time).into() } else { self.lasts.times(time, -64) };
         if self.back { self.begin.saturating_sub(since) } else { self.begin.saturating_add(since) }
@@ -256,6 +257,7 @@ impl Part {
         Stretch { count: u16::try_from(count).unwrap_or(1), first, differences: [interval, 0, 0] }
     }
 
+    #[inline(never)]
     fn at(&self, time: u64) -> Place {
         let bent = high(self.sixth, time);
         let bow = high(along(self.half, bent, self.grows), time);

@@ -182,6 +182,7 @@ const fn times(x: i64, part: u32) -> i64 {
 }
 
 /// The logarithm of base 2, in 256ths: straight between the powers of 2, at most 22 too small.
+#[inline(never)]
 fn log(x: u64) -> i32 {
     let zeros = x.leading_zeros();
     let part = x.checked_shl(zeros).unwrap_or(0) << 1 >> 56;
