@@ -56,7 +56,7 @@ pub fn open(input: Input, mut hints: Hints) -> Result<Capture, Fault> {
     decoder(input, format, hints)
 }
 
-/// Returns the format that the first bytes identify beyond doubt.
+/// Returns the format, if the first bytes identify it beyond doubt.
 fn known(head: &[u8]) -> Option<Format> {
     const VCD: [&[u8]; 7] = [b"$comment", b"$date", b"$enddefinitions", b"$scope", b"$timescale", b"$var", b"$version"];
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
@@ -115,7 +115,7 @@ const TABLES: &[&[u8]] = &[
     b"milliseconds",
 ];
 
-/// Packed files that are not unpacked, by their first bytes.
+/// Packed formats that are not supported, by their first bytes.
 const PACKED: &[(&[u8], &str)] =
     &[(b"BZh", "bzip2"), (b"\xfd7zXZ\0", "xz"), (b"\x04\x22\x4d\x18", "lz4"), (b"7z\xbc\xaf", "7z")];
 

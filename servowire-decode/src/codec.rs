@@ -33,7 +33,7 @@ pub struct Facts {
     pub clocked: bool,
     /// An answer can be identified without its request.
     pub answers_alone: bool,
-    /// A frame in a log carries a check, so other bytes are not mistaken for one.
+    /// A frame in a log carries a check, so other bytes are not mistaken for a frame.
     pub checked: bool,
     /// Published recordings: names and contents, each a VCD.
     pub captures: &'static [(&'static str, &'static [u8])],
@@ -85,7 +85,7 @@ impl Deref for dyn Codec + '_ {
     }
 }
 
-/// Two are the same if their names are.
+/// Two protocols are the same if their names are.
 impl PartialEq for dyn Codec {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
@@ -110,7 +110,7 @@ pub trait LogDecoder {
     /// Bytes that followed each other, without times.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// Takes a burst, or what is in place of one.
+    /// Takes a burst, or what the log has in its place.
     fn take(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         let Some(what) = &burst.spoilt else { return self.burst(burst, out) };
         self.spoilt(out)?;
@@ -132,7 +132,7 @@ pub trait LogDecoder {
 /// Findings about a log as a whole, at its end.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Found {
-    /// The reason why it cannot be read as written.
+    /// Why the log cannot be read as it is written.
     pub misread: Option<String>,
     /// Anything that needs attention although every frame is good.
     pub trouble: Option<String>,

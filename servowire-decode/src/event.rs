@@ -23,7 +23,7 @@ pub struct Event {
     /// Address of the encoder, drive or device that sends or is addressed, if the protocol has addresses and this one is
     /// known.
     pub address: Option<u32>,
-    /// What happened in this frame and belongs in a list of events: an alarm, or a servo that is switched on.
+    /// What happened in this frame and belongs in a list of events, such as an alarm or a servo being switched on.
     pub happened: Vec<String>,
     /// For an answer: time since the end of its request, in picoseconds.
     pub delay: Option<i64>,
@@ -97,7 +97,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// Returns when it ends; `None` in a log without times.
+    /// When the place ends; `None` in a log without times.
     pub fn end(self) -> Option<Time> {
         match self {
             Self::Time { end, .. } => Some(end),

@@ -49,11 +49,11 @@ fn read(
     })
 }
 
-/// Before a window that is asked for, so much is decoded, in picoseconds: a link of HIPERFACE DSL has its position again by then.
+/// Time decoded before a requested window, in picoseconds: within it a HIPERFACE DSL link finds its position again.
 const LEAD: i64 = 100_000_000_000;
 
-/// Goes on shortly before what is wanted, if the recording can be skipped and its lines are known: what their decoders have learnt
-/// so far stays.
+/// Skips to shortly before the requested window, if the recording allows it and its lines are known; the decoders keep what
+/// they have learnt.
 fn skip(line: &mut dyn Line, decoder: &PushDecoder, out: &Output<'_>) -> Result<bool, Fault> {
     match out.from() {
         Some(from) if decoder.is_settled() && line.reached() < from - 2 * LEAD => line.skip(from - LEAD),
@@ -111,7 +111,7 @@ pub(crate) fn samples(
     out: &mut Output<'_>,
 ) -> Result<(), Stop> {
     let rate = raw.clock().rate();
-    // A sample a bit: what a receiver has read already.
+    // One sample per bit: a stream that a receiver has already sampled.
     let is_stream = |protocol: &&dyn Codec| {
         protocol.clocked && protocol.rates.iter().any(|bit| rate.abs_diff(u64::from(*bit)) * 1000 < rate)
     };
@@ -125,9 +125,9 @@ pub(crate) fn samples(
     decode(file, raw, protocol, settings, out)
 }
 
-/// Fewer than four samples per bit.
+/// Returns a message if there are fewer than four samples per bit.
 fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
-    // A line may be a little faster than its name.
+    // A line may be a little faster than its nominal rate.
     let need = 4 * u64::from(bit_rate);
     let digits = |value: f64| format!("{value:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
     let (a_bit, mhz) = (digits(rate as f64 / f64::from(bit_rate)), digits(need as f64 / 1e6));

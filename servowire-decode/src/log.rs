@@ -16,9 +16,9 @@ use crate::settings::Settings;
 use crate::sink::Sink;
 use crate::time::{SECOND, Time};
 
-/// Bursts by which the protocol is recognised.
+/// Number of bursts from which the protocol is recognised.
 const SAMPLE: usize = 256;
-/// The same of a log that arrives slowly.
+/// The same for a log that arrives slowly.
 const FEW: usize = 16;
 
 /// Decodes a log; if the protocol is unknown, with the one that has the most good frames.
@@ -74,22 +74,22 @@ pub(crate) fn decode(
     }
 }
 
-/// Whether so many bursts have to do: no more arrive for now, or they arrive slowly.
+/// Returns whether this many bursts have to be enough: no more arrive for now, or they arrive slowly.
 fn is_enough(bursts: usize, log: &mut ByteLog) -> bool {
     bursts > 0 && log.pauses() || bursts >= FEW && log.is_due()
 }
 
-/// Times of day and dates are counted from the first one, as in a capture; other times are already times of the log.
+/// Counts times of day and dates from the first one, as in a capture; other times are already relative to the log.
 fn since_first(burst: Burst, origin: &mut Option<Time>) -> Burst {
     let first = |time| if time < LATER { Time::ZERO } else { time };
     let time = burst.time.map(|time| time.since(*origin.get_or_insert_with(|| first(time))));
     Burst { time, ..burst }
 }
 
-/// A log that begins later than this has times of day or dates.
+/// A log whose first time is later than this has times of day or dates.
 const LATER: Time = Time::from_ps(1_000 * SECOND as i128);
 
-/// Takes a burst, or joined lines once they are complete.
+/// Passes on a burst, or joined lines once they are complete.
 fn join(reader: &mut dyn LogDecoder, burst: Burst, whole: &mut Option<Burst>, out: &mut dyn Sink) -> io::Result<()> {
     match whole {
         Some(whole) if burst.spoilt.is_none() && whole.bytes.len() < MOST_JOINED => {

@@ -26,7 +26,7 @@ pub struct Output<'a> {
     filter: Option<&'a mut filter::Filter>,
     /// Called after every block read.
     progress: Option<&'a dyn Fn()>,
-    /// Takes what the user should know but did not ask for.
+    /// Receives what the user should know but did not ask for.
     notes: Option<&'a dyn Fn(&Note)>,
     /// Returns whether the user has seen enough.
     enough: Option<&'a dyn Fn() -> bool>,
@@ -37,7 +37,7 @@ pub struct Output<'a> {
     done: bool,
     /// Frames so far.
     pub tally: Tally,
-    /// Those that were requested.
+    /// Frames that were requested.
     pub chosen: Tally,
     /// Refused frames by class, with the first cause that was given.
     refused: BTreeMap<&'static str, (u64, Option<String>)>,
@@ -160,7 +160,7 @@ impl<'a> Output<'a> {
         (!both.is_empty()).then_some(both)
     }
 
-    /// The first instant of which anything is wanted.
+    /// The first instant of interest.
     pub(crate) fn from(&self) -> Option<Time> {
         self.filter.as_ref().and_then(|filter| filter.from())
     }

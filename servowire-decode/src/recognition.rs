@@ -1,4 +1,4 @@
-//! What was recognised in a capture, and why, as values that print as a sentence.
+//! Describes what was recognised in a capture, and why, as values that print as a sentence.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -34,7 +34,7 @@ pub struct Recognition {
     pub rates: Rates,
     /// The first frames by their verdict.
     pub tally: Tally,
-    /// Whether these are all frames.
+    /// Whether these are all the frames.
     pub whole: bool,
     /// The next best protocol and rate of the same channel, if it is close.
     pub rival: Option<(&'static dyn Codec, u32)>,
@@ -113,7 +113,7 @@ pub enum Note {
         /// What is on the line.
         line: Recognition,
     },
-    /// A line is not what it was said to be.
+    /// A line is not what the user said it is.
     LineRather {
         /// The file.
         file: String,
@@ -140,10 +140,10 @@ pub enum Note {
     Log {
         /// The protocol.
         protocol: &'static dyn Codec,
-        /// Share of good frames among the first ones, in per cent.
+        /// Share of good frames among the first frames, in per cent.
         share: u64,
     },
-    /// A log is not what it was said to be.
+    /// A log is not what the user said it is.
     LogRather {
         /// The protocol.
         protocol: &'static dyn Codec,

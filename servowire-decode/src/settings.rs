@@ -28,10 +28,10 @@ pub struct Options {
     pub inverted: Option<bool>,
 }
 
-/// Properties of an encoder that its frames do not tell.
+/// Properties of an encoder that its frames do not carry.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Widths {
-    /// Bits of a turn; if unset, as the encoder says, provided that the line carries it.
+    /// Bits within a turn; if unset, as the encoder says, provided that this was seen on the line.
     pub single_turn_bits: Option<u8>,
     /// Bits that count turns; if unset, as the encoder says, otherwise 16.
     pub multi_turn_bits: Option<u8>,
@@ -45,7 +45,7 @@ impl Widths {
     }
 }
 
-/// Properties of a system that RTEX blocks do not tell.
+/// Properties of a system that RTEX blocks do not carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rtex {
     /// Bytes of a block, 16 or 32; if unset, the size that most of the first blocks appear to have.
@@ -56,7 +56,7 @@ pub struct Rtex {
     pub period_ns: Option<u32>,
     /// Electronic gear of the drives, for the same limit.
     pub gear: Gear,
-    /// Show every block whole, instead of what changed in it.
+    /// Show every block whole, instead of only what changed in it.
     pub whole: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Instants of a capture, and conversions from the file formats.
+//! Instants in a capture, and conversions from the file formats.
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Neg, Sub};
@@ -12,7 +12,7 @@ pub const SECOND: i64 = 1_000_000_000_000;
 /// if the format gives the date. It can hold any number of years; the time between two instants is a plain number of
 /// picoseconds, at most 106 days.
 ///
-/// In memory it need not be aligned to more than eight bytes: edges with a level take 24.
+/// Its alignment in memory is at most eight bytes, so an edge with a level takes 24.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(C, packed(8))]
 pub struct Time(i128);
@@ -44,13 +44,13 @@ impl Time {
         (self.0 as i64).wrapping_sub(earlier.0 as i64)
     }
 
-    /// The last instant on a way that leads beyond it.
+    /// The saturated result of an addition: the last instant that can be represented.
     #[cold]
     fn far(self, picoseconds: i128) -> Self {
         Self(self.0.saturating_add(picoseconds))
     }
 
-    /// The most that can be said of the way from one that is more than 106 days away.
+    /// The saturated difference of two instants that are more than 106 days apart.
     #[cold]
     fn longest(self, before: Self) -> i64 {
         if self < before { i64::MIN } else { i64::MAX }
@@ -122,7 +122,7 @@ impl Serialize for Time {
     }
 }
 
-/// The longest time there is: 30 million years.
+/// The longest representable time: 30 million years.
 const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
 
 /// Converts decimal seconds (`-0.000012345`, `1.5e-6`) to picoseconds; further digits are dropped.
@@ -228,13 +228,13 @@ impl Clock {
         }
     }
 
-    /// Samples that take at least so many picoseconds.
+    /// Returns the number of samples that take at least this many picoseconds.
     pub(crate) fn fewest(self, picoseconds: i64) -> u64 {
         let samples = u128::from(picoseconds.max(0).unsigned_abs()) * u128::from(self.samples);
         u64::try_from(samples.div_ceil(self.picoseconds.into())).unwrap_or(u64::MAX)
     }
 
-    /// Samples that take at most so many picoseconds.
+    /// Returns the number of samples that take at most this many picoseconds.
     pub(crate) fn most(self, picoseconds: i64) -> u64 {
         let samples = u128::from(picoseconds.max(0).unsigned_abs()) * u128::from(self.samples);
         u64::try_from(samples / u128::from(self.picoseconds)).unwrap_or(u64::MAX)

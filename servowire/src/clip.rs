@@ -24,19 +24,19 @@ pub(crate) struct Trace {
 #[derive(Debug, Clone)]
 pub(crate) struct Bits {
     start: Time,
-    /// Picoseconds of a bit, measured from the edges.
+    /// Picoseconds per bit, measured from the edges.
     width: f64,
     /// Their levels, in the order of the line.
     pub(crate) levels: Vec<bool>,
 }
 
 impl Bits {
-    /// When bit `index` begins.
+    /// Returns when bit `index` begins.
     pub(crate) fn begin(&self, index: usize) -> Time {
         self.start + (self.width * index as f64) as i64
     }
 
-    /// The bit at a time.
+    /// Returns the bit at a time.
     pub(crate) fn at(&self, time: Time) -> Option<usize> {
         let index = ((time - self.start) as f64 + self.width * 0.1) / self.width;
         (0.0..self.levels.len() as f64).contains(&index).then_some(index as usize)
@@ -54,7 +54,7 @@ pub(crate) struct Clip {
 }
 
 impl Clip {
-    /// Of an event with a time, without levels yet; `names`: of the channels.
+    /// Creates a clip of an event with a time, still without levels; `names`: names of the channels.
     pub(crate) fn new(event: &Event, lane: &Lane, names: &[String]) -> Option<Self> {
         let Place::Time { start, end } = event.place else { return None };
         let around = (1_000_000_000_000 / i64::from(lane.rate.max(1)) * AROUND).max((end - start) / 20);
@@ -64,14 +64,14 @@ impl Clip {
         Some(Self { event: event.clone(), lane: lane.clone(), from: start - around, to: end + around, traces })
     }
 
-    /// The levels that the channels have at the beginning.
+    /// Sets the levels of the channels at the beginning.
     pub(crate) fn begin(&mut self, level: impl Fn(u16) -> Option<bool>) {
         for (channel, trace) in self.lane.channels.iter().zip(&mut self.traces) {
             trace.edges.extend(level(*channel).map(|level| (self.from, level)));
         }
     }
 
-    /// The next change of any channel after the beginning, in the order of time.
+    /// Takes the next change of any channel after the beginning, in the order of time.
     pub(crate) fn change(&mut self, change: &Change) {
         let own = self.lane.channels.iter().position(|channel| *channel == change.channel);
         let Some(trace) = own.and_then(|own| self.traces.get_mut(own)).filter(|_| change.time <= self.to) else {
@@ -80,7 +80,7 @@ impl Clip {
         trace.edges.push((change.time, change.level));
     }
 
-    /// Start and end of the frame.
+    /// Returns start and end of the frame.
     pub(crate) fn span(&self) -> (Time, Time) {
         match self.event.place {
             Place::Time { start, end } => (start, end),
@@ -95,7 +95,7 @@ impl Clip {
         }
     }
 
-    /// The bits of the frame, as they look when the line idles high; none of an answer that is missing.
+    /// Returns the bits of the frame, as they look if the line idles high; none for a missing answer.
     pub(crate) fn bits(&self) -> Option<Bits> {
         if self.event.verdict.is_silence() {
             return None;
@@ -130,14 +130,14 @@ impl Clip {
         Some(Bits { start, width, levels })
     }
 
-    /// The bit that broke the frame, if the check tells it.
+    /// Returns the bit that broke the frame, if the check identifies it.
     pub(crate) fn broken_bit(&self) -> Option<usize> {
         let refusal = self.refusal()?;
         let first = self.bits()?.at(refusal.time?)?;
         Some(first + refusal.bit? as usize)
     }
 
-    /// The stretch that is wrong: the bit, else the field.
+    /// Returns the place that is wrong: the bit, or else the field.
     pub(crate) fn broken(&self) -> Option<(Time, Time)> {
         let (refusal, bits) = (self.refusal()?, self.bits()?);
         if let Some(bit) = self.broken_bit() {

@@ -35,18 +35,18 @@ use crate::picture::Picture;
 use crate::units::tformat_rate;
 use crate::{serial, terminal};
 
-/// Files from this size on have a progress bar.
+/// Files of at least this size have a progress bar.
 const LONG: u64 = 1 << 24;
 
 /// How often figures are shown on a terminal.
 const A_SECOND: Duration = Duration::from_secs(1);
 
-/// What was found, as the exit code says it; of several files or findings the sum.
+/// What was found, as bits of the exit code; several files or findings add up.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct End {
-    /// A frame is refused, or a file cannot be read to its end.
+    /// A frame was refused, or a file cannot be read to its end.
     bad: bool,
-    /// Frames hold and show something that somebody has to look after.
+    /// All frames are good, but show something that needs attention.
     trouble: bool,
 }
 
@@ -62,8 +62,8 @@ impl End {
     }
 }
 
-/// Decodes all files. 0: all frames good; 1: not so; 4: something shows that somebody has to look after; 5: both; 2: the options do
-/// not go together.
+/// Decodes all files. 0: all frames good; 1: not all; 4: something needs attention; 5: both; 2: the options do not go
+/// together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     if let Some(what) = arguments.contradiction() {
         eprintln!("error: {what}");
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     print(arguments, piped.is_some(), headed, |printer| all(arguments, piped, printer))
 }
 
-/// Decodes what a serial port hears.
+/// Decodes the bytes heard by a serial port.
 fn listen(arguments: &Decode, port: &str) -> ExitCode {
     let protocol =
         arguments.reading.protocol.0.or_else(|| CODECS.iter().copied().find(|codec| codec.name == "tformat"));
@@ -134,7 +134,8 @@ fn listen(arguments: &Decode, port: &str) -> ExitCode {
     print(arguments, true, false, |printer| one(arguments, Ok(input), hints, protocol, &Bar { bar: None }, printer))
 }
 
-/// Prints what `decode` finds as the arguments want it. `live`: it comes while it happens; `headed`: each file has a heading.
+/// Prints the results of `decode` as the arguments require. `live`: the data arrive as they occur; `headed`: each file has
+/// a heading.
 fn print(
     arguments: &Decode,
     live: bool,
@@ -210,12 +211,12 @@ fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> i
     Ok(end)
 }
 
-/// The captures that come with the program, of the protocol that is meant.
+/// Returns the bundled captures of the chosen protocol.
 fn bundled(arguments: &Decode) -> &'static [(&'static str, &'static [u8])] {
     arguments.reading.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures)
 }
 
-/// Decodes one file, and says what is wrong with it.
+/// Decodes one file, and reports what is wrong with it.
 fn one(
     arguments: &Decode,
     input: Result<Input, Fault>,
@@ -292,7 +293,7 @@ fn one(
     Ok(complain(&Fault::new(name, At::File, nothing), bar))
 }
 
-/// Why what is asked cannot be had of a capture of its kind.
+/// Returns why the request is impossible for a capture of this kind.
 fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<&'static str> {
     let timeless = match capture {
         Capture::Bytes(log) => arguments.reading.rtex.period.is_none() && !log.has_times(),
@@ -307,13 +308,13 @@ fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<
     cannot.into_iter().find(|(is, _)| *is).map(|(_, what)| what)
 }
 
-/// Says what is wrong; the file is not good.
+/// Reports what is wrong; the file is not good.
 fn complain(fault: &Fault, bar: &Bar) -> End {
     bar.say(&format!("error: {fault}"));
     End::BAD
 }
 
-/// The progress bar, on a terminal and for a long file.
+/// Returns the progress bar, on a terminal and for a long file.
 struct Bar {
     bar: Option<ProgressBar>,
 }
@@ -334,7 +335,7 @@ impl Bar {
         }
     }
 
-    /// A line on the error output, above the bar.
+    /// Writes a line to standard error, above the bar.
     fn say(&self, text: &str) {
         let print = || drop(writeln!(io::stderr(), "{text}"));
         match &self.bar {

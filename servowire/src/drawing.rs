@@ -1,8 +1,8 @@
-//! The one design of all pictures: a sheet of panels, one an axis or encoder, in a title's width.
+//! The common design of all pictures: a sheet with a title and one panel per axis or encoder.
 //!
 //! Nothing covers the data: names of rows are to the left of them, notes to the right, the legend above the panels. Each
-//! curve has a colour and a dash of its own, so that it can be told apart in black and white too. On a dark screen the
-//! colours are others; printed, they are those for paper.
+//! curve has a colour and a dash of its own, so that it can be told apart in black and white too. Dark screens get other
+//! colours; prints use those for paper.
 
 mod chart;
 #[cfg(test)]
@@ -21,13 +21,13 @@ pub(crate) use rows::{Row, Rows};
 pub(crate) use stroke::{ALARM, Stroke};
 pub(crate) use wave::Wave;
 
-/// What is written on, what is written, lines that only lead the eye, and areas behind the data.
+/// Colours of the background, of text, of guide lines, and of areas behind the data.
 pub(crate) const PAPER: RGBColor = RGBColor(255, 255, 255);
 pub(crate) const INK: RGBColor = RGBColor(25, 25, 25);
 pub(crate) const GRID: RGBColor = RGBColor(215, 215, 215);
 pub(crate) const SHADE: RGBColor = RGBColor(205, 220, 240);
 
-/// The same on a dark screen, and brighter strokes; by the colours, which stand in the attributes of the elements.
+/// The same for a dark screen, with brighter strokes; selected by the colours in the attributes of the elements.
 pub(crate) const DARK: &str = "@media screen and (prefers-color-scheme: dark) {
 [fill=\"#FFFFFF\"] { fill: #16191D } [fill=\"#191919\"] { fill: #E4E4E4 } [stroke=\"#191919\"] { stroke: #E4E4E4 }
 [stroke=\"#D7D7D7\"] { stroke: #3A4048 } [fill=\"#CDDCF0\"] { fill: #2A3B52 }
@@ -38,23 +38,23 @@ pub(crate) const DARK: &str = "@media screen and (prefers-color-scheme: dark) {
 pub(crate) type Drawn<T = ()> = Result<T, Box<dyn Error>>;
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Letters are so wide at most, in parts of the size that plotters is told.
+/// Maximum width of a letter, as a fraction of the size passed to plotters.
 const LETTER: f64 = 0.53;
 /// Sizes of letters.
 pub(crate) const SMALL: u32 = 13;
 const TITLE: u32 = 19;
-/// The room of a line of the legend, and of its samples.
+/// Space for a line of the legend, and for its samples.
 const LEGEND: u32 = 22;
 const SAMPLE: i32 = 44;
-/// The room around everything.
+/// Margin around everything.
 const MARGIN: i32 = 10;
 
-/// Pixels that a text takes at most.
+/// Returns the maximum number of pixels that a text takes.
 pub(crate) fn width_of(text: &str, size: u32) -> i32 {
     (text.chars().count() as f64 * f64::from(size) * LETTER).ceil() as i32
 }
 
-/// Text in the colour of ink.
+/// Returns a style for text in the ink colour.
 pub(crate) fn ink(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
@@ -68,12 +68,12 @@ pub(crate) trait Panel {
 /// A panel with its share of the width.
 pub(crate) type Share = (u32, Box<dyn Panel>);
 
-/// A picture: panels below each other, some beside each other.
+/// A picture: panels below each other, or side by side.
 pub(crate) struct Sheet {
     title: String,
     width: u32,
     legend: Vec<(Stroke, String)>,
-    /// Each with its height.
+    /// Rows of panels, each with its height.
     rows: Vec<(u32, Vec<Share>)>,
 }
 
@@ -82,22 +82,22 @@ impl Sheet {
         Self { title: title.to_owned(), width, legend: Vec::new(), rows: Vec::new() }
     }
 
-    /// Says what a stroke stands for.
+    /// Adds the meaning of a stroke to the legend.
     pub(crate) fn explain(&mut self, stroke: Stroke, what: impl Into<String>) {
         self.legend.push((stroke, what.into()));
     }
 
-    /// A panel over the whole width.
+    /// Adds a panel over the whole width.
     pub(crate) fn panel(&mut self, height: u32, panel: impl Panel + 'static) {
         self.beside(height, vec![(1, Box::new(panel))]);
     }
 
-    /// Panels beside each other, with their shares of the width.
+    /// Adds panels side by side, with their shares of the width.
     pub(crate) fn beside(&mut self, height: u32, panels: Vec<Share>) {
         self.rows.push((height, panels));
     }
 
-    /// The picture as SVG.
+    /// Returns the picture as SVG.
     pub(crate) fn svg(&self) -> Drawn<String> {
         let lines = self.title_lines();
         let legend = self.legend_places();
@@ -136,7 +136,7 @@ impl Sheet {
         Ok(())
     }
 
-    /// The title in lines that are not wider than the sheet.
+    /// Breaks the title into lines no wider than the sheet.
     fn title_lines(&self) -> Vec<String> {
         let room = self.width as i32 - 2 * MARGIN;
         let mut lines: Vec<String> = Vec::new();
@@ -149,7 +149,7 @@ impl Sheet {
         lines
     }
 
-    /// The line and the column of each entry of the legend.
+    /// Returns the line and the column of each entry of the legend.
     fn legend_places(&self) -> Vec<(u32, i32)> {
         let (mut line, mut x) = (0, MARGIN);
         let place = |(_, what): &(Stroke, String)| {
@@ -164,7 +164,7 @@ impl Sheet {
     }
 }
 
-/// A text cut to the pixels that there is room for.
+/// Cuts a text to the available pixels.
 pub(crate) fn shortened(text: &str, size: u32, room: i32) -> String {
     let printable = || text.chars().map(|c| if c.is_control() { ' ' } else { c });
     if width_of(text, size) <= room {
@@ -174,7 +174,7 @@ pub(crate) fn shortened(text: &str, size: u32, room: i32) -> String {
     printable().take(most.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// With the colours for dark screens.
+/// Adds the colours for dark screens.
 fn finished(svg: &str) -> String {
     svg.replacen(">\n", &format!(">\n<style>{DARK}</style>\n"), 1)
 }

@@ -21,7 +21,7 @@ use crate::units::moment;
 
 /// Bits of a line of text, in groups of ten.
 const BITS: usize = 60;
-/// A frame is looked for so long after the time, in picoseconds.
+/// How long after the given time a frame is looked for, in picoseconds.
 const AFTER: i64 = 20_000_000_000;
 
 /// Show one frame of a capture, bit by bit.
@@ -58,7 +58,7 @@ impl Arguments {
         }
     }
 
-    /// Whether the frame holds.
+    /// Returns whether the frame is good.
     fn explain(&self) -> Result<bool, Box<dyn Error>> {
         let mut scope = Scope::new(Wanted::At(self.at));
         let mut filter = Filter::new(Choice { to: Some(self.at + AFTER), ..Choice::default() });
@@ -79,7 +79,7 @@ impl Arguments {
     }
 }
 
-/// What the frame is.
+/// Describes the frame.
 pub(crate) fn heading(clip: &Clip) -> String {
     let Event { direction, kind, .. } = &clip.event;
     let side = match direction {
@@ -91,7 +91,7 @@ pub(crate) fn heading(clip: &Clip) -> String {
     format!("{side}{kind}, {:.3} us to {:.3} us: {}", start.us(), end.us(), verdict(&clip.event.verdict))
 }
 
-/// The frame in words and digits.
+/// Describes the frame in words and digits.
 fn text(clip: &Clip, at: Time) -> String {
     let mut out = String::new();
     let (start, end) = clip.span();
@@ -119,7 +119,7 @@ fn text(clip: &Clip, at: Time) -> String {
     out
 }
 
-/// Levels and bits of the line, the broken one marked.
+/// Shows levels and bits of the line, with the broken bit marked.
 fn bits(clip: &Clip, out: &mut String) {
     let Some(bits) = clip.bits() else { return };
     let broken = clip.broken_bit();

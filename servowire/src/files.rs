@@ -1,4 +1,4 @@
-//! Files and the standard input, as captures are read from them.
+//! Opens files and the standard input for reading captures.
 
 use std::fs::File;
 use std::io::{self, BufReader, IsTerminal};
@@ -10,23 +10,23 @@ use servowire_decode::fault::{At, Fault};
 
 use crate::pipe::Pipe;
 
-/// How long a pipe that was not requested may be silent.
+/// How long a pipe may be silent if `-` was not given.
 const PATIENCE: Duration = Duration::from_millis(400);
 
-/// The state of the standard input if it was not requested.
+/// The state of the standard input if `-` was not given.
 pub(crate) enum Piped {
     /// A terminal, or at its end.
     Nothing,
-    /// A pipe that is open but delivers nothing for a moment.
+    /// A pipe that is open but delivers nothing for the moment.
     Silence,
-    /// Something to read.
+    /// There is something to read.
     Content(Input),
 }
 
 /// The name of the standard input.
 const STDIN: &str = "standard input";
 
-/// Opens `path`, or the standard input for `-`. `grows`: its end is waited for.
+/// Opens `path`, or the standard input for `-`. `grows`: wait for more data at its end.
 pub(crate) fn open(path: &Path, grows: bool) -> Result<Input, Fault> {
     let name = path.display().to_string();
     if path.as_os_str() == "-" {
@@ -44,7 +44,7 @@ pub(crate) fn open(path: &Path, grows: bool) -> Result<Input, Fault> {
     Ok(Input::seeking(&name, BufReader::new(file)))
 }
 
-/// What comes through a pipe or from a redirected file. `wanted`: waits for it, however long it takes.
+/// Returns the input from a pipe or a redirected file. `wanted`: wait for it, however long it takes.
 pub(crate) fn piped(wanted: bool) -> Piped {
     if io::stdin().is_terminal() {
         return Piped::Nothing;

@@ -1,4 +1,4 @@
-//! G-code: a part program as straight lines, and the steps that they are made of.
+//! G-code: turns a part program into straight lines, and these into steps.
 
 mod arcs;
 mod item;

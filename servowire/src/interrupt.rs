@@ -11,7 +11,7 @@ const ENDED: i32 = 128 + SIGINT;
 
 static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// From now on Ctrl-C is only noted. If the system does not allow that, it ends the program as usual.
+/// Makes Ctrl-C only set a flag from now on. If the system does not allow that, it ends the program as usual.
 pub(crate) fn note() {
     for signal in [SIGINT, SIGTERM] {
         let _ = register_conditional_shutdown(signal, ENDED, Arc::clone(&ASKED))
@@ -19,7 +19,7 @@ pub(crate) fn note() {
     }
 }
 
-/// Whether the program was asked to end.
+/// Returns whether the program was asked to end.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }

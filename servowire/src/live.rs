@@ -15,15 +15,15 @@ use crate::pipe;
 /// How the figures are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shown {
-    /// One below the other: in a file or pipe.
+    /// One below the other, in a file or pipe.
     Lines,
-    /// Over the last ones: on a terminal.
+    /// Replacing the last ones, on a terminal.
     InPlace,
-    /// An object a line.
+    /// One object per line.
     Json,
 }
 
-/// Shows figures while events come, and while nothing comes.
+/// Shows figures while events arrive, and while nothing arrives.
 pub(crate) struct Live<W>(Rc<RefCell<Figures<W>>>);
 
 impl<W: Write + 'static> Live<W> {
@@ -39,7 +39,7 @@ impl<W: Write + 'static> Live<W> {
     }
 }
 
-/// Figures of the whole, and of the part since they were last shown.
+/// Figures of the whole capture, and of the part since they were last shown.
 struct Figures<W> {
     out: W,
     shown: Shown,

@@ -11,22 +11,22 @@ use servowire_decode::time::Time;
 
 use crate::drawing::{Chart, Drawn, Row, Rows, Share, Sheet, Stroke};
 
-/// Buckets of a time axis; when there are more, two become one.
+/// Maximum number of buckets on a time axis; when there are more, they are merged in pairs.
 const MOST: usize = 2000;
-/// Bars of a histogram.
+/// Maximum number of bars in a histogram.
 const MOST_BARS: usize = 160;
-/// Width of the first buckets, in picoseconds: of times, of delays.
+/// Initial width of a bucket in picoseconds, for times and for delays.
 const FIRST: i128 = 1_000_000;
 const FIRST_BAR: i128 = 10_000;
 /// Maximum number of error classes with their own row, and of encoders with a panel.
 const MOST_CLASSES: usize = 24;
 const MOST_ENCODERS: usize = 32;
-/// Instants later than this are shown from the first frame on, in picoseconds: 1000 s.
+/// Instants later than this, in picoseconds, are shown relative to the first frame: 1000 s.
 const LATE: i128 = 1_000_000_000_000_000;
 
 /// The content of a bucket.
 trait Gather: Clone {
-    /// The later bucket becomes part of this one.
+    /// Merges a later bucket into this one.
     fn join(&mut self, later: &Self);
 }
 
@@ -84,7 +84,7 @@ impl<T: Gather> Buckets<T> {
     }
 }
 
-/// Positions that can be compared with each other.
+/// Positions that can be compared.
 #[derive(Debug, Clone)]
 struct Curve {
     turns: bool,
@@ -104,9 +104,9 @@ struct Encoder {
 pub(crate) struct Picture {
     title: String,
     encoders: BTreeMap<Speaker, Encoder>,
-    /// By who is meant and by class.
+    /// Errors by speaker and by class.
     errors: BTreeMap<(Speaker, &'static str), Buckets<u64>>,
-    /// First and last time.
+    /// First and last instant.
     extent: Option<(Time, Time)>,
     /// The names of the speakers, once all lines are known.
     names: BTreeMap<Speaker, String>,
@@ -137,7 +137,7 @@ impl Picture {
         }
     }
 
-    /// When the first frame begins, and when the last one ends.
+    /// Returns when the first frame begins, and when the last one ends.
     pub(crate) fn extent(&self) -> Option<(Time, Time)> {
         self.extent
     }
@@ -163,7 +163,7 @@ impl Picture {
         }
     }
 
-    /// The picture as SVG.
+    /// Returns the picture as SVG.
     pub(crate) fn draw(&self) -> Drawn<String> {
         let more = self.encoders.len().saturating_sub(MOST_ENCODERS);
         let more = if more > 0 {
@@ -222,7 +222,7 @@ impl Encoder {
         }
     }
 
-    /// Its positions below each other, the delays beside the first one.
+    /// Draws its positions below each other, with the delays beside the first one.
     fn draw(&self, who: &str, clock: &Clock, sheet: &mut Sheet) {
         let of = if who.is_empty() { String::new() } else { format!("{who}: ") };
         // Of each name the curve that has most points; turns and counts do not go together.
@@ -261,7 +261,7 @@ impl Encoder {
     }
 }
 
-/// The time axis: in which unit, and from when on.
+/// The time axis: its unit, and its origin.
 struct Clock {
     origin: i128,
     unit: f64,

@@ -13,9 +13,9 @@ use crate::interrupt;
 
 /// Bytes read at once.
 const CHUNK: usize = 1 << 16;
-/// Chunks that wait to be taken.
+/// Maximum number of chunks waiting to be taken.
 const AHEAD: usize = 4;
-/// A source that delivers nothing for this long has nothing for now.
+/// A source that delivers nothing for this long counts as empty for now.
 const PAUSE: Duration = Duration::from_millis(60);
 /// Complete events are shown after this time at the latest.
 const SHOWN: Duration = Duration::from_millis(250);
@@ -23,7 +23,7 @@ const SHOWN: Duration = Duration::from_millis(250);
 const LOOK: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// The call repeated while nothing arrives.
+    /// The function called repeatedly while nothing arrives.
     static WAITING: RefCell<Option<Rc<dyn Fn()>>> = const { RefCell::new(None) };
 }
 
@@ -32,19 +32,19 @@ pub(crate) fn while_waiting(call: impl Fn() + 'static) {
     WAITING.set(Some(Rc::new(call)));
 }
 
-/// Reads in a separate thread, so that one can ask whether data are available.
+/// Reads in a separate thread, so that it can be asked whether data are available.
 pub(crate) struct Pipe {
     chunks: Receiver<io::Result<Vec<u8>>>,
     chunk: Vec<u8>,
     taken: usize,
     fault: Option<io::Error>,
     ended: bool,
-    /// When it was last reported that events are to be shown.
+    /// When it last reported that events are to be shown.
     shown: Instant,
 }
 
 impl Pipe {
-    /// `grows`: the end of the source is not the end.
+    /// `grows`: the source may grow at its end.
     pub(crate) fn over(mut source: impl Read + Send + 'static, grows: bool) -> Self {
         let (send, chunks) = mpsc::sync_channel(AHEAD);
         thread::spawn(move || {
@@ -96,7 +96,7 @@ impl Pipe {
         true
     }
 
-    /// Whether it has ended.
+    /// Returns whether it has ended.
     pub(crate) fn is_over(&self) -> bool {
         self.ended && self.taken == self.chunk.len()
     }

@@ -102,7 +102,7 @@ enum Mode {
 }
 
 impl Arguments {
-    /// Does it. 0: done; 1: cannot write; 2: the move is not possible.
+    /// Runs the command. 0: done; 1: cannot write; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
         let out = &mut BufWriter::new(io::stdout().lock());
         if let Some(path) = &self.part.gcode {
@@ -156,7 +156,7 @@ impl Arguments {
         })
     }
 
-    /// The shape that is asked for, or all.
+    /// Returns the requested shape, or all shapes.
     fn moves(&self) -> Result<Vec<Move>, Box<dyn Error>> {
         let frequency = match (self.tone, self.freq) {
             (Some(tone), _) => tone.frequency(),
@@ -235,7 +235,7 @@ fn wrong_use(error: &dyn Display) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Number and time of every step, in ns from the start.
+/// Returns number and time of every step, in ns from the start.
 fn write_ticks(made: &Move, json: bool, out: &mut dyn Write) -> io::Result<()> {
     if !json {
         writeln!(out, "step,time_ns")?;

@@ -1,4 +1,4 @@
-//! What is said of captures and of the lines in them, for every command that decodes.
+//! Options on captures and on the lines in them, for every command that decodes.
 
 use std::cell::RefCell;
 use std::error::Error;
@@ -58,7 +58,7 @@ impl ValueEnum for Named {
     }
 }
 
-/// Comes back from a call that panics, and prints nothing of it.
+/// Returns from a call that panics, without printing anything about it.
 fn guarded(call: &mut dyn FnMut()) {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(|_| ()));
@@ -209,7 +209,7 @@ fn block_size(text: &str) -> Result<u8, String> {
 }
 
 impl Reading {
-    /// An option that says something of a file.
+    /// Returns an option that describes a file.
     pub(crate) fn describes_a_file(&self) -> Option<&'static str> {
         let said = [
             (self.file.format.is_some(), "--format"),
@@ -231,12 +231,12 @@ impl Reading {
         said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
     }
 
-    /// The rate of the line, where it was given.
+    /// Returns the rate of the line, if it was given.
     pub(crate) fn bit_rate(&self) -> Option<u32> {
         self.line.bit_rate
     }
 
-    /// What was said about the files.
+    /// Returns the options on the files.
     pub(crate) fn hints(&self) -> Hints {
         let format = if self.file.bytes { Some(Format::Hex) } else { self.file.format.map(|Named(format)| format) };
         Hints {
@@ -250,7 +250,7 @@ impl Reading {
         }
     }
 
-    /// What was said about line and protocol.
+    /// Returns the options on line and protocol.
     pub(crate) fn settings(&self) -> Settings {
         Settings {
             line: Options {
@@ -275,7 +275,7 @@ impl Reading {
     }
 }
 
-/// What came of decoding a file.
+/// The result of decoding a file.
 #[derive(Debug, Default)]
 pub(crate) struct Read {
     /// What was found, in sentences.
@@ -284,7 +284,7 @@ pub(crate) struct Read {
     pub(crate) fault: Option<String>,
     /// The refused frames in a sentence.
     pub(crate) refusals: Option<String>,
-    /// When it was recorded, as the file says it.
+    /// When it was recorded, as the file says.
     pub(crate) date: Option<String>,
 }
 

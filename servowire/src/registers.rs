@@ -84,7 +84,7 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Pairs of hex digits with or without space between them; anything else is taken as it is.
+/// Decodes pairs of hex digits with or without spaces between them; anything else is taken as it is.
 fn bytes(file: &[u8]) -> Vec<u8> {
     let digits: Vec<u8> = file.iter().copied().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let pairs = digits.chunks_exact(2).map(|pair| core::str::from_utf8(pair).ok());
@@ -92,7 +92,7 @@ fn bytes(file: &[u8]) -> Vec<u8> {
     bytes.filter(|_| digits.len() % 2 == 0 && digits.iter().all(u8::is_ascii_hexdigit)).unwrap_or_else(|| file.to_vec())
 }
 
-/// A map in the layout of the SDK, and whether by the rules of SICK's.
+/// A map in the layout of the SDK, and whether it follows SICK's rules.
 struct Map(Registers, bool);
 
 impl Map {
@@ -162,7 +162,7 @@ impl Map {
     }
 }
 
-/// Encoder and cable; the identifier.
+/// Describes encoder and cable, and the identifier.
 fn identity(map: &Registers, out: &mut String) -> Result<EncoderId, fmt::Error> {
     let id = EncoderId::truncate(u32::from_be_bytes([0, byte(map, 0x0d) & 15, byte(map, 0x0e), byte(map, 0x0f)]));
     line(out, "encoder", encoder(id))?;
@@ -180,14 +180,14 @@ fn safe_2(map: &Registers, stale: &str, out: &mut String) -> fmt::Result {
     line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
 }
 
-/// Why the encoder refused a long message: by the rules of SICK's detail and class stand in this order, by those of TI's in the other.
+/// Describes why the encoder refused a long message: by SICK's rules the detail comes before the class, by TI's after it.
 fn refused(map: &Registers, sick: bool) -> String {
     let [first, second] = map.get(Register::PcBuffer);
     let [detail, class] = if sick { [first, second] } else { [second, first] };
     format!("refused: {}", ResourceError::new(class, detail))
 }
 
-/// The first bytes of the buffer of long messages, as text too if they are text.
+/// Describes the first bytes of the buffer of long messages, also as text if they are text.
 fn data(map: &Registers, bytes: usize) -> String {
     let buffer: [u8; 8] = map.get(Register::PcBuffer);
     let data = buffer.get(..bytes).unwrap_or_default();
@@ -223,13 +223,13 @@ fn encoder(id: EncoderId) -> String {
     }
 }
 
-/// A position with the sign that the encoder gives it.
+/// Describes a position with the sign that the encoder gives it.
 fn number(id: EncoderId, raw: u64) -> String {
     let position = if id.check().is_ok() { id.position(raw).to_string() } else { raw.to_string() };
     format!("{position} ({raw:010X}h)")
 }
 
-/// Whether the CRC in the map fits to the status byte and the position.
+/// Returns whether the CRC in the map matches the status byte and the position.
 fn check(map: &Registers, status: u8, position: Register, crc: Register) -> &'static str {
     let (status, [p4, p3, p2, p1, p0]) = (byte(map, status), map.get(position));
     let want = crc16(&[status, p4, p3, p2, p1, p0]);

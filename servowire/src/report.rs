@@ -1,4 +1,4 @@
-//! `servowire report`: all that a capture tells, in one file that can be printed and sent.
+//! `servowire report`: everything that a capture shows, in one file that can be printed and sent.
 
 mod html;
 
@@ -19,7 +19,7 @@ use crate::picture::Picture;
 use crate::reading::{Read, Reading};
 use crate::scope::{Scope, Wanted};
 
-/// Refused frames that are listed.
+/// Maximum number of refused frames listed.
 const LISTED: usize = 500;
 
 /// Write a report on a capture: one file, for a browser or a printer.
@@ -66,7 +66,7 @@ struct Listed {
     event: Event,
 }
 
-/// Collects what no other printer does.
+/// Collects what no other printer collects.
 struct Gatherer {
     figures: Gathered,
     tables: Vec<Table>,
@@ -119,7 +119,7 @@ impl Arguments {
         }
     }
 
-    /// Whether all frames are good.
+    /// Returns whether all frames are good.
     fn report(&self) -> Result<bool, Box<dyn Error>> {
         let file = self.file.display().to_string();
         let mut gatherer = Gatherer {
@@ -159,7 +159,7 @@ impl Arguments {
     }
 }
 
-/// The size of a file and its SHA-256 in hex.
+/// Returns the size of a file and its SHA-256 in hex.
 fn hash(path: &Path) -> io::Result<(u64, String)> {
     let (mut file, mut hasher) = (File::open(path)?, Sha256::new());
     let bytes = io::copy(&mut file, &mut hasher)?;

@@ -24,14 +24,14 @@ pub(crate) enum Wanted {
     At(Time),
 }
 
-/// Changes of the last moments, and the clips made of them.
+/// The most recent changes, and the clips made from them.
 pub(crate) struct Scope {
     wanted: Wanted,
     names: Vec<String>,
     recent: VecDeque<Change>,
-    /// The levels before those.
+    /// The levels before these changes.
     before: BTreeMap<u16, bool>,
-    /// By the class of the error.
+    /// Keyed by the class of the error.
     clips: BTreeMap<&'static str, Clip>,
 }
 
@@ -40,12 +40,12 @@ impl Scope {
         Self { wanted, names: Vec::new(), recent: VecDeque::new(), before: BTreeMap::new(), clips: BTreeMap::new() }
     }
 
-    /// What was wanted, by the class of the error.
+    /// Returns the wanted clips, keyed by the class of the error.
     pub(crate) fn clips(&self) -> impl Iterator<Item = &Clip> {
         self.clips.values()
     }
 
-    /// Distance of an event from the wanted one.
+    /// Returns the distance of an event from the wanted time.
     fn distance(event: &Event, at: Time) -> i64 {
         match event.place {
             Place::Time { start, end } if at < end => (start - at).max(0),
@@ -54,7 +54,7 @@ impl Scope {
         }
     }
 
-    /// The key under which an event is kept, if it is better than what is there.
+    /// Returns the key under which an event is kept, if it is better than the one there.
     fn key(&self, event: &Event) -> Option<&'static str> {
         match (self.wanted, &event.verdict) {
             (Wanted::Errors, Verdict::Refused(refusal)) if !self.clips.contains_key(refusal.class) => {

@@ -1,8 +1,8 @@
-//! `servowire decode --serial`: what a serial port hears of a T-Format line, without sending anything.
+//! `servowire decode --serial`: listens to a T-Format line at a serial port, without sending anything.
 //!
 //! A port delivers bytes without times, and an adapter hands over many exchanges at once: a pause does not show where a frame
-//! ends. So an exchange is found by its content: a request, its control field once more, and a check that holds. What is heard
-//! becomes a log of bytes, a frame per line.
+//! ends. An exchange is therefore found by its content: a request, its control field once more, and a valid check. The
+//! bytes heard become a log, with one frame per line.
 
 use std::fmt::Write as _;
 use std::io::{self, Read};
@@ -15,11 +15,11 @@ use crate::pipe::Pipe;
 use crate::talk::fault::Fault;
 use crate::talk::port;
 
-/// A port that delivers nothing for this long has nothing for now.
+/// A port that delivers nothing for this long counts as quiet.
 const QUIET: Duration = Duration::from_millis(50);
-/// Bytes among which no exchange is found are passed on when there are more than this.
+/// Bytes without an exchange are passed on when there are more than this.
 const MOST_KEPT: usize = 256;
-/// Of these, so many stay: an exchange may have begun.
+/// This many of them are kept, because an exchange may have begun.
 const LONGEST: usize = 16;
 
 /// Opens a port for listening.
@@ -32,12 +32,12 @@ pub(crate) fn listen(name: &str, rate: BitRate) -> Result<Input, Fault> {
 /// What begins at a byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Begin {
-    /// A request of so many bytes and its sound answer, so many bytes in all.
+    /// A request and its sound answer: bytes of the request, and bytes in total.
     Exchange {
         request: usize,
         whole: usize,
     },
-    /// The beginning of one, as far as it has come.
+    /// The beginning of an exchange, as far as it has arrived.
     Open,
     Nothing,
 }
@@ -60,7 +60,7 @@ impl Begin {
         }
     }
 
-    /// Whatever was asked, an encoder refuses a damaged request with a frame of ID 3.
+    /// An encoder refuses any damaged request with an ID 3 frame, whatever was requested.
     fn rejected(asked: DataId, request: usize, rest: &[u8]) -> Self {
         let length = usize::from(DataId::ReadAll.response_fields());
         match rest.get(..length).map(|answer| Response::parse(Request::ReadAll, answer)) {
@@ -77,9 +77,9 @@ struct Listener<P> {
     port: P,
     /// Bytes in which no exchange was found yet.
     kept: Vec<u8>,
-    /// Whether an exchange was found before them: what comes before the first one is a part of one.
+    /// Whether an exchange was found before them: bytes before the first exchange are part of one.
     begun: bool,
-    /// Lines of the log, and how much of them was taken.
+    /// Lines of the log, and how much of them has been taken.
     lines: String,
     taken: usize,
 }
@@ -99,7 +99,7 @@ impl<P: Read> Listener<P> {
         self.lines.push('\n');
     }
 
-    /// Writes bytes in which there is no exchange; of those before the first one nobody knows how a frame was cut.
+    /// Writes bytes that hold no exchange; before the first exchange it is unknown how a frame was cut.
     fn rubbish(&mut self, count: usize) {
         if count > LONGEST || self.begun && count > 0 {
             self.line("", count);
@@ -108,7 +108,7 @@ impl<P: Read> Listener<P> {
         }
     }
 
-    /// Writes all exchanges that are sure. `quiet`: nothing follows for now.
+    /// Writes all exchanges that are certain. `quiet`: nothing follows for now.
     fn cut(&mut self, quiet: bool) {
         while let Some((at, request, whole)) = self.exchange() {
             let inside = (at + 1..at + whole).map(|from| (from, self.begins(from)));
@@ -123,7 +123,7 @@ impl<P: Read> Listener<P> {
             self.rubbish(at);
             self.begun = true;
             if let Some(both) = second {
-                // An answer is missing, and a check holds by chance: nobody can tell which one.
+                // An answer is missing, and a check is valid by chance: it is impossible to tell which one.
                 self.kept.drain(..both);
                 self.lines.push_str("readable-in-two-ways\n");
             } else {
@@ -142,7 +142,7 @@ impl<P: Read> Listener<P> {
         self.kept.get(at..).map_or(Begin::Open, Begin::of)
     }
 
-    /// The first exchange: where it begins, the bytes of its request, and all its bytes.
+    /// Returns the first exchange: where it begins, the length of its request, and its total length.
     fn exchange(&self) -> Option<(usize, usize, usize)> {
         (0..self.kept.len()).find_map(|at| match self.begins(at) {
             Begin::Exchange { request, whole } => Some((at, request, whole)),
@@ -193,7 +193,7 @@ mod tests {
         answer
     }
 
-    /// What becomes of the bytes, `chunk` at once.
+    /// Returns the log made from the bytes, taken `chunk` at a time.
     fn log(bytes: &[u8], chunk: usize) -> String {
         let mut listener = Listener::new(io::empty());
         for bytes in bytes.chunks(chunk) {

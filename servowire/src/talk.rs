@@ -172,7 +172,7 @@ impl Arguments {
         }
     }
 
-    /// The encoder at a port that is open.
+    /// Returns the encoder at an open port.
     fn link<P: port::Port>(&self, port: P) -> Result<Link<P>, fault::Fault> {
         Link::open(port, Duration::from_millis(self.timeout)).map_err(|fault| match fault {
             fault::Fault::Encoder(error) => fault::Fault::Nobody(error, port::megabits(self.rate)),

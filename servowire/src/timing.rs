@@ -58,7 +58,7 @@ impl Arguments {
     }
 }
 
-/// Something that somebody does, in ns from the start of the request.
+/// An action of one party, in ns from the start of the request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Bar {
     who: &'static str,

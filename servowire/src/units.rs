@@ -11,7 +11,7 @@ pub(crate) fn frequency(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Rates for which the receiver's grid of 80 samples a bit can be laid.
+/// Parses a bit rate that the receiver's grid of 80 samples per bit allows.
 pub(crate) fn bit_rate(text: &str) -> Result<u32, String> {
     match frequency(text)? {
         rate @ 1..=1_000_000_000 => Ok(rate as u32),
@@ -19,12 +19,12 @@ pub(crate) fn bit_rate(text: &str) -> Result<u32, String> {
     }
 }
 
-/// A time of the capture.
+/// Parses a time of the capture.
 pub(crate) fn moment(text: &str) -> Result<Time, String> {
     time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, such as 20us, 1.5ms or 2s"))
 }
 
-/// One of the bit rates that a protocol has, in the same form; `6.67M` is near enough to 6,666,667.
+/// Parses one of a protocol's bit rates in the same form; `6.67M` is close enough to 6,666,667.
 pub(crate) fn one_of<T>(text: &str, rates: impl Iterator<Item = (T, u32)> + Clone) -> Result<T, String> {
     let said = frequency(text).unwrap_or(0);
     let near = |(_, rate): &(T, u32)| said.abs_diff(u64::from(*rate)) * 200 < u64::from(*rate);
@@ -34,7 +34,7 @@ pub(crate) fn one_of<T>(text: &str, rates: impl Iterator<Item = (T, u32)> + Clon
     })
 }
 
-/// A rate of T-Format.
+/// Parses a rate of T-Format.
 pub(crate) fn tformat_rate(text: &str) -> Result<BitRate, String> {
     one_of(text, [BitRate::Mbit2_5, BitRate::Mbit5].into_iter().map(|rate| (rate, rate.bits_per_second())))
 }

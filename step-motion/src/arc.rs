@@ -1,8 +1,8 @@
-//! Arcs as chords.
+//! Splits arcs into chords.
 
 use crate::error::Error;
 
-/// A place in a plane, in any unit: units of 0.1 µm reach 107 m.
+/// A point in a plane, in any unit: units of 0.1 µm reach 107 m.
 type Point = [i32; 2];
 
 /// Direction of an arc, seen with the second axis to the left of the first.
@@ -33,18 +33,18 @@ pub enum Turning {
 pub struct Arc {
     center: Point,
     radius: i64,
-    /// Square of the longest sum of two neighbours that is not split further.
+    /// An arc between two points is not split further if the square of their vectors' sum is at least this.
     split: u64,
-    /// Present position, from the center.
+    /// Present position, relative to the center.
     at: [i64; 2],
-    /// Ends of parts, the next one last.
+    /// End points of the parts still to be split; the next one is last.
     ends: [[i64; 2]; Self::DEPTH],
     len: usize,
     to: Point,
 }
 
 impl Arc {
-    /// Four quarters, each halved as often as a number has bits.
+    /// Room for the four quarters, and for one halving per bit of a coordinate.
     const DEPTH: usize = 40;
     /// Largest permitted radius, the distance of `from` and `to` from the center.
     pub const MAX_RADIUS: u32 = 1 << 30;
@@ -135,7 +135,7 @@ fn away(point: Point, center: Point) -> [i64; 2] {
     [i64::from(point[0]).saturating_sub(center[0].into()), i64::from(point[1]).saturating_sub(center[1].into())]
 }
 
-/// A quarter turn counter-clockwise.
+/// Rotates the point a quarter turn counter-clockwise.
 const fn quarter([x, y]: [i64; 2]) -> [i64; 2] {
     [y.wrapping_neg(), x]
 }
@@ -148,7 +148,7 @@ fn square(a: [i64; 2]) -> u64 {
     dot(a, a).max(0).unsigned_abs()
 }
 
-/// To the nearest.
+/// Divides and rounds to the nearest.
 fn length(a: [i64; 2]) -> i64 {
     let square = square(a);
     let root = square.isqrt();
@@ -167,7 +167,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// The angle from `from` to `to` in the direction of the arc, above 0 and at most a turn.
+    /// Returns the angle from `from` to `to` in the direction of the arc, above 0 and at most one turn.
     fn angle(from: [f64; 2], to: [f64; 2], clockwise: bool) -> f64 {
         let turn = core::f64::consts::TAU;
         let angle = to[1].atan2(to[0]) - from[1].atan2(from[0]);

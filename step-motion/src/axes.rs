@@ -23,8 +23,9 @@ use crate::writer::{LONGEST, Writer};
 /// them. A request takes effect at the end of the blocks already handed out: after at most twice the
 /// [reach](Self::with_reach). Only [`halt`](Self::halt) takes effect at once: no step follows it. Each block is followed by
 /// a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to rest on its lines, and
-/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or
-/// [as all others are](Self::with_exact_stops), every other step to 3/4 of a tick, or 25 ns if that is more. If a block ends within two ticks of a step, or DIR changes, a step may be a
+/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or [as exact as
+/// all others](Self::with_exact_stops); every other step is exact to 3/4 of a tick, or 25 ns if that is more. If a block
+/// ends within two ticks of a step, or DIR changes, a step may be a
 /// tick or two late.
 ///
 /// It contains four copies of the [`PathMover`], so keep it in a `static` or on a large stack.
@@ -58,28 +59,28 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     queue: &'q AxesQueue<N, S>,
     /// How far off a step may be, in moments.
     off: Real,
-    /// Ticks of motion in a block, and how many times it is halved for want of slots.
+    /// Ticks of motion in a block, and how many times this has been halved because slots ran out.
     reach: u32,
     shorter: u32,
-    /// The path where the blocks that are out end, the tick there, DIR of each axis, and the steps until there as the interrupt
-    /// counts them.
+    /// The path at the end of the blocks handed out, with the tick, DIR of each axis and the interrupt's step count at that
+    /// point.
     path: PathMover<N, M>,
     end: u64,
     dirs: [Option<Direction>; N],
     made: [u32; N],
-    /// What is being made from it, and where.
+    /// The block being made from it: the stage of the work, its copy of the path, the block and its writers.
     stage: Stage,
     work: PathMover<N, M>,
     block: usize,
     writers: [Writer; N],
-    /// The axis that is cut, and how many before it had nothing.
+    /// The axis being cut, and how many axes before it had nothing to cut.
     axis: usize,
     quiet: usize,
-    /// Where the block is to end, and how often that was postponed; the writers there.
+    /// Where the block is to end, how often that was postponed, and the writers at that point.
     until: u64,
     put_off: u8,
     joint: [Writer; N],
-    /// How exact the stop is, and is to be at best.
+    /// The present exactness of the stop, and the best that is allowed.
     coarse: u32,
     finest: u32,
     /// The stop after each of the two blocks, with all later requests.
@@ -87,7 +88,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     outs: [Out<N>; 2],
     /// The interrupt is stopped, and the following motion begins there.
     standing: bool,
-    /// It has not entered the last block yet.
+    /// The interrupt has not entered the last block yet.
     pending: bool,
     /// The plan cannot be run.
     lost: bool,
@@ -110,16 +111,16 @@ enum Stage {
 /// The finished part of a block.
 #[derive(Debug, Clone, Copy)]
 struct Out<const N: usize> {
-    /// The interrupt may come to its stop.
+    /// The interrupt may reach the stop of this block.
     valid: bool,
-    /// Slots of the first axis before those of the stop.
+    /// Slots of the first axis that come before the stop.
     len: usize,
     /// Where the stop ends.
     end: u64,
     dirs: [Option<Direction>; N],
 }
 
-/// How often the end of a block is postponed so that no step is late because of it.
+/// How often the end of a block may be postponed so that it makes no step late.
 const PUT_OFF: u8 = 8;
 
 impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
@@ -167,8 +168,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
 
-    /// Makes the stop behind each block as exact as other steps are, where the [`AxesQueue`] has slots for it: about three times as many
-    /// as else, and instructions.
+    /// Makes the stop behind each block as exact as all other steps, if the [`AxesQueue`] has slots for it. This takes
+    /// about three times as many slots and instructions.
     pub fn with_exact_stops(self) -> Self {
         Self { finest: EXACT, ..self }
     }
@@ -196,7 +197,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         stops || self.path.is_full()
     }
 
-    /// Returns whether the interrupt is stopped and nothing is to come (or it is held).
+    /// Returns whether the interrupt is stopped and no motion is pending (or it is on hold).
     pub fn is_at_rest(&self) -> bool {
         self.halt.is_none() && self.standing && !self.pending && self.path.due().is_none()
     }
@@ -209,7 +210,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Does the same as [`PathMover::push`].
     ///
     /// # Errors
-    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
         if self.is_full() {
@@ -227,7 +228,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Does the same as [`PathMover::move_to`].
     ///
     /// # Errors
-    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
         self.begin_anew();
@@ -273,7 +274,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         });
     }
 
-    /// As [`PathMover::quick_stop`].
+    /// Does the same as [`PathMover::quick_stop`].
     pub fn quick_stop(&mut self, limits: [Limits; N]) {
         self.begin_anew();
         self.path.quick_stop(limits, self.end);
@@ -336,7 +337,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
     }
 
-    /// In which place of which block the first axis is, and whether all stand.
+    /// Returns the block and the place in it where the first axis is, and whether all axes are stopped.
     fn place(&self) -> (Option<(usize, usize)>, bool) {
         let mut places = self.queue.axes.iter().map(|queue| queue.current.load(Ordering::Acquire));
         let first = places.next().unwrap_or(IDLE);
@@ -352,13 +353,13 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         })
     }
 
-    /// Returns whether the interrupt may come to the stop of a block, or that is being cut.
+    /// Returns whether the interrupt may reach the stop of a block, or that stop is being cut.
     fn may_come_to(&self, block: usize) -> bool {
         let cut = self.stage == Stage::Stop && block == self.block;
         cut || self.outs.get(block).is_some_and(|out| out.valid)
     }
 
-    /// Passes requests to the stops too, so that the machine continues from there as it would have.
+    /// Passes requests to the stops too, so that the machine would carry them out after a stop as well.
     fn tell_stops(&mut self, ask: impl Fn(&mut PathMover<N, M>, u64) -> Result<(), Error>) {
         for at in 0..2 {
             if !self.may_come_to(at) {
@@ -381,7 +382,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.stage = Stage::Idle;
     }
 
-    /// The interrupt stands for a halt.
+    /// Confirms a halt once the interrupt has stopped for it.
     fn confirm(&mut self, ticket: u32) -> Work {
         let parked = IDLE | ticket << TICKET;
         if self.queue.axes.iter().any(|queue| queue.current.load(Ordering::Acquire) != parked) {
@@ -398,7 +399,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Work::More
     }
 
-    /// The interrupt stands at the end of the stop of a block.
+    /// Continues from the end of a block's stop, where the interrupt has stopped.
     fn recover(&mut self, block: usize) {
         let (Some(stop), Some(out)) = (self.stops.get_mut(block), self.outs.get(block).copied()) else { return };
         stop.go_on_as(&self.path, out.end);

@@ -12,12 +12,12 @@ use crate::step_timer::StepTimer;
 #[derive(Debug)]
 pub struct AxesQueue<const N: usize, const S: usize> {
     pub(crate) axes: [Queue<S>; N],
-    /// The slot at which the next block begins, in all axes, [`REST`] if it is to follow a stop and not a block, and from
-    /// [`TURN`] on a number that is another one for each block. So one store lets all axes in.
+    /// The slot at which the next block begins in all axes; [`REST`] if it follows a stop rather than a block; and from bit
+    /// [`TURN`] up, a number that changes with each block. One store therefore lets all axes in.
     pub(crate) gate: AtomicU32,
 }
 
-/// Where the number of a gate begins, and how many there are.
+/// The lowest bit of a gate's number, and how many such numbers there are.
 pub(crate) const TURN: u32 = 16;
 pub(crate) const TURNS: u32 = 1 << 11;
 
@@ -45,7 +45,7 @@ pub struct FiredAxes {
 }
 
 impl FiredAxes {
-    /// The axes that make a step now, one bit each, the first axis in bit 0. DIR of each has been valid for the time that
+    /// The axes that step now, one bit each, the first axis in bit 0. DIR of each has been valid for the time that
     /// its driver needs.
     #[inline(always)]
     pub const fn steps(self) -> u16 {
@@ -103,7 +103,7 @@ pub struct AxesTimer<'q, const N: usize, const S: usize> {
     reverse: u16,
     /// The wait requested by the last call.
     wait: u32,
-    /// The gate that was gone through last.
+    /// The gate passed last.
     taken: u32,
 }
 

@@ -17,15 +17,15 @@ use crate::real::Real;
 use crate::step_timer::StepTimer;
 use crate::writer::{LONGEST, Writer, tick};
 
-/// The work left after a call of [`Axis::poll`].
+/// The work left after a call to [`Axis::poll`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Work {
     /// Call it again.
     More,
-    /// Fire the interrupt now: it is stopped, and there is motion for it.
+    /// Fire the interrupt now: it is stopped, and motion is ready for it.
     Start,
-    /// Nothing until the interrupt has progressed.
+    /// Nothing to do until the interrupt has progressed.
     Later,
     /// The axis is at rest at its target.
     Rest,
@@ -41,7 +41,7 @@ pub enum Work {
 /// or within 25 ns if that is more. All segments handed out are followed by a stop, unless they end at rest: if
 /// [`poll`](Self::poll) is not called in time, the axis stops after at most eight times the reach, or comes to rest by
 /// itself within four more, and continues from there at the next call. Each step of the stop is exact to a sixteenth of an
-/// interval, or as all others are [if that is asked for](Self::with_exact_stops).
+/// interval, or as exact as all others [on request](Self::with_exact_stops).
 ///
 /// ```
 /// use step_motion::{Axis, Clock, Limits, Queue, Work};
@@ -68,23 +68,23 @@ pub struct Axis<'q, const N: usize> {
     queue: &'q Queue<N>,
     /// How far off a step may be, in moments.
     off: Real,
-    /// Ticks within which half of a reaction is.
+    /// Ticks within which half of the reaction to a request takes place.
     reach: u32,
-    /// What the interrupt told when there was nothing to do for a slice, and what that said.
+    /// What the interrupt last reported when a slice had nothing to do, and the result of that slice.
     seen: u32,
     waits: Work,
-    /// What it told when notice of it was taken last.
+    /// What the interrupt reported when it was last read.
     looked: u32,
-    /// The position when the interrupt had counted so many steps.
+    /// The position when the interrupt had counted `made` steps.
     position: i64,
     made: u32,
-    /// What has been asked for, on the plan of the block in which the interrupt is; the end of its steps, and the slot there. A block
-    /// has one plan.
+    /// All requests, on the plan of the block that the interrupt is in; the end of that block's steps, and the last slot of
+    /// them. Each block has a single plan.
     mover: Mover,
     end: Writer,
     last: usize,
     news: News,
-    /// The block that is made, or linked, to follow: behind which slot, by which plan, with what that was told.
+    /// The block being made, or linked, to follow: the slot that it is joined to, its plan, and the request in it.
     stage: Stage,
     block: usize,
     joint: usize,
@@ -92,15 +92,16 @@ pub struct Axis<'q, const N: usize> {
     writer: Writer,
     until: u64,
     told: News,
-    /// The stop behind it, while that is cut.
+    /// The stop behind it, while it is being cut.
     stop: Option<Tail>,
-    /// Slots for the steps of a block, and how exact its stop is, as the one before had room for; how exact it is to be at best.
+    /// Slots for the steps of a block and the exactness of its stop, as the previous block had room for; and the best
+    /// exactness that is allowed.
     room: usize,
     coarse: u32,
     finest: u32,
-    /// How often in turn the interrupt was beyond the joint before the block was there.
+    /// How many times in a row the interrupt had passed the joint before the block was ready.
     missed: u32,
-    /// Of both blocks, and of their slots.
+    /// What was handed out in both blocks, and the ends of their slots.
     out: [Out; 2],
     marks: [Mark; N],
     /// The plan cannot be run; nothing is made until the interrupt is stopped.
@@ -116,19 +117,19 @@ enum Stage {
     Idle,
     Block,
     Stop,
-    /// It waits for the interrupt to come near.
+    /// The block waits for the interrupt to come near.
     Ready,
-    /// The interrupt will come to it, if it is not beyond the joint.
+    /// The interrupt will reach the block, unless it has already passed the joint.
     Linked,
 }
 
-/// What has been made of a block.
+/// What has been made of a block so far.
 #[derive(Debug, Clone, Copy)]
 struct Out {
-    /// Where its time begins, and the tick after the last step before that.
+    /// The start of its time, and the tick after the last step before that.
     begin: i128,
     free: u64,
-    /// Slots before those of the stop, and their steps.
+    /// Slots before the stop, and the steps in them.
     len: usize,
     steps: u32,
     /// Where the stop ends, and whether there is one.
@@ -142,32 +143,33 @@ impl Out {
         Self { begin: 0, free: 0, len: 0, steps: 0, position: 0, rest: Writer::new(0, None), brakes: false };
 }
 
-/// Where the events of a slot end: 2^-32 ticks and steps from where its block begins. No time: nothing is to be joined there.
+/// Where the events of a slot end, counted from the start of its block: in 2^-32 ticks, and in steps. Time 0: nothing may
+/// be joined there.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mark {
     end: u64,
     steps: u32,
 }
 
-/// A stop while it is cut.
+/// A stop while it is being cut.
 #[derive(Debug)]
 struct Tail {
     mover: Mover,
-    /// It is still the motion that is to be stopped.
+    /// The mover still holds the motion that is to be stopped.
     moves: bool,
     demand: Demand,
     writer: Writer,
-    /// Steps of the block before it.
+    /// Steps of the block before the stop.
     steps: u32,
 }
 
-/// How exact a stop is that is to be run only if the background starves: by parts of 16 of an interval, or of 4 where slots are few; or as
+/// How exact a stop is that runs only if the background is late: to 1/16 of an interval, or 1/4 if slots are scarce; or as
 /// exact as all other steps.
 pub(crate) const COARSE: u32 = 4;
 pub(crate) const COARSEST: u32 = 2;
 pub(crate) const EXACT: u32 = 63;
 
-/// The next less exact one.
+/// Returns the next coarser one.
 pub(crate) const fn coarser(than: u32) -> u32 {
     if than > COARSE { COARSE } else { than.saturating_sub(1) }
 }
@@ -221,8 +223,8 @@ impl<'q, const N: usize> Axis<'q, N> {
         Self { reach: ticks.clamp(LEAST, LONGEST >> 3), ..self }
     }
 
-    /// Makes the stop behind all that is queued as exact as other steps are, where the [`Queue`] has slots for it: about three
-    /// times as many as else, and instructions.
+    /// Makes the stop behind everything queued as exact as all other steps, if the [`Queue`] has slots for it. This takes
+    /// about three times as many slots and instructions.
     pub fn with_exact_stops(self) -> Self {
         Self { coarse: EXACT, finest: EXACT, ..self }
     }
@@ -246,7 +248,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.position.wrapping_add(since.into())
     }
 
-    /// Returns whether the timer is stopped and no step is to come (or is held back).
+    /// Returns whether the timer is stopped and no step is pending (or steps are on hold).
     pub fn is_at_rest(&self) -> bool {
         let (running, slot) = self.current();
         let (mover, end) = match self.stage {
@@ -266,7 +268,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Does the same as [`Mover::move_to`].
     ///
     /// # Errors
-    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: i64) -> Result<(), Error> {
         self.ready()?;
         self.mover.ask_move(target, self.commanded())?;
@@ -277,7 +279,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Does the same as [`Mover::run`].
     ///
     /// # Errors
-    /// As there; [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
         self.ready()?;
         self.mover.ask_run(direction, speed);

@@ -3,11 +3,11 @@
 use crate::real::{Real, THIRD};
 use crate::slope::Slope;
 
-/// What the acceleration of a piece does.
+/// How the acceleration changes during a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Bend {
-    /// It grows from its start.
+    /// It grows.
     Growing,
     /// It stays the same, possibly 0.
     Flat,
@@ -15,11 +15,11 @@ pub(super) enum Bend {
     Fading,
 }
 
-/// A piece of constant jerk: its state at its start.
+/// A piece of constant jerk, described by the state at its start.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Piece {
-    /// Begin, on the curve's time.
+    /// Start, in the curve's time.
     pub(super) time: Real,
     /// Distance from the start of the curve.
     pub(super) p: Real,
@@ -28,20 +28,20 @@ pub(super) struct Piece {
     pub(super) a: Real,
     /// Size of the jerk.
     pub(super) j: Real,
-    /// The acceleration speeds up.
+    /// The acceleration increases the speed.
     pub(super) up: bool,
     pub(super) bend: Bend,
 }
 
 impl Piece {
-    /// The state `t` after the start.
+    /// Returns the state `t` after the start.
     pub(super) fn after(&self, t: Real) -> Self {
         let Self { time, a, j, up, bend, .. } = *self;
         let (p, v) = self.way(t);
         Self { time: time + t, p, v, a: a.along(j * t, bend != Bend::Fading), j, up, bend }
     }
 
-    /// Distance and speed `t` after the start.
+    /// Returns distance and speed `t` after the start.
     pub(super) fn way(&self, t: Real) -> (Real, Real) {
         let Self { p, v, a, j, up, bend, .. } = *self;
         let growing = bend != Bend::Fading;
@@ -53,7 +53,7 @@ impl Piece {
     }
 }
 
-/// Up to eight pieces: back to acceleration 0, a slope, a cruise, a slope.
+/// Up to eight pieces: a return to acceleration 0, a slope, a cruise, and another slope.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Curve {
@@ -62,14 +62,14 @@ pub(super) struct Curve {
     /// Where the next piece begins.
     pub(super) time: Real,
     pub(super) p: Real,
-    /// Time of the curve that had passed before it was planned, and the distance covered in it.
+    /// Time of the curve that had passed before it was planned, and the distance covered in that time.
     pub(super) skipped: (Real, Real),
 }
 
 impl Curve {
     pub(super) const MAX: usize = 8;
 
-    /// Nothing but zero bytes: it is cleared, not copied.
+    /// All bytes are zero, so it is cleared rather than copied.
     const EMPTY: Self = {
         let none = Real::ZERO;
         let none = Piece { time: none, p: none, v: none, a: none, j: none, up: false, bend: Bend::Growing };
@@ -80,7 +80,7 @@ impl Curve {
         Self::EMPTY
     }
 
-    /// Without pieces.
+    /// Creates a curve without pieces.
     pub(super) const fn clear(&mut self) {
         (self.len, self.time, self.p, self.skipped) = (0, Real::ZERO, Real::ZERO, (Real::ZERO, Real::ZERO));
     }
@@ -89,14 +89,14 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
-    /// The state at a time of the curve, also before its start and after its end; `None` without pieces.
+    /// Returns the state at a time of the curve, even before its start or after its end; `None` without pieces.
     pub(super) fn at(&self, time: Real) -> Option<Piece> {
         let pieces = self.pieces();
         let piece = pieces.iter().rev().find(|piece| piece.time <= time).or(pieces.first())?;
         Some(piece.after(time - piece.time))
     }
 
-    /// The state at which it has made a distance from where it was joined.
+    /// Returns the state after a distance from the point where the curve was joined.
     pub(super) fn after(&self, way: Real) -> Option<Piece> {
         let p = self.skipped.1 + way;
         let piece = self.pieces().iter().rev().find(|piece| piece.p <= p).or(self.pieces().first())?;
@@ -109,12 +109,12 @@ impl Curve {
         Some(piece.after(high))
     }
 
-    /// The distance that is planned: from where the curve was joined to its end.
+    /// Returns the planned distance, from the point where the curve was joined to its end.
     pub(super) fn way(&self) -> Real {
         self.p - self.skipped.1
     }
 
-    /// Adds a piece with its duration and distance; a piece without duration is omitted.
+    /// Adds a piece with its duration and distance; a piece of zero duration is omitted.
     pub(super) fn push(&mut self, (lasts, distance): (Real, Real), [v, a, j]: [Real; 3], up: bool, bend: Bend) {
         if lasts.is_zero() {
             return;

@@ -1,11 +1,13 @@
 //! From curves to segments: stretches of steps whose times are, closely enough, a cubic of their number.
 //!
-//! A segment leads from one time to another. It has the time and the pace of both ends, and how far it is off at most follows from both, too
-//! (`segment`). Near rest, where it would hold few steps, up to four of them are found one by one and make a segment (`near_rest`, `part`).
+//! A segment leads from one time to another. It takes the time and the pace at both ends from the curve; its maximum error
+//! also follows from these (`segment`). Near rest, where a segment would hold few steps, up to four steps are found one by
+//! one and make a segment (`near_rest`, `part`).
 //!
-//! Within a piece all is in parts of it: times in parts of its time, positions in parts of its way, in words of 64 bits. With t from 0 to 1
-//! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2. Each piece is seen from the end at which it is
-//! slower, backwards in time if need be: so the position is a convex function of the time, and no search goes astray.
+//! Within a piece everything is scaled to it: times are fractions of its duration, positions fractions of its length, in
+//! 64-bit words. With t from 0 to 1
+//! a position is c1 t + c2 t² + c3 t³, from 0 to 1 as well, and no coefficient is above 3/2. Each piece is seen from its
+//! slower end, backwards in time if need be: the position is then a convex function of the time, so every search converges.
 
 mod near_rest;
 mod part;
@@ -19,7 +21,7 @@ use crate::curve::Curve;
 use crate::phases::Frame;
 use crate::real::Real;
 
-/// Steps of an axis on a curve as segments, one after another.
+/// Cuts the steps of an axis on a curve into segments, one after another.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Cutter {
@@ -27,58 +29,58 @@ pub(crate) struct Cutter {
     count: u32,
     /// Nothing has been made of the piece yet.
     fresh: bool,
-    /// The piece after the one under way, and the steps made where that ends.
+    /// The piece after the present one, and the steps made where the present one ends.
     next: u8,
     until: u32,
     piece: Part,
     /// Where the next segment may begin.
     last: Last,
-    /// Steps that have been counted, and are not a stretch yet.
+    /// Steps that have been counted but do not form a stretch yet.
     few: Option<Few>,
 }
 
-/// At the last step, or between two of them.
+/// Where the cutter is: at the last step, or between two steps.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Last {
     /// The time from the slower end of the piece.
     At(u64),
-    /// With the time that the next segment may take, about.
+    /// Where the next segment begins, and about how long it may take.
     There(Spot, u64),
 }
 
-/// What a part of the work gives.
+/// The result of a slice of the work.
 pub(crate) enum Slice {
     More,
     Steps(Stretch),
-    /// There was the last step.
+    /// There are no further steps.
     End,
 }
 
-/// Up to four steps, which are a segment whatever the curve is.
+/// Up to four steps, which a segment can hold whatever the curve is.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Few {
     stretch: Stretch,
-    /// When the first one is made in the piece, and how much later the last one, with the differences there.
+    /// Time of the first step in the piece, how much later the last one is, and the differences there.
     begin: u64,
     since: u64,
     interval: i64,
     add: i64,
 }
 
-/// How a segment is to be.
+/// The requirements on a segment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Demand {
     /// How far off a step may be, in moments.
     pub(crate) off: Real,
-    /// For a stop that is only a precaution: it may also be off by an interval times 2 to the power of minus this.
+    /// For a stop that is only a precaution: a step may also be off by 2^-this of an interval.
     pub(crate) coarse: Option<u32>,
     /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
     pub(crate) time: u64,
 }
 
-/// As many steps are a segment whatever the curve is: each is searched.
+/// Up to this many steps fit into a segment whatever the curve is; each of them is found by itself.
 const FEW: u16 = 4;
 impl Cutter {
     pub(crate) const fn new() -> Self {
@@ -90,7 +92,7 @@ impl Cutter {
         self.count
     }
 
-    /// The next steps; `None` after the last one.
+    /// Returns the next steps; `None` after the last one.
     pub(crate) fn next(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Option<Stretch> {
         loop {
             match self.slice(curve, frame, demand) {
@@ -101,7 +103,7 @@ impl Cutter {
         }
     }
 
-    /// A part of the work for the next steps.
+    /// Does a slice of the work for the next steps.
     pub(crate) fn slice(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Slice {
         if let Some(few) = self.few.take() {
             return self.search(few, demand);
@@ -130,12 +132,12 @@ impl Cutter {
         self.search(Few::NONE, demand)
     }
 
-    /// Steps left of the piece.
+    /// Steps left in the piece.
     const fn left(&self) -> u32 {
         self.until.saturating_sub(self.count)
     }
 
-    /// The next piece with steps; false after the last one.
+    /// Goes on to the next piece with steps; returns false after the last one.
     fn take_piece(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> bool {
         while self.count >= self.until {
             let Some((piece, end, until)) = frame.piece(curve, self.next) else { return false };
@@ -148,7 +150,7 @@ impl Cutter {
         true
     }
 
-    /// The next two steps of some that are searched one by one.
+    /// Finds the next two of the steps that are found one by one.
     fn search(&mut self, mut few: Few, demand: &Demand) -> Slice {
         let mut coarse = 0;
         let mut last = match self.last {
@@ -165,7 +167,8 @@ impl Cutter {
                 return Slice::Steps(few.stretch);
             }
             self.count = self.count.saturating_add(1);
-            // A step that was due before the piece began is made there, and has not its place: no segment begins at it.
+            // A step that was due before the piece began is made at its start, not at its own place, so no segment begins
+            // at it.
             if time.abs_diff(self.piece.entry()) <= near {
                 self.last = Last::At(self.piece.entry());
                 return Slice::Steps(few.stretch);
@@ -180,7 +183,7 @@ impl Cutter {
         Slice::Steps(few.stretch)
     }
 
-    /// When a step of the piece under way is made, as exactly as there are digits.
+    /// Returns when a step of the present piece is made, as exactly as the arithmetic allows.
     pub(crate) fn exact(&self, count: u32) -> i128 {
         if self.piece.even {
             return self.piece.cruise(count, 1, 0).first;
@@ -225,7 +228,7 @@ mod tests {
     use crate::planner::{Goal, Motion, plan};
     use proptest::prelude::*;
 
-    /// How far the steps of the segments are off at most, in parts of what they may be, and how many steps a segment has.
+    /// Returns the largest error of the segments' steps as a share of the permitted one, and how many steps a segment has.
     fn worst(curve: &Curve, frame: &Frame, off: Real) -> (f64, f64) {
         let (mut cutter, mut worst, mut segments) = (Cutter::new(), 0.0, 0.0);
         let most = off.scaled(48).to_wide(32 - i32::try_from(frame.shift).unwrap()) as f64 / 2_f64.powi(48);
@@ -245,7 +248,7 @@ mod tests {
         (low.ln()..high.ln()).prop_map(f64::exp)
     }
 
-    /// How far off the steps of a move are at most, in parts of what they may be; `None` if there is no such move.
+    /// Returns the largest error of a move's steps as a share of the permitted one; `None` if there is no such move.
     fn off_by(
         hz: u32,
         [v, a, j]: [u64; 3],
@@ -262,8 +265,8 @@ mod tests {
         Some(worst(&curve, &frame, off(clock)).0)
     }
 
-    /// The last step of a piece lies at its end, beyond which the three terms lead; terms of one of few steps in a piece are
-    /// large; and a slope that begins has more of the fifth derivative than of the fourth.
+    /// The last step of a piece lies at its end, beyond which the three terms extrapolate; in a piece of few steps the
+    /// terms are large; and at the start of a slope the fifth derivative outweighs the fourth.
     #[test]
     fn segments_where_two_terms_do_not_say_it() {
         for (hz, limits, n) in [
@@ -282,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Of a test that takes more of them where there is time.
+    /// Returns the number of cases for a test that runs more of them if there is time.
     fn cases() -> u32 {
         extern crate std;
         std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(2000)
@@ -300,7 +303,7 @@ mod tests {
             ends in prop_oneof![Just([0.0; 2]), [0.0..1.0, 0.0..1.0]],
             part in prop_oneof![Just(0.0), spread(1.0 / 64.0, 1.0)],
         ) {
-            // What an axis asks for, or a part of a tick.
+            // What an axis requires, or a fraction of a tick.
             let off = |clock: Clock| if part == 0.0 {
                 clock.blur()
             } else {

@@ -16,11 +16,11 @@ pub struct HomingConfig {
     pub seek: u32,
     /// Speed of the second, exact approach, in steps/s.
     pub approach: u32,
-    /// How far to go back before it, in steps.
+    /// How far to back off before the second approach, in steps.
     pub back_off: u32,
     /// After this many steps without a switch the search is abandoned.
     pub range: u32,
-    /// Limits of the stop at the switch. After the switch there must be room for the distance to rest: v² / 2a, or (v /
+    /// Limits for the stop at the switch. Beyond the switch there must be room to come to rest: v² / 2a, or (v /
     /// 2)(v / a + a / j) with a jerk limit.
     pub stop: Limits,
 }
@@ -41,9 +41,9 @@ impl HomingConfig {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Switch {
-    /// The axis is not at it.
+    /// The axis is not at the switch.
     Open,
-    /// The axis is at it, or beyond it.
+    /// The axis is at the switch, or beyond it.
     Closed,
 }
 
@@ -56,15 +56,15 @@ pub enum HomingState {
     Seeking,
     /// On the switch, slowing down.
     Stopping,
-    /// Going back from it.
+    /// Backing off from the switch.
     BackingOff,
-    /// Approaching it slowly.
+    /// Approaching the switch slowly.
     Approaching,
     /// On the switch again, slowing down.
     Settling,
     /// At rest; position 0 is the place where the switch closed.
     Done,
-    /// No switch within the range, or it stays closed. The axis is stopped and its position is not a reference.
+    /// No switch was found within the range, or it stays closed. The axis is stopped and its position is not a reference.
     Failed,
 }
 

@@ -40,42 +40,42 @@ impl Clock {
         self.0.leading_zeros().saturating_sub(1)
     }
 
-    /// Half a tick, in moments: how exactly steps are found, for the tick is rounded from it.
+    /// Half a tick, in moments: steps are found to this grid, and rounded to a tick from it.
     pub(super) const fn grid(self) -> u32 {
         1 << self.shift().saturating_sub(1)
     }
 
-    /// The next half tick.
+    /// Rounds up to the next half tick.
     pub(super) const fn aligned(self, moment: u64) -> u64 {
         let mask = (self.grid() as u64).wrapping_sub(1);
         moment.saturating_add(mask) & !mask
     }
 
-    /// Moments a second: 2^30 to 2^31.
+    /// Moments per second: 2^30 to 2^31.
     pub(super) const fn moments(self) -> u32 {
         self.0 << self.shift()
     }
 
-    /// A moment, in seconds.
+    /// Duration of a moment, in seconds.
     pub(super) fn seconds(self) -> Real {
         Real::ONE / Real::new(self.moments().into())
     }
 
-    /// How far off a step of a segment may be, in moments: half a tick is what rounding to ticks takes of 3/4, or of 25 ns where
-    /// that is more.
+    /// How far off a step of a segment may be, in moments: 3/4 of a tick, or 25 ns if that is more, less the half tick that
+    /// rounding to ticks takes.
     pub(super) fn blur(self) -> Real {
         let tick = Real::new(self.moment(1));
         let ns = |n: u64| Real::new(self.moments().into()) * Real::new(n) / Real::new(1_000_000_000);
         (tick / Real::new(5)).max(ns(23) - tick.half())
     }
 
-    /// The tick nearest to a moment, half up.
+    /// Returns the tick nearest to a moment, rounding halves up.
     pub(super) const fn tick(self, moment: u64) -> u64 {
         let shift = self.shift();
         moment.saturating_add(1 << shift.saturating_sub(1)) >> shift
     }
 
-    /// The moment at which a tick begins; the last one there is for a tick beyond it.
+    /// Returns the moment at which a tick begins, or the last moment for a tick beyond it.
     pub(super) const fn moment(self, tick: u64) -> u64 {
         let shift = self.shift();
         if tick > u64::MAX >> shift { u64::MAX } else { tick << shift }
@@ -157,7 +157,7 @@ impl Limits {
         Ok(Self { jerk: Some(jerk), ..self })
     }
 
-    /// Without a jerk limit.
+    /// Removes the jerk limit.
     pub const fn without_jerk(self) -> Self {
         Self { jerk: None, ..self }
     }
@@ -185,7 +185,7 @@ impl Limits {
         self.jerk
     }
 
-    /// The higher of both in each; no limit of jerk is the highest.
+    /// Returns the higher of the two limits of each kind; no jerk limit counts as the highest.
     pub(super) fn or_higher(self, other: Self) -> Self {
         Self {
             speed: self.speed.max(other.speed),
@@ -194,12 +194,12 @@ impl Limits {
         }
     }
 
-    /// In steps and moments.
+    /// Converts the limits to steps and moments.
     pub(super) fn bounds(self, clock: Clock) -> Bounds {
         self.bounds_in(clock.seconds())
     }
 
-    /// The same, with a moment in seconds.
+    /// Does the same for a moment given in seconds.
     pub(super) fn bounds_in(self, moment: Real) -> Bounds {
         let squared = moment.squared();
         let (speed, acceleration) =
@@ -251,7 +251,7 @@ pub(super) struct Jerk {
     pub(super) per_j: Real,
     /// Time to the greatest acceleration, a / j.
     pub(super) edge: Real,
-    /// Change of speed that just reaches the greatest acceleration, a² / j.
+    /// The change of speed that just reaches the greatest acceleration, a² / j.
     pub(super) knee: Real,
 }
 
@@ -265,7 +265,8 @@ impl Bounds {
         Self { v, a, per_a: Real::ONE / a, jerk }
     }
 
-    /// High enough for an acceleration that there is already, and for a jerk that leads a deceleration back to 0 before rest.
+    /// Raises the limits as far as an acceleration under way needs, and the jerk so that it brings a deceleration back to 0
+    /// before rest.
     pub(super) fn holding(self, v: Real, (a, up): (Real, bool)) -> Self {
         let Some(Jerk { j, .. }) = self.jerk else { return self };
         // Rounding may make it a little more than the jerk that leads there already.
@@ -278,13 +279,13 @@ impl Bounds {
         self
     }
 
-    /// The higher of both in each; no limit is the highest.
+    /// Returns the higher of the two limits of each kind; no limit counts as the highest.
     pub(super) fn or_higher(self, other: &Self) -> Self {
         let jerk = self.jerk.zip(other.jerk).map(|(own, other)| own.j.max(other.j));
         Self::new(self.v.max(other.v), self.a.max(other.a), jerk)
     }
 
-    /// With a lower speed.
+    /// Returns the limits with a lower speed.
     pub(super) fn slower(self, v: Real) -> Self {
         Self { v: self.v.min(v), ..self }
     }

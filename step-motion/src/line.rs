@@ -9,17 +9,17 @@ use crate::real::Real;
 use crate::stepper::Stepper;
 use servowire_core::Direction;
 
-/// A line that waits or runs.
+/// A line that is waiting or running.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Line<const N: usize> {
     /// Steps of each axis to its end.
     pub(super) steps: [i32; N],
-    /// Length in units: steps of the finest axis.
+    /// Length in units; a unit is a step of the finest axis.
     pub(super) whole: Real,
-    /// Where it is left: at its end, or where a stop has cut it off.
+    /// Length up to the point where the path leaves the line: its end, or where a stop has cut it off.
     pub(super) length: Real,
-    /// Steps made there, of each axis.
+    /// Steps that each axis has made there.
     pub(super) ends: [u32; N],
     /// The limits of the axes, along the line, in units.
     pub(super) bounds: Bounds,
@@ -27,9 +27,9 @@ pub(super) struct Line<const N: usize> {
     pub(super) feed: Real,
     /// Greatest speed at its start, for the corner.
     pub(super) corner: Real,
-    /// Cut off by a stop.
+    /// The line was cut off by a stop.
     pub(super) cut: bool,
-    /// The speed at which a stop that ends later leaves it.
+    /// The speed at which a stop that ends on a later line leaves this one.
     pub(super) leave: Option<Real>,
 }
 
@@ -39,12 +39,12 @@ impl<const N: usize> Line<N> {
         Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None }
     }
 
-    /// Sets the speed to a part of the requested one, never above the limits of the axes.
+    /// Returns the limits with the speed set to a fraction of the requested one, never above the limits of the axes.
     pub(super) fn bounds(&self, part: Real) -> Bounds {
         self.bounds.slower(self.feed * part)
     }
 
-    /// Steps that each axis has made at a place of the line; all at its end.
+    /// Returns the steps that each axis has made at a place on the line; all steps at its end.
     pub(super) fn steps_at(&self, place: Real) -> [u32; N] {
         if place >= self.length {
             return self.ends;
@@ -52,7 +52,7 @@ impl<const N: usize> Line<N> {
         self.steps.map(|steps| phases::steps(self.place(steps, place)).min(steps.unsigned_abs()))
     }
 
-    /// The position of an axis at a place of the line, in 2^-32 steps.
+    /// Returns the position of an axis at a place on the line, in 2^-32 steps.
     fn place(&self, steps: i32, at: Real) -> i64 {
         let place = Real::new(steps.unsigned_abs().into()) * at / self.whole;
         i64::try_from(place.to_fixed(P)).unwrap_or(i64::MAX)
@@ -76,19 +76,19 @@ pub struct AxisPulse {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Start<const N: usize> {
-    /// In units from the start of the line, or before that.
+    /// Place in units from the start of the line, or before it.
     pub(super) place: Real,
     pub(super) before: Real,
     /// Steps of the line that have been made.
     pub(super) made: [u32; N],
     pub(super) moment: u64,
-    /// What it begins later than that, less than half a tick.
+    /// How much later than that it begins, less than half a tick.
     pub(super) offset: Real,
-    /// It ends with the line, not at a rest before that.
+    /// It ends with the line rather than at a rest before its end.
     pub(super) whole: bool,
 }
 
-/// The steps of a line, of all axes in the order of time.
+/// The steps of all axes on a line, in the order of time.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinePulses<const N: usize> {
@@ -98,7 +98,7 @@ pub struct LinePulses<const N: usize> {
     pub(super) due: [Option<u64>; N],
     pub(super) directions: [Direction; N],
     pub(super) start: Start<N>,
-    /// Moments at which the curve is over, and the line.
+    /// Moments at which the curve and the line end.
     end: u64,
     pub(super) left: u64,
 }
@@ -107,9 +107,9 @@ pub struct LinePulses<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Steps {
-    /// One by one: it is known when the next one is due.
+    /// One by one: the time of the next step is known.
     Single,
-    /// In stretches: it is known that there is one, not before its line begins.
+    /// In stretches: that there is a next step is known, but not before its line begins.
     Stretches,
 }
 
@@ -144,12 +144,12 @@ impl<const N: usize> LinePulses<N> {
         self.clock.tick(self.left)
     }
 
-    /// Moment at which its curve is over.
+    /// Moment at which its curve ends.
     pub(super) const fn over(&self) -> u64 {
         self.end
     }
 
-    /// Speed and acceleration along the line at a moment, the place on it, and how far it is before the line.
+    /// Returns speed and acceleration along the line at a moment, the place on the line, and how far before the line that is.
     pub(super) fn motion(&self, moment: u64) -> (Motion, Real, Real) {
         let Start { place, before, .. } = self.start;
         let piece = self.axes.first().and_then(|(frame, _)| self.curve.at(frame.time(&self.curve, moment)));
@@ -158,7 +158,7 @@ impl<const N: usize> LinePulses<N> {
         (Motion { v, a, up }, at - before, before - at)
     }
 
-    /// The next step: which axis, and when.
+    /// Returns when the next step is due, and on which axis.
     pub(super) fn first(&self) -> Option<(u64, usize)> {
         self.due.iter().enumerate().filter_map(|(axis, due)| due.map(|due| (due, axis))).min()
     }
@@ -170,7 +170,7 @@ impl<const N: usize> LinePulses<N> {
         }
     }
 
-    /// The next steps of an axis; `None` after the last one.
+    /// Returns the next steps of an axis; `None` after the last one.
     pub(super) fn stretch(&mut self, at: usize, demand: &Demand) -> Option<Stretch> {
         let (frame, stepper) = self.axes.get_mut(at)?;
         stepper.cutter.next(&self.curve, frame, demand)
@@ -182,7 +182,7 @@ impl<const N: usize> LinePulses<N> {
         }
     }
 
-    /// Returns whether an axis has more of them.
+    /// Returns whether an axis has more steps.
     pub(super) fn has_more(&self, at: usize) -> bool {
         let more =
             |(frame, stepper): &(Frame, Stepper)| stepper.cutter.count() < phases::steps(frame.last(&self.curve));

@@ -34,7 +34,7 @@ enum Aim {
     Run(Direction, u32),
 }
 
-/// All requests.
+/// All requests in force.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Wish {
@@ -76,9 +76,9 @@ pub struct Mover {
     stepper: Stepper,
     /// Its steps are cut into stretches, not taken one by one.
     cuts: bool,
-    /// The stretch that comes next, if that is known.
+    /// The next stretch, if it is known.
     left: Option<Stretch>,
-    /// Steps of the plan; the greatest number of one without end.
+    /// Steps of the plan; the greatest number for a plan without end.
     all: u32,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
@@ -86,13 +86,13 @@ pub struct Mover {
     commanded: i64,
     /// Tick of the next step.
     due: Option<u64>,
-    /// Tick from which on it may come.
+    /// Earliest tick at which it may come.
     free: u64,
     wish: Wish,
     soft: Option<(i64, i64)>,
     /// Ticks of rest before the direction changes.
     pause: u32,
-    /// Tick at which DIR changes for the next step, and from which on it may.
+    /// Tick at which DIR changes for the next step, and the earliest tick at which it may.
     turn: Option<u64>,
     idle: u64,
     /// DIR of the last step; `None` if DIR may have changed since.
@@ -190,7 +190,7 @@ impl Mover {
         state.on_axis(self.origin, self.direction)
     }
 
-    /// Returns whether the axis is at rest at a tick, with no step to come (or held back).
+    /// Returns whether the axis is at rest at a tick with no step pending (or on hold).
     pub fn is_at_rest(&self, now: u64) -> bool {
         self.due.is_none() && self.clock.moment(now) >= self.phases.end()
     }
@@ -298,7 +298,7 @@ impl Mover {
         self.limits
     }
 
-    // What is asked for is written down first, and planned then.
+    // Requests are recorded first and planned afterwards.
 
     /// Refuses moves during a quick stop, which ends at rest.
     pub(super) fn ready(&mut self, at_rest: bool) -> Result<(), Error> {

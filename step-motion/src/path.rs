@@ -28,34 +28,35 @@ pub struct AxisSetup {
 }
 
 impl AxisSetup {
-    /// Without soft limits or a reversal pause.
+    /// Creates an axis without soft limits or a reversal pause.
     pub const fn new(limits: Limits, steps_per_m: u32) -> Self {
         Self { limits, steps_per_m, soft_limits: None, reversal_pause: 0 }
     }
 
-    /// With a range that no line may leave, both ends included, in steps.
+    /// Sets a range that no line may leave, both ends included, in steps.
     pub const fn with_soft_limits(self, low: i64, high: i64) -> Self {
         Self { soft_limits: Some((low, high)), ..self }
     }
 
-    /// With so many ticks at least between two steps in different directions: what the driver and the mechanics need between a step and
-    /// DIR, and between DIR and the next step. A corner at which the axis turns round is as slow as that takes, or the machine rests there.
+    /// Sets the minimum number of ticks between two steps in different directions: the time that the driver and the
+    /// mechanics need between a step and DIR, and between DIR and the next step. At a corner where the axis reverses, the
+    /// machine slows down as far as this needs, or stops.
     pub const fn with_reversal_pause(self, ticks: u32) -> Self {
         Self { reversal_pause: ticks, ..self }
     }
 }
 
-/// How it continues along a line, and lines that follow.
+/// How the motion continues along a line and those that follow.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Course {
     pub(super) curve: Curve,
-    /// The speed at its end, and at which it was to be as far as later lines know.
+    /// The speed at its end, and the speed that the later lines asked for there.
     pub(super) exit: Real,
     pub(super) wish: Real,
-    /// It ends with a line, not at a rest before that.
+    /// It ends with a line rather than at a rest before the line's end.
     pub(super) whole: bool,
-    /// Lines that it goes along after the first one.
+    /// Number of lines that it covers after the first one.
     pub(super) more: usize,
 }
 
@@ -65,7 +66,7 @@ pub(super) struct Leaving {
     /// Lines after the first one.
     pub(super) more: usize,
     pub(super) exit: Real,
-    /// The limits of the run that they belong to, if that has been planned anew.
+    /// The limits of the run that they belong to, if that run has been planned again.
     pub(super) bounds: Option<Bounds>,
 }
 
@@ -107,18 +108,19 @@ pub struct Path<const N: usize, const M: usize> {
     len: usize,
     /// Direction and length of the line before the next one pushed, in units.
     before: Option<([i32; N], Real)>,
-    /// Where the last line ends, and which way each axis has gone last until there.
+    /// Where the last line ends, and the last direction of each axis up to there.
     target: [i64; N],
     ways: [Option<Direction>; N],
-    /// Which way each axis has gone last on lines that are over, and when they were.
+    /// The last direction of each axis on lines that have ended, and when they ended.
     gone: [Option<Direction>; N],
     over: u64,
-    /// Speed at which the next line begins, in units a moment.
+    /// Speed at which the next line begins, in units per moment.
     speed: Real,
     moment: u64,
-    /// What it begins later than that, less than half a tick.
+    /// How much later than that it begins, less than half a tick.
     offset: Real,
-    /// On which curve the first line continues, and where that has begun, if there is one; and whether it knows all lines that there are.
+    /// The curve that continues on the first line, if there is one, and where it began; and whether it takes all lines in
+    /// the queue into account.
     on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
 }
@@ -188,8 +190,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line of zero length adds nothing.
     ///
     /// # Errors
-    /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more than 2^31
-    /// - 1 steps.
+    /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more
+    /// than 2^31 - 1 steps.
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         if self.is_full() {
             return Err(Error::QueueFull);
@@ -249,7 +251,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(pulses)
     }
 
-    /// From the motion on a curve at the start of the first line, along more lines than it knew.
+    /// Plans again from the motion on a curve at the start of the first line, along lines that were added since.
     fn anew(&self, (old, start, bounds): &(Course, Start<N>, Bounds)) -> Option<(Course, Start<N>, Bounds)> {
         let Piece { time, v, a, up, .. } = old.curve.after(start.before)?;
         let how = (Some(Real::ONE), Some(*bounds), false);
@@ -261,7 +263,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some((course, start, bounds))
     }
 
-    /// A time in whole units of the grid.
+    /// Rounds a time to whole units of the grid.
     fn whole(&self, time: Real) -> u64 {
         time.to_fixed(0) & u64::from(self.clock.grid()).wrapping_neg()
     }
@@ -276,7 +278,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(())
     }
 
-    /// Lets the lines use higher limits, of those there are and these, for a stop that is to be found anew.
+    /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again.
     pub(super) fn hurry(&mut self, limits: &[Limits; N]) {
         let own = self.axes;
         for (axis, limits) in self.axes.iter_mut().zip(limits) {
@@ -293,7 +295,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.axes = own;
     }
 
-    /// Steps of each axis from one position to another.
+    /// Returns the steps of each axis from one position to another.
     pub(super) fn steps(from: [i64; N], to: [i64; N]) -> Result<[i32; N], Error> {
         let mut steps = [0; N];
         for ((to, from), step) in to.iter().zip(from).zip(&mut steps) {
@@ -329,9 +331,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Start { place, before, made: [0; N], moment: self.moment, offset: self.offset, whole: true }
     }
 
-    /// Takes the first line out, whose last curve has begun at a moment and an offset, and ends with a speed.
+    /// Takes out the first line, whose last curve began at a moment and an offset and ends at a speed.
     pub(super) fn finish(&mut self, curve: &Curve, moment: u64, offset: Real, exit: Real) {
-        // Between lines in motion the time goes on exactly; after a rest with half a tick.
+        // Between lines in motion the time continues exactly; after a rest it is rounded to half a tick.
         let time = offset + (curve.time - curve.skipped.0);
         let whole = self.whole(time);
         self.moment = moment.saturating_add(whole);
@@ -359,12 +361,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// Returns the line that is cut off, and the place on it.
+    /// Returns the line that was cut off, and the place on it.
     pub(super) fn end_of_cut(&self) -> Option<(usize, Real)> {
         (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
     }
 
-    /// The position in whole steps at a place on line `at`, if the first line begins at `from`.
+    /// Returns the position in whole steps at a place on line `at`, if the first line begins at `from`.
     /// `made`: the steps made on the first line, which cannot be undone.
     pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
         let mut to = from;
@@ -382,7 +384,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         to
     }
 
-    /// The queue as far as a place on line `at`, if the first line begins at `from` and a stop leaves it at `exit`.
+    /// Cuts the queue off at a place on line `at`, if the first line begins at `from` and a stop leaves it as `first` says.
     pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], first: Leaving) {
         self.target = self.place((at, place), from, made);
         let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
@@ -395,7 +397,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
             let mut entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
             if let (Some(Some(line)), Some(bounds)) = (&mut entry, bounds.filter(|_| i <= end)) {
-                // The stop is the same one when its run is shorter.
+                // The stop must stay the same when its run gets shorter.
                 line.bounds = bounds;
             }
             match entry {
@@ -415,7 +417,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
     }
 
-    /// Empty, at rest at a position from a moment on.
+    /// Empties the queue, at rest at a position from a moment onwards.
     pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
         (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
         (self.speed, self.moment, self.offset, self.on) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO, None);
@@ -429,7 +431,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// After a rest, the next line begins no earlier than the pause of an axis that goes the other way, or did so perhaps.
+    /// After a rest, the next line begins no earlier than the pause of any axis that reverses, or may have done so.
     pub(super) fn not_before_turning(&mut self) {
         let first = self.line(0).filter(|_| self.speed.is_zero());
         let Some(all) = first.map(|line| line.steps) else { return };
@@ -441,8 +443,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// After a rest, the next line begins no earlier than half a step behind the last one of each axis, by its greatest speed: it
-    /// may have come to rest right behind that step, and the line begins at it. `free`: the ticks after those steps.
+    /// After a rest, the next line begins no earlier than half a step after the last step of each axis, at its greatest
+    /// speed: the axis may have come to rest right after that step, and the line begins at it. `free`: the ticks after
+    /// these steps.
     pub(super) fn not_before_steps(&mut self, free: [u64; N]) {
         if !self.speed.is_zero() {
             return;
@@ -456,7 +459,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// Line `at` of the queue.
+    /// Returns line `at` of the queue.
     pub(super) fn line(&self, at: usize) -> Option<&Line<N>> {
         if at >= self.len {
             return None;
@@ -466,14 +469,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 }
 
-/// Which way each axis has gone behind a line.
+/// Updates the last direction of each axis after a line.
 fn gone_along<const N: usize>(ways: &mut [Option<Direction>; N], steps: &[i32; N]) {
     for (way, &steps) in ways.iter_mut().zip(steps).filter(|(_, steps)| **steps != 0) {
         *way = Some(Direction::of(steps.into()));
     }
 }
 
-/// A step falls into the nearest tick, so it may have been made before the place where it belongs.
+/// Raises the steps to those already made: a step falls into the nearest tick, so it may have been made before its place
+/// was reached.
 fn at_least<const N: usize>(mut ends: [u32; N], made: [u32; N]) -> [u32; N] {
     for (end, made) in ends.iter_mut().zip(made) {
         *end = made.max(*end);

@@ -45,34 +45,35 @@ use servowire_core::Direction;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PathMover<const N: usize, const M: usize> {
-    /// Its first line is the one that runs.
+    /// The path; its first line is the one that is running.
     path: Path<N, M>,
     /// The first line, once it has begun.
     line: Option<LinePulses<N>>,
-    /// The speed at the end of its curve and what it was to be, how many lines that goes along after it, and whether it ends with one of them.
+    /// The speed at the end of its curve and the speed asked for there, how many lines the curve covers after this one, and
+    /// whether it ends with one of them.
     exit: Real,
     wish: Real,
     more: usize,
     whole: bool,
-    /// The limits that it keeps to.
+    /// The limits that its curve keeps.
     bounds: Option<Bounds>,
-    /// Steps of it that have been made.
+    /// Steps of the first line that have been made.
     made: [u32; N],
     commanded: [i64; N],
-    /// Positions where the positions of its plan are 0.
+    /// Position of each axis where the position in its plan is 0.
     origin: [i64; N],
-    /// Ticks from which on the next steps may come.
+    /// Earliest ticks of the next steps.
     free: [u64; N],
-    /// Its steps are taken in stretches: what is left of the one of each axis.
+    /// Its steps are taken in stretches; this is the rest of each axis's stretch.
     steps: Steps,
     left: [Option<Stretch>; N],
     percent: u16,
     held: bool,
-    /// What runs slows down to rest.
+    /// The present motion slows down to rest.
     braking: bool,
-    /// A stop is under way: what runs has been cut off.
+    /// A stop is under way: the path has been cut off.
     stopping: bool,
-    /// A quick one: until its last step, lines are refused.
+    /// The stop is a quick one: until its last step, lines are refused.
     quick: bool,
     halted: bool,
 }
@@ -169,7 +170,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             for (state, (((frame, _), direction), origin)) in states.iter_mut().zip(own) {
                 let mut there = frame.at(&line.curve, moment);
                 if !line.start.before.is_zero() {
-                    // Before the line it is on the one before, at whose end it is told to be.
+                    // Before the start of the line the machine is on the previous one; it is reported at that line's end.
                     there.p = there.p.max(0);
                 }
                 let there = Setpoint::new(self.clock(), there);
@@ -179,7 +180,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         states
     }
 
-    /// Returns whether all axes are at rest at a tick, with no step to come (or held back).
+    /// Returns whether all axes are at rest at a tick with no step pending (or on hold).
     pub fn is_at_rest(&self, now: u64) -> bool {
         let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
         self.due().is_none() && self.clock().moment(now) >= over
@@ -194,7 +195,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// as much as the corner requires.
     ///
     /// # Errors
-    /// As [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
+    /// Those of [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready()?;
         self.path.push(target, feed)?;
@@ -232,8 +233,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Slows down to rest along the path within other limits of the axes, higher ones for a limit switch, and forgets the rest of it. Until
-    /// its last step, lines are refused. Where an axis's own limits are higher, those are used: a quick stop is never longer than a
-    /// [`stop`](Self::stop), also of one that is under way.
+    /// its last step, lines are refused. Where an axis's own limits are higher, those are used: a quick stop is never
+    /// longer than a [`stop`](Self::stop), even one that is already under way.
     pub fn quick_stop(&mut self, limits: [Limits; N], now: u64) {
         if self.line.is_none() {
             return self.stop(now);
@@ -254,9 +255,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// from there.
     ///
     /// # Errors
-    /// [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::QueueFull`] if the way to rest takes all lines of a full queue;
-    /// [`Error::TooManySteps`] more than 2^31 - 1 steps from there; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop). All leave
-    /// the path as it was.
+    /// [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::QueueFull`] if coming to rest takes all lines of a
+    /// full queue;
+    /// [`Error::TooManySteps`] more than 2^31 - 1 steps from there; [`Error::Moving`] during a
+    /// [`quick_stop`](Self::quick_stop). All of them leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready()?;
         self.path.check(&target)?;
@@ -283,12 +285,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.clock()
     }
 
-    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
+    /// Prepares the mover for [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
     pub(super) const fn cutting(self) -> Self {
         Self { steps: Steps::Stretches, ..self }
     }
 
-    /// The next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse); `None` if there are none on this line.
+    /// Returns the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse); `None` if this line
+    /// has none.
     pub(super) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Option<(Stretch, Direction)> {
         let line = self.line.as_mut()?;
         let due = line.due.get_mut(at)?;
@@ -320,13 +323,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some((stretch, direction))
     }
 
-    /// The tick at which the plan under way is over.
+    /// The tick at which the present plan ends.
     pub(super) fn over(&self) -> u64 {
         let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
         over.div_ceil(self.clock().moment(1))
     }
 
-    /// As [`push`](Self::push); what runs takes no notice of it before it is told to [look ahead](Self::look_ahead).
+    /// Does the same as [`push`](Self::push), but the present motion ignores the line until
+    /// [`look_ahead`](Self::look_ahead) is called.
     pub(super) fn append(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready()?;
         self.path.push(target, feed)?;
@@ -350,20 +354,20 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
-    /// At rest after a stop that nobody asked for: it goes on from there as another one would.
+    /// Continues as another mover would, from a rest after a stop that was not requested.
     pub(super) fn go_on_as(&mut self, other: &Self, now: u64) {
         (self.held, self.percent) = (other.held, other.percent);
         self.replan(now);
     }
 
-    /// Halted at a position.
+    /// Records a halt at a position.
     pub(super) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
         self.halt(now);
         (self.commanded, self.halted) = (commanded, was_moving);
         self.leave(now);
     }
 
-    /// Refuses lines in a quick stop, which is over when no step is to come.
+    /// Refuses lines during a quick stop, which ends when no step is to come.
     fn ready(&mut self) -> Result<(), Error> {
         if self.quick && self.due().is_some() {
             return Err(Error::Moving);
@@ -372,14 +376,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Ok(())
     }
 
-    /// Part of the speeds that were asked for; `None` to brake.
+    /// Fraction of the requested speeds; `None` to brake.
     fn part(&self) -> Option<Real> {
         let brakes = self.held || self.stopping || self.percent == 0;
         (!brakes).then(|| Real::new(self.percent.into()) / Real::new(100))
     }
 
-    /// The tick of a request. Machines that move are somewhere between their last step and the next one, whatever the caller's
-    /// clock says.
+    /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the
+    /// caller's clock says.
     fn tick(&self, now: u64) -> u64 {
         let last = self.free.iter().copied().max().unwrap_or(0).saturating_sub(1);
         let now = now.max(last);
@@ -398,7 +402,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         from
     }
 
-    /// At rest with an empty queue, from a tick on.
+    /// Empties the queue, at rest from a tick onwards.
     fn leave(&mut self, now: u64) {
         let moment = self.clock().moment(now).max(self.path.start().moment);
         self.path.clear(self.commanded, moment);

@@ -1,14 +1,15 @@
 //! The peak speed of a jerk-limited move that never cruises.
 //!
-//! The move is two slopes from the peak down, to a lower and to a higher speed. Where a slope does not reach the greatest
+//! Seen from the peak, the move is two slopes downwards: one to the lower end speed, one to the higher. Where a slope does
+//! not reach the greatest
 //! acceleration, its change of speed is j x² and its distance (2 v + j x²) x, with v its lower speed and x the time of either
-//! jerk. So the distance of the move is a polynomial of degree 4 in a time, and its root is what is searched: to 16
-//! bits in words of 32, then with a step of third order, which makes that 48.
+//! jerk. The distance of the move is therefore a polynomial of degree 4 in a time. Its root is found to 16 bits in 32-bit
+//! words, and then refined to 48 bits by one third-order step.
 
 use crate::limits::{Bounds, Jerk};
 use crate::real::Real;
 
-/// The ends of the slopes, the lower speed first, and the distance of both together.
+/// The end speeds of the slopes, the lower one first, and the total distance of both.
 pub(super) struct Peak {
     pub(super) low: Real,
     pub(super) high: Real,
@@ -16,7 +17,7 @@ pub(super) struct Peak {
 }
 
 impl Peak {
-    /// The peak speed. There has to be enough distance for the change from one end to the other.
+    /// The peak speed. The distance must be enough for the change from one end speed to the other.
     pub(super) fn speed(&self, bounds: &Bounds, jerk: &Jerk) -> Real {
         let Self { low, high, n } = *self;
         if n.is_zero() {
@@ -24,7 +25,7 @@ impl Peak {
         }
         let (between, edge) = (high - low, jerk.edge);
         let apart = between * jerk.per_j;
-        // The slope to the lower speed reaches the greatest acceleration from this speed on.
+        // From this peak speed upwards, the slope to the lower speed reaches the greatest acceleration.
         let full = low + jerk.knee;
         let over = n - (low + full) * edge;
         let square = edge.squared();
@@ -32,7 +33,7 @@ impl Peak {
         let x = if over.is_zero() || full > high && is_short() {
             self.bends(jerk, apart)
         } else {
-            // And the other one from this on.
+            // From this one upwards, the other slope does too.
             let full = high + jerk.knee;
             let time = between * bounds.per_a + edge;
             let way = (high + full) * edge + (low + full).half() * (time + edge);
@@ -44,7 +45,8 @@ impl Peak {
         high + jerk.j * x.squared()
     }
 
-    /// Both reach it: v² + (a²/j) v = a n + (v0² + v1²) / 2 - (v0 + v1) a²/2j.
+    /// Returns the peak speed if both slopes reach the greatest acceleration: v² + (a²/j) v = a n + (v0² + v1²) / 2 - (v0 +
+    /// v1) a²/2j.
     fn trapezoids(&self, bounds: &Bounds, jerk: &Jerk) -> Real {
         let knee = jerk.knee.half();
         let sum = bounds.a * self.n + (self.low.squared() + self.high.squared()).half();
@@ -52,10 +54,11 @@ impl Peak {
         rest / (knee + (knee.squared() + rest).sqrt())
     }
 
-    /// The jerk's time of the slope to the higher speed, where the other one alone reaches the greatest acceleration.
+    /// Returns the jerk time of the slope to the higher speed, if only the other slope reaches the greatest acceleration.
     ///
-    /// With e the time to that and u = 2 v1 / j, x² (x + e)² + u x (x + 2e) = 2e/j (n - n0). n0 is the way from one end to the
-    /// other in the `time` that it would take if it reached that; `square` is e².
+    /// With e the time to the greatest acceleration and u = 2 v1 / j, x² (x + e)² + u x (x + 2e) = 2e/j (n - n0). n0 is the
+    /// distance from one end speed to the other in the `time` that this would take if the slope reached that acceleration;
+    /// `square` is e².
     fn trapezoid_and_bend(&self, jerk: &Jerk, square: Real, time: Real) -> Real {
         let edge = jerk.edge;
         let n0 = (self.low + self.high).half() * time;
@@ -70,9 +73,9 @@ impl Peak {
         nearer(x, [left, right], (xt * sum + ut).scaled(1), sum.squared() + xt.scaled(1) + u)
     }
 
-    /// The jerk's time of the slope to the higher speed, where neither reaches the greatest acceleration.
+    /// Returns the jerk time of the slope to the higher speed, if neither slope reaches the greatest acceleration.
     ///
-    /// With z the other time, z² - x² = (v1 - v0) / j = k is `apart`. With w = x + z, x = (w - k/w) / 2, and
+    /// With z the jerk time of the other slope, z² - x² = (v1 - v0) / j = k is `apart`. With w = x + z, x = (w - k/w) / 2, and
     /// w⁴ + 4 (v0 + v1) / j w² = 4n/j w + k².
     fn bends(&self, jerk: &Jerk, apart: Real) -> Real {
         let square = ((self.low + self.high) * jerk.per_j).scaled(2);
@@ -91,17 +94,18 @@ impl Peak {
     }
 }
 
-/// The next value on the way to the root, of the third order: Chebyshev's. `left` outgrows `right` by `slope`, and `bend` is half of
-/// what that grows by.
+/// Returns a better approximation of the root, by Chebyshev's method of third order. `slope` is the derivative of `left` -
+/// `right`, and `bend` half of their second derivative.
 fn nearer(x: Real, [left, right]: [Real; 2], slope: Real, bend: Real) -> Real {
     let per = Real::ONE / slope;
     let by = left.distance(right) * per;
     x.along(by, left < right) - by.squared() * bend * per
 }
 
-/// The root of x⁴ + c3 x³ + c2 x² + c1 x = c0, or with c1 on the `other` side, not above 2^`most`; to 16 bits at least.
+/// Returns the root of x⁴ + c3 x³ + c2 x² + c1 x = c0, or with c1 on the `other` side, not above 2^`most`; exact to at
+/// least 16 bits.
 ///
-/// Newton's steps from 2^`most` down, in units of it and of the greatest coefficient.
+/// Uses Newton's method from 2^`most` downwards, in units of 2^`most` and of the greatest coefficient.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of 31 bits")]
 fn rough([c0, c1, c2, c3]: [Real; 4], other: bool, most: i32) -> Real {
     let scaled = |c: Real, by: i32| c.scaled(most.wrapping_mul(by));
@@ -122,7 +126,7 @@ fn rough([c0, c1, c2, c3]: [Real; 4], other: bool, most: i32) -> Real {
         let Some(inverse) = (1_u32 << 31).checked_div((slope as u32).wrapping_shl(zeros) >> 16) else { break };
         let step = (i64::from(value).wrapping_mul(inverse.into()) << zeros >> 16) as i32;
         x = x.saturating_sub(step);
-        // The next one is about the square of this one.
+        // The next step is about the square of this one.
         if step < 1 << 16 {
             break;
         }
@@ -136,7 +140,7 @@ mod tests {
     use crate::slope::distance;
     use proptest::prelude::*;
 
-    /// The peak is right in 46 bits: a little less needs no more than the distance, a little more no less.
+    /// The peak is exact to 46 bits: a slightly lower one needs no more than the distance, a slightly higher one no less.
     fn check(low: Real, high: Real, n: Real, bounds: &Bounds) -> Result<(), TestCaseError> {
         let need = |v| distance(low, v, bounds) + distance(v, high, bounds);
         if n < need(high) {
@@ -154,8 +158,8 @@ mod tests {
         (1_u64 << 52..1 << 53, -20..20_i32).prop_map(|(m, e)| Real::fixed(m, 52).scaled(e))
     }
 
-    /// In units of the change of speed that just reaches the greatest acceleration, and of the distance of it from rest; and as
-    /// little or as much as a clock of nanoseconds makes of them.
+    /// In units of the change of speed that just reaches the greatest acceleration, and of its distance from rest; over the
+    /// whole range that a nanosecond clock allows.
     #[test]
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn the_peak_needs_the_distance() {
@@ -166,7 +170,7 @@ mod tests {
             let Jerk { edge, knee, .. } = bounds.jerk.unwrap();
             let (low, high) = (low * knee, (low + more) * knee);
             check(low, high, n * (knee * edge), &bounds)?;
-            // As much more than the least, and about as much as reaches the greatest acceleration once or twice.
+            // That much above the minimum, and about as much as reaches the greatest acceleration once or twice.
             let least = distance(low, high, &bounds);
             check(low, high, least + n * (knee * edge), &bounds)?;
             for full in [low + knee, (low + high).half() + knee, high + knee] {
@@ -178,7 +182,7 @@ mod tests {
         });
     }
 
-    /// 2 v sqrt(v / j) of way from rest to v and back.
+    /// From rest to v and back the distance is 2 v sqrt(v / j).
     #[test]
     fn from_rest_to_rest() {
         let bounds = Bounds::new(Real::HUGE, Real::new(1000), Some(Real::new(8)));

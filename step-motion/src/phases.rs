@@ -16,9 +16,9 @@ pub(super) struct Frame {
     pub(super) begin: u64,
     /// Position at which it begins.
     pub(super) from: i64,
-    /// Position at which it ends, if that is known; else where the curve leads.
+    /// Position at which it ends, if that is known; otherwise the end of the curve counts.
     pub(super) to: Option<i64>,
-    /// What the curve begins later than `begin`, less than half a tick.
+    /// How much later than `begin` the curve begins, less than half a tick.
     pub(super) offset: Real,
     /// Steps of the axis in a unit of the curve.
     pub(super) scale: Real,
@@ -31,27 +31,27 @@ pub(super) struct Frame {
 pub(super) struct State {
     /// Position.
     pub(super) p: i64,
-    /// Speed, never below 0, in steps a moment.
+    /// Speed, never below 0, in steps per moment.
     pub(super) v: Real,
-    /// Size of the acceleration, and whether it speeds up.
+    /// Size of the acceleration, and whether it increases the speed.
     pub(super) a: (Real, bool),
-    /// Size of the jerk, and whether it adds to the speed.
+    /// Size of the jerk, and whether it acts in the direction of the speed.
     pub(super) j: (Real, bool),
 }
 
 impl Frame {
-    /// At rest at a position.
+    /// Creates a frame at rest at a position.
     pub(super) const fn rest(shift: u32, moment: u64, at: i64) -> Self {
         let (offset, scale) = (Real::ZERO, Real::ONE);
         Self { shift, begin: moment, from: at, to: Some(at), offset, scale, endless: false }
     }
 
-    /// Moments from `begin` to a time of the curve.
+    /// Returns the moments from `begin` to a time of the curve.
     pub(super) fn since(&self, curve: &Curve, time: Real) -> Real {
         self.offset + (time - curve.skipped.0)
     }
 
-    /// The time of the curve at a moment.
+    /// Returns the time of the curve at a moment.
     pub(super) fn time(&self, curve: &Curve, moment: u64) -> Real {
         (Real::new(moment.saturating_sub(self.begin)) + curve.skipped.0) - self.offset
     }
@@ -63,17 +63,18 @@ impl Frame {
         if back { self.from.saturating_sub(way) } else { self.from.saturating_add(way) }
     }
 
-    /// Moment at which the curve is over.
+    /// Moment at which the curve ends.
     pub(super) fn end(&self, curve: &Curve) -> u64 {
         self.begin.saturating_add(self.since(curve, curve.time).to_fixed(0))
     }
 
-    /// Position at its end: that of the motor, which is at a whole step.
+    /// Position at its end: the motor's, which is a whole step.
     pub(super) fn last(&self, curve: &Curve) -> i64 {
         self.to.unwrap_or_else(|| i64::from(steps(self.position(curve, curve.p))) << P)
     }
 
-    /// Piece `at`, with its end and the steps made then, none if that is before the curve was joined; `None` after the last one.
+    /// Returns piece `at`, its end and the steps made by then (0 if that is before the curve was joined); `None` after the
+    /// last piece.
     pub(super) fn piece<'c>(&self, curve: &'c Curve, at: u8) -> Option<(&'c Piece, Real, u32)> {
         let at = usize::from(at);
         let piece = curve.pieces().get(at)?;
@@ -90,7 +91,7 @@ impl Frame {
         })
     }
 
-    /// The state at a moment; at rest after the end.
+    /// Returns the state at a moment; at rest after the end.
     pub(super) fn at(&self, curve: &Curve, moment: u64) -> State {
         if !self.endless && moment >= self.end(curve) { self.rests(curve) } else { self.within(curve, moment) }
     }
@@ -99,7 +100,7 @@ impl Frame {
         State { p: self.last(curve), v: Real::ZERO, a: (Real::ZERO, true), j: (Real::ZERO, true) }
     }
 
-    /// The state at a moment before the end.
+    /// Returns the state at a moment before the end.
     pub(super) fn within(&self, curve: &Curve, moment: u64) -> State {
         let Some(Piece { p, v, a, j, up, bend, .. }) = curve.at(self.time(curve, moment)) else {
             return self.rests(curve);
@@ -127,7 +128,7 @@ impl Phases {
         Self { curve: Curve::new(), frame: Frame::rest(shift, moment, at) }
     }
 
-    /// Without pieces, in another frame.
+    /// Removes all pieces, and sets another frame.
     pub(super) const fn anew(&mut self, frame: Frame) -> &mut Self {
         self.frame = frame;
         self.curve.clear();
@@ -147,7 +148,7 @@ impl Phases {
     }
 }
 
-/// Steps made at a position: step k falls where the position is k - 1/2.
+/// Returns the steps made at a position: step k falls where the position is k - 1/2.
 pub(super) fn steps(p: i64) -> u32 {
     u32::try_from(p.saturating_add(1 << 31) >> P).unwrap_or(if p < 0 { 0 } else { u32::MAX })
 }

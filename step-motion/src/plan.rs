@@ -44,7 +44,7 @@ impl Plan {
     /// follow it without a ramp.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and [`Error::TooShort`] if the change of speed needs more steps.
+    /// Those of [`new`](Self::new), and [`Error::TooShort`] if the change of speed needs more steps.
     pub fn between(clock: Clock, limits: Limits, steps: u32, entry: u32, exit: u32) -> Result<Self, Error> {
         check(clock, limits)?;
         let to = position(steps)?;
@@ -55,7 +55,7 @@ impl Plan {
         Self::planned(clock, (steps, to), Motion::steady(speed(entry)), goal, &bounds)
     }
 
-    /// The plan itself, made where it is returned: it is large.
+    /// Makes the plan in place, because it is large.
     fn planned(
         clock: Clock,
         (steps, to): (u32, i64),
@@ -148,12 +148,12 @@ pub struct Setpoint {
 }
 
 impl Setpoint {
-    /// At rest at a position in 2^-32 steps.
+    /// Creates a setpoint at rest at a position in 2^-32 steps.
     pub(super) const fn at_rest(position: i64) -> Self {
         Self { position, speed: 0, acceleration: 0, jerk: 0 }
     }
 
-    /// Of an axis that moves in a direction from a position in steps.
+    /// Converts it to an axis that moves in a direction from a position in steps.
     pub(super) const fn on_axis(self, origin: i64, direction: Direction) -> Self {
         let origin = origin.saturating_mul(1 << 32);
         match direction {
@@ -193,26 +193,26 @@ impl fmt::Display for Setpoint {
     }
 }
 
-/// Half the clock at most, so that each tick has one step.
+/// Refuses speeds above half the clock, so that no tick has two steps.
 fn check(clock: Clock, limits: Limits) -> Result<(), Error> {
     let limit = clock.hz() / 2;
     let speed = limits.speed();
     if speed > limit { Err(Error::SpeedAboveClock { speed, limit }) } else { Ok(()) }
 }
 
-/// What follows from limits that the clock allows.
+/// Returns the limits in units of the clock, if the clock allows them.
 pub(super) fn checked(clock: Clock, limits: Limits) -> Result<Bounds, Error> {
     check(clock, limits)?;
     Ok(limits.bounds(clock))
 }
 
-/// A number of steps as a position.
+/// Converts a number of steps to a position.
 pub(super) fn position(steps: u32) -> Result<i64, Error> {
     let limit = u32::MAX / 2;
     if steps > limit { Err(Error::TooManySteps { steps, limit }) } else { Ok(i64::from(steps) << 32) }
 }
 
-/// A position for [`Error::SoftLimit`].
+/// Converts a position for [`Error::SoftLimit`].
 pub(super) fn clamp(target: i64) -> i32 {
     i32::try_from(target).unwrap_or(if target < 0 { i32::MIN } else { i32::MAX })
 }

@@ -1,8 +1,8 @@
-//! The fastest curve from a state to a speed, over a distance or without end.
+//! Plans the fastest curve from a state to a speed, over a distance or without end.
 //!
-//! All curves are made of slopes between speeds at acceleration 0. A state with an acceleration lies on a slope that began
-//! earlier, at its *virtual start*, so a curve may begin in the middle of a slope. Only where the acceleration has to change
-//! its sign it is brought to 0 first.
+//! All curves are made of slopes between speeds at acceleration 0. A state with non-zero acceleration lies on a slope that
+//! began earlier, at its *virtual start*, so a curve may begin in the middle of a slope. Only if the acceleration has to
+//! change its sign is it brought to 0 first.
 
 use crate::curve::{Bend, Curve};
 use crate::limits::{Bounds, Jerk};
@@ -16,7 +16,7 @@ pub(super) struct Motion {
     pub(super) v: Real,
     /// Size of the acceleration.
     pub(super) a: Real,
-    /// The acceleration speeds up.
+    /// The acceleration increases the speed.
     pub(super) up: bool,
 }
 
@@ -26,19 +26,19 @@ impl Motion {
     }
 }
 
-/// Where a curve leads.
+/// The goal of a curve.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Goal {
-    /// This far, with this speed at the end.
+    /// Over this distance, with this speed at the end.
     At(Real, Real),
     /// To this speed, wherever that is.
     Speed(Real),
 }
 
-/// Distances may be this much too short, in steps: what rounding leaves.
+/// Distances may be too short by this much, in steps, because of rounding.
 pub(super) const SLACK: Real = Real::fixed(1, 16);
 
-/// The speed at which an endless curve ends is cruised for this many moments.
+/// An endless curve cruises at its end speed for this many moments.
 pub(super) const ENDLESS: Real = Real::fixed(1, -60);
 
 /// Returns the curve, or the smallest sufficient distance if there is too little.
@@ -50,7 +50,7 @@ pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, 
     }
 }
 
-/// Does the same into an empty curve, which is large.
+/// Does the same into an empty curve, to avoid copying the large value.
 pub(super) fn plan_into(curve: &mut Curve, start: Motion, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     match bounds.jerk {
         Some(jerk) if !start.a.is_zero() => {
@@ -90,13 +90,13 @@ impl Bent {
         }
     }
 
-    /// The curve has begun at the virtual start.
+    /// Makes the curve begin at the virtual start.
     const fn on_the_slope(&self, curve: &mut Curve) {
         curve.skipped = (self.edge, self.base.1);
     }
 }
 
-/// Further up the slope if the goal asks for it, else back to acceleration 0 and on from there.
+/// Continues up the slope if the goal requires it, otherwise goes back to acceleration 0 and on from there.
 fn rising(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let from_base = match goal {
         Goal::At(n, exit) => Goal::At(n + bent.base.1, exit),
@@ -124,8 +124,8 @@ fn coast(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bou
     steady(curve, bent.coast.0, rest, bounds).map_err(|need| need + bent.coast.1)
 }
 
-/// Off the slope if the goal leaves room for it, else further down it: at least to the speed that the brake has reached,
-/// and as little below as the distance allows.
+/// Leaves the slope if the goal leaves room for that, otherwise continues down it: at least to the speed that braking has
+/// reached, and as little below that as the distance allows.
 fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let ((base, back), (low, _)) = (bent.base, bent.coast);
     let (target, exit) = match goal {
@@ -143,7 +143,7 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
         curve.clear();
     }
     let least = distance(base, exit, bounds);
-    // Above the speed that is left when the acceleration is back at 0 the slope does not lead there.
+    // The slope cannot lead to a speed above the one that is left when the acceleration is back at 0.
     if least > target + SLACK || exit > low {
         return Err(least - back);
     }
@@ -155,7 +155,7 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
     Ok(())
 }
 
-/// Slope, cruise for the rest of the distance if there is one to make, slope.
+/// Adds a slope, a cruise over the rest of the distance if there is one, and a slope.
 fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Option<Real>, bounds: &Bounds) {
     let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
     curve.slope(&up);
@@ -170,7 +170,7 @@ fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<
     match goal {
         Goal::At(n, exit) => {
             let top = top(from, goal, bounds)?;
-            // A peak below the greatest speed is that of slopes that take all of the distance.
+            // If the peak is below the greatest speed, the slopes take all of the distance.
             finish(curve, [from, top, exit], Some(n).filter(|_| top >= bounds.v), bounds);
         }
         Goal::Speed(v) => {
@@ -181,7 +181,7 @@ fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<
     Ok(())
 }
 
-/// The speed between the two slopes.
+/// Returns the speed between the two slopes.
 fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     let (n, exit) = match goal {
         Goal::At(n, exit) => (n, exit),
@@ -205,7 +205,8 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     Ok(peak.min(bounds.v).max(high))
 }
 
-/// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
+/// Returns the greatest speed from which `to` can be reached within `n`, which is also the greatest that can be reached
+/// from `to`.
 pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
     let way = n.scaled(1);
     let speed = match &bounds.jerk {
@@ -216,7 +217,7 @@ pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
     speed.min(bounds.v).max(to)
 }
 
-/// The greatest speed at which a motion may end after `n`.
+/// Returns the greatest speed at which a motion may end after `n`.
 pub(super) fn fastest_exit(start: Motion, n: Real, bounds: &Bounds) -> Real {
     match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
         None => greatest(start.v, n, bounds),
@@ -225,10 +226,11 @@ pub(super) fn fastest_exit(start: Motion, n: Real, bounds: &Bounds) -> Real {
     }
 }
 
-/// The speed nearest to `exit` from above at which a motion that brakes at once may end after `n`.
+/// Returns the lowest speed not below `exit` at which a motion that brakes at once may end after `n`.
 ///
-/// A jerk-limited brake to a lower speed may be shorter than one to a higher speed, for it has more of its way at the
-/// greatest acceleration. What is found is the end of the speeds that the way lasts for, from the present one down.
+/// Jerk-limited braking to a lower speed may take less distance than to a higher one, because more of it is at the greatest
+/// acceleration. The result is the lower end of the range of speeds, from the present one downwards, for which the distance
+/// is enough.
 pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -> Real {
     let (from, least, n) = match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
         None => (start.v, Real::ZERO, n),
@@ -244,11 +246,11 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
     }
 }
 
-/// The largest speed between `low` and `high`, as near as it matters, from and to which `need` is not above `n`. It is not
-/// `low`.
+/// Returns, closely enough, the largest speed between `low` and `high` for which `need` is not above `n`. The result is
+/// above `low`.
 ///
-/// Near `low` the need grows with the root of the speed above it, and that root is what is searched: false position, with
-/// the end that stays weighed less (Illinois), and halving if that takes long.
+/// Near `low` the need grows with the square root of the excess speed, so the search runs over that root: by false
+/// position, with less weight on the end that stays (Illinois), and by halving if that takes long.
 fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
     let top = need(high);
     if top <= n {
@@ -289,8 +291,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// From any speed, also above the greatest one, and any acceleration under way: a curve makes all of its distance, ends with
-    /// the speed that was asked for, and goes on from piece to piece without a jump.
+    /// From any speed, even above the greatest one, and any acceleration under way: a curve covers its whole distance, ends
+    /// at the requested speed, and has no jump between pieces.
     #[test]
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_curve_makes_its_distance() {
@@ -301,7 +303,7 @@ mod tests {
             let bounds = Bounds::new(thousandths(most), Real::ONE, jerk.map(thousandths));
             let mut start = Motion::steady(thousandths(from));
             if let Some(jerk) = bounds.jerk {
-                // The speed at which the acceleration began is not below 0, nor that at which it ends.
+                // Neither the speed at which the acceleration began nor the one at which it ends is below 0.
                 let least = (start.v * jerk.j).scaled(1).sqrt().min(Real::ONE);
                 start = Motion { a: least * thousandths(part), up, ..start };
             }

@@ -3,21 +3,22 @@
 //!
 //! Two blocks of slots take turns. A block is a chain of segments to run, followed by the chain of a stop from their end.
 //! The last segment is linked to that stop at first; when the next block is ready, one store links it to that block
-//! instead. So whichever the reader finds there is complete: more motion, or a stop. A block is rewritten only after the
+//! instead. Whichever chain the reader finds there is therefore complete: more motion, or a stop. A block is rewritten only
+//! after the
 //! reader has entered the other one.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Some steps with intervals that change by second and third differences. Times are in 2^-32 ticks.
+/// Some steps whose intervals change by the second and third differences of their times. Times are in 2^-32 ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Segment {
     /// Events, 1 to 65535.
     pub(crate) count: u16,
-    /// What each of them is.
+    /// The kind of each event.
     pub(crate) kind: Kind,
-    /// From the event before to the first one.
+    /// Interval from the previous event to the first one.
     pub(crate) first: i64,
-    /// At each event after it `interval` grows by `add`, and that by `bend`.
+    /// At each event after the first, `interval` grows by `add`, and `add` by `bend`.
     pub(crate) interval: i64,
     pub(crate) add: i64,
     pub(crate) bend: i64,
@@ -26,7 +27,7 @@ pub(crate) struct Segment {
 /// What happens at an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Kind {
-    /// A step, or nothing but DIR and time.
+    /// A step, or merely DIR and a wait.
     pub(crate) step: bool,
     /// DIR is high: backwards.
     pub(crate) reverse: bool,
@@ -34,7 +35,7 @@ pub(crate) struct Kind {
     pub(crate) joint: Joint,
 }
 
-/// Where all axes of a path have an event at the same tick, and go on together.
+/// A point where all axes of a path have an event at the same tick and continue together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Joint {
     /// Nowhere.
@@ -49,7 +50,7 @@ pub(crate) enum Joint {
 pub(crate) const DELTA: u32 = 30;
 pub(crate) const DIR: u32 = 1 << 29;
 pub(crate) const COUNT: u32 = 0xffff;
-/// A [`Joint`], and one at rest.
+/// The bit of a [`Joint`], and the bit of one at rest.
 pub(crate) const JOINT: u32 = 1 << 28;
 pub(crate) const REST: u32 = 1 << 27;
 
@@ -71,9 +72,9 @@ impl Segment {
 
 /// No slot follows.
 pub(crate) const NONE: u32 = u32::MAX;
-/// In what the reader tells: it stands at the end of that slot.
+/// In the reader's report: it has stopped at the end of that slot.
 pub(crate) const IDLE: u32 = 1 << 31;
-/// Above this many bits, and below [`IDLE`]: the ticket of the halt that put it there.
+/// From this bit up to [`IDLE`]: the ticket of the halt that put the reader there.
 pub(crate) const TICKET: u32 = 16;
 
 /// A segment in words.
@@ -129,7 +130,7 @@ impl Slot {
         Self::wide(&self.bend)
     }
 
-    /// Writes a segment that nothing follows yet; no reader may be here.
+    /// Writes a segment that nothing follows yet; the reader must not be in this slot.
     fn put(&self, segment: &Segment) {
         self.head.store(segment.head(), Ordering::Relaxed);
         self.next.store(NONE, Ordering::Relaxed);
@@ -151,15 +152,15 @@ pub struct Queue<const N: usize> {
     pub(crate) current: AtomicU32,
     /// Steps made, forward less reverse ones, modulo 2^32.
     pub(crate) made: AtomicU32,
-    /// Not 0, the ticket of a halt: no further step.
+    /// The ticket of a halt if not 0: no further step.
     pub(crate) halt: AtomicU32,
 }
 
 impl<const N: usize> Queue<N> {
-    /// Slots of a block; slot 0 belongs to none, the reader is parked there.
+    /// Slots of a block; slot 0 belongs to no block, the reader is parked there.
     pub(crate) const BLOCK: usize = N.saturating_sub(1) / 2;
 
-    /// Empty.
+    /// Creates an empty queue.
     pub const fn new() -> Self {
         const { assert!(N >= 9 && N < 1 << 16, "9 to 65535 slots") };
         Self {
@@ -170,18 +171,18 @@ impl<const N: usize> Queue<N> {
         }
     }
 
-    /// The slot of a block, by its place there.
+    /// Returns the slot at a place of a block.
     pub(crate) const fn slot(block: usize, at: usize) -> usize {
         1_usize.saturating_add(block.saturating_mul(Self::BLOCK)).saturating_add(at)
     }
 
-    /// The block of a slot, and its place there.
+    /// Returns the block of a slot, and its place in it.
     pub(crate) fn place(slot: usize) -> Option<(usize, usize)> {
         let at = slot.checked_sub(1)?;
         Some((at.checked_div(Self::BLOCK)?, at.checked_rem(Self::BLOCK)?))
     }
 
-    /// Writes a segment into a slot, and links it to the one before it if that is of the same block.
+    /// Writes a segment into a slot, and links it to the one before it if that is in the same block.
     pub(crate) fn put(&self, slot: usize, segment: &Segment, after: Option<usize>) {
         if let Some(place) = self.slots.get(slot) {
             place.put(segment);
@@ -191,7 +192,7 @@ impl<const N: usize> Queue<N> {
         }
     }
 
-    /// From now on `slot` follows `after`.
+    /// Makes `slot` follow `after` from now on.
     pub(crate) fn link(&self, after: usize, slot: usize) {
         if let (Some(place), Ok(slot)) = (self.slots.get(after), u32::try_from(slot)) {
             place.next.store(slot, Ordering::Release);

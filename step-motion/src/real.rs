@@ -1,34 +1,34 @@
-//! Numbers for planning: what a float is, in integers alone.
+//! Numbers for planning: floating point made of integers.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Sub};
 
-/// A number from 0 upwards with 64 significant bits: `m · 2^(e - BIAS)`, the top bit of `m` set; or 0, which is nothing but
-/// zero bits, so that its `e` is below that of any other number.
+/// A non-negative number with 64 significant bits: `m · 2^(e - BIAS)`, with the top bit of `m` set; or 0, all of whose bits
+/// are zero, so that its `e` is below that of any other number.
 ///
-/// Results keep 58 bits at least. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
+/// Results are exact to at least 58 bits. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
 /// can overflow or panic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-// In two registers of 64 bits where there are any.
+// Fits into two 64-bit registers on machines that have them.
 #[cfg_attr(target_pointer_width = "64", repr(align(8)))]
 pub(super) struct Real {
-    /// Upper and lower half of `m`: three words, without a gap.
+    /// Upper and lower half of `m`, so that the number takes three words without padding.
     high: u32,
     low: u32,
     e: i32,
 }
 
-/// Far from either end, as no sum of exponents that a plan knows leaves the word.
+/// Far enough from both ends that no sum of the exponents in a plan overflows the word.
 const BIAS: i32 = 1 << 29;
 
 impl Real {
     pub(super) const ZERO: Self = Self { high: 0, low: 0, e: 0 };
     pub(super) const ONE: Self = Self::new(1);
-    /// Larger than anything a plan knows.
+    /// Larger than any value in a plan.
     pub(super) const HUGE: Self = Self::from_parts(1 << 63, 937);
 
-    /// With an exponent as it is kept.
+    /// Creates the number from its stored exponent.
     #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
     const fn raw(m: u64, e: i32) -> Self {
         Self { high: (m >> 32) as u32, low: m as u32, e }
@@ -39,7 +39,7 @@ impl Real {
         Self::raw(m, e.wrapping_add(BIAS))
     }
 
-    /// The same for any `m` but 0.
+    /// The same for any `m` other than 0.
     const fn normal(m: u64, e: i32) -> Self {
         let zeros = m.leading_zeros();
         Self::raw(m << (zeros & 63), e.wrapping_sub_unsigned(zeros))
@@ -49,12 +49,12 @@ impl Real {
         (self.high as u64) << 32 | self.low as u64
     }
 
-    /// The exponent of `m`.
+    /// Returns the exponent of `m`.
     const fn e(self) -> i32 {
         self.e.wrapping_sub(BIAS)
     }
 
-    /// A whole number.
+    /// Converts a whole number.
     pub(super) const fn new(n: u64) -> Self {
         Self::fixed(n, 0)
     }
@@ -68,7 +68,7 @@ impl Real {
         Self::from_parts(n << zeros, 0_i32.wrapping_sub_unsigned(zeros).wrapping_sub(bits))
     }
 
-    /// In units of `2^-bits`, truncated; the largest number if it does not fit.
+    /// Converts to units of `2^-bits`, truncated; the largest number if it does not fit.
     pub(super) const fn to_fixed(self, bits: i32) -> u64 {
         let shift = self.e().saturating_add(bits);
         match shift {
@@ -82,7 +82,7 @@ impl Real {
         }
     }
 
-    /// As [`to_fixed`](Self::to_fixed), up to 2^126.
+    /// Does the same as [`to_fixed`](Self::to_fixed), up to 2^126.
     pub(super) const fn to_wide(self, bits: i32) -> i128 {
         let shift = self.e().saturating_add(bits);
         match shift {
@@ -92,7 +92,7 @@ impl Real {
         }
     }
 
-    /// Times `x` and 2^`bits`, up to 2^126.
+    /// Multiplies by `x` and 2^`bits`, up to 2^126.
     #[expect(clippy::cast_possible_wrap, reason = "the top bit is shifted out or known to be 0")]
     pub(super) const fn times(self, x: u64, bits: i32) -> i128 {
         let (high, low) = product(self.m(), x);
@@ -108,7 +108,7 @@ impl Real {
         }
     }
 
-    /// Times a part in 2^-64, truncated; the largest number if it does not fit.
+    /// Multiplies by a fraction in 2^-64, truncated; the largest number if it does not fit.
     pub(super) const fn part(self, x: u64) -> u64 {
         let whole = high(self.m(), x);
         let by = self.e().unsigned_abs();
@@ -121,7 +121,7 @@ impl Real {
         }
     }
 
-    /// Over a number in units of 2^-62, truncated; the largest number if it does not fit.
+    /// Divides by a number in units of 2^-62, truncated; the largest number if it does not fit.
     pub(super) const fn over(self, by: Inverse) -> u64 {
         let quotient = high(self.m(), by.per);
         let shift = self.e().saturating_add_unsigned(by.zeros).saturating_sub(1);
@@ -133,12 +133,12 @@ impl Real {
         }
     }
 
-    /// To divide by it: its digits, and the power of 2 of their unit.
+    /// Returns it as a divisor: its digits, and the power of 2 of their unit.
     pub(super) const fn inverse(self) -> (Inverse, i32) {
         (Inverse::new(self.m()), self.e())
     }
 
-    /// The exponent of the top bit: the number is from 2^this to less than twice that.
+    /// Returns the exponent of the top bit: the number is at least 2^this and less than twice that.
     pub(super) const fn exponent(self) -> i32 {
         self.e().wrapping_add(63)
     }
@@ -147,7 +147,7 @@ impl Real {
         self.high == 0
     }
 
-    /// Times 2^`by`.
+    /// Multiplies by 2^`by`.
     pub(super) const fn scaled(self, by: i32) -> Self {
         if self.is_zero() { self } else { Self { e: self.e.wrapping_add(by), ..self } }
     }
@@ -168,7 +168,7 @@ impl Real {
         if other > self { other } else { self }
     }
 
-    /// The root of the upper 32 bits, and two of Heron's steps, s + (m - s²) / 2s, with a reciprocal of s that is refined
+    /// Takes the root of the upper 32 bits, then two Heron steps, s + (m - s²) / 2s, with a reciprocal of s that is refined
     /// along with it.
     #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "differences in two's complement")]
     pub(super) fn sqrt(self) -> Self {
@@ -177,7 +177,7 @@ impl Real {
         }
         let (m, e) = (self.m(), self.e());
         let (m, e) = if e & 1 == 0 { (m, e) } else { (m >> 1, e.wrapping_add(1)) };
-        // 2^15 to 2^16, and 2^32 over it.
+        // The root is 2^15 to 2^16; below it is 2^32 divided by the root.
         let coarse = ((m >> 32) as u32).isqrt();
         let per = u64::from(u32::MAX.checked_div(coarse).unwrap_or(u32::MAX));
         let s = u64::from(coarse) << 16;
@@ -188,7 +188,7 @@ impl Real {
         // 2^63 / s to 28 bits: x (2 - s x).
         let rest = (1_u64 << 48).wrapping_sub((s >> 15).wrapping_mul(per)) as i64;
         let per = (per << 15).wrapping_add((rest.wrapping_mul(per as i64) >> 33) as u64);
-        // With 32 bits below the point the upper half of the square is m but for 36 bits.
+        // With 32 bits below the point, the upper half of the square equals m except for 36 bits.
         let s = s << 17;
         let (square, _) = product(s, s);
         let off = m.wrapping_sub(square) as i64;
@@ -277,11 +277,11 @@ impl Div for Real {
     }
 }
 
-/// A number of 64 bits to divide by.
+/// A 64-bit divisor.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Inverse {
-    /// 2^127 over it, with its leading `zeros` shifted out.
+    /// 2^127 divided by it, with its leading `zeros` shifted out.
     per: u64,
     zeros: u32,
 }
@@ -294,18 +294,19 @@ impl Inverse {
         if zeros == 64 { Self { per: u64::MAX, zeros } } else { Self { per: reciprocal(x << zeros), zeros } }
     }
 
-    /// As [`of`](Self::of) in units of 2^-32, at most a few of them too much, and of a number in units of 2^32 of its own.
+    /// Does the same as [`of`](Self::of) in units of 2^-32, for a number in units of 2^32 times its own; the result is at
+    /// most a few units too large.
     pub(super) fn rough(self, x: u32) -> u32 {
         let quotient = upper(x, (self.per >> 32) as u32);
         if quotient.leading_zeros() > self.zeros { quotient << self.zeros << 1 } else { u32::MAX }
     }
 
-    /// The part of it that 2^`bits` is, as its first digits over 2^64 and a power of 2; `None` if it is less than that.
+    /// Returns 2^`bits` divided by it, as the first digits in 2^-64 and a power of 2; `None` if it is less than 2^`bits`.
     pub(super) fn part(self, bits: u32) -> Option<(u64, u32)> {
         Some((self.per, 63_u32.checked_sub(bits)?.checked_sub(self.zeros)?))
     }
 
-    /// `x` over it in units of 2^-64; the largest number from 1 on.
+    /// Returns `x` divided by it in units of 2^-64; the largest number if the quotient is 1 or more.
     #[inline(never)]
     pub(super) const fn of(self, x: u64) -> u64 {
         let quotient = high(x, self.per);
@@ -319,25 +320,25 @@ impl Inverse {
     }
 }
 
-/// A product over 2^`down`, 1 to 63, modulo 2^64.
+/// Returns a product divided by 2^`down`, 1 to 63, modulo 2^64.
 #[inline]
 pub(super) const fn middle(a: u64, b: u64, down: u32) -> u64 {
     let (high, low) = product(a, b);
     high << (64_u32.wrapping_sub(down) & 63) | low >> (down & 63)
 }
 
-/// The upper half of a product of 64 bits, rounded up.
+/// Returns the upper half of a 64-bit product, rounded up.
 pub(super) const fn upper(a: u32, b: u32) -> u32 {
     ((a as u64).wrapping_mul(b as u64) >> 32).saturating_add(1) as u32
 }
 
-/// The upper half of a product.
+/// Returns the upper half of a product.
 #[inline]
 pub(super) const fn high(a: u64, b: u64) -> u64 {
     product(a, b).0
 }
 
-/// Both halves of a product of 128 bits, on a 32-bit core in multiplications that it has.
+/// Returns both halves of a 128-bit product; on a 32-bit core it uses only multiplications that the core has.
 #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
 #[inline]
 const fn product(a: u64, b: u64) -> (u64, u64) {
@@ -353,8 +354,8 @@ const fn product(a: u64, b: u64) -> (u64, u64) {
     (high, other << 32 | low as u32 as u64)
 }
 
-/// `2^127 / d` for a `d` with its top bit set, to 59 bits at least: 16 bits by division, then twice as many and twice as
-/// many again by Newton's steps x (2 - d x).
+/// Returns `2^127 / d` for a `d` with its top bit set, exact to at least 59 bits: 16 bits by division, then doubled twice
+/// by Newton steps x (2 - d x).
 #[expect(
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
@@ -388,7 +389,7 @@ mod tests {
 
     #[expect(clippy::cast_precision_loss, reason = "compared within 2^-50")]
     fn float(x: Real) -> f64 {
-        // The power of two by its bits: Miri makes `exp2` wrong in the last ones, as it may be.
+        // The power of two is built from its bits: Miri makes the last bits of `exp2` wrong, as they may be.
         if x.is_zero() { 0.0 } else { x.m() as f64 * f64::from_bits(u64::try_from(x.e() + 1023).unwrap() << 52) }
     }
 
@@ -428,7 +429,7 @@ mod tests {
         }
     }
 
-    /// Squares of whole numbers have their roots to 58 bits.
+    /// The roots of squares of whole numbers are exact to 58 bits.
     #[test]
     fn roots_of_squares() {
         for bits in 0..32_u32 {

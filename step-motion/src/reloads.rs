@@ -1,11 +1,11 @@
 //! Motion in the reloads of a timer.
 
-/// The next value to load into a timer.
+/// A value to load into a timer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reload {
-    /// Ticks until it runs out, from 1 to its maximum. Many timers need one less in their register.
+    /// Ticks until the timer runs out, from 1 to its maximum. Many timers need one less in their register.
     pub ticks: u32,
     /// Whether a step is due then; if not, the timer is too short for the interval and this is only part of it.
     pub step: bool,
@@ -20,7 +20,7 @@ pub struct Reloads<I> {
     ticks: I,
     longest: u32,
     last: u64,
-    /// The step after `last`, if its interval has begun.
+    /// The step after `last`, once its interval has begun.
     next: Option<u64>,
 }
 

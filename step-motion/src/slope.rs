@@ -3,11 +3,11 @@
 use crate::limits::Bounds;
 use crate::real::Real;
 
-/// From one speed to another in the least time: jerk, constant acceleration, jerk back; without a jerk limit the middle
-/// alone.
+/// From one speed to another in the least time: jerk, constant acceleration, jerk back; without a jerk limit only the
+/// middle part.
 ///
-/// With dv the change of speed, a² / j <= dv reaches the greatest acceleration and takes dv / a + a / j. A smaller one
-/// takes 2 sqrt(dv / j) and has no middle. The distance is the mean of both speeds times the time in either case.
+/// A change of speed dv of at least a² / j reaches the greatest acceleration and takes dv / a + a / j. A smaller one takes
+/// 2 sqrt(dv / j) and has no middle part. The distance is the mean of both speeds times the time in either case.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slope {
     pub(super) from: Real,
@@ -40,12 +40,12 @@ impl Slope {
     }
 }
 
-/// The least distance of a change of speed.
+/// Returns the least distance of a change of speed.
 pub(super) fn distance(from: Real, to: Real, bounds: &Bounds) -> Real {
     if from == to { Real::ZERO } else { Slope::new(from, to, bounds).distance }
 }
 
-/// At least as much, without a root: as if the greatest acceleration were reached.
+/// Returns at least that distance, without taking a root: as if the greatest acceleration were reached.
 pub(super) fn most_distance(from: Real, to: Real, bounds: &Bounds) -> Real {
     let edge = bounds.jerk.map_or(Real::ZERO, |jerk| jerk.edge);
     (from + to).half() * (from.distance(to) * bounds.per_a + edge)

@@ -1,4 +1,4 @@
-//! The interrupt half of a motion: it only makes additions.
+//! The interrupt half of a motion: it only adds.
 
 use core::sync::atomic::{Ordering, fence};
 
@@ -35,9 +35,9 @@ impl Fired {
     }
 }
 
-/// It stands: an event that is none, behind which something may follow.
+/// The head of a stopped timer: an event that does nothing, after which motion may follow.
 const STANDING: u32 = JOINT | REST | 1;
-/// Of a queue without slots.
+/// The slot of a queue that has none.
 static NOWHERE: Slot = Slot::new();
 
 /// The step interrupt of an axis.
@@ -66,11 +66,11 @@ static NOWHERE: Slot = Slot::new();
 #[derive(Debug)]
 pub struct StepTimer<'q, const N: usize> {
     queue: &'q Queue<N>,
-    /// The segment under way, or the one that it stands behind.
+    /// The present segment, or the one after which the timer has stopped.
     slot: &'q Slot,
-    /// What this event is, and how many are left in the segment, this one included.
+    /// The kind of this event, and how many are left in the segment, including this one.
     head: u32,
-    /// Part of a tick that the next event is later than its tick, in 2^-32.
+    /// How much later than its tick the next event is, in 2^-32 ticks.
     fraction: u32,
     interval: u64,
     add: u64,
@@ -107,19 +107,19 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         self.event(|slot, _| slot.next.load(Ordering::Relaxed))
     }
 
-    /// The event that is due; `next` says which slot follows the one that is over, of which it gets the head.
+    /// Makes the event that is due; `next` gets the head of the slot that has ended and says which slot follows.
     #[inline(always)]
     pub(crate) fn event(&mut self, next: impl FnOnce(&Slot, u32) -> u32) -> Fired {
         let queue = self.queue;
         let head = self.head;
-        // Nobody else writes there.
+        // Nothing else writes there.
         #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "-1, 0 or 1 in the top bits")]
         let made = queue.made.load(Ordering::Relaxed).wrapping_add((head as i32 >> DELTA) as u32);
         queue.made.store(made, Ordering::Relaxed);
         let left = head.wrapping_sub(1);
         let interval = if left & COUNT == 0 {
             let next = next(self.slot, head);
-            // The slot has been written before it was linked, and the one before it is read before its block is free.
+            // The slot was written before it was linked, and the previous one is read before its block is freed.
             fence(Ordering::AcqRel);
             let Some(slot) = queue.slots.get(next as usize) else { return self.idle(head) };
             queue.current.store(next, Ordering::Relaxed);
@@ -140,7 +140,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Fired { head, wait: whole.wrapping_add(u32::from(carry)) }
     }
 
-    /// The last event has been; nothing follows.
+    /// Stops the timer after the last event.
     #[cold]
     #[inline(never)]
     fn idle(&mut self, head: u32) -> Fired {

@@ -5,21 +5,21 @@ use crate::cutter::{Cutter, Demand, Stretch};
 use crate::phases::Frame;
 use crate::real::Real;
 
-/// Makes the steps of an axis on a curve, one after another.
+/// Makes the steps of an axis on a curve, one at a time.
 ///
-/// Step k falls into the tick nearest to the time at which the position passes k - 1/2. The times come from segments that are exact to a
-/// part of a tick. That tells in which tick most steps fall; the few others are searched.
+/// Step k falls into the tick nearest to the time at which the position passes k - 1/2. The times come from segments that
+/// are exact to a fraction of a tick. This determines the tick of most steps; the few others are found exactly.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
     pub(super) cutter: Cutter,
-    /// Steps left of the segment, the time of the last one made, and the differences from there.
+    /// Steps left in the segment, the time of the last one made, and the differences from there.
     left: u32,
     time: i128,
     differences: [i64; 3],
 }
 
-/// A tick in times, and what a time may be off.
+/// A tick in units of time, and how far off a time may be.
 const TICK: i128 = 1 << 32;
 const BLUR: u32 = 1 << 26;
 
@@ -33,11 +33,11 @@ impl Stepper {
         self.cutter.count().wrapping_sub(self.left)
     }
 
-    /// The tick of the next step; `None` after the last one.
+    /// Returns the tick of the next step; `None` after the last one.
     #[inline]
     pub(super) fn next(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
         if self.left == 0 {
-            // Half of the doubt is left for rounding.
+            // Half of the tolerance is left for rounding.
             let tick = Real::fixed(1 << frame.shift, 7);
             let Stretch { count, first, differences } =
                 self.cutter.next(curve, frame, &Demand { off: tick, coarse: None, time: u64::MAX })?;
@@ -57,7 +57,7 @@ impl Stepper {
     }
 }
 
-/// The tick into which a time in 2^-32 ticks falls.
+/// Returns the tick into which a time in 2^-32 ticks falls.
 pub(super) fn tick(time: i128) -> u64 {
     u64::try_from(time.wrapping_add(TICK / 2) >> 32).unwrap_or(0)
 }

@@ -1,19 +1,19 @@
-//! Segments on their way into the slots of a block.
+//! Writes segments into the slots of a block.
 
 use servowire_core::Direction;
 
 use crate::cutter::Stretch;
 use crate::queue::{Joint, Kind, Queue, Segment};
 
-/// A tick in times.
+/// A tick in units of time.
 pub(crate) const TICK: i128 = 1 << 32;
 /// The longest wait in an event, in ticks.
 pub(crate) const LONGEST: u32 = 1 << 30;
 
-/// Where segments are put.
+/// Where the next segment is written.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Writer {
-    /// The end of what has been cut, in 2^-32 ticks, as the interrupt's sum has it; and DIR there, if that is known.
+    /// The end of what has been cut, in 2^-32 ticks as the interrupt adds them up; and DIR there, if it is known.
     pub(crate) end: i128,
     pub(crate) dir: Option<Direction>,
     /// Slots of the block that are filled.
@@ -21,12 +21,12 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    /// At the begin of a block.
+    /// Creates a writer at the start of a block.
     pub(crate) const fn new(end: i128, dir: Option<Direction>) -> Self {
         Self { end, dir, len: 0 }
     }
 
-    /// Steps behind what there is; before them DIR, where it changes, and a wait that an event cannot hold.
+    /// Appends steps; before them a change of DIR, if there is one, and a wait if it is too long for one event.
     pub(crate) fn put_steps<const N: usize>(
         &mut self,
         to: (&Queue<N>, usize),
@@ -49,7 +49,7 @@ impl Writer {
         self.end = stretch.last().wrapping_add(late);
     }
 
-    /// Nothing until a time.
+    /// Appends a wait until a time.
     pub(crate) fn put_wait<const N: usize>(&mut self, to: (&Queue<N>, usize), until: i128) {
         let kind = self.rest(Joint::No);
         let mut left = until.saturating_sub(self.end);
@@ -68,7 +68,7 @@ impl Writer {
         }
     }
 
-    /// Where all axes of a path have an event, which is to be after the last one of this axis.
+    /// Appends an event that all axes of a path share; it must come after the last event of this axis.
     pub(crate) fn put_joint<const N: usize>(&mut self, to: (&Queue<N>, usize), at: i128, joint: Joint) {
         if at.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
             self.put_wait(to, at.saturating_sub(TICK));
@@ -77,12 +77,13 @@ impl Writer {
         self.end = at;
     }
 
-    /// An event that is no step.
+    /// Returns the kind of an event without a step.
     fn rest(&self, joint: Joint) -> Kind {
         Kind { step: false, reverse: self.dir.is_some_and(Direction::dir), joint }
     }
 
-    /// Events, the first one at a time, and the differences from there on. Where they begin anew is one step before them.
+    /// Appends events: the time of the first one, and the differences from it. Restarting the differences takes them one
+    /// step back.
     fn put<const N: usize>(
         &mut self,
         (queue, block): (&Queue<N>, usize),
@@ -103,7 +104,7 @@ impl Writer {
     }
 }
 
-/// The tick of a time as the interrupt has it, half a tick on.
+/// Returns the tick of a time as the interrupt counts it, half a tick later.
 pub(crate) fn tick(time: i128) -> u64 {
     u64::try_from(time >> 32).unwrap_or(0)
 }

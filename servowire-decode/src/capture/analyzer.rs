@@ -6,7 +6,7 @@
 //! "Async Serial","data",0.000592672,0.0000038,0x1A     0.000592672000000,0x1A,,
 //! ```
 //! A row is a byte with its time. The line is reconstructed from the rows: a start bit, eight bits with the lowest first, a
-//! delimiter. So gaps separate the frames, and two analysers are two channels.
+//! delimiter. Gaps therefore separate the frames, and two analysers give two channels.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -35,11 +35,11 @@ pub(super) struct Analyzer {
     lines: Lines,
     columns: Columns,
     channels: Vec<String>,
-    /// Rows that were read to know the channels.
+    /// Rows that were read to determine the channels.
     waiting: VecDeque<(u64, Row)>,
     /// Picoseconds.
     bit: f64,
-    /// The first time, where times are dates.
+    /// The first time, if times are dates.
     origin: Option<Time>,
     /// Edges drawn but not yet returned, the earliest first.
     drawn: BinaryHeap<Reverse<(Time, u64, u16, bool)>>,
@@ -74,7 +74,7 @@ struct Row {
     delimiter: bool,
 }
 
-/// Whether a file begins like a table of bytes.
+/// Returns whether a file begins like a table of bytes.
 pub(super) fn looks_like(head: &[u8]) -> bool {
     let line = head.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
     let text = String::from_utf8_lossy(line).to_lowercase().replace('"', "");
@@ -83,7 +83,7 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
 }
 
 impl Columns {
-    /// By the names in lower case.
+    /// Finds the columns by their names in lower case.
     fn of(names: &[&str]) -> Option<Self> {
         let find = |wanted: &[&str]| names.iter().position(|name| wanted.contains(name));
         let start = find(&["start_time", "time [s]", "time[s]"])?;
@@ -103,7 +103,7 @@ impl Columns {
 }
 
 impl Analyzer {
-    /// Reads the heading, and rows enough to know the analysers.
+    /// Reads the heading, and enough rows to determine the analysers.
     pub(super) fn new(input: Input) -> Result<Self, Fault> {
         let mut lines = Lines::new(input);
         let mut heading = Vec::new();
@@ -154,7 +154,7 @@ impl Analyzer {
         Ok(table)
     }
 
-    /// Length of a bit in picoseconds: from the durations, otherwise from bytes that follow each other without a gap.
+    /// Returns the length of a bit in picoseconds: from the durations, otherwise from bytes without a gap between them.
     fn length(&self) -> Option<f64> {
         let mut durations: Vec<i64> = self.waiting.iter().filter_map(|(_, row)| row.duration).collect();
         durations.sort_unstable();
@@ -169,7 +169,7 @@ impl Analyzer {
         apart.get(apart.len() / 8).map(|apart| *apart as f64 / FIELD_BITS as f64)
     }
 
-    /// The next row that holds a byte, with its line.
+    /// Returns the next row that holds a byte, with its line.
     fn next_row(&mut self) -> Result<Option<(u64, Row)>, Fault> {
         let mut text = Vec::new();
         while self.lines.next(&mut text)? {
@@ -224,7 +224,7 @@ impl Analyzer {
         }))
     }
 
-    /// Draws a byte; edges earlier than it can then be returned.
+    /// Draws a byte; edges before it can then be returned.
     fn draw(&mut self, row: &Row) -> Result<(), String> {
         let Some(channel) = self.channels.iter().position(|known| *known == row.name) else {
             return Err(format!("the analyser {:?} has no byte before this one", row.name));
@@ -266,7 +266,7 @@ impl Analyzer {
     }
 }
 
-/// The cells of a line, without their quotes.
+/// Returns the cells of a line, without their quotes.
 fn cells(line: &[u8]) -> Vec<String> {
     titles(&String::from_utf8_lossy(line), b',')
 }

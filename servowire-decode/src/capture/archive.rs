@@ -1,7 +1,7 @@
 //! Sessions that are zip files: sigrok and PulseView (`.sr`), DSView (`.dsl`).
 //!
 //! Both begin with a list of keys and values that names the channels and the sample rate. sigrok's samples follow in
-//! chunks of all channels together, DSView's in blocks of one channel each, a bit a sample.
+//! chunks of all channels together, DSView's in blocks of one channel each, one bit per sample.
 
 use std::io::{self, Read, SeekFrom, Take};
 
@@ -16,7 +16,7 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::{self, Clock, Time};
 
-/// A longer list of keys cannot be one.
+/// A longer file is not a list of keys.
 const MOST_KEYS: u64 = 1 << 20;
 
 type Archive = ZipArchive<Box<dyn SeekRead>>;
@@ -41,7 +41,7 @@ pub(super) fn open(input: Input) -> Result<Capture, Fault> {
     }
 }
 
-/// A small entry as text.
+/// Reads a small entry as text.
 fn text(archive: &mut Archive, name: &str) -> Result<String, String> {
     let mut bytes = Vec::new();
     let entry = archive.by_name(name).map_err(|e| format!("its {name} cannot be read: {e}"))?;
@@ -49,7 +49,7 @@ fn text(archive: &mut Archive, name: &str) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// `key=value` lines; blanks around both mean nothing.
+/// Reads `key=value` lines; blanks around both are ignored.
 fn keys(text: &str) -> impl Iterator<Item = (&str, &str)> {
     text.split(['\n', '\r']).filter(|line| !line.starts_with('#')).filter_map(|line| {
         let (key, value) = line.split_once('=')?;
@@ -100,7 +100,7 @@ fn sigrok(name: &str, mut archive: Archive) -> Result<Capture, Fault> {
     Ok(Capture::Samples(Raw::with_channels(input, rate, Unit::Bytes(unit), channels)))
 }
 
-/// A value of a key file: `\s` and its like.
+/// Decodes a value of a key file with its escapes, such as `\s`.
 fn unescaped(text: &str) -> String {
     let mut out = String::new();
     let mut letters = text.chars();
@@ -150,7 +150,7 @@ impl Open {
 
 /// The chunks of a session, one after another.
 struct Chunks {
-    /// The remaining chunks; one that cannot be read is the last.
+    /// The remaining chunks; a chunk that cannot be read is the last.
     left: std::vec::IntoIter<io::Result<Chunk>>,
     /// Between two chunks.
     file: Option<Box<dyn SeekRead>>,
@@ -219,7 +219,7 @@ impl Read for Chunks {
 
 /// Maximum number of samples in a block of a DSView channel; blocks are shorter at the beginning and at the end.
 const DSVIEW_BLOCK: u64 = 1 << 24;
-/// Number of bytes of all channels that are searched for changes at once.
+/// Bytes of all channels that are searched for changes at once.
 const PIECE: usize = 1 << 12;
 
 /// A DSView session, version 2 or 3.

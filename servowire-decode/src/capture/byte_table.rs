@@ -24,14 +24,14 @@ pub struct ByteTable {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Columns {
     separator: u8,
-    /// With the parts of a second that it counts.
+    /// A column of times, with the fraction of a second that it counts.
     time: Option<(usize, i64)>,
     direction: Option<usize>,
     data: usize,
 }
 
 impl Columns {
-    /// By the names of the heading; `None` if it is not a table of messages.
+    /// Finds the columns by their names; `None` if it is not a table of messages.
     fn of(heading: &str) -> Option<Self> {
         let separator = separator(heading.as_bytes());
         let names: Vec<String> = titles(&heading.to_lowercase(), separator);
@@ -78,7 +78,7 @@ fn direction(text: &str) -> Result<Direction, String> {
     of_side.ok_or_else(|| format!("{text:?} does not say who spoke: command or response, TX or RX, master or drive"))
 }
 
-/// Whether a file begins like a table of messages: by its heading, and a first row with more than a byte.
+/// Returns whether a file begins like a table of messages: with its heading, and a first row of more than one byte.
 pub(super) fn looks_like(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     let mut lines = text.lines().filter(|line| !is_remark(line));

@@ -1,10 +1,10 @@
 //! Logs of a CAN bus, as `candump` of can-utils writes them: recognised only to be refused with a clear message.
 
-/// The message for them.
+/// The message for such a log.
 pub(super) const REFUSED: &str = "a log of a CAN bus (candump): none of the protocols that are decoded runs on CAN. If an \
     adapter carried bytes of a serial line, cut them out, one burst per line, and give --bytes";
 
-/// Whether the first lines are frames of a CAN bus.
+/// Returns whether the first lines are frames of a CAN bus.
 ///
 /// ```text
 ///   can0  123   [8]  11 22 33 44 55 66 77 88         on the screen; a time in brackets may come first

@@ -18,12 +18,13 @@ const PARTS: u64 = 64;
 /// Maximum number of channels.
 const CHANNELS: usize = 65_535;
 
-/// The type of a block that holds a whole file, packed by gzip; its own length and that of the file follow.
+/// The type of a block that holds a whole file packed by gzip; its own length and the length of the file follow.
 const WRAPPED: u8 = 254;
 
 const DAMAGED: &str = "not valid FST: the file is damaged";
 
-/// The library panics on some damaged files. The files are at fault: `guard` returns from the panic, without a result.
+/// The library panics on some damaged files. `guard` catches the panic and returns no result, and the file is reported as
+/// faulty.
 fn guarded<T>(guard: Option<Guard>, call: impl FnOnce() -> T) -> Option<T> {
     let Some(guard) = guard else { return Some(call()) };
     let (mut call, mut result) = (Some(call), None);
@@ -49,7 +50,7 @@ pub struct Fst {
     guard: Option<Guard>,
     reader: FstReader<Box<dyn SeekRead>>,
     channels: Vec<String>,
-    /// Channel of a handle's index.
+    /// The channel for each handle index.
     of_handle: HashMap<usize, u16>,
     last: Vec<Option<bool>>,
     /// Power of ten of the unit of time, in seconds.

@@ -1,7 +1,7 @@
 //! Bytes as text: a log of a serial monitor or a debugger, a dump, an array of C or Rust.
 //!
 //! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `TX: 1A -> RX: 1A 20` are all read; text after `#` or `//` is a comment.
-//! The bytes of one line of a log followed each other without a pause; a dump or an array is one burst.
+//! The bytes of a log line are taken as one burst without pauses; so is a dump or an array as a whole.
 
 mod dump;
 pub(super) mod words;
@@ -29,7 +29,7 @@ pub struct HexLog {
     input: Input,
     text: Vec<u8>,
     line: u64,
-    /// Bytes were read, so this is a log.
+    /// Bytes were read, so the file is a log.
     good: bool,
     shape: Shape,
     ready: VecDeque<Burst>,
@@ -85,7 +85,7 @@ impl Burst {
     }
 }
 
-/// Whether a file looks like a log of bytes.
+/// Returns whether a file looks like a log of bytes.
 pub(super) fn looks_like(head: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(head.get(..head.len().min(1 << 12)).unwrap_or(head)) else { return false };
     if text.bytes().any(|byte| byte < b' ' && !matches!(byte, b'\t' | b'\r' | b'\n')) {
@@ -103,10 +103,10 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
 struct Sample {
     /// Lines with bytes.
     good: usize,
-    /// Lines that are something else.
+    /// Other lines.
     bad: usize,
     bytes: usize,
-    /// A line has a time.
+    /// At least one line has a time.
     timed: bool,
 }
 

@@ -71,7 +71,7 @@ impl Format {
     }
 }
 
-/// Calls a function and returns even if it panics. Without a guard, the argument is called directly.
+/// Calls a function and returns even if it panics. If no guard is set, the function is called directly.
 pub type Guard = fn(&mut dyn FnMut());
 
 /// Hints from the user about the files.

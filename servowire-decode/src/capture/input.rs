@@ -12,7 +12,7 @@ use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
 
-/// Bytes by which a file is recognised.
+/// Bytes from which a file is recognised.
 pub(super) const HEAD: usize = 1 << 12;
 
 /// Maximum depth to which packed files inside packed files are unpacked.
@@ -66,7 +66,7 @@ pub struct Input {
     head: Vec<u8>,
     head_taken: usize,
     taken: Rc<Cell<u64>>,
-    /// The bytes are counted elsewhere.
+    /// A reader whose bytes are counted elsewhere.
     quiet: bool,
 }
 
@@ -182,7 +182,7 @@ impl Input {
         Ok(&self.head)
     }
 
-    /// Returns whether nothing but the head is available for the moment.
+    /// Returns whether nothing but the beginning is available at the moment.
     fn waits(&mut self) -> bool {
         self.reader.buffer().is_empty() && self.reader.get_mut().live().is_some_and(|source| !source.is_ready())
     }
@@ -207,7 +207,7 @@ impl Input {
         self.fault(at, format!("cannot be read: {}", plain(error)))
     }
 
-    /// Leaves out so many bytes of a file, without reading them; not of what comes as a stream, nor of what was looked at before.
+    /// Skips this many bytes of a file without reading them; not in a stream, nor in what has been read ahead.
     pub(super) fn skip(&mut self, bytes: u64) -> io::Result<bool> {
         let buffered = self.reader.buffer().len();
         let Some(rest) = bytes.checked_sub(buffered as u64).and_then(|rest| i64::try_from(rest).ok()) else {

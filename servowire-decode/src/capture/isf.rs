@@ -17,7 +17,7 @@ use crate::time::Time;
 
 /// The longest preamble.
 const LONGEST: usize = 1 << 12;
-/// Samples read at once, and examined for the levels.
+/// Samples read at once, and samples examined for the levels.
 const BLOCK: usize = 1 << 16;
 
 /// A waveform after its preamble.
@@ -25,16 +25,16 @@ pub struct Isf {
     input: Input,
     channel: [String; 1],
     encoding: Encoding,
-    /// Volts of a step, and at 0.
+    /// Volts per step, and volts at step 0.
     scale: f64,
     zero: f64,
-    /// Time of the first sample and from one to the next, in picoseconds.
+    /// Time of the first sample, and the interval from one sample to the next, in picoseconds.
     start: f64,
     period: f64,
     /// Remaining bytes of the curve; `None` if it extends to the end of the file.
     left: Option<u64>,
     threshold: Threshold,
-    /// Samples that were read to know the levels.
+    /// Samples that were read to determine the levels.
     waiting: Vec<f64>,
     level: Option<bool>,
     count: u64,
@@ -47,7 +47,7 @@ enum Encoding {
     Ascii,
 }
 
-/// Whether a file begins with a preamble.
+/// Returns whether a file begins with a preamble.
 pub(super) fn looks_like(head: &[u8]) -> bool {
     let text = head.trim_ascii_start();
     let text = text.strip_prefix(b":").unwrap_or(text);
@@ -78,7 +78,7 @@ fn items(text: &str) -> Vec<(String, String)> {
 }
 
 impl Isf {
-    /// Reads the preamble, and samples enough to know the levels.
+    /// Reads the preamble, and enough samples to determine the levels.
     pub fn new(mut input: Input, threshold: Option<f64>) -> Result<Self, Fault> {
         let preamble = preamble(&mut input)?;
         let items = items(&preamble);
@@ -180,7 +180,7 @@ impl Isf {
     }
 }
 
-/// The preamble up to the curve.
+/// Reads the preamble up to the curve.
 fn preamble(input: &mut Input) -> Result<String, Fault> {
     let mut text = Vec::new();
     loop {

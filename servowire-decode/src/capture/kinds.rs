@@ -51,7 +51,7 @@ impl ByteLog {
         }
     }
 
-    /// Returns whether it says when its bytes were sent. Call it before anything is read.
+    /// Returns whether the log says when its bytes were sent. Call it before anything is read.
     pub fn has_times(&mut self) -> bool {
         match self {
             Self::Hex(log) => log.has_times(),

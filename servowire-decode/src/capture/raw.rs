@@ -15,7 +15,7 @@ pub enum Unit {
     Bytes(usize),
 }
 
-/// Bytes read at once: a multiple of 64 samples of every unit.
+/// Bytes read at once: a multiple of 64 samples of any unit.
 const BLOCK: usize = 1 << 16;
 
 /// A file of samples.
@@ -27,16 +27,16 @@ pub struct Raw {
     /// The channel of each bit of a sample.
     of_bit: Vec<Option<u16>>,
     block: Vec<u8>,
-    /// How much of it was filled and is not read, in bytes and samples.
+    /// How much of it is filled and has not been read yet, in bytes and samples.
     filled: Option<(usize, u64)>,
-    /// The samples of one channel in it, eight a byte.
+    /// The samples of one channel in it, eight per byte.
     packed: Vec<u8>,
     /// The last sample, from which changes are determined.
     last: Option<u64>,
     samples: u64,
     /// Reported when the whole samples before it have been taken.
     ragged: Option<Fault>,
-    /// What was left out before what is read next.
+    /// What was skipped before the next data.
     hole: Option<Hole>,
 }
 
@@ -108,7 +108,8 @@ impl Raw {
         Ok((got - rest, (got / n) as u64))
     }
 
-    /// Packs the samples of one channel, a byte each. None where another one moves, or where they do not fill whole bytes.
+    /// Packs the samples of one channel, if a sample is one byte. Returns `None` if another channel moves, or if the
+    /// samples do not fill whole bytes.
     fn pack(&mut self, channel: u16, bytes: usize) -> Option<()> {
         const ONES: u64 = 0x0101_0101_0101_0101;
         let last = self.last?;
@@ -124,19 +125,19 @@ impl Raw {
             if samples & others != still {
                 return None;
             }
-            // The bits of eight bytes come together in the highest byte.
+            // This gathers the bits of eight bytes in the highest byte.
             *packed = ((samples >> bit & ONES).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8;
         }
         self.last = self.block.get(..bytes)?.last().map_or(self.last, |last| Some(u64::from(*last)));
         Some(())
     }
 
-    /// The bits that are channels.
+    /// Returns the bits that are channels.
     fn mask(&self) -> u64 {
         (0..64).filter(|bit| self.of_bit.get(*bit).copied().flatten().is_some()).fold(0, |m, bit| m | 1 << bit)
     }
 
-    /// The changes between the last sample and the next ones, whose bits are the channels.
+    /// Appends the changes between the last sample and the next ones, if the bits of a sample are the channels.
     fn differences(&mut self, bytes: usize, changes: &mut Vec<Change>) {
         let mask = self.mask();
         let block = self.block.get(..bytes).unwrap_or_default();
@@ -160,7 +161,7 @@ impl Raw {
                     if last.is_none() {
                         see(&mut last, index, word & 1);
                     }
-                    // A one where a sample differs from the one before.
+                    // A bit is 1 where a sample differs from the previous one.
                     let before = last.unwrap_or(0);
                     let mut edges = word ^ (word << 1 | before);
                     if count < 64 {
@@ -175,7 +176,7 @@ impl Raw {
             }
             Unit::Bytes(1) => {
                 for (index, eight) in (self.samples..).step_by(8).zip(block.chunks(8)) {
-                    // Eight samples like the one before: nothing to see.
+                    // Eight samples like the previous one: no change.
                     let same = last.is_some_and(|last| little_endian(eight) == (last & 0xff) * 0x0101_0101_0101_0101);
                     if !same {
                         for (k, sample) in (0..).zip(eight) {
@@ -248,7 +249,7 @@ impl Line for Raw {
         self.hole.take()
     }
 
-    /// By whole blocks of 64 samples, in a file that can go forward.
+    /// Skips whole blocks of 64 samples, in a file that can seek.
     fn skip(&mut self, to: Time) -> Result<bool, Fault> {
         let (from, next) = (self.samples, self.clock.index(to) / 64 * 64);
         let bytes = |samples: u64| match self.unit {

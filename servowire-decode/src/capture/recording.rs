@@ -36,9 +36,9 @@ pub trait Line {
     /// appended, and nothing more will come.
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
 
-    /// The next samples of a channel instead of the next changes, of a recording of samples in which no other channel moves
-    /// meanwhile; nothing of another one, or as long as the first levels have not been read. What it does not give is
-    /// [`read`](Self::read).
+    /// Returns the next samples of a channel instead of the next changes, if this is a recording of samples and no other
+    /// channel moves meanwhile; otherwise nothing, nor before the first levels have been read. Anything it does not return
+    /// comes from [`read`](Self::read).
     fn samples(&mut self, channel: u16) -> Option<Result<Samples<'_>, Fault>> {
         let _ = channel;
         None
@@ -52,12 +52,12 @@ pub trait Line {
         None
     }
 
-    /// When it was recorded, in the words of the file, which rarely say of which time zone.
+    /// When it was recorded, in the words of the file, which rarely name the time zone.
     fn date(&self) -> Option<&str> {
         None
     }
 
-    /// Goes on at a time instead of reading what is before it, if that can be; the levels that the channels have then come next.
+    /// Skips to a time without reading what comes before it, if possible; the levels of the channels at that time come next.
     fn skip(&mut self, _to: Time) -> Result<bool, Fault> {
         Ok(false)
     }

@@ -15,7 +15,7 @@ use super::recording::{Change, Hole, Line};
 use crate::fault::{At, Fault};
 use crate::time::{self, Time};
 
-/// Changes given at once.
+/// Changes returned at once.
 const BLOCK: usize = 4096;
 /// Bytes of the header before the first chunk, and of the header of a chunk.
 const HEADER: usize = 16;
@@ -92,7 +92,7 @@ impl SaleaeBinary {
         Ok(file)
     }
 
-    /// The next bytes of the file.
+    /// Returns the next bytes of the file.
     fn bytes<const N: usize>(&mut self, missing: &str) -> Result<[u8; N], Fault> {
         let mut raw = [0; N];
         let at = At::Byte(self.at);
@@ -105,7 +105,7 @@ impl SaleaeBinary {
         Ok(raw)
     }
 
-    /// The header of the next chunk.
+    /// Reads the header of the next chunk.
     fn chunk(&mut self, changes: &mut Vec<Change>) -> Result<(), Fault> {
         self.chunks -= 1;
         let missing = "ends in the header of its transitions";
@@ -188,7 +188,7 @@ impl Line for SaleaeBinary {
     }
 }
 
-/// The next N bytes; zeros if they are missing, which an earlier length check rules out.
+/// Returns the next N bytes; zeros if they are missing, which an earlier length check rules out.
 fn take<const N: usize>(rest: &mut &[u8]) -> [u8; N] {
     let Some((first, after)) = rest.split_first_chunk::<N>() else { return [0; N] };
     *rest = after;

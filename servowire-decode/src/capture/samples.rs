@@ -53,7 +53,7 @@ impl<'a> Samples<'a> {
         self.clock
     }
 
-    /// Returns 64 samples that begin at number `at`, the oldest in bit 0, if all of them exist.
+    /// Returns the 64 samples from number `at` onwards, the oldest in bit 0, if all of them exist.
     #[inline]
     pub fn word(&self, at: u64) -> Option<u64> {
         let place = at.checked_sub(self.first)?;
@@ -61,7 +61,7 @@ impl<'a> Samples<'a> {
         let word = match (nine, place % 8) {
             (Some(nine), by) => {
                 let (low, high) = nine.split_at(8);
-                // Of the ninth byte the lowest `by` bits are taken.
+                // Takes the lowest `by` bits of the ninth byte.
                 little_endian(low) >> by | u64::from(*high.first()?) << 1 << (63 - by)
             }
             (None, 0) => u64::from_le_bytes(*self.bytes.get((place / 8) as usize..)?.first_chunk()?),
@@ -83,7 +83,7 @@ impl<'a> Samples<'a> {
         self.last_change(at, level)
     }
 
-    /// Does the same in the last samples.
+    /// Does the same for the last samples, which are fewer than 64.
     #[cold]
     fn last_change(&self, at: u64, level: bool) -> Option<u64> {
         (at..self.end()).find(|at| {
@@ -101,7 +101,7 @@ impl<'a> Samples<'a> {
         numbers.into_iter().zip([!before, before].into_iter().cycle()).map(move |(at, level)| (clock.time(at), level))
     }
 
-    /// The same in pieces of so many samples that the numbers of their changes fit into a near memory.
+    /// Returns the same samples in pieces so small that the numbers of their changes fit into the cache.
     pub(crate) fn pieces(self) -> impl Iterator<Item = Self> {
         let mut before = self.before;
         let mut first = self.first;
@@ -112,7 +112,8 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// All changes, by time, with room for their numbers. Runs are even that last between `least` and `most` picoseconds.
+    /// Returns all changes by time; `room` holds their numbers. A run is even if it lasts between `least` and `most`
+    /// picoseconds.
     pub(crate) fn turns(self, room: &mut Vec<u64>, least: i64, most: i64) -> Turns<'_> {
         room.clear();
         self.numbers(room);
@@ -140,30 +141,30 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Bytes of samples that are looked at together.
+/// Bytes of samples that are examined together.
 const PIECE: usize = 1 << 10;
 
 /// The changes of a piece of a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct Turns<'a> {
-    /// Of the samples before which the level changes.
+    /// Numbers of the samples before which the level changes.
     numbers: &'a [u64],
-    /// Changes that are told.
+    /// Number of changes reported so far.
     told: usize,
-    /// The level after the last of them.
+    /// The level after the last of these.
     level: bool,
     clock: Clock,
     even: RangeInclusive<u64>,
 }
 
 impl<'a> Turns<'a> {
-    /// The change that was told last.
+    /// Returns the time of the change reported last.
     pub(crate) fn told_at(&self) -> Option<Time> {
         Some(self.clock.time(*self.numbers.get(self.told.checked_sub(1)?)?))
     }
 
-    /// Changes from the last one told on, each with an even run behind it, at most so many: all of them are told then, and the one
-    /// behind them.
+    /// Returns at most this many changes, starting with the one reported last, each followed by an even run. All of them
+    /// then count as reported, and so does the change after them.
     pub(crate) fn even(
         &mut self,
         most: usize,
@@ -195,7 +196,7 @@ impl Iterator for Turns<'_> {
     }
 }
 
-/// Up to 8 bytes as a number.
+/// Reads up to 8 bytes as a number.
 pub(super) fn little_endian(bytes: &[u8]) -> u64 {
     match bytes.first_chunk() {
         Some(whole) => u64::from_le_bytes(*whole),

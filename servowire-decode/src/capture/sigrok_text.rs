@@ -33,7 +33,7 @@ pub struct SigrokText {
     last: Vec<Option<bool>>,
     /// Samples of each channel so far.
     samples: Vec<u64>,
-    /// The first round of lines, read to know the channels.
+    /// The first round of lines, read to determine the channels.
     waiting: Vec<(String, Vec<bool>)>,
 }
 
@@ -88,7 +88,8 @@ impl SigrokText {
         Ok((got > 0).then(|| String::from_utf8_lossy(&text).trim_end_matches(['\n', '\r']).to_owned()))
     }
 
-    /// `NAME:` and samples: groups of eight are bits, of two hex digits with the oldest sample first.
+    /// Reads `NAME:` and samples: groups of eight characters are bits, groups of two are hex digits, with the oldest sample
+    /// first.
     fn samples_of(&self, line: &str) -> Result<(String, Vec<bool>), Fault> {
         let only = |rest: &str, digits: fn(char) -> bool| rest.chars().all(|c| c == ' ' || digits(c));
         // Drawn: a high level, a low one, and either one after an edge.

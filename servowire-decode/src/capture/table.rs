@@ -1,8 +1,8 @@
 //! CSV of logic analysers and oscilloscopes: Saleae, sigrok, DSView, Kingst, WaveForms, Rigol, Siglent, Tektronix,
 //! Keysight, PicoScope.
 //!
-//! They differ in separators, headings and units, so nothing is assumed about the table: data begin where two lines of
-//! numbers follow each other, and the names are above them. A column of 0 and 1 is a channel; a column of voltages becomes
+//! They differ in separators, headings and units, so nothing is assumed about the table: the data begin at the first two
+//! consecutive lines of numbers, and the names are above them. A column of 0 and 1 is a channel; a column of voltages becomes
 //! one, with a threshold half-way between its levels.
 
 pub(super) mod cell;
@@ -40,14 +40,14 @@ pub struct Table {
     /// Rows that were read to find the columns.
     waiting: Waiting,
     clock: Times,
-    /// Time of the first row, where times are absolute.
+    /// Time of the first row, if times are absolute.
     origin: Option<Time>,
     now: Option<Time>,
     rows: u64,
     /// Rows that could not be read, and the first of them.
     bad: u64,
     first_bad: Option<(u64, String)>,
-    /// Since when there have been no data.
+    /// Time since which there have been no data.
     since: Option<Time>,
     hole: Option<Hole>,
     over: bool,
@@ -67,7 +67,7 @@ struct Column {
     level: Option<bool>,
 }
 
-/// Lines with their numbers.
+/// Reads lines and numbers them.
 pub(super) struct Lines {
     pub(super) input: Input,
     /// The number of the last one, from 1.
@@ -99,7 +99,7 @@ impl Lines {
 }
 
 impl Table {
-    /// Reads the heading, and rows enough to know the columns.
+    /// Reads the heading, and enough rows to determine the columns.
     pub fn new(input: Input, hints: Hints) -> Result<Self, Fault> {
         let name = input.name().to_owned();
         let mut lines = Lines::new(input);
@@ -200,7 +200,7 @@ impl Table {
         Ok(true)
     }
 
-    /// The time of a row.
+    /// Returns the time of a row.
     fn time(&mut self, cells: &[&[u8]]) -> Result<Time, String> {
         let text = |index: usize| String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
         let time = match self.clock {
@@ -218,7 +218,7 @@ impl Table {
         Ok(if self.backwards { -time } else { time })
     }
 
-    /// The level of a column in a row and its voltage; no level where its cell is empty.
+    /// Returns the level of a column in a row, and its voltage; no level if the cell is empty.
     fn level(&self, column: &Column, cells: &[&[u8]]) -> Result<(Option<bool>, Option<f64>), String> {
         let volts = |text| cell::number(text, self.heading.comma());
         let text = cells.get(column.index).copied().unwrap_or_default();
@@ -243,7 +243,7 @@ impl Table {
         }
     }
 
-    /// Takes a row, or returns what is wrong with it and changes nothing.
+    /// Takes a row; if something is wrong with it, returns that and changes nothing.
     fn row(&mut self, row: &[u8], changes: &mut Vec<Change>) -> Result<(), String> {
         let cells = self.heading.split(row);
         let needed = self.columns.last().map_or(0, |column| column.index);
@@ -283,7 +283,7 @@ impl Table {
 /// Numbered rows that were read but not yet taken.
 type Waiting = VecDeque<(u64, Vec<u8>)>;
 
-/// The lines of a heading, and the first two rows after it: up to the second of two lines of numbers.
+/// Reads the lines of a heading and the first two rows after it: up to the second of two consecutive lines of numbers.
 fn beginning(lines: &mut Lines) -> Result<(Vec<Vec<u8>>, Waiting), Fault> {
     let mut above: Vec<Vec<u8>> = Vec::new();
     let mut waiting = Waiting::new();

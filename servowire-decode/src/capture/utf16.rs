@@ -5,7 +5,7 @@ use std::io::{self, Read};
 /// Bytes read at once.
 const BLOCK: usize = 1 << 14;
 
-/// Whether text of two bytes a character begins here, and which byte comes first.
+/// Returns whether text with two bytes per character begins here, and which byte comes first.
 pub(super) fn mark(head: &[u8]) -> Option<fn([u8; 2]) -> u16> {
     match head {
         [0xff, 0xfe, ..] => Some(u16::from_le_bytes),
@@ -14,7 +14,7 @@ pub(super) fn mark(head: &[u8]) -> Option<fn([u8; 2]) -> u16> {
     }
 }
 
-/// Such a text in UTF-8. The byte order mark is kept; half a character becomes the replacement character.
+/// Reads this text as UTF-8. The byte order mark is kept; half a character becomes the replacement character.
 pub(super) struct Utf16<R> {
     text: R,
     unit: fn([u8; 2]) -> u16,

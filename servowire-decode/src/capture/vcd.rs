@@ -27,7 +27,7 @@ const BUFFER: usize = 1 << 18;
 pub struct Vcd {
     input: Input,
     buffer: Vec<u8>,
-    /// The unread part of the buffer.
+    /// Returns the unread part of the buffer.
     from: usize,
     to: usize,
     /// The line at the beginning of the buffer.
@@ -46,9 +46,9 @@ pub struct Vcd {
 
 /// How to continue after a piece of the body.
 enum Next {
-    /// It was taken; continue after it.
+    /// The piece was taken; continue after it.
     Taken(usize),
-    /// It may continue after the buffer.
+    /// The piece may continue after the buffer.
     More,
 }
 
@@ -133,8 +133,8 @@ impl Vcd {
         result.map_err(|what| self.fault(what))
     }
 
-    /// Takes the usual pieces of a body (stamps that do not go back, and levels of codes of one or two letters) as long as
-    /// they are complete; returns how much of `rest` is left.
+    /// Takes the common pieces of a body (stamps that do not decrease, and levels with codes of one or two letters) as long
+    /// as they are complete; returns how much of `rest` is left.
     fn plain(&mut self, mut rest: &[u8], changes: &mut Vec<Change>, enough: usize) -> usize {
         while changes.len() < enough {
             let (level, code) = match *rest {
@@ -165,7 +165,7 @@ impl Vcd {
         rest.len()
     }
 
-    /// One stamp, value change or command. At the end of the file a word ends as well.
+    /// Takes one stamp, value change or command. At the end of the file a word ends as well.
     fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, String> {
         let length = word(rest);
         let (text, after) = rest.split_at(length);
@@ -237,7 +237,7 @@ impl Vcd {
         Ok(())
     }
 
-    /// A value and a code with a blank between; `length` is that of the value with its letter.
+    /// Takes a value and a code with a blank between them; `length` is the length of the value with its letter.
     fn vector(
         &mut self,
         kind: u8,
@@ -305,7 +305,7 @@ fn level(state: u8) -> u8 {
     }
 }
 
-/// Returns the digits at the front as a number, and the rest after the blank that ends them; `None` for anything else.
+/// Returns the leading digits as a number, and the rest after the blank that ends them; `None` for anything else.
 fn stamp(digits: &[u8]) -> Option<(u64, &[u8])> {
     let (mut stamp, mut rest) = (0_u64, digits);
     while let [digit @ b'0'..=b'9', after @ ..] = rest {
@@ -319,12 +319,12 @@ fn stamp(digits: &[u8]) -> Option<(u64, &[u8])> {
     }
 }
 
-/// Length of the word at the front.
+/// Returns the length of the first word.
 fn word(text: &[u8]) -> usize {
     text.iter().position(|byte| *byte <= b' ').unwrap_or(text.len())
 }
 
-/// The word after the one that ends at `from`, and where it ends.
+/// Returns the word after the one that ends at `from`, and where it ends.
 fn second(text: &[u8], from: usize) -> Option<(&[u8], usize)> {
     let rest = text.get(from..)?;
     let blanks = rest.iter().position(|byte| *byte > b' ')?;

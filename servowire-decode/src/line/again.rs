@@ -1,8 +1,8 @@
-//! Second reading of a failed frame from its edges.
+//! Reads a failed frame from its edges a second time.
 //!
 //! When a driver releases the line, the line may dip for a bit before the bias pulls it up, or it may be disturbed. A
-//! receiver takes that for a start bit, and the following frame is lost. Here it is read a second time, from the next edge
-//! onwards.
+//! receiver takes that for a start bit, and the following frame is lost. Here the frame is read a second time, from the
+//! next edge onwards.
 
 use super::evidence::Weights;
 use super::receive::EdgeReceiver;
@@ -14,11 +14,11 @@ use crate::time::Time;
 
 /// Maximum number of edges read again: those of one or two exchanges.
 pub(super) const MOST_AGAIN: usize = 400;
-/// Maximum number of pulses skipped in them.
+/// Maximum number of pulses skipped in these.
 const ROUNDS: usize = 4;
 /// The longest low pulse that need not belong to the frame, in bits.
 const LONGEST_PULSE: f64 = 1.75;
-/// Shortest high level after it, in bits: nobody answers earlier.
+/// Shortest high level after this pulse, in bits: nobody answers earlier.
 const QUIET: f64 = 3.0;
 /// Time after a frame within which its driver releases the line, in bits.
 const LETS_GO: f64 = 2.5;
@@ -34,7 +34,7 @@ pub(super) struct Failed<'a, P> {
     pub(super) passed: &'a [Time],
     /// The time until which the line has been idle.
     pub(super) now: Time,
-    /// Picoseconds of a bit.
+    /// Picoseconds per bit.
     pub(super) bit: f64,
 }
 
@@ -61,7 +61,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         Trial::of(self.receiver, self.before, self.weights, edges, self.now)
     }
 
-    /// Whether a reading contains the frames that were already passed on.
+    /// Returns whether a reading contains the frames that were already passed on.
     fn goes_on(&self, trial: &Trial<P>) -> bool {
         let same = |(start, event): (&Time, &Event)| match event.place {
             Place::Time { start: own, .. } => !is_failed(event) && ((own - *start) as f64).abs() < self.bit,
@@ -70,7 +70,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         trial.heard.events.len() >= self.passed.len() && self.passed.iter().zip(&trial.heard.events).all(same)
     }
 
-    /// Low pulses that need not belong to a frame: the places of their falling edges.
+    /// Returns the low pulses that need not belong to a frame, with the places of their falling edges.
     fn pulses(&self, edges: &[Edge]) -> Vec<(usize, Pulse)> {
         let pulse = |(at, fall): (usize, &Edge)| {
             let rise = edges.get(at + 1).filter(|_| !fall.level)?;
@@ -81,7 +81,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
         edges.iter().enumerate().filter_map(pulse).collect()
     }
 
-    /// A reading without some pulses in which more frames are good.
+    /// Returns a reading that skips some pulses and has more good frames.
     pub(super) fn again(&self) -> Option<Better<P>> {
         let mut edges = self.edges.to_vec();
         let mut best = self.trial(&edges);
@@ -92,7 +92,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
                 let mut without = edges.clone();
                 without.drain(at..at + 2);
                 let trial = self.trial(&without);
-                // In the middle of a frame it would be a guess by which damage might hold by chance.
+                // In the middle of a frame this would be a guess, and a damaged frame might pass by chance.
                 let inside = |event: &Event| match event.place {
                     Place::Time { start, end } => pulse.time > start && pulse.time < end - (0.6 * self.bit) as i64,
                     Place::Line(_) => false,
@@ -124,7 +124,7 @@ impl<P: StartStop + Clone> Failed<'_, P> {
             let what = if lets_go { "dip" } else { "pulse" };
             let when = if lets_go { ", when its driver let go" } else { " on the idle line" };
             (dips, dip_bits) = (dips + u64::from(lets_go), dip_bits + if lets_go { *bits } else { 0.0 });
-            // What is told already cannot be told again.
+            // What has already been reported cannot be changed.
             let at = if lets_go && behind > self.passed.len() { behind - 1 } else { behind.max(self.passed.len()) };
             if let Some(event) = events.get_mut(at) {
                 let when = if at + 1 == behind || !lets_go { when } else { ", when the driver before it let go" };

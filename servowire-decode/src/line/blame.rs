@@ -1,4 +1,4 @@
-//! What the edges of a frame that failed tell of its cause: two drivers at once have two clocks.
+//! What the edges of a failed frame show about its cause: two drivers at once have two clocks.
 
 use super::receive::EdgeReceiver;
 use super::spikes::Edge;
@@ -9,27 +9,27 @@ use crate::time::Time;
 /// Minimum number of edges on the second grid, and minimum share: one in this many.
 const FEWEST_OFF: usize = 6;
 const SHARE_OFF: usize = 6;
-/// An edge further than this from the grid of the others, in bits, belongs to another one, however bad the line is; and how many
-/// of these two drivers leave at least.
+/// An edge further than this from the grid of the others, in bits, belongs to another grid, however bad the line is; and
+/// the minimum number of such edges that two drivers leave.
 const OFF_GRID: f64 = 0.27;
 const FEWEST_FAR: usize = 4;
-/// Minimum number of times that the edges of a frame change from one grid to the other. Two speakers in turn change grid
-/// once, and each dip between them twice.
+/// Minimum number of times that the edges of a frame change from one grid to the other. Two speakers taking turns change
+/// the grid once, and each dip between them changes it twice.
 const FEWEST_TURNS: usize = 6;
-/// Edges of each direction on each of the two grids: where only one direction is late, a driver is slow.
+/// Minimum number of edges of each direction on each of the two grids: if only one direction is late, a driver is slow.
 const FEWEST_EACH: usize = 2;
-/// How far an edge may be from its grid, in standard deviations of edges on this line, and at least and at most, in bits: on a
-/// line that is worse nothing can be told.
+/// How far an edge may be from its grid, in standard deviations of edges on this line, with its minimum and maximum in
+/// bits: nothing can be concluded on a worse line.
 const DEVIATIONS: f64 = 4.0;
 const NEAR: [f64; 2] = [0.04, 0.1];
-/// Of the edges near to the first grid, one in so many may lie beside it.
+/// One in this many of the edges near the first grid may lie beside it.
 const BESIDE: usize = 8;
-/// Bit lengths that are tried to each side, and how far they are apart, one part in so many.
+/// Number of bit lengths tried to each side, and the step between them: one part in this many.
 const STEPS: i32 = 20;
 const STEP: f64 = 1000.0;
 
-/// Names the cause of failed frames as shown by their edges, if two drive at once. What two say together comes in pieces, so the
-/// edges of all of them count.
+/// Names the cause of failed frames as shown by their edges, if two drivers are on at once. Two speakers at once give
+/// several failed frames, so the edges of all of them count.
 pub(super) fn blame(events: &mut [Event], receiver: &EdgeReceiver) {
     let (edges, bit) = (receiver.past(), receiver.bit_before());
     let Some(spread) = receiver.spread() else { return };
@@ -58,14 +58,14 @@ fn place(event: &Event) -> Option<(Time, Time)> {
     }
 }
 
-/// The edges of a frame, and those with which its drivers let go.
+/// Returns the edges of a frame, including those with which its drivers release the line.
 fn between(edges: &[Edge], start: Time, end: Time, bit: f64) -> &[Edge] {
     let first = edges.partition_point(|edge| edge.time < start - (0.5 * bit) as i64);
     let last = edges.partition_point(|edge| edge.time < end + (3.0 * bit) as i64);
     edges.get(first..last).unwrap_or_default()
 }
 
-/// Where the second driver is first seen, and what is said of it.
+/// Returns when the second driver is first seen, and the remark about it.
 fn said(edges: &[Edge], second: &[bool]) -> (Time, String) {
     let count = second.iter().filter(|second| **second).count();
     let at = edges.iter().zip(second).find(|(_, second)| **second).map_or(Time::ZERO, |(edge, _)| edge.time);
@@ -73,23 +73,24 @@ fn said(edges: &[Edge], second: &[bool]) -> (Time, String) {
     (at, format!("two drive at once: from {at_us:.3} us on, {count} of {all} edges are off the grid of the others"))
 }
 
-/// Where edges lie between the bits of a grid that begins at `begin`, from 0 to 1.
+/// Returns where edges lie between the bits of a grid that begins at `begin`, from 0 to 1.
 fn phases<'a>(edges: impl Iterator<Item = &'a Edge>, begin: Time, bit: f64) -> Vec<f64> {
     edges.map(|edge| ((edge.time - begin) as f64 / bit).rem_euclid(1.0)).collect()
 }
 
-/// The likelier ones first.
+/// Returns the bit lengths to try, the likelier ones first.
 fn bits(nominal: f64) -> impl Iterator<Item = f64> {
     (0..=STEPS).flat_map(|k| [k, -k]).skip(1).map(move |k| nominal * (1.0 + f64::from(k) / STEP))
 }
 
-/// How far two places are apart on the circle of a bit.
+/// Returns the distance of two places on the circle of a bit.
 fn distance(a: f64, b: f64) -> f64 {
     let apart = (a - b).rem_euclid(1.0);
     apart.min(1.0 - apart)
 }
 
-/// Whether each edge lies on the grid of a second driver, if there is one: most lie on one grid, and all others on another.
+/// Returns for each edge whether it lies on the grid of a second driver, if there is one: most edges lie on one grid, and
+/// all others on another.
 /// `spread`: the mean square distance of edges from their grid on this line, in bits.
 fn two_grids(edges: &[Edge], nominal: f64, spread: f64) -> Option<Vec<bool>> {
     let [least, most] = NEAR;
@@ -118,7 +119,7 @@ fn two_grids(edges: &[Edge], nominal: f64, spread: f64) -> Option<Vec<bool>> {
         let of = |(edge, second): &(&Edge, &bool)| **second == *on && edge.level == *level;
         edges.iter().zip(&second).filter(of).count() >= FEWEST_EACH
     });
-    // The shortest part of the circle in which all others lie.
+    // The shortest part of the circle that holds all others.
     let arc = bits(nominal).map(|bit| {
         let mut phases =
             self::phases(edges.iter().zip(&second).filter(|(_, second)| **second).map(|it| it.0), begin, bit);
@@ -129,7 +130,7 @@ fn two_grids(edges: &[Edge], nominal: f64, spread: f64) -> Option<Vec<bool>> {
     (all && arc.fold(1.0, f64::min) <= 2.0 * near).then_some(second)
 }
 
-/// The same for one frame, however far the clocks differ: many edges lie far from the grid on which most lie.
+/// Does the same for one frame, however much the clocks differ: many edges lie far from the grid that holds most of them.
 fn two_clocks(edges: &[Edge], nominal: f64) -> Option<Vec<bool>> {
     let begin = edges.first()?.time;
     let off = |phase: &f64| *phase > OFF_GRID && *phase < 1.0 - OFF_GRID;

@@ -18,9 +18,9 @@ pub struct Weights {
     pub alone: i64,
 }
 
-/// An answer that came but does not hold, by its check alone.
+/// An answer that came and fails only its check.
 const ONLY_THE_CHECK: i64 = 4;
-/// The encoder's own refusal is a sound frame.
+/// A refusal by the encoder itself is a sound frame.
 const REJECTED: i64 = 10;
 /// A frame that is not valid.
 const NO_FRAME: i64 = -6;
@@ -66,7 +66,7 @@ impl Evidence {
         self.score < HOPELESS
     }
 
-    /// Whether most of the sound frames here also occur there, within `near` picoseconds and while both were heard.
+    /// Returns whether most of the sound frames here also occur there, within `near` picoseconds and while both were heard.
     pub(super) fn is_part_of(&self, other: &Self, near: i64) -> bool {
         let heard = |(start, content): &&(Time, u64)| {
             let at = other.starts.partition_point(|(there, _)| *there < *start - near);
@@ -116,7 +116,7 @@ impl Sink for Evidence {
     }
 }
 
-/// A hash of the kind and fields of an event, except what depends on the frames before it.
+/// Returns a hash of the kind and fields of an event, except what depends on earlier frames.
 fn content(event: &Event) -> u64 {
     let mut hasher = DefaultHasher::new();
     event.kind.hash(&mut hasher);

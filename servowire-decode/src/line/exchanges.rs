@@ -28,12 +28,12 @@ pub(crate) struct StartStopLine<P> {
     opening: Vec<(Time, bool)>,
     /// Number of changes with which the opening was tried without success.
     tried: usize,
-    /// Of a line without bias.
+    /// The reader for a line without bias.
     floating: Option<Floating>,
     told: Told<P>,
-    /// Whether failed frames stay as they are.
+    /// Whether failed frames are left as they are.
     once: bool,
-    /// For the numbers of samples.
+    /// Buffer for the numbers of samples.
     room: Vec<u64>,
 }
 
@@ -47,15 +47,15 @@ struct Told<P> {
     failed: Vec<Event>,
     /// Remaining second attempts, as long as none helps. Each sound exchange earns one.
     luck: u32,
-    /// Failures since the last one that had a second attempt.
+    /// Failures since the last one that got a second attempt.
     untried: u32,
     dips: u64,
     dip_bits: f64,
 }
 
-/// Second attempts that need not help.
+/// Second attempts that may fail to help.
 const LUCK: u32 = 24;
-/// Where there are none left, one failure in this many has a second attempt: the line may have changed.
+/// If none are left, one failure in this many gets a second attempt, because the line may have changed.
 const NOW_AND_THEN: u32 = 16;
 /// Maximum number of changes used to find the first field.
 const OPENING: usize = 256;
@@ -70,8 +70,8 @@ impl<P> Told<P> {
     }
 }
 
-/// Whether an event is held back until the line rests. If a frame after it fails, an answer that seems to be missing may have come,
-/// and one that seems to have no request may be its request and a piece of it.
+/// Returns whether an event is held back until the line rests. If a later frame fails, an answer that seems to be missing
+/// may have come after all, and an answer that seems to have no request may be its request together with part of itself.
 fn is_doubtful(event: &Event) -> bool {
     let alone = event.direction == Some(Direction::Answer) && event.delay.is_none() && event.verdict.is_ok();
     alone || event.verdict.is_silence()
@@ -97,11 +97,12 @@ impl Sink for Watch<'_> {
     }
 }
 
-/// The last level of a recording is taken to last. A frame that is not good under this assumption was cut off.
+/// Handles the end of a recording, where the last level is assumed to last. A frame that is not good under this assumption
+/// was cut off.
 struct Held<'a> {
     out: &'a mut dyn Sink,
     end: Time,
-    /// What a frame is then.
+    /// The verdict on such a frame.
     cut: &'a Verdict,
 }
 
@@ -214,7 +215,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         if self.receiver.change(time, level) { self.give(out) } else { Ok(()) }
     }
 
-    /// The next edges of a line without bias.
+    /// Takes the next edges of a line without bias.
     fn float(&mut self, edges: [Option<super::spikes::Edge>; 2], out: &mut dyn Sink) -> io::Result<()> {
         for edge in edges.into_iter().flatten() {
             self.float_until(edge.time, out)?;
@@ -231,7 +232,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         floating.read(&mut self.receiver, &mut self.protocol, self.weights, out)
     }
 
-    /// Nothing is known after `time`; `cut`: what becomes of an unfinished frame.
+    /// Ends the reading at `time`, after which nothing is known; `cut`: the verdict on an unfinished frame.
     fn end(&mut self, time: Time, cut: &Verdict, out: &mut dyn Sink) -> io::Result<()> {
         if !self.opening.is_empty() {
             self.open(true, out)?;
@@ -254,7 +255,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         self.protocol.finish(time, &mut out)
     }
 
-    /// Whether the line is busy when the recording begins, so that the first falling edge need not be a start bit.
+    /// Returns whether the line is busy when the recording begins, so that the first falling edge need not be a start bit.
     fn begins_inside(&self) -> bool {
         match self.opening.as_slice() {
             [(begin, true), (fall, _), ..] => *fall - *begin < i64::from(P::CONTENT_BITS + 3) * self.bit,
@@ -262,7 +263,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         }
     }
 
-    /// Returns what a line would make of the opening.
+    /// Tries a line on the opening.
     fn trial(&self, mut line: Self, evidence: &mut Evidence) -> io::Result<()> {
         for (time, level) in &self.opening {
             line.take(*time, *level, evidence)?;
@@ -271,13 +272,13 @@ impl<P: StartStop + Clone> StartStopLine<P> {
         line.finish(end, evidence)
     }
 
-    /// Creates a line that has only begun.
+    /// Creates a line at its beginning.
     fn fresh(&self, skipped: u32, luck: u32) -> Self {
         let receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS).beginning_at(skipped);
         Self { once: self.once, ..Self::with(receiver, self.protocol.clone(), self.weights, self.bit, luck) }
     }
 
-    /// Whether the line is low rather than high when idle.
+    /// Returns whether the line is low rather than high when idle.
     fn rests_low(&self) -> bool {
         let (mut high, mut low) = (0_i64, 0_i64);
         for pair in self.opening.windows(2) {
@@ -366,7 +367,7 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
                 let Some((time, level)) = turns.next() else { break };
                 self.change(time, level, out)?;
             }
-            // So it stays, and nothing but the receiver takes changes.
+            // This state stays, so only the receiver takes changes.
             while self.receiver.turns(&mut turns) {
                 self.give(out)?;
             }

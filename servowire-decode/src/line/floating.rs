@@ -1,8 +1,9 @@
 //! A line without bias: between frames nobody drives it, and it floats low.
 //!
-//! Its frames end with a falling edge that is no start bit, and begin out of a low level: with a rising edge where the driver is on
-//! a little before the start bit, or with the first 1, in which case the start bit has no edge. The line is also low during
-//! a change of direction, and its length cannot be told from a field of zeros; only the checks of the frames decide.
+//! Its frames end with a falling edge that is not a start bit, and begin from a low level: with a rising edge if the driver
+//! is on a little before the start bit, otherwise with the first 1, so that the start bit has no edge. The line is also low
+//! during a change of direction, which cannot be told from a field of zeros by its length; only the checks of the frames
+//! decide.
 
 use std::io;
 
@@ -19,16 +20,16 @@ use crate::time::Time;
 const REST: f64 = 26.0;
 /// Maximum number of edges in a piece.
 const MOST_EDGES: usize = 400;
-/// The shortest low run in a change of direction, in bits: both drivers hold the line for a part of it.
+/// The shortest low run in a change of direction, in bits: both drivers hold the line for part of it.
 const SHORTEST_GAP: f64 = 2.2;
 /// A driver releases the line at most this many bits before the end of its frame, and at most this many after it.
 const LETS_GO: [f64; 2] = [0.6, 2.6];
-/// Pieces after which the way in which frames begin is known.
+/// Number of pieces after which it is known how frames begin.
 const KNOWN: u32 = 3;
-/// Runs of one piece that are tried as the change of direction.
+/// Maximum number of runs in a piece that are tried as the change of direction.
 const MOST_TRIED: usize = 12;
 
-/// How a frame begins out of the low level.
+/// How a frame begins from the low level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Begin {
     /// The line is high before the start bit.
@@ -37,7 +38,7 @@ enum Begin {
     Hidden,
 }
 
-/// All ways, of requests and of answers.
+/// All combinations, for requests and for answers.
 const WAYS: [[Begin; 2]; 4] = [
     [Begin::Seen, Begin::Seen],
     [Begin::Hidden, Begin::Hidden],
@@ -51,18 +52,18 @@ pub(super) struct Floating {
     bit: f64,
     spikes: Spikes,
     piece: Vec<Edge>,
-    /// How frames begin, and in how many pieces they did.
+    /// How frames begin, and in how many pieces this has held.
     way: [Begin; 2],
     held: u32,
 }
 
 impl Floating {
-    /// `bit`: its length in picoseconds.
+    /// `bit`: length of a bit in picoseconds.
     pub(super) fn new(bit: f64) -> Self {
         Self { bit, spikes: Spikes::new(bit), piece: Vec::new(), way: WAYS[0], held: 0 }
     }
 
-    /// The line takes a level: its edges that are known to last.
+    /// The line takes a level; returns the edges whose levels are now known to last.
     pub(super) fn change(&mut self, time: Time, level: bool) -> [Option<Edge>; 2] {
         self.spikes.change(time, level)
     }
@@ -72,18 +73,18 @@ impl Floating {
         self.spikes.reach(time)
     }
 
-    /// Whether the piece ends before `time`.
+    /// Returns whether the piece ends before `time`.
     pub(super) fn is_over(&self, time: Time) -> bool {
         let rests = |last: &Edge| (time - last.time) as f64 > REST * self.bit;
         self.piece.last().is_some_and(rests) || self.piece.len() >= MOST_EDGES
     }
 
-    /// The next edge of the piece.
+    /// Takes the next edge of the piece.
     pub(super) fn push(&mut self, edge: Edge) {
         self.piece.push(edge);
     }
 
-    /// Reads the piece in the way in which most of its frames are good.
+    /// Reads the piece in the way that makes most of its frames good.
     pub(super) fn read<P: StartStop + Clone>(
         &mut self,
         receiver: &mut EdgeReceiver,
@@ -95,11 +96,11 @@ impl Floating {
         let Some(last) = piece.last() else { return Ok(()) };
         let now = last.time + (REST * self.bit) as i64;
         let longest = (f64::from(P::CONTENT_BITS) + 1.7) * self.bit;
-        // Longer than any field is low.
+        // These are longer than any field is low.
         let sure = runs(&piece, |run| run > longest);
         let maybe = runs(&piece, |run| run <= longest && run > SHORTEST_GAP * self.bit);
         let maybe = maybe.into_iter().take(MOST_TRIED).map(Some);
-        // Where a change of direction is sure already, there is hardly another one.
+        // If one change of direction is certain, another one is unlikely.
         let gaps: Vec<Option<usize>> =
             if sure.is_empty() { maybe.chain([None]).collect() } else { [None].into_iter().chain(maybe).collect() };
         let known = self.held >= KNOWN;
@@ -111,7 +112,8 @@ impl Floating {
                 let idle: Vec<usize> = sure.iter().copied().chain(gap).collect();
                 let edges = raised(&piece, &idle, *way, P::FIRST_LOW, self.bit);
                 let trial = Trial::of(receiver, protocol, weights, &edges, now);
-                // The change of direction is behind a request; anywhere else it is a guess by which damage might hold by chance.
+                // The change of direction is behind a request; anywhere else it is a guess, and a damaged frame might pass
+                // by chance.
                 if gap.is_some_and(|gap| !piece.get(gap).is_some_and(|fall| self.ends_request(&trial, fall.time))) {
                     continue;
                 }
@@ -141,7 +143,7 @@ impl Floating {
 }
 
 impl Floating {
-    /// Whether a sound request ends where the line is released.
+    /// Returns whether a sound request ends where the line is released.
     fn ends_request<P>(&self, trial: &Trial<P>, fall: Time) -> bool {
         let [before, behind] = LETS_GO.map(|bits| (bits * self.bit) as i64);
         let is_there = |event: &Event| {
@@ -154,7 +156,7 @@ impl Floating {
     }
 }
 
-/// The falling edges of low runs of such a length, in picoseconds.
+/// Returns the falling edges of low runs of the wanted length, in picoseconds.
 fn runs(piece: &[Edge], wanted: impl Fn(f64) -> bool) -> Vec<usize> {
     let low = |(at, pair): (usize, &[Edge])| match pair {
         [fall, rise] if !fall.level && wanted((rise.time - fall.time) as f64) => Some(at),
@@ -163,8 +165,8 @@ fn runs(piece: &[Edge], wanted: impl Fn(f64) -> bool) -> Vec<usize> {
     piece.windows(2).enumerate().filter_map(low).collect()
 }
 
-/// Returns the same piece of a line that is high while nobody drives it: before its first edge, behind its last one, and
-/// from the falling edges at `idle` on.
+/// Returns the same piece as if the line were high while nobody drives it: before its first edge, after its last one, and
+/// from the falling edges at `idle` onwards.
 fn raised(piece: &[Edge], idle: &[usize], way: [Begin; 2], low_bits: [u32; 2], bit: f64) -> Vec<Edge> {
     let mut out = Vec::with_capacity(piece.len() + 2);
     let [request, answer] = way;

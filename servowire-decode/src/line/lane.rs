@@ -22,7 +22,7 @@ pub trait LineDecoder {
     /// The line takes a level.
     fn change(&mut self, time: Time, level: bool, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// The next samples: the same as their changes.
+    /// Takes the next samples; equivalent to taking their changes.
     fn samples(&mut self, samples: Samples<'_>, out: &mut dyn Sink) -> io::Result<()> {
         for (time, level) in samples.changes() {
             self.change(time, level, out)?;
@@ -39,14 +39,14 @@ pub trait LineDecoder {
     /// The capture ends at `time`.
     fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// From now on frames that fail are not read a second time: an impression of the line at first sight.
+    /// From now on failed frames are not read a second time, for a first impression of the line.
     fn look_once(&mut self) {}
 
     /// Returns the measurements of the line.
     fn rates(&self) -> Rates;
 }
 
-/// The wires of a lane combined to one idle-high line: an active wire is low, so both together are a half-duplex line.
+/// The wires of a lane combined into one idle-high line: an active wire is low, so both together form a half-duplex line.
 #[derive(Debug, Clone)]
 pub(crate) struct Wires {
     taps: Vec<Tap>,
@@ -55,12 +55,12 @@ pub(crate) struct Wires {
 }
 
 impl Wires {
-    /// One tap, or one for the requests and one for the answers.
+    /// Creates the wires from one tap, or from one for the requests and one for the answers.
     pub(crate) fn new(taps: &[Tap]) -> Self {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
 
-    /// The only wire, as an idle-high line, has come to a level without being told of its changes.
+    /// Sets the level of the only wire, as an idle-high line, whose changes were not passed here.
     pub(crate) fn keep(&mut self, level: bool) {
         self.levels.fill(Some(level));
         self.level = Some(level);

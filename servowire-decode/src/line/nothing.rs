@@ -5,7 +5,8 @@ use crate::codec::Codec;
 use crate::protocols::meant;
 use crate::recognition::mbit;
 
-/// Why no channel can be decoded: `busiest`: the one with most edges, and the first of them; `moves`: edges by channel.
+/// Explains why no channel can be decoded. `busiest`: the channel with most edges, and the first of these; `moves`: edges
+/// by channel.
 pub(super) fn nothing(
     busiest: Option<(u16, &Edges)>,
     moves: &[u64],
@@ -25,7 +26,7 @@ pub(super) fn nothing(
     strange(name(channel), edges, protocol)
 }
 
-/// A channel with edges but without frames.
+/// Explains a channel with edges but without frames.
 fn strange(name: &str, edges: &Edges, protocol: Option<&'static dyn Codec>) -> String {
     let of_lines = || meant(protocol).filter(|protocol| !protocol.rates.is_empty());
     let rates = |protocol: &'static dyn Codec| {

@@ -1,4 +1,5 @@
-//! All channels of a recording as it arrives: which are decoded, which carry nothing, which have had hardly any edges yet.
+//! Keeps track of all channels of a recording as it arrives: which are decoded, which carry nothing, and which have had
+//! hardly any edges yet.
 
 mod judge;
 
@@ -15,12 +16,12 @@ use crate::output::Output;
 use crate::settings::{Options, Settings};
 use crate::time::Time;
 
-/// Changes of one channel by which it is judged later on.
+/// Changes of one channel that are enough to judge it later on.
 const ENOUGH: usize = 1 << 9;
-/// Changes of undecided channels that are kept together.
+/// Maximum number of changes kept of all undecided channels together.
 const MOST_KEPT: usize = 1 << 20;
 
-/// An edge of an undecided channel: its time, and the level in the lowest bit. There may be very many of them.
+/// An edge of an undecided channel: its time, and the level in the lowest bit. There may be very many of these.
 #[derive(Debug, Clone, Copy)]
 struct Kept(i128);
 
@@ -38,7 +39,7 @@ fn edges_of(kept: &[Kept]) -> Vec<(Time, bool)> {
     kept.iter().map(|kept| kept.edge()).collect()
 }
 
-/// What a channel is.
+/// The state of a channel.
 #[derive(Debug, Clone)]
 enum State {
     /// Not judged yet.
@@ -71,7 +72,7 @@ pub struct PushDecoder {
     /// Holes between them, each with the number of changes before it.
     holes: Vec<(usize, Hole)>,
     kept: usize,
-    /// Changes held back when they were judged early.
+    /// Number of changes held back when they were last judged early.
     tried: usize,
     /// Channels with enough edges to be judged.
     due: bool,
@@ -158,12 +159,12 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// Whether the first survey is over and has found something.
+    /// Returns whether the first survey has ended and has found something.
     pub(super) fn is_settled(&self) -> bool {
         self.held.is_none() && !self.lines.is_empty()
     }
 
-    /// The only channel that is decoded, where nobody else needs its changes.
+    /// Returns the only decoded channel, if nothing else needs its changes.
     pub(super) fn takes_samples(&self, out: &Output<'_>) -> Option<u16> {
         let ([_], [Found { taps, .. }], None) = (self.lines.as_slice(), self.found.as_slice(), &self.held) else {
             return None;
@@ -171,7 +172,7 @@ impl PushDecoder {
         if let ([tap], false) = (taps.as_slice(), out.wants_changes()) { Some(tap.channel) } else { None }
     }
 
-    /// The next samples of the channel that takes them; no other one moves meanwhile.
+    /// Takes the next samples of that channel; no other channel moves meanwhile.
     pub(super) fn samples(&mut self, samples: Samples<'_>, out: &mut Output<'_>) -> io::Result<()> {
         let ([running], [Found { taps, .. }]) = (self.lines.as_mut_slice(), self.found.as_slice()) else {
             return Ok(());
@@ -241,8 +242,8 @@ impl PushDecoder {
             let what = nothing(busiest, &self.moves, &self.names, self.protocol, self.only.as_deref());
             return Err(Fault::new(&self.file, At::File, what));
         }
-        // A line that was found upside down is decoded, but it is not good: somebody has to look at the wires. Where
-        // hardly anything could be decoded, the polarity was only a guess and says nothing.
+        // An inverted line is decoded, but it is a fault: somebody has to check the wires. If hardly anything could be
+        // decoded, the polarity was only a guess and means nothing.
         let inverted = self.found.iter().any(Found::is_inverted);
         if !inverted || self.candidates.inverted.is_some() || out.tally.ok <= out.tally.faults() {
             return Ok(());
@@ -280,7 +281,7 @@ impl PushDecoder {
     }
 }
 
-/// The channels that the user named.
+/// Finds the channels that the user named.
 fn wanted(options: &Options, names: &[String]) -> Result<Option<Vec<u16>>, String> {
     match (&options.pair, &options.channel) {
         (Some((requests, answers)), _) => Ok(Some(vec![find(requests, names)?, find(answers, names)?])),
@@ -289,7 +290,7 @@ fn wanted(options: &Options, names: &[String]) -> Result<Option<Vec<u16>>, Strin
     }
 }
 
-/// A channel by its name, or by its number from 0.
+/// Finds a channel by its name, or by its number from 0.
 fn find(name: &str, channels: &[String]) -> Result<u16, String> {
     let by_name = channels.iter().position(|c| c == name).or_else(|| {
         let last = |c: &String| c.rsplit('.').next().is_some_and(|end| end == name);

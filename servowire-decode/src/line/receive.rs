@@ -1,8 +1,8 @@
 //! Start-stop fields from the edges of a line whose speakers keep their own time.
 //!
 //! Edges are gathered until the line is idle. All fields up to a change of direction were sent by one clock: its bit
-//! length is fitted to the edges, then every field is read on the grid that fits it best. So a controller and an encoder
-//! may be off by some per cent each, and jitter and spikes move no bit.
+//! length is fitted to the edges, then every field is read on the grid that fits it best. A controller and an encoder may
+//! therefore each be off by a few per cent, and jitter and spikes do not shift any bit.
 
 mod even;
 mod field;
@@ -17,14 +17,15 @@ use super::start_stop::LineField;
 use crate::capture::samples::Turns;
 use crate::time::Time;
 
-/// Who speaks after so few bits of pause answers somebody.
+/// A speaker that begins after at most this many bits of pause is answering another one.
 const ANSWERS_WITHIN: f64 = 22.0;
-/// Speeches over which the spread of edges is a mean, and the fewest that tell it.
+/// Number of speeches over which the spread of edges is averaged, and the minimum for a result.
 const LATELY: u32 = 32;
 const FEWEST: u32 = 4;
 /// Maximum number of edges kept of an open burst; beyond that, whole fields are read.
 const MOST_EDGES: usize = 512;
-/// A line that is low for longer ends a burst too, in picoseconds: 13 days. So 64 bits hold the times of a burst from its beginning.
+/// A line that is low for longer ends a burst too, in picoseconds: 13 days. The times within a burst therefore fit into 64
+/// bits.
 const LONGEST_LOW: i64 = 1 << 60;
 
 /// Receives fields of one line. Levels are given as on an idle-high line.
@@ -35,7 +36,7 @@ pub(crate) struct EdgeReceiver {
     spikes: Spikes,
     /// The open burst; it begins with a falling edge.
     burst: Vec<Edge>,
-    /// Bit lengths measured, the last one first.
+    /// Measured bit lengths, the most recent first.
     heard: Vec<f64>,
     /// Sum of measured bit lengths relative to the nominal one, and their number.
     rates: Rates,
@@ -45,7 +46,7 @@ pub(crate) struct EdgeReceiver {
     dropped: u32,
     /// A line that is high for longer is idle, in picoseconds.
     rest: i64,
-    /// Falling edges of the first burst that are no start bits, until it has been read.
+    /// Falling edges of the first burst that are not start bits, until it has been read.
     skipped: u32,
     /// Edges that were read, until they are [forgotten](Self::forget).
     past: Vec<Edge>,
@@ -53,7 +54,7 @@ pub(crate) struct EdgeReceiver {
     heard_before: Vec<f64>,
     /// When the last field ended.
     until: Option<Time>,
-    /// Mean square distance of edges from the grid of who speaks first, in bits, over so many speeches.
+    /// Mean square distance of edges from the grid of the first speaker, in bits, and the number of speeches in it.
     spread: (f64, u32),
     tried: grid::Tried,
 }
@@ -106,8 +107,8 @@ impl EdgeReceiver {
         self.close();
     }
 
-    /// Returns the mean square distance of edges from their grid, in bits, as those of who speaks first have it: nobody else is
-    /// on then.
+    /// Returns the mean square distance of edges from their grid, in bits, for those who speak first: no other driver is on
+    /// then.
     pub(super) fn spread(&self) -> Option<f64> {
         (self.spread.1 >= FEWEST).then_some(self.spread.0)
     }
@@ -133,7 +134,7 @@ impl EdgeReceiver {
         self.heard.first().copied().unwrap_or(self.bit)
     }
 
-    /// Whether all edges were read except the first of the next burst.
+    /// Returns whether all edges were read except the first of the next burst.
     pub(super) fn is_between(&self) -> bool {
         self.burst.len() < 2
     }
@@ -156,7 +157,7 @@ impl EdgeReceiver {
         rates
     }
 
-    /// The line takes a level. Says whether there are fields to [`take`](Self::take).
+    /// The line takes a level. Returns whether there are fields to [`take`](Self::take).
     #[inline]
     pub(crate) fn change(&mut self, time: Time, level: bool) -> bool {
         if let Some(edge) = self.spikes.plain_change(time, level) {
@@ -169,13 +170,13 @@ impl EdgeReceiver {
         !self.fields.is_empty()
     }
 
-    /// The shortest run that is no spike, and the longest in a field.
+    /// Returns the shortest run that is not a spike, and the longest in a field.
     pub(super) fn runs(&self) -> [i64; 2] {
         [self.spikes.shortest(), self.rest]
     }
 
-    /// Takes changes until there are fields to [`take`](Self::take) or none is left; says whether there are. Even runs are
-    /// [those](Self::runs) of a field.
+    /// Takes changes until there are fields to [`take`](Self::take) or no change is left; returns whether there are. Runs
+    /// are even if they [may belong](Self::runs) to a field.
     pub(super) fn turns(&mut self, turns: &mut Turns<'_>) -> bool {
         loop {
             self.even_turns(turns);
@@ -186,7 +187,7 @@ impl EdgeReceiver {
         }
     }
 
-    /// Takes changes as long as each of them is an edge without spikes that goes on with the burst.
+    /// Takes changes as long as each of them is an edge without spikes that continues the burst.
     fn even_turns(&mut self, turns: &mut Turns<'_>) {
         let Some((since, last)) = self.spikes.plain().zip(self.burst.last()) else { return };
         let room = MOST_EDGES.saturating_sub(self.burst.len());
@@ -201,7 +202,7 @@ impl EdgeReceiver {
         }
     }
 
-    /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
+    /// The line has not changed until `time`. Returns whether there are fields to [`take`](Self::take).
     pub(crate) fn reach(&mut self, time: Time) -> bool {
         for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge);
@@ -214,7 +215,7 @@ impl EdgeReceiver {
         !self.fields.is_empty()
     }
 
-    /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
+    /// The capture ends at `time`. A high level is assumed to last; a field that ends low is incomplete and is dropped.
     pub(crate) fn finish(&mut self, time: Time) -> bool {
         for edge in self.spikes.reach(time + (self.bit * 2.0) as i64).into_iter().flatten() {
             self.edge(edge);
@@ -236,7 +237,7 @@ impl EdgeReceiver {
         self.content_bits + 2
     }
 
-    /// Longer than a line is high inside a field, in bits.
+    /// A line is high for less than this inside a field, in bits.
     fn longest_high(&self) -> f64 {
         f64::from(self.field_bits()) + 1.0
     }
@@ -244,7 +245,7 @@ impl EdgeReceiver {
     #[inline]
     fn push(&mut self, edge: Edge) {
         self.rates.count_edge(edge.spikes);
-        // A burst begins with a falling edge: a rising one ends what was before the capture.
+        // A burst begins with a falling edge; a rising one ends something from before the capture.
         if self.burst.is_empty() && edge.level {
             self.dropped = self.dropped.saturating_add(edge.spikes);
         } else {
@@ -268,7 +269,7 @@ impl EdgeReceiver {
         self.burst.clear();
     }
 
-    /// Reads the burst speaker by speaker. Unless it is `whole`, its last speech stays for the next time.
+    /// Reads the burst speaker by speaker. Unless it is `whole`, the fields of its last speaker stay for the next call.
     fn read(&mut self, whole: bool) {
         let burst = std::mem::take(&mut self.burst);
         let mut rest = burst.as_slice();
@@ -277,7 +278,7 @@ impl EdgeReceiver {
             let mut falls = rest.iter().enumerate().filter(|(_, edge)| !edge.level);
             let (piece, fields) = rest.split_at(falls.nth(skipped).map_or(rest.len(), |(at, _)| at));
             if let (Some(first), Some(last)) = (piece.first(), piece.last()) {
-                // How long the level after its last edge still belongs to it is not known.
+                // It is not known how long the level after its last edge still belongs to it.
                 let end = last.time + self.bit as i64;
                 let (start, end) = (first.time, fields.first().map_or(end, |next| end.min(next.time)));
                 self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0, bits: 0 });
@@ -301,7 +302,7 @@ impl EdgeReceiver {
         self.burst.drain(..kept);
     }
 
-    /// Edges up to the first pause in which somebody else may have begun.
+    /// Returns the number of edges up to the first pause in which another speaker may have begun.
     fn speech(&self, edges: &[Edge]) -> usize {
         let Some((first, rest)) = edges.split_first() else { return 0 };
         let bit = self.bit_heard();
@@ -321,7 +322,8 @@ impl EdgeReceiver {
         edges.len()
     }
 
-    /// Fields of one speaker; `exact`: the bit length by which they were read already, as all edges are where they should be.
+    /// Reads the fields of one speaker; `exact`: the bit length by which they have already been read, if all edges were in
+    /// their places.
     fn speak(&mut self, edges: &[Edge], exact: Option<f64>) {
         let field_bits = self.field_bits();
         let grid::Found { bit, is_sure, alone, misfit, read_by } = match exact {
@@ -377,13 +379,13 @@ impl EdgeReceiver {
         }
     }
 
-    /// A field of a speaker.
+    /// Adds a field of a speaker.
     #[inline]
     fn take_field(&mut self, read: &reading::Read, speaker: field::Speaker) {
         let reading::Read { bits, start, spikes, .. } = *read;
         let spikes = spikes.saturating_add(std::mem::take(&mut self.dropped));
         if bits & 1 == 1 {
-            // The start bit was no bit.
+            // The start bit was not a bit.
             self.dropped = spikes.saturating_add(1);
             return;
         }

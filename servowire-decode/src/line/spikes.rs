@@ -1,8 +1,9 @@
-//! Runs too short to be a bit, taken out of a line.
+//! Removes runs that are too short to be a bit.
 
 use crate::time::Time;
 
-/// Shorter runs are spikes, in bits: above a sample at four samples per bit, below a bit with jitter at both ends.
+/// Runs shorter than this, in bits, are spikes: more than a sample at four samples per bit, less than a bit with jitter at
+/// both ends.
 const SHORTEST_RUN: f64 = 0.375;
 
 /// A cluster between equal levels that spends this long at the other level is a bit in pieces; in bits.
@@ -18,7 +19,7 @@ pub(crate) struct Edge {
     pub(crate) time: Time,
     /// The level from here onwards.
     pub(crate) level: bool,
-    /// Spikes dropped since the edge before.
+    /// Spikes dropped since the previous edge.
     pub(crate) spikes: u32,
 }
 
@@ -31,29 +32,29 @@ pub(crate) struct Edge {
 pub(crate) struct Spikes {
     bit: f64,
     shortest: i64,
-    /// The level that lasted.
+    /// The last level that lasted.
     solid: Option<bool>,
     /// The present level and since when.
     level: bool,
     since: Time,
-    /// Edges of the cluster, and the time in it at the level opposite to the solid one.
+    /// Edges of the cluster, and its time at the level opposite to the solid one.
     edges: u32,
     other: i64,
     /// When the cluster began.
     begun: Time,
     dropped: u32,
-    /// The edge before.
+    /// Time of the previous edge.
     last: Time,
     /// Clusters near a rising edge and near a falling one, and the total length of their spikes, in bits.
     near: [u64; 2],
     near_bits: f64,
 }
 
-/// Up to two edges: those of a bit in pieces come together.
+/// Up to two edges: both edges of a bit in pieces come together.
 pub(crate) type Edges = [Option<Edge>; 2];
 
 impl Spikes {
-    /// For bits of `bit` picoseconds.
+    /// Creates it for bits of `bit` picoseconds.
     pub(crate) fn new(bit: f64) -> Self {
         let shortest = (bit * SHORTEST_RUN) as i64;
         Self {
@@ -72,7 +73,7 @@ impl Spikes {
         }
     }
 
-    /// Spikes that were near a rising edge and near a falling one, and their total length, in bits.
+    /// Returns how many spikes were near a rising edge and near a falling one, and their total length in bits.
     pub(crate) fn near_edges(&self) -> ([u64; 2], f64) {
         (self.near, self.near_bits)
     }
@@ -89,17 +90,18 @@ impl Spikes {
         })
     }
 
-    /// Shorter runs are spikes.
+    /// Returns the length below which a run is a spike.
     pub(super) fn shortest(&self) -> i64 {
         self.shortest
     }
 
-    /// When the level changed last, where that is an edge that is not told yet, and no spike is about.
+    /// Returns when the level last changed, if that is an edge that has not been reported yet and no spike is near.
     pub(super) fn plain(&self) -> Option<Time> {
         (self.edges == 1 && self.dropped == 0).then_some(self.since)
     }
 
-    /// All changes of a [plain](Self::plain) line were edges. Those up to `last` are told, not that at `since`.
+    /// Notes that all changes of a [plain](Self::plain) line were edges. Those up to `last` have been reported, the one at
+    /// `since` has not.
     pub(super) fn go_on(&mut self, last: &Edge, since: Time) {
         if since != self.since {
             (self.last, self.solid) = (last.time, Some(last.level));
@@ -107,7 +109,7 @@ impl Spikes {
         }
     }
 
-    /// The line changes to `level`; the edges before it that are known to last.
+    /// The line changes to `level`; returns the earlier edges whose levels are now known to last.
     #[inline]
     pub(crate) fn change(&mut self, time: Time, level: bool) -> Edges {
         let edge = self.reach(time);
@@ -139,7 +141,7 @@ impl Spikes {
             return [None; 2];
         }
         if self.edges == 1 {
-            // Nothing but an edge.
+            // A plain edge.
             self.edges = 0;
             self.solid = Some(self.level);
             return [Some(self.edge(self.since, self.level)), None];
@@ -168,10 +170,10 @@ impl Spikes {
         [Some(self.edge(self.begun, !solid)), Some(self.edge(after, solid))]
     }
 
-    /// Counts a cluster of spikes with the edge that it is near, if there is one.
+    /// Assigns a cluster of spikes to the edge that it is near, if there is one.
     fn classify(&mut self, solid: bool, other: i64) {
         let rings = self.level != solid;
-        // A spike beside an edge of the line, or in front of the one that ends the cluster.
+        // A spike beside an edge of the line, or before the edge that ends the cluster.
         let (spike, rising) = if rings {
             (other.min(self.since - self.begun - other), self.level)
         } else if (self.begun - self.last) as f64 <= NEAR * self.bit {
@@ -184,17 +186,17 @@ impl Spikes {
         self.near_bits += spike as f64 / self.bit;
     }
 
-    /// The last change of the line and the level since.
+    /// Returns the last change of the line and the level since.
     pub(crate) fn last_change(&self) -> Option<(Time, bool)> {
         self.solid.map(|_| (self.since, self.level))
     }
 
-    /// The last change of the line and the level since, if no spike is near.
+    /// Returns the last change of the line and the level since, if no spike is near.
     pub(crate) fn settled(&self) -> Option<(Time, bool)> {
         (self.solid == Some(self.level) && self.edges == 0 && self.dropped == 0).then_some((self.since, self.level))
     }
 
-    /// The last change was at `time`, and the level since has lasted.
+    /// Notes that the last change was at `time`, and that the level since has lasted.
     pub(crate) fn settle(&mut self, time: Time, level: bool) {
         (self.solid, self.level, self.since, self.edges, self.other) = (Some(level), level, time, 0, 0);
     }

@@ -1,8 +1,8 @@
-//! Finds out from their first edges which channels carry a protocol, which protocol, how fast, and with which polarity.
+//! Determines from their first edges which channels carry a protocol, which protocol it is, how fast, and with which polarity.
 //!
 //! Every rate of every protocol is tried on every channel with edges, in both polarities; a trial ends early if hardly any
-//! frame is good. So a spike, a slow encoder or a decoy never hides a line. Failed frames are read a second time only where that
-//! can decide between two readings.
+//! frame is good. A spike, a slow encoder or a decoy therefore never hides a line. Failed frames are read a second time
+//! only if that can decide between two readings.
 
 use super::evidence::{CERTAIN, Evidence};
 use super::lane::{Tap, Wires};
@@ -17,11 +17,12 @@ use crate::time::Time;
 pub(super) const SAMPLE: usize = 3000;
 /// Edges after which a trial may be given up.
 const PIECE: usize = 96;
-/// Fewer changes, including the level at the beginning, are not traffic: the shortest frame has four edges.
+/// Fewer changes than this, including the initial level, are not traffic: the shortest frame has four edges.
 pub(super) const FEWEST: usize = 5;
-/// A rival within this share of the best score is mentioned.
+/// A rival with at least this share of the best score is mentioned.
 const CLOSE: f64 = 0.5;
-/// Where a line is certain at first sight, readings with less than one in this many of its score are not looked at again.
+/// If a line is certain at first sight, readings with less than this fraction (one in so many) of its score are not
+/// examined again.
 const FAR: i64 = 4;
 
 /// The edges of a channel, by time.
@@ -71,12 +72,12 @@ impl Found {
         1_000_000_000_000 / i64::from(self.speech.rate.max(1))
     }
 
-    /// All taps idle low.
+    /// Returns whether all taps idle low.
     pub(super) fn is_inverted(&self) -> bool {
         self.taps.iter().all(|tap| tap.inverted)
     }
 
-    /// What was found, on channels of these names.
+    /// Describes what was found, on channels of these names.
     pub(super) fn recognition(&self, channels: Vec<String>) -> Recognition {
         Recognition {
             channels,
@@ -93,7 +94,7 @@ impl Found {
     }
 }
 
-/// What may be on the lines.
+/// The candidates for the lines.
 #[derive(Debug, Clone)]
 pub(super) struct Candidates {
     pub(super) speeches: Vec<Speech>,
@@ -105,7 +106,7 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// The candidates that the options leave open.
+    /// Collects the candidates that the options leave open.
     pub(super) fn new(protocol: Option<&'static dyn Codec>, settings: Settings, pair: Option<[u16; 2]>) -> Self {
         let rated = |protocol: &'static dyn Codec| {
             let rates: Vec<u32> = match settings.line.bit_rate {
@@ -120,12 +121,12 @@ impl Candidates {
         Self { speeches, inverted, settings, asked, pair }
     }
 
-    /// Whether the user said what the lines are.
+    /// Returns whether the user said what the lines are.
     pub(super) fn is_asked_for(&self) -> bool {
         self.asked
     }
 
-    /// The channels of requests and answers as the user named them.
+    /// Returns the channels of requests and answers as the user named them.
     pub(super) fn pair(&self) -> Option<[u16; 2]> {
         self.pair
     }
@@ -184,7 +185,7 @@ impl Candidates {
         Some(best)
     }
 
-    /// The polarities that the options leave open.
+    /// Returns the polarities that the options leave open.
     fn polarities(&self) -> impl Iterator<Item = bool> {
         let given = self.inverted;
         [false, true].into_iter().filter(move |inverted| given.is_none_or(|given| given == *inverted))
@@ -196,7 +197,7 @@ impl Candidates {
         Found { taps, speech, evidence, rates, idle, seen: None, rival: None, whole: false }
     }
 
-    /// Reads failed frames a second time, where that may still make a reading the best or the second best.
+    /// Reads failed frames a second time, if that may still make a reading the best or the second best.
     fn look_again(&self, readings: &mut [Found], channels: &[&Edges]) {
         let most = readings.iter().map(|found| found.evidence.score).max().unwrap_or(0);
         for found in readings {
@@ -233,7 +234,7 @@ impl Candidates {
             }
             end = time;
             let channel = taps.get(k).map_or(0, |tap| tap.channel);
-            // Evidence takes whatever comes.
+            // Evidence accepts everything.
             if let Some(level) = wires.change(channel, level) {
                 let _ = decoder.change(time, level, &mut evidence);
             }
@@ -247,8 +248,8 @@ impl Candidates {
         (evidence, decoder.rates())
     }
 
-    /// Picks the lines among the readings of channels: a line heard twice is taken once; requests and answers on two
-    /// channels are one line.
+    /// Picks the lines among the readings of channels: a line heard twice counts once; requests and answers on two channels
+    /// form one line.
     pub(super) fn lines(
         &self,
         mut readings: Vec<Found>,
@@ -271,7 +272,7 @@ impl Candidates {
         lines
     }
 
-    /// Answers of HIPERFACE DSL prove nothing by themselves, so they are looked for on every channel that is nothing else.
+    /// Answers of HIPERFACE DSL prove nothing by themselves, so they are looked for on every channel without another protocol.
     fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| {
             let evidence = &found.evidence;
@@ -306,7 +307,7 @@ impl Candidates {
         }
     }
 
-    /// Requests alone on one channel and their answers on another.
+    /// Joins requests alone on one channel with their answers on another.
     fn join(&self, readings: &mut Vec<Found>, edges: &dyn Fn(u16) -> Vec<(Time, bool)>) {
         let asks = |found: &Found| found.evidence.requests > 0 && found.evidence.answers * 4 < found.evidence.requests;
         let answers = |found: &Found| found.evidence.alone > found.evidence.requests;
@@ -342,13 +343,13 @@ impl Candidates {
     }
 }
 
-/// What makes one reading better than another: sound frames, then the level at which the line rests.
+/// Returns what makes one reading better than another: sound frames, then the level at which the line rests.
 fn mark(found: &Found) -> (i64, bool, bool) {
     let inverted = found.is_inverted();
     (found.evidence.score, found.idle.is_none_or(|idle| idle != inverted), !inverted)
 }
 
-/// Whether there are any runs of about this bit length. Spikes beside every edge are two of three runs.
+/// Returns whether there are any runs of about this bit length. With spikes beside every edge, two of three runs are spikes.
 fn may_run_at(edges: &Edges, bit: f64) -> bool {
     let (mut short, mut fitting, mut all) = (0_u32, 0_u32, 0_u32);
     for pair in edges.windows(2).take(1024) {
@@ -361,7 +362,8 @@ fn may_run_at(edges: &Edges, bit: f64) -> bool {
     5 * short <= 4 * all && 12 * fitting >= all
 }
 
-/// The level of what is longer than any field's run, by time. The level before the first edge may be from before power-on:
+/// Returns the level, weighted by time, of runs longer than any in a field. The level before the first edge may be from
+/// before power-on:
 /// it counts only if nothing else does.
 pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
     let later = edges.get(1..).unwrap_or_default();
@@ -381,7 +383,7 @@ fn level_of_rest(edges: &Edges, bit: i64) -> Option<bool> {
     (high != low).then_some(high > low)
 }
 
-/// The rate that the runs of a channel look like, in bits per second: the shortest length that is too frequent to be a
+/// Estimates the rate from the runs of a channel, in bits per second: by the shortest length that is too frequent to be a
 /// spike. `None` if there are hardly any runs.
 pub(super) fn seen_rate(edges: &Edges) -> Option<f64> {
     let mut lengths: Vec<f64> = edges

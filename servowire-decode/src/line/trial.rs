@@ -10,7 +10,7 @@ use crate::event::{Event, Verdict};
 use crate::sink::Sink;
 use crate::time::Time;
 
-/// Whether an event is a frame that came and is not good. A refusal by an encoder is itself a sound frame.
+/// Returns whether an event is a frame that arrived but is not good. A refusal by an encoder is itself a sound frame.
 pub(super) fn is_failed(event: &Event) -> bool {
     match &event.verdict {
         Verdict::Ok => false,
@@ -32,19 +32,20 @@ impl Heard {
         Self { events: Vec::new(), evidence: Evidence::new(weights), failed: 0 }
     }
 
-    /// Whether there is an answer, and no frame that is not good.
+    /// Returns whether there is an answer, and every frame is good.
     pub(super) fn is_perfect(&self) -> bool {
         self.failed == 0 && self.evidence.answers > 0
     }
 
-    /// Frames before the first that failed.
+    /// Returns the number of frames before the first that failed.
     fn sound(&self) -> usize {
         let sound = self.events.iter().take_while(|event| !is_failed(event));
         sound.filter(|event| event.verdict.is_ok()).count()
     }
 
-    /// Whether more of it is good: more answers, more frames before the first that failed, or fewer that failed. What failed as one
-    /// frame may then be two: an answer, and what follows it. A request alone proves little, and part of an answer may look like
+    /// Returns whether more of it is good: more answers, more frames before the first failed one, or fewer failed ones.
+    /// One failed frame may have become two: an answer, and what follows it. A request alone proves little, and part of an
+    /// answer may look like
     /// a request, which then has no answer.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let more = self.evidence.answers > other.evidence.answers && self.failed <= other.failed;
@@ -65,7 +66,7 @@ impl Sink for Heard {
     }
 }
 
-/// A reading of some edges by a receiver and a protocol in their state before these edges.
+/// A reading of some edges, with the receiver and the protocol in their state before these edges.
 #[derive(Debug)]
 pub(super) struct Trial<P> {
     pub(super) receiver: EdgeReceiver,
@@ -74,7 +75,7 @@ pub(super) struct Trial<P> {
 }
 
 impl<P: StartStop + Clone> Trial<P> {
-    /// Reads `edges`, after which the line is idle until `now`.
+    /// Reads `edges`; after these the line is idle until `now`.
     pub(super) fn of(receiver: &EdgeReceiver, protocol: &P, weights: Weights, edges: &[Edge], now: Time) -> Self {
         let mut trial = Self { receiver: receiver.emptied(), protocol: protocol.clone(), heard: Heard::new(weights) };
         trial.receiver.feed(edges);

@@ -1,4 +1,4 @@
-//! Which protocol a log of bytes holds, and whether its lines are its bursts.
+//! Recognises which protocol a log of bytes holds, and whether each line is a burst.
 
 use crate::capture::hexlog::Burst;
 use crate::codec::{Codec, LogDecoder};
@@ -8,11 +8,11 @@ use crate::recognition::Note;
 use crate::settings::Settings;
 use crate::sink::Tally;
 
-/// Bytes of a burst by which it is recognised.
+/// Bytes of a burst that are used to recognise it.
 const MOST_TRIED: usize = 1 << 14;
-/// Per cent of the frames that are good if a log is what it was taken for.
+/// Minimum share of good frames, in per cent, if a log is what it was assumed to be.
 const SURE: u64 = 80;
-/// Shorter lines contain bytes as they arrived.
+/// Lines shorter than this contain bytes as they arrived.
 const NARROW: usize = 8;
 
 /// A possible reading of a log.
@@ -23,7 +23,7 @@ pub(super) struct Reading {
     pub(super) wrapped: bool,
 }
 
-/// All of them. Lines as they are come before lines joined together. Among equals a protocol without a check comes last,
+/// All of them. Lines as they are take precedence over joined lines. Among equals a protocol without a check comes last,
 /// and only with lines as they are; the reading with the fewest refused frames wins.
 fn readings() -> impl Iterator<Item = Reading> {
     let of = |checked: bool, wrapped: bool| {
@@ -33,7 +33,7 @@ fn readings() -> impl Iterator<Item = Reading> {
     of(true, false).chain(of(true, true)).chain(of(false, false))
 }
 
-/// Returns the reading that was asked for, or the one with the most good frames, and a decoder for it.
+/// Returns the requested reading, or the one with the most good frames, and a decoder for it.
 pub(super) fn recognise(
     bursts: &[Burst],
     protocol: Option<&'static dyn Codec>,
@@ -84,7 +84,7 @@ impl<'a> Sample<'a> {
         Self { lines, joined, settings }
     }
 
-    /// The frames that are good by this reading; `None` if the lines are not a dump, or if no protocol decodes logs.
+    /// Returns the frames that are good in this reading; `None` if the lines are not a dump, or if no protocol decodes logs.
     fn tally(&self, reading: Reading) -> Option<Tally> {
         let bursts = if reading.wrapped { self.joined.as_ref()?.as_slice() } else { self.lines.as_slice() };
         let mut tally = Tally::default();
@@ -102,7 +102,7 @@ impl<'a> Sample<'a> {
         tried.reduce(|best, next| if share(next.0) > share(best.0) { next } else { best })
     }
 
-    /// Returns what the log is if it differs from what was asked for, of which `held` per cent of the frames are good.
+    /// Returns what the log is, if that differs from what was requested; as requested, `held` per cent of its frames are good.
     fn rather(&self, asked: &'static dyn Codec, held: u64) -> Option<(Tally, &'static dyn Codec)> {
         let (other, reading) = self.best(|known| known != asked)?;
         // Of what has no check not one may be refused, and hardly anything hold as it was meant.
@@ -115,7 +115,7 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// Whether all lines except the last have as many bytes as those of a dump.
+/// Returns whether all lines except the last have as many bytes as the lines of a dump.
 fn may_be_wrapped(bursts: &[Burst]) -> bool {
     let Some((last, rest)) = bursts.split_last() else { return false };
     let width = bursts.first().map_or(0, |first| first.bytes.len());
@@ -127,7 +127,7 @@ fn may_be_wrapped(bursts: &[Burst]) -> bool {
         && !bursts.iter().any(said)
 }
 
-/// Good frames, in per cent.
+/// Returns the share of good frames, in per cent.
 fn share(tally: Tally) -> u64 {
     (100 * tally.ok).checked_div(tally.ok + tally.faults()).unwrap_or(0)
 }

@@ -6,7 +6,7 @@ use super::printer::Origin;
 use crate::event::{Direction, Event, Place};
 use crate::time::Time;
 
-/// The frames that the user wants to see; an empty field lets everything through.
+/// The frames that the user wants to see; an unset field lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Choice {
     /// The whole name of a frame or its last word, in upper or lower case.
@@ -23,11 +23,11 @@ pub struct Choice {
     pub errors: bool,
 }
 
-/// Lets the chosen frames through.
+/// Passes the chosen frames.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Filter {
     choice: Choice,
-    /// By line: whether the last request passed by its address.
+    /// For each line, whether the last request passed by its address.
     passed: BTreeMap<usize, bool>,
 }
 
@@ -36,7 +36,7 @@ pub struct Filter {
 const REST: i64 = 10_000_000_000;
 
 impl Filter {
-    /// Lets the frames through that the user chose.
+    /// Creates a filter for the frames that the user chose.
     pub fn new(choice: Choice) -> Self {
         Self { choice, passed: BTreeMap::new() }
     }
@@ -61,7 +61,7 @@ impl Filter {
         self.choice.to.is_some_and(|to| time > to + REST)
     }
 
-    /// Returns whether an event was requested; of the requested ones, perhaps only the refused ones are shown.
+    /// Returns whether an event was requested; of these, it may be that only the refused ones are shown.
     pub(super) fn takes(&mut self, origin: &Origin, event: &Event) -> bool {
         let is_meant = |encoder: &String| origin.is_meant(origin.speaker(event), encoder);
         self.choice.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)

@@ -34,7 +34,7 @@ impl<W: Write> Printer for JsonLines<W> {
     }
 }
 
-/// An event as described in the README; keys without content are omitted.
+/// Writes an event as described in the README; keys without content are omitted.
 struct Object<'a> {
     origin: &'a Origin,
     event: &'a Event,

@@ -1,4 +1,4 @@
-//! A form of output, and what it is told besides the events.
+//! A form of output, and the information that it gets besides the events.
 
 use std::io;
 
@@ -9,7 +9,7 @@ use crate::event::Event;
 /// A line of a capture that is decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lane {
-    /// The name of its channel, or of its two.
+    /// The name of its channel, or of both its channels.
     pub channel: String,
     /// Its channels by index.
     pub channels: Vec<u16>,
@@ -92,7 +92,7 @@ pub trait Printer {
     /// Takes the next event.
     fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()>;
 
-    /// Nothing arrives for a while: whatever is complete is shown.
+    /// Nothing arrives for a while: shows whatever is complete.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

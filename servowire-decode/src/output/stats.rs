@@ -1,4 +1,4 @@
-//! Figures over a whole capture instead of its frames.
+//! Prints figures for a whole capture instead of its frames.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -9,9 +9,9 @@ use super::printer::{Origin, Printer, Speaker};
 use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
 use crate::time::Time;
 
-/// Jumps of the position that are listed; further ones are counted.
+/// Maximum number of position jumps listed; further ones are only counted.
 const LISTED: usize = 10;
-/// Events that are listed of each kind; further ones are counted.
+/// Maximum number of events listed of each kind; further ones are only counted.
 const EVENTS: usize = 1_000;
 
 /// Collects figures and prints them at the end of a file.
@@ -33,7 +33,7 @@ pub struct Table {
 /// Figures of each encoder, drive or device.
 #[derive(Debug, Clone, Default)]
 pub struct Gathered {
-    /// Counts that a position may move from one frame to the next.
+    /// How many counts a position may move from one frame to the next.
     limit: Option<u64>,
     by: BTreeMap<Speaker, Figures>,
 }
@@ -50,13 +50,13 @@ struct Figures {
     last_start: Option<(Option<Direction>, Time)>,
     cycle: Spread,
     delay: Spread,
-    /// By the names of the positions.
+    /// Keyed by the names of the positions.
     positions: BTreeMap<&'static str, Followed>,
     /// Positions in frames without a time.
     untimed: u64,
     jumps: u64,
     listed: Vec<Jump>,
-    /// Times are counted and say nothing about a cycle.
+    /// Times are counted, not measured, and say nothing about the cycle.
     counted: bool,
     /// Events with their places, and their number.
     happened: Vec<(Place, String)>,
@@ -142,7 +142,7 @@ impl Figures {
         match &event.verdict {
             Verdict::Ok => {
                 self.ok += 1;
-                // A request and its answer are one of a kind.
+                // A request and its answer count as one.
                 if event.direction != Some(Direction::Request) {
                     match self.kinds.get_mut(event.kind.as_ref()) {
                         Some(count) => *count += 1,
@@ -172,7 +172,7 @@ impl Figures {
         }
     }
 
-    /// What is missing to detect jumps.
+    /// Returns what is missing to detect jumps.
     fn missing(&self) -> Option<&'static str> {
         match (self.positions.is_empty(), self.untimed) {
             (false, _) => None,

@@ -15,7 +15,7 @@ use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 /// Columns of a line if there is no terminal, and the minimum for a terminal.
 const COLUMNS: usize = 100;
 const FEWEST: usize = 40;
-/// Wider values extend beyond their column.
+/// A value wider than this extends beyond its column.
 const WIDEST: usize = 24;
 /// Fields that hardly ever change are shown only when they do.
 const STEADY: &[&str] = &["ENID", "delay"];
@@ -35,7 +35,7 @@ pub struct Text<W> {
     headings: bool,
     /// The widest value of each field so far, so that lines of one kind align in columns.
     widths: HashMap<&'static str, usize>,
-    /// The last values shown of a line's steady fields.
+    /// The last shown values of a line's rarely changing fields.
     steady: HashMap<(usize, &'static str), Value>,
 }
 
@@ -133,7 +133,7 @@ impl<W: Write> Text<W> {
 /// A line made of unbreakable pieces.
 struct Columns {
     text: String,
-    /// Where they begin.
+    /// Where its lines begin.
     pieces: Vec<usize>,
     colour: bool,
     /// Columns of a line.
@@ -188,7 +188,7 @@ impl Columns {
         out.write_all(b"\n")
     }
 
-    /// Puts a piece at a column; a piece that is too long by itself is split between words.
+    /// Puts a piece at a column; a piece longer than a line is split between words.
     fn words(&self, out: &mut impl Write, piece: &str, mut at: usize, indent: usize) -> io::Result<usize> {
         for (k, word) in piece.split(' ').enumerate() {
             let width = word.chars().count();

@@ -35,9 +35,9 @@ pub struct VcdOut {
     origin: Option<Time>,
     written: Option<u64>,
     window: Option<(Time, Time)>,
-    /// Only what is near refused frames.
+    /// Set if only the parts near refused frames are written.
     ring: Option<Ring>,
-    /// The levels of the channels before the window, or before what is written next.
+    /// The levels of the channels before the window, or before the next part to be written.
     before: BTreeMap<u16, bool>,
 }
 
@@ -101,7 +101,7 @@ impl VcdOut {
         self.levels.extend(levels.into_iter().map(|(channel, level)| Change { time, channel, level }));
     }
 
-    /// All string variables.
+    /// Returns all string variables.
     fn codes(&self) -> Vec<IdCode> {
         let of = |s: &Strings| [s.frame, s.verdict].into_iter().chain(s.fields.clone()).collect::<Vec<_>>();
         self.strings.iter().flat_map(of).collect()
@@ -166,7 +166,7 @@ impl VcdOut {
         }
     }
 
-    /// Advances to a time. An event older than the window is shown late rather than out of order.
+    /// Advances the output to a time. An event older than the window is shown late rather than out of order.
     fn stamp(&mut self, time: Time) -> io::Result<()> {
         let nanoseconds = ((time.since(self.origin.unwrap_or_default()).ps().max(0) + 500) / 1000) as u64;
         if self.written.is_none_or(|written| written < nanoseconds) {
@@ -274,7 +274,7 @@ fn text(field: &Field) -> String {
     }
 }
 
-/// As the format wants it: one word of printable ASCII.
+/// Converts a string as the format requires: one word of printable ASCII.
 fn word(text: &str) -> String {
     let printable = |c: char| if c.is_ascii_graphic() { c } else { '_' };
     if text.is_empty() { NOTHING.to_owned() } else { text.chars().map(printable).collect() }

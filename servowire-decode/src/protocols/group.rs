@@ -1,4 +1,4 @@
-//! What start-stop protocols have in common: the fields that make a frame, and what is said of them.
+//! What start-stop protocols have in common: the fields that make up a frame, and remarks about them.
 
 use std::fmt::Display;
 
@@ -8,12 +8,12 @@ use crate::time::Time;
 
 use super::plausible::{joined, two_masters};
 
-/// The position does not fit the encoder: said beside the values, which are those of the line.
+/// Adds that the position does not fit the encoder, beside the values as they were on the line.
 pub(super) fn too_wide(error: impl Display, single_turn: u8, multi_turn: u8) -> Field {
     Field::text("width", format_args!("{error}; taken as {single_turn} + {multi_turn} bits"))
 }
 
-/// Fields that belong together, at most `N`; what comes after replaces the last one.
+/// Fields that belong together, at most `N`; further fields replace the last one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group<T, const N: usize> {
     contents: [T; N],
@@ -23,7 +23,7 @@ pub(super) struct Group<T, const N: usize> {
     /// The first field whose delimiter read 0.
     pub(super) broken: Option<u8>,
     spikes: u32,
-    /// The bits of the line, the first in bit 0, where they are known.
+    /// The bits of the line, the first in bit 0, if they are known.
     pub(super) raw: u128,
     /// The line of a log without times.
     pub(super) line: Option<u64>,
@@ -58,17 +58,17 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         self.len = k + 1;
     }
 
-    /// What the fields hold.
+    /// The contents of the fields.
     pub(super) fn contents(&self) -> &[T] {
         self.contents.get(..self.len).unwrap_or_default()
     }
 
-    /// When each field began.
+    /// Start of each field.
     pub(super) fn starts(&self) -> &[Time] {
         self.starts.get(..self.len).unwrap_or_default()
     }
 
-    /// Where content bits `first` to `last` are, counted from 0 through the contents of all fields.
+    /// Returns the place of content bits `first` to `last`, counted from 0 across all fields.
     pub(super) fn span(&self, first: u32, last: u32) -> Option<Span> {
         self.spans()?.of(first, last)
     }
@@ -101,12 +101,12 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         }
     }
 
-    /// The spikes that were dropped.
+    /// The number of dropped spikes.
     pub(super) fn spikes(&self) -> Option<Field> {
         (self.spikes > 0).then(|| Field::number("spikes", self.spikes))
     }
 
-    /// The refusal with its place: the index of a field called by `names`, and a bit of it.
+    /// Returns the refusal with its place: the index of a field, whose names are `names`, and a bit in it.
     pub(super) fn refused(
         &self,
         names: &[&'static str],
@@ -122,7 +122,7 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
     }
 }
 
-/// Where the content bits of fields are.
+/// The places of the content bits of fields.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spans<'a> {
     starts: &'a [Time],
@@ -133,7 +133,7 @@ pub(super) struct Spans<'a> {
 }
 
 impl Spans<'_> {
-    /// Where content bits `first` to `last` are.
+    /// Returns the place of content bits `first` to `last`.
     pub(super) fn of(&self, first: u32, last: u32) -> Option<Span> {
         let Self { starts, field, width, line } = *self;
         let at = |bit: u32, after: u32| {
@@ -147,11 +147,12 @@ impl Spans<'_> {
     }
 }
 
-/// Nobody gives up an encoder after so short a time, in picoseconds.
+/// No controller gives up on an encoder this soon, in picoseconds.
 const BRIEF: i64 = 20_000_000;
 
-/// No answer, called `what`, came to the request at `place` within `timeout`, or until `now`, when somebody `asked` again.
-/// `nobody`: who may be missing.
+/// Reports that no answer, called `what`, came to the request at `place` within `timeout`, or before `now`, when the next
+/// request came (`asked`).
+/// `nobody`: name of the party that may be missing.
 pub(super) fn silence(
     place: Place,
     kind: &'static str,

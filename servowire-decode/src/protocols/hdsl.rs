@@ -1,7 +1,7 @@
 //! HIPERFACE DSL: H-frames, answers, V-frames and messages of a recorded pair.
 //!
-//! Every run of equal levels is rounded to whole bits, so that the grid follows the edges of whoever drives. A frame is
-//! found by the head of the master; the answer after it at the delay where its words hold.
+//! Every run of equal levels is rounded to whole bits, so that the grid follows the edges of the present driver. A frame is
+//! found by the master's head, and the answer to it at the delay at which its words are valid.
 
 mod bits;
 mod decoder;
@@ -31,7 +31,7 @@ const FIELDS: &[&str] = &[
     "VPOS", "STATUS2", "VPOS2", "QM", "ENC_ID", "message", "note",
 ];
 
-/// HIPERFACE DSL in the table.
+/// The table row of HIPERFACE DSL.
 pub(super) struct Hdsl;
 
 impl Codec for Hdsl {
@@ -64,12 +64,12 @@ pub struct DslLine {
     bits: Bits,
     decoder: Decoder,
     bit: f64,
-    /// The sample at which the line last changed, if it comes as samples.
+    /// The sample at which the line last changed, if its levels come as samples.
     since: Option<u64>,
 }
 
 impl DslLine {
-    /// `bit`: nominal length in picoseconds.
+    /// `bit`: nominal length of a bit in picoseconds.
     pub fn new(bit: f64) -> Self {
         Self { bits: Bits::new(bit), decoder: Decoder::new(), bit, since: None }
     }

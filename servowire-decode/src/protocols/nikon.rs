@@ -1,4 +1,4 @@
-//! Nikon A-format: frames of a half-duplex line into requests and replies.
+//! Nikon A-format: combines frames of a half-duplex line into requests and replies.
 //!
 //! Requests and replies begin with different sync codes. A command data frame says how many memory data frames follow;
 //! the frames of a reply follow each other without a pause, and their number tells the layout if the command leaves it
@@ -30,7 +30,7 @@ use crate::time::Time;
 use describe::Encoder;
 use frames::Frames;
 
-/// A-format in the table.
+/// The table row of A-format.
 pub(super) struct Nikon;
 
 impl Codec for Nikon {
@@ -73,16 +73,16 @@ const PAUSE_BITS: i64 = 4;
 /// The longest reply, in bits.
 const LONGEST_BITS: i64 = 6 * FRAME_BITS as i64;
 
-/// A pause that ends a request whose memory data frames do not come, in picoseconds: drivers leave 1 to 10 us.
+/// A pause that ends a request whose memory data frames do not follow, in picoseconds: masters leave 1 to 10 us.
 const MEMORY_PAUSE: i64 = 50_000_000;
 
-/// The content of what a dip of the idle line looks like, but for the first bit.
+/// The content, except the first bit, of a frame that is really a dip of the idle line.
 const IDLE: u16 = 0xffff;
 
 /// A reply begins within this time, in bits. The turn-around time is not documented.
 const REPLY_TIMEOUT_BITS: i64 = 1_000;
 
-/// A request that waits for its reply.
+/// A request that is waiting for its reply.
 #[derive(Debug, Clone, Copy)]
 struct Pending {
     request: Request,
@@ -96,9 +96,9 @@ struct Pending {
 pub struct Decoder {
     bit: i64,
     encoder: Encoder,
-    /// Begin of the capture, until the first group has been seen.
+    /// Start of the capture, until the first group has been seen.
     begin: Option<Time>,
-    /// Until when the rest of a reply may come in which the capture began.
+    /// Time until which the rest of a reply may come, if the capture began inside one.
     cut_until: Option<Time>,
     open: Frames,
     pending: Option<Pending>,
@@ -117,18 +117,17 @@ impl Decoder {
         }
     }
 
-    /// Whether the open group is over before a frame that begins at `start`, and may be the first one of what it
-    /// `begins`.
+    /// Returns whether the open group ends before a frame at `start`, which may be the first of the kind that it `begins`.
     fn is_over(&self, start: Time, begins: Kind) -> bool {
         let pause = start - self.open.end;
-        // The frames of a reply follow each other: after anything else a new one begins.
+        // The frames of a reply follow each other; after anything else a new group begins.
         if begins == Kind::Response && self.open.kind() != Kind::Response && 2 * pause > 3 * self.bit {
             return true;
         }
         match self.open.kind() {
             Kind::Request => pause > MEMORY_PAUSE,
             _ if pause <= PAUSE_BITS * self.bit => false,
-            // The frames of a damaged reply need not follow each other: it lasts as long as a whole one.
+            // The frames of a damaged reply need not follow each other: it is given the length of a whole one.
             _ => {
                 let asked = self.pending.map(|pending| pending.request);
                 let whole = asked
@@ -139,7 +138,8 @@ impl Decoder {
         }
     }
 
-    /// Whether the open group is a sound reply: what looks like a frame of idle line behind it is none of it.
+    /// Returns whether the open group is a sound reply: something after it that looks like a frame of idle line is then not
+    /// part of it.
     #[cold]
     fn is_whole(&self) -> bool {
         let sound = |expected: Expected| {
@@ -158,10 +158,10 @@ impl Decoder {
             Kind::Request => self.request(&group, out)?,
             _ => self.reply(&group),
         };
-        // With no idle line before it, a bad first group is only the end of one.
+        // Without idle line before it, a bad first group is only the end of a group.
         let after = begin.map(|begin| group.start() - begin);
         let at_once = after.is_some_and(|after| after < i64::from(FRAME_BITS) * self.bit);
-        // Nor is a memory data frame whose command data frame was before it.
+        // Neither is a memory data frame whose command data frame came before the capture.
         let no_command = matches!(&event.verdict, Verdict::Refused(refusal) if refusal.class == "frame_code");
         let at_once = at_once || no_command && after.is_some_and(|after| after < MEMORY_PAUSE);
         let still = self.cut_until.take().is_some_and(|until| group.start() < until);
@@ -211,7 +211,7 @@ impl Decoder {
         event
     }
 
-    /// No reply came until `now`; `asked`: when somebody asked again.
+    /// Ends the wait for a reply at `now`; `asked`: whether that is because the next request came.
     fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             Some(pending) if pending.replies == 0 => {
@@ -237,8 +237,8 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     let due = usize::from(layout.frames());
     let sound =
         |bits: u128| Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(&expected, line).is_ok());
-    // With one bit wrong, none has slipped, unless it is the last 0 before idle line: that is missing too where the reply
-    // was cut in the ones before it, or lost one of several zeros.
+    // If one bit is wrong, none has slipped, unless it is the last 0 before idle line: that one is also missing if the
+    // reply was cut in the ones before it, or lost one of several zeros.
     let wrong = (0..len).find(|at| sound(line.bits() ^ 1 << at));
     if let Some(at) = wrong.filter(|at| (line.bits() << (128 - len)).leading_ones() >= len - at && *at > 0) {
         return Some(if line.bits() >> (at - 1) & 1 == 1 { CUT } else { LOST }.to_owned());
@@ -261,7 +261,8 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     found.map(|cause| cause.to_string())
 }
 
-/// What a reply has to be: as asked, in the layout that has this many frames; without a request, as it says itself.
+/// Returns what a reply has to be: as requested, in the layout with this many frames; without a request, as the reply
+/// itself says.
 fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
     let frames = group.len();
     let fits = |layout: &Layout| usize::from(layout.frames()) == frames;
@@ -343,7 +344,8 @@ impl StartStop for Decoder {
 }
 
 impl LogDecoder for Decoder {
-    /// A line of a log, two bytes a frame, the first bit of the line in bit 7 of the first: a request, a reply, or both.
+    /// Takes a line of a log with a request, a reply, or both: two bytes per frame, the first bit on the wire in bit 7 of
+    /// the first byte.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         let words = burst.bytes.chunks(2).map(|pair| match *pair {
             [high, low] => u16::from_be_bytes([high, low]),

@@ -1,13 +1,12 @@
-//! Remarks beside an `ok` about values that are valid but implausible, and about the probable damage to a frame that is not
-//! ok.
+//! Remarks on good frames whose values are valid but implausible, and on the probable damage to bad frames.
 
 use crate::event::{Place, Position};
 use crate::time::Time;
 
-/// Turns per second that no servo motor reaches: 30,000 per minute.
+/// Turns per second that no servo motor reaches: 30,000 rpm.
 const FASTEST: f64 = 500.0;
-/// Consecutive moves below that after which a move above it is mentioned. Where positions jump from one
-/// frame to the next, the times or the resolution are not what they seem.
+/// Consecutive moves below that after which a move above it is mentioned. If positions jump from one frame to the next, the
+/// times or the resolution are not what they seem.
 const CALM: u32 = 8;
 
 /// Follows the position of an encoder.
@@ -18,7 +17,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Takes the next position; returns what is strange about it.
+    /// Takes the next position; returns what is implausible about it.
     pub(super) fn note(&mut self, place: Place, position: Position) -> Option<String> {
         let Place::Time { start: time, .. } = place else { return None };
         let same = |before: &(Time, Position)| {
@@ -36,14 +35,14 @@ impl Motion {
             self.calm = 0;
             return None;
         }
-        // The way back from a wrong position is the second of two.
+        // The jump back from a wrong position is the second of two.
         self.calm -= CALM / 2;
         Some(format!("moved {turns:+.4} turns in {:.1} us, faster than any motor turns", seconds * 1e6))
     }
 }
 
-/// Whether one bit more, or one less, makes a frame of `len` bits sound; `raw` is what the line carried, the first bit
-/// in bit 0.
+/// Returns whether one bit more, or one less, makes a frame of `len` bits sound; `raw` holds the bits on the line, the
+/// first in bit 0.
 pub(super) fn slipped_bit(raw: u128, len: u32, sound: impl Fn(u128) -> bool) -> Option<&'static str> {
     let mask = 1_u128.checked_shl(len)? - 1;
     if raw == 0 {
@@ -59,26 +58,26 @@ pub(super) fn slipped_bit(raw: u128, len: u32, sound: impl Fn(u128) -> bool) -> 
     })
 }
 
-/// The bits of a line and those that begin at bit `at` of it, the first in bit 0; what nobody drives is 1.
+/// Joins the bits of a line and those that begin at its bit `at`, the first in bit 0; undriven bits are 1.
 pub(super) fn joined(bits: u128, behind: u128, at: i64) -> u128 {
     let at = u32::try_from(at).unwrap_or(u32::MAX);
     let below = 1_u128.checked_shl(at).map_or(u128::MAX, |one| one - 1);
     bits & (behind.checked_shl(at).unwrap_or(u128::MAX) | below)
 }
 
-/// What is said of an answer that came a bit short.
+/// The remark on an answer that is one bit short.
 pub(super) const LOST: &str = "a bit was lost on the line";
 
-/// What is said of an answer that ends early.
+/// The remark on an answer that ends early.
 pub(super) const CUT: &str = "it was cut short: the encoder stopped, or the line was switched";
 
-/// High bits at the end of a whole answer that say more of an idle line than of its check field.
+/// Number of high bits at the end of a whole answer that suggest an idle line rather than its check field.
 pub(super) const CUT_BITS: u32 = 5;
-/// So many are an idle line even if one bit the other way, lost or added would make a frame of an eight-bit check sound:
-/// of what was cut, that is so in a quarter of all cases.
+/// This many are an idle line even if flipping, removing or adding one bit would make a frame with an eight-bit check
+/// sound: that is so for a quarter of all cut frames.
 pub(super) const SURELY_CUT_BITS: u32 = 9;
 
-/// Why a request got no answer when the next one came `after` picoseconds later: nobody waits so briefly.
+/// Why a request got no answer when the next one came `after` picoseconds later: no master waits that briefly.
 pub(super) fn two_masters(after: i64) -> String {
     let after = after as f64 / 1e6;
     format!("another request came {after:.1} us later, before the answer was due to be over: two masters on the line?")
@@ -105,7 +104,7 @@ mod tests {
         assert_eq!(notes(&counts), [0; 0]);
         counts[20] += 128;
         assert_eq!(notes(&counts), [20, 21]);
-        // 30,000 a minute are 62.5 counts in 125 us.
+        // 30,000 rpm are 62.5 counts in 125 us.
         let fast: Vec<i64> = (0..30).map(|k| 62 * k).collect();
         assert_eq!(notes(&fast), [0; 0]);
     }
@@ -120,7 +119,7 @@ mod tests {
     fn a_bit_more_or_less() {
         let good = 0b1011_0111_0010_u128;
         let sound = |bits: u128| bits == good;
-        // Bit 5 is missing; a bit came in at 3; all is well.
+        // Bit 5 is missing; a bit was inserted at 3; the frame is sound.
         assert_eq!(slipped_bit(0b101_1011_0010, 12, sound), Some("a bit was lost on the line"));
         assert_eq!(slipped_bit(0b1_0110_1110_1010, 12, sound), Some("a bit was doubled or inserted on the line"));
         assert_eq!(slipped_bit(0b1111, 12, sound), None);

@@ -1,7 +1,7 @@
 //! Panasonic RTEX: logs of data blocks, command and response.
 //!
-//! The first block of a drive is shown whole (flags that are 0 and numbers that are 0 left out), of each later one what
-//! changed since the block of the same drive and direction before it. The counter is mentioned only if it neither stays the
+//! The first block of a drive is shown whole, except flags and numbers that are 0; of each later block only what changed
+//! since the previous block of the same drive and direction. The counter is mentioned only if it neither stays the
 //! same nor advances by one.
 
 mod blocks;
@@ -21,7 +21,7 @@ use crate::sink::Sink;
 use crate::time::Time;
 use blocks::{Blocks, Piece};
 
-/// RTEX in the table.
+/// The table row of RTEX.
 pub(super) struct Rtex;
 
 impl Codec for Rtex {
@@ -44,13 +44,14 @@ impl Codec for Rtex {
     }
 }
 
-/// Lines or records that are held back where the beginning says nothing of the shape: seconds of NOPs after power-up.
+/// Maximum number of lines or records that are held back if the beginning says nothing about the shape, such as seconds of
+/// NOPs after power-up.
 const MOST_HELD: usize = 1 << 16;
 
-/// Lines or records behind the NOPs that are enough to tell the shape.
+/// Lines or records after the NOPs that are enough to determine the shape.
 const TELLING: usize = 16;
 
-/// Flags of a response that come and go with every motion: no events.
+/// Flags of a response that change with every motion and are therefore not events.
 const MOTION: [&str; 3] = ["IN_POSITION", "IN_PROGRESS", "TORQUE_LIMITED"];
 
 /// Follows the blocks of a log.
@@ -59,14 +60,14 @@ struct Decoder {
     blocks: Blocks,
     /// The data read before the shape was known.
     held: Vec<Burst>,
-    /// Whether blocks are being decoded, in any shape.
+    /// Whether blocks are being decoded in some shape.
     began: bool,
     /// Why the log is not as written.
     misread: Option<String>,
     analysis: LogAnalysis,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
-    /// Of the same: the last counter, and the update periods so far.
+    /// For the same key, the last counter and the number of update periods so far.
     updates: HashMap<u8, (u8, i64)>,
     /// Place of the last block.
     place: Place,
@@ -107,7 +108,7 @@ impl Decoder {
         held.iter().try_for_each(|burst| self.decode(burst, out))
     }
 
-    /// A line or record, now that the shape is known as well as it can be.
+    /// Takes a line or record, now that the shape is known as well as possible.
     fn decode(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(piece) = self.blocks.feed(burst) {
             self.piece(&piece, out)?;
@@ -118,7 +119,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// A block, or what stands in the place of one.
+    /// Decodes a block, or whatever is in its place.
     fn piece(&mut self, piece: &Piece, out: &mut dyn Sink) -> io::Result<()> {
         let block = self.blocks.in_order(&piece.bytes);
         let report = inspect(&block);
@@ -133,8 +134,8 @@ impl Decoder {
         out.event(&Event::remark(self.place, "log", note))
     }
 
-    /// Where a block is: at its time, if the log has times; in update periods, if the period is known; else in the log. And whether
-    /// that is counted.
+    /// Returns where a block is: at its time, if the log has times; in update periods, if the period is known; otherwise by
+    /// its line in the log. Also returns whether that time is counted.
     fn place(&mut self, piece: &Piece, header: Header) -> (Place, bool) {
         let counter = header.update_counter.get();
         let (last, updates) = self.updates.entry(header.emit() & 0x9f).or_insert((counter, 0));
@@ -190,7 +191,7 @@ impl Decoder {
     }
 }
 
-/// The actual position.
+/// Returns the actual position.
 fn position(report: &Report) -> Option<Position> {
     let field = report.fields().find(|field| field.name == "Response_Data1")?;
     match field.value {
@@ -218,7 +219,7 @@ fn events(report: &Report, before: Option<&Report>) -> Vec<String> {
     }
 }
 
-/// The shape in words.
+/// Describes the shape in words.
 fn said(LogShape { size, word, skip }: LogShape) -> String {
     let size = size.bytes();
     let order = match word {
@@ -230,7 +231,7 @@ fn said(LogShape { size, word, skip }: LogShape) -> String {
     format!("blocks of {size} bytes{order}{from}")
 }
 
-/// Why a log of this shape is not as somebody meant it.
+/// Says why a log of this shape is not what was intended.
 fn misread(shape: LogShape) -> Option<String> {
     let what = match shape {
         LogShape { skip: 1.., .. } => {
@@ -251,7 +252,7 @@ fn misread(shape: LogShape) -> Option<String> {
 }
 
 impl LogDecoder for Decoder {
-    /// What there is to say about the log as a whole, before its blocks.
+    /// Returns remarks about the log as a whole, before its blocks.
     fn note(&self) -> Option<String> {
         let (Some(shape), taken) = self.blocks.shape() else { return None };
         let size = shape.size.bytes();
@@ -263,7 +264,7 @@ impl LogDecoder for Decoder {
         Some(format!("the log looks like {}{other}", said(shape)))
     }
 
-    /// What is wrong with the log as a whole, and what needs attention.
+    /// Returns what is wrong with the log as a whole, and what needs attention.
     fn found(&self) -> Found {
         let said = |it: DriveTrouble| format!("drive {} {}", it.mac_id, it.trouble.name());
         let troubles: Vec<String> = self.analysis.troubles().map(said).collect();
@@ -271,7 +272,7 @@ impl LogDecoder for Decoder {
         Found { misread: self.misread.clone(), trouble }
     }
 
-    /// A line or record of the log. NOPs from before the start are held back until something tells the shape.
+    /// Takes a line or record of the log. NOPs from before the start are held back until something determines the shape.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         if self.blocks.shape().0.is_some() || self.settings.block_size.is_some() || self.began {
             return self.decode(burst, out);
@@ -293,7 +294,7 @@ impl LogDecoder for Decoder {
         Ok(())
     }
 
-    /// The end of the log: drives that were on one side of it only, and what goes on there.
+    /// Ends the log: reports drives that appear in only one direction, and what remains open.
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         if !self.held.is_empty() {
             self.let_go(out)?;
@@ -309,13 +310,13 @@ impl LogDecoder for Decoder {
     }
 }
 
-/// A NOP from before the start, in any order of its bytes: there is nothing but an address, or Sub_Chk.
+/// Returns whether a block is a NOP from before the start, in any byte order: it holds only an address, or Sub_Chk.
 fn is_empty(block: &[u8]) -> bool {
     let nothing_else = || block.iter().filter(|byte| **byte != 0).count() <= 1;
     matches!(block, [_, code, control, ..] if code & 0x7f == 0 && *control == 0) || nothing_else()
 }
 
-/// The log says that the other end sent it.
+/// Returns whether the log says that the other end sent it.
 fn turned_round(response: bool) -> Verdict {
     let (told, is) = if response { ("command", "response") } else { ("response", "command") };
     Refusal {
@@ -325,7 +326,7 @@ fn turned_round(response: bool) -> Verdict {
     .into()
 }
 
-/// Whether it is a block at all. A bus without a device is not a drive, although its ones look like a response with an
+/// Returns whether it is a block at all. A bus without a device is not a drive, although its ones look like a response with an
 /// undefined code.
 fn is_block(report: &Report) -> bool {
     report.is_usable() && report.cause() != Some(Cause::AllOnes)

@@ -1,8 +1,8 @@
 //! TI SORTE: the frames of a network capture, one event per packet.
 //!
-//! Packets of an Ethernet interface are start-up frames, with their FCS if the file says so. If it does not, frames without
-//! an FCS, padded or not, are accepted as a network card delivers them, with a remark. Packets of another interface are
-//! frames of the IO exchange, which have neither type nor addresses: the one with SA 0 is the master's.
+//! Packets of an Ethernet interface are start-up frames, with their FCS if the file says so. Otherwise frames without an
+//! FCS, padded or not, are accepted as a network card delivers them, with a remark. Packets of another interface are
+//! frames of the IO exchange, which have neither a type nor Ethernet addresses: the frame with SA 0 is the master's.
 
 use std::fmt::Write as _;
 
@@ -42,7 +42,7 @@ const PTO: [&str; 4] = ["PTO 1", "PTO 2", "PTO 3", "PTO 4"];
 /// One byte at 100 Mbit/s, in picoseconds.
 const BYTE: i64 = 80_000;
 
-/// SORTE in the table.
+/// The table row of SORTE.
 pub(super) struct Sorte;
 
 impl Codec for Sorte {
@@ -97,7 +97,7 @@ fn event(packet: &Packet) -> Event {
     })
 }
 
-/// The first and the last byte of a field, of `len` in all.
+/// Returns the first and the last byte of a field; the frame has `len` bytes.
 fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
     Some(match (frame, name) {
         (Frame::Master(_) | Frame::Device(_), "STATUS") => (1, 1),
@@ -109,7 +109,7 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
         (Frame::Param(_), "delay_burst") => (14, 14),
         (Frame::Param(_), "ipg") => (20, 23),
         (Frame::Param(_), "crc_mode") => (35, 35),
-        // Behind the output data come CRC and time stamp, behind a payload its check.
+        // The output data are followed by CRC and time stamp, a payload by its check.
         (Frame::Master(_), "time stamp") => (len.checked_sub(2)?, len - 1),
         (Frame::Master(_), "data") => (2, len.checked_sub(4)?),
         (Frame::Device(_), "data") => (2, len.checked_sub(2)?),
@@ -122,7 +122,7 @@ fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
     })
 }
 
-/// An impossible table is not an answer, even if its check is right.
+/// Judges the content of a frame: an impossible table is not an answer, even if its check is right.
 fn contents(frame: &Frame<'_>) -> Verdict {
     match frame {
         Frame::Discovery(view) => match Network::new(*view) {
@@ -158,7 +158,7 @@ fn fields(frame: &Frame<'_>) -> Vec<Field> {
         Frame::Other(frame) => vec![status(frame.status()), data(frame.payload())],
         Frame::Master(view) => {
             let mut fields = vec![status(view.status())];
-            // Four bytes a device is the CNC machine; anything else is shown as it is.
+            // Four bytes per device mean the CNC machine; anything else is shown as it is.
             match frame.cnc_slices() {
                 Some(slices) => {
                     fields.extend(PTO.into_iter().zip(slices).map(|(name, slice)| Field::text(name, slice.pto)));
@@ -183,11 +183,11 @@ fn fields(frame: &Frame<'_>) -> Vec<Field> {
     }
 }
 
-/// Bytes shown unchanged, without spaces.
+/// Shows bytes unchanged, without spaces.
 fn data(bytes: &[u8]) -> Field {
     let mut digits = String::new();
     for byte in bytes {
-        // A String takes everything.
+        // Writing to a String cannot fail.
         let _ = write!(digits, "{byte:02X}");
     }
     Field::text("data", digits)
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(class(&of(DataLink::ETHERNET, true, &frame.emit())), Some("too_many_devices"));
     }
 
-    /// As a network card gives it, 10 bytes and padded to 60; but not where the file says that the FCS is there.
+    /// As a network card delivers it, 10 bytes or padded to 60; but not if the file says that the FCS is present.
     #[test]
     fn frames_without_their_fcs_are_taken_where_the_file_does_not_promise_it() {
         let sync = Sync::of_master(500, 76, Place::Inner).emit();

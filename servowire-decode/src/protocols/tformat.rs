@@ -1,7 +1,7 @@
-//! Tamagawa T-Format: fields of a half-duplex line into requests and answers.
+//! Tamagawa T-Format: combines fields of a half-duplex line into requests and answers.
 //!
 //! Requests and answers look alike on the line: both begin with the control field. They are told apart by their
-//! place. After a request comes its answer; any other frame is a request if it has the length of one, and else an
+//! place. A request is followed by its answer; any other frame is a request if it has the length of one, otherwise an
 //! answer whose request was not recorded.
 
 mod describe;
@@ -27,7 +27,7 @@ use crate::time::Time;
 use describe::Encoder;
 use frame::{ANSWER_TIMEOUT, Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
-/// T-Format in the table.
+/// The table row of T-Format.
 pub(super) struct Tformat;
 
 impl Codec for Tformat {
@@ -40,7 +40,7 @@ impl Codec for Tformat {
                 needs: "T-Format is decoded from edges or samples of the line, or from a log of bytes",
                 fields: describe::FIELDS,
                 rates: &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()],
-                // 9 of 256 control fields; with the echo and the check field of the answer.
+                // 9 of 256 control fields are valid; an answer adds its echo and its check field.
                 weights: Weights { request: 4, answer: 24, alone: 16 },
                 captures: &bundled::TFORMAT,
                 ..Facts::NONE
@@ -61,13 +61,14 @@ impl Codec for Tformat {
 /// Shortest pause that ends a frame, in bits: one and a half fields.
 const FIELD_TIMEOUT_BITS: i64 = 15;
 
-/// The ones in what a dip of the idle line looks like: it may be two bits long, and the answer may begin behind these.
+/// The ones in the field that a dip of the idle line looks like: the dip may be two bits long, and the answer may begin
+/// after these ones.
 const IDLE: u16 = 0x1e;
 
-/// The shortest pause for the change of direction, in bits. Fields of one frame follow more closely.
+/// The shortest pause for the change of direction, in bits. The fields of one frame follow each other more closely.
 const TURN_ROUND_BITS: i64 = 4;
 
-/// The longest answer, with some pauses in it, in bits.
+/// The longest answer, including some pauses, in bits.
 const LONGEST_BITS: i64 = 150;
 
 /// Finds the frames among the fields of a line.
@@ -75,19 +76,19 @@ const LONGEST_BITS: i64 = 150;
 pub struct Decoder {
     bit: i64,
     encoder: Encoder,
-    /// Begin of the capture, until the first frame has been seen.
+    /// Start of the capture, until the first frame has been seen.
     begin: Option<Time>,
-    /// Until when the rest of a frame is passed over in which the capture began.
+    /// Time until which the rest of a frame is skipped, if the capture began inside one.
     skip: Option<Time>,
-    /// Until when another piece of that frame may come.
+    /// Time until which another piece of that frame may come.
     cut_until: Option<Time>,
-    /// The end of what was passed over.
+    /// The end of the skipped part.
     skipped: Time,
     open: Frame,
     pending: Option<Pending>,
-    /// Until when a frame may answer a request that was before the capture, as long as none was sound.
+    /// Time until which a frame may answer a request from before the capture, as long as no frame was sound.
     early: Option<Time>,
-    /// A frame that may be a request or such an answer: the next frame decides.
+    /// A frame that may be a request or an answer to one from before the capture: the next frame decides.
     unclear: Option<Frame>,
 }
 
@@ -108,7 +109,7 @@ impl Decoder {
         }
     }
 
-    /// Whether the open frame is over before a field that begins at `start`.
+    /// Returns whether the open frame ends before a field that begins at `start`.
     fn is_over(&self, start: Time) -> bool {
         let pause = start - self.open.end;
         if pause > FIELD_TIMEOUT_BITS * self.bit {
@@ -118,12 +119,12 @@ impl Decoder {
             return false;
         }
         match self.pending {
-            // A request is over when its answer may follow.
+            // A request ends when its answer may follow.
             None => {
                 let request_fields = |id: DataId| usize::from(id.request_fields());
                 self.open.broken.is_some() || self.open.len() >= self.open.data_id().map_or(1, request_fields)
             }
-            // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
+            // After a low delimiter the receiver may have skipped fields: the answer is given the length of a whole one.
             Some(pending) => {
                 let whole = 10 * pending.answer_fields(self.open.first()) as i64;
                 pending.is_asked_again(&self.open)
@@ -132,7 +133,8 @@ impl Decoder {
         }
     }
 
-    /// Whether the open frame is a sound request of several fields: what looks like a field of idle line behind it is none of it.
+    /// Returns whether the open frame is a sound request of several fields: something after it that looks like a field of
+    /// idle line is then not part of it.
     fn is_long_request(&self) -> bool {
         self.pending.is_none()
             && self.open.len() > 1
@@ -141,7 +143,7 @@ impl Decoder {
                 .is_ok_and(|request| self.open.len() == usize::from(request.data_id().request_fields()))
     }
 
-    /// Whether the open frame is whole as an answer and too long for a request.
+    /// Returns whether the open frame is a complete answer and too long for a request.
     fn is_answer_alone(&self) -> bool {
         if self.pending.is_some() || self.open.broken.is_some() {
             return false;
@@ -169,7 +171,7 @@ impl Decoder {
             self.unclear = Some(frame);
             return Ok(());
         }
-        // With no idle line before it, a bad first frame is only the end of one.
+        // Without idle line before it, a bad first frame is only the end of a frame.
         let at_once = begin.is_some_and(|begin| frame.start() - begin < FIELD_TIMEOUT_BITS * self.bit);
         let still = self.cut_until.take().filter(|until| frame.start() < *until);
         if (at_once || still.is_some()) && !event.verdict.is_ok() {
@@ -183,7 +185,7 @@ impl Decoder {
         out.event(&event)
     }
 
-    /// A frame that follows a request.
+    /// Decodes a frame that follows a request.
     fn answer(&mut self, frame: &Frame, pending: Pending) -> Event {
         let result = match (frame.broken, pending.request) {
             (Some(field), _) => Err(Error::Delimiter { field }),
@@ -206,13 +208,13 @@ impl Decoder {
             None => inspect_bytes(request, frame.contents()),
             Some(_) => inspect(request, frame.line(self.bit)?),
         };
-        // That is what its verdict says already.
+        // Its verdict already says that.
         let cause = report.cause().filter(|cause| *cause != Cause::RequestRefused);
         if cause.is_some_and(|cause| cause != Cause::Line(LineCause::Disturbed)) {
             return cause.map(|cause| cause.to_string());
         }
         let due = usize::from(request.data_id().response_fields());
-        // With all delimiters in place and one bit wrong, none has slipped.
+        // If all delimiters are in place and one bit is wrong, none has slipped.
         let wrong = frame.contents().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
         let flipped = frame.broken.is_none() && frame.len() == due && wrong == 1;
         if frame.broken.is_some() && frame.is_one_bit_off(request) {
@@ -230,11 +232,11 @@ impl Decoder {
         cause.map(|cause| cause.to_string())
     }
 
-    /// A frame without a request before it: a request, or an answer alone.
+    /// Decodes a frame without a request before it: a request, or an answer alone.
     fn unasked(&mut self, frame: &Frame) -> Event {
         let asked = frame.data_id().ok();
         let longer = |id: DataId| frame.len() > usize::from(id.request_fields());
-        // More fields than any request has are an answer whatever they hold.
+        // A frame with more fields than any request is an answer, whatever it holds.
         if asked.map_or(frame.len() > 4, longer) {
             let result = match (frame.broken, Request::answered_by(frame.contents())) {
                 (Some(field), _) => Err(Error::Delimiter { field }),
@@ -251,7 +253,7 @@ impl Decoder {
         describe::request(frame, asked, result)
     }
 
-    /// The unclear frame was a request.
+    /// Takes the unclear frame as a request.
     fn clear(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         match self.unclear.take() {
             Some(frame) => {
@@ -261,10 +263,10 @@ impl Decoder {
         }
     }
 
-    /// The answer did not come until `now`; `asked`: when somebody asked again.
+    /// Ends the wait for an answer at `now`; `asked`: whether that is because the next request came.
     fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match (self.unclear.take(), self.pending.take()) {
-            // Nobody answers an answer.
+            // There is no answer to an answer.
             (Some(frame), Some(Pending { request: Some(request), .. })) => {
                 let event = self.encoder.answer(
                     &frame,
@@ -274,7 +276,7 @@ impl Decoder {
                 );
                 out.event(&event)
             }
-            // Nobody owes an answer to a damaged request.
+            // A damaged request need not be answered.
             (_, Some(Pending { request: Some(request), place })) => {
                 out.event(&describe::silence(request, place, now, asked))
             }
@@ -282,7 +284,7 @@ impl Decoder {
         }
     }
 
-    /// A frame of a log.
+    /// Takes a frame of a log.
     fn take(&mut self, line: u64, bytes: &[u8], out: &mut dyn Sink) -> io::Result<()> {
         let frame = Frame::of_log(line, bytes);
         let event = match self.pending.take() {
@@ -365,11 +367,11 @@ impl StartStop for Decoder {
 }
 
 impl LogDecoder for Decoder {
-    /// A line of a log: requests and answers, one after the other.
+    /// Takes a line of a log: requests and answers, one after the other.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         let mut rest = burst.bytes.as_slice();
         let id = |bytes: &[u8]| ControlField::parse(bytes.first().copied().unwrap_or_default())?.data_id();
-        // The line is nothing but a request, or nothing but an answer.
+        // The line is only a request, or only an answer.
         let is_request = id(rest).is_ok_and(|id| rest.len() == usize::from(id.request_fields()));
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
         let asks = burst.direction == Some(Direction::Request);

@@ -1,4 +1,4 @@
-//! One axis: SYNC0 generator, DIR, motor, and the fate of each step.
+//! One axis: SYNC0 generator, DIR, motor, and what becomes of each step.
 
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ pub(super) struct Tally {
     pub(super) lost: u64,
     /// Steps that the motor made: pulses with the driver on.
     pub(super) moved: u64,
-    /// Steps made later, in a cycle without a step of its own, because their frame was lost.
+    /// Steps made later, in a cycle that had no step itself, because their frame was lost.
     pub(super) caught_up: u64,
     /// DIR too close to a rising STEP.
     pub(super) dir_faults: u64,
@@ -68,7 +68,7 @@ pub(super) struct Build {
     pub(super) variant: Variant,
     pub(super) latency_ns: u16,
     pub(super) write_ns: u16,
-    /// A pulse further than this from its time is late.
+    /// A pulse this far from its time or further is late.
     pub(super) tolerance_ns: f64,
 }
 
@@ -117,7 +117,7 @@ impl Axis {
         self.expected.clear();
     }
 
-    /// Handles an activity; `word`: the word in progress. Changes are passed to `seen`, if it is wanted.
+    /// Handles an activity; `word`: the word in progress. Passes changes to `seen`, if that is set.
     pub(super) fn take(
         &mut self,
         change: Change,
@@ -133,7 +133,7 @@ impl Axis {
         }
     }
 
-    /// Notes that the word is in the buffer, so its step will come.
+    /// Notes that the word is in the buffer, so that its step will come.
     fn order(&mut self, Incoming { word, expected, .. }: Incoming) {
         if word.start().is_some() {
             self.tally.ordered += 1;

@@ -2,7 +2,7 @@
 
 use sorte_proto::Correction;
 
-/// From the decision to a new counter value until it takes effect in the published device, in ns.
+/// Time from the decision on a new counter value until it takes effect in the published device, in ns.
 const WRITE_NS: f64 = 135.0;
 /// A tick of the counter in ns.
 const TICK: f64 = 5.0;
@@ -12,30 +12,30 @@ const TICK: f64 = 5.0;
 /// Times are ns of the simulation, which are those of the master's crystal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock {
-    /// The counter held `value` at `at`.
+    /// At time `at` the counter held `value`.
     at: f64,
     value: f64,
     /// Counter ns for each ns.
     rate: f64,
-    /// Until then a correction runs, which adds `slew` to the rate.
+    /// A correction that adds `slew` to the rate runs until then.
     slew: f64,
     slew_until: f64,
-    /// The crystal warms up: the gain of `rate` in a second.
+    /// Gain of `rate` per second as the crystal warms up.
     drift: f64,
 }
 
 impl Clock {
-    /// `ppm`: error of the crystal; `drift_ppm`: its gain in a second.
+    /// `ppm`: error of the crystal; `drift_ppm`: its change per second.
     pub(super) fn new(value: f64, ppm: f64, drift_ppm: f64) -> Self {
         Self { at: 0.0, value, rate: 1.0 + ppm * 1e-6, slew: 0.0, slew_until: 0.0, drift: drift_ppm * 1e-6 }
     }
 
-    /// Returns the counter at a time. A correction that has begun is not seen before its time.
+    /// Returns the counter at a time. A correction that has begun does not show before its time.
     pub(super) fn at(&self, ns: f64) -> f64 {
         self.value + (ns - self.at) * self.rate + (ns.min(self.slew_until) - self.at).max(0.0) * self.slew
     }
 
-    /// The reading of the register: whole ticks.
+    /// Returns the register's reading, in whole ticks.
     pub(super) fn read(&self, ns: f64) -> u32 {
         let value = self.at(ns);
         // Rounded down, also below 0.
@@ -43,7 +43,7 @@ impl Clock {
         (whole.div_euclid(5) * 5) as u32
     }
 
-    /// When the counter holds a value.
+    /// Returns when the counter holds a value.
     pub(super) fn when(&self, value: f64) -> f64 {
         let slewing = (self.slew_until - self.at).max(0.0);
         let slewed = self.value + slewing * (self.rate + self.slew);

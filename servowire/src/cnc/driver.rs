@@ -4,7 +4,7 @@ use core::fmt;
 
 use servowire_drivers::drv8711::{self, Apply, Configuration, Register, Status, StepMode};
 
-/// Time of a word at the 500 kHz of the SPI, in ns: so old can the STATUS be that a device tells.
+/// Duration of a word on the 500 kHz SPI, in ns: the STATUS that a device reports can be this old.
 const WORD_NS: u64 = 32_000;
 
 /// The registers after power-up: CTRL, TORQUE, OFF, BLANK, DECAY, STALL, DRIVE, STATUS.
@@ -15,11 +15,11 @@ const ENABLED: u16 = 1;
 /// Something that happens to a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// It sets bits of STATUS and stops driving the motor.
+    /// The driver sets bits of STATUS and stops driving the motor.
     Reports(Status),
-    /// It has no supply: every register reads all ones.
+    /// The driver has no supply: every register reads as all ones.
     Unpowered,
-    /// A dip of its supply: all registers have their reset values, ENBL is 0, and STATUS reports nothing.
+    /// A dip in its supply: all registers have their reset values, ENBL is 0, and STATUS reports nothing.
     Reset,
 }
 
@@ -48,13 +48,13 @@ impl fmt::Display for Fault {
 pub(super) struct Driver {
     registers: [u16; 8],
     powered: bool,
-    /// What the device read last, and when it reads again.
+    /// What the device last read, and when it reads again.
     polled: Status,
     due_ns: u64,
 }
 
 impl Driver {
-    /// After power-up.
+    /// Creates a driver after power-up.
     pub(super) fn new() -> Self {
         Self { registers: RESET, powered: true, polled: Status::empty(), due_ns: 0 }
     }
@@ -71,7 +71,7 @@ impl Driver {
         }
     }
 
-    /// The registers of the reference motor: 1/256 steps, and the motor driven.
+    /// Returns the registers for the reference motor: 1/256 steps, with the motor driven.
     pub(super) fn set_up(&mut self) -> Result<(), drv8711::Error> {
         let mut configuration = Configuration::default();
         configuration.ctrl.enable = true;
@@ -83,7 +83,7 @@ impl Driver {
         Ok(())
     }
 
-    /// A word over the SPI.
+    /// Transfers a word over the SPI.
     fn transfer(&mut self, word: u16) -> u16 {
         if !self.powered {
             return 0xffff;
@@ -98,13 +98,13 @@ impl Driver {
         if address == 1 { *register & 0xbff } else { *register }
     }
 
-    /// Whether steps move the motor.
+    /// Returns whether steps move the motor.
     pub(super) fn drives(&self) -> bool {
         let [ctrl, .., status] = self.registers;
         self.powered && ctrl & ENABLED != 0 && status == 0
     }
 
-    /// STATUS as the device has it at `now_ns` of its time.
+    /// Returns STATUS as the device knows it at `now_ns` of its time.
     pub(super) fn status(&mut self, now_ns: u64) -> Status {
         if now_ns >= self.due_ns {
             self.due_ns = now_ns + WORD_NS;

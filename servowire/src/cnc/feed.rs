@@ -1,7 +1,8 @@
-//! Feed override: a program is slowed down, stopped and restarted on its path.
+//! Feed override: slows down, stops and restarts a program on its path.
 //!
-//! The words of the program are steps at times. Here time runs at a rate of 0 to 1, so all axes slow down together and stay on
-//! their path, whatever the program is; steps only move apart, so two steps of an axis that are 4 us apart stay at least 4
+//! The words of the program are steps at times. Here the program's time runs at a rate of 0 to 1, so all axes slow down
+//! together and stay on their path, whatever the program is; steps only move apart, so two steps of an axis that are 4 us
+//! apart stay at least 4
 //! us apart.
 
 use sorte_proto::{Pto, StartTime};
@@ -16,7 +17,7 @@ const PERIOD: f64 = 4000.0;
 pub(super) struct Feed {
     rate: f64,
     target: f64,
-    /// Ns of the program's cycle that have passed.
+    /// Nanoseconds of the program's cycle that have passed.
     done: f64,
     /// The program's cycle.
     words: Vec<Pto>,
@@ -27,7 +28,7 @@ impl Feed {
         Self { rate: 1.0, target: 1.0, done: 0.0, words: vec![Pto::default(); axes] }
     }
 
-    /// The rate to run at from now on, reached on a ramp.
+    /// Sets the rate from now on, which is reached by a ramp.
     pub(super) fn set(&mut self, target: f64) {
         self.target = target;
     }
@@ -36,13 +37,13 @@ impl Feed {
         self.rate == 0.0 && self.target == 0.0
     }
 
-    /// Whether everything taken from the program has been passed on.
+    /// Returns whether everything taken from the program has been passed on.
     pub(super) fn is_empty(&self) -> bool {
         self.done == 0.0
             || self.words.iter().all(|word| word.start().is_none_or(|start| f64::from(start.ns()) < self.done))
     }
 
-    /// The words of the next cycle.
+    /// Returns the words of the next cycle.
     pub(super) fn next(&mut self, program: &mut Power, words: &mut [Pto]) {
         if self.rate >= 1.0 && self.target >= 1.0 && self.done == 0.0 {
             program.next(words);
@@ -74,7 +75,7 @@ impl Feed {
         }
     }
 
-    /// The steps of the program's cycle from `from` to before `to`, which begin `offset` into the cycle given on.
+    /// Passes on the steps of the program's cycle from `from` to before `to`; they begin `offset` into the resulting cycle.
     fn part(&self, words: &mut [Pto], from: f64, to: f64, rate: f64, offset: f64) {
         for (out, word) in words.iter_mut().zip(&self.words) {
             let Pto::Pulse { start, direction } = *word else { continue };

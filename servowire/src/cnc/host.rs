@@ -8,7 +8,7 @@ use super::power::Power;
 
 /// Number of missing steps at which the host slows down, so that the axis finds cycles in which to catch up.
 const SLOW_LAG: u16 = 32;
-/// The rate then: 12 us and more between two steps, so two cycles in a row without one.
+/// The rate in that case: at least 12 us between two steps, so two cycles in a row without a step.
 const SLOW: f64 = 0.3;
 /// Cycles from the last word until all pulses have ended.
 const DRAIN: u32 = 6;
@@ -25,10 +25,10 @@ pub(super) struct Host {
     cycle: u64,
     /// Why the motion was ended early.
     pub(super) ended: Option<String>,
-    /// The master has restarted: nothing moves until the axes are where they should be.
+    /// Set after the master has restarted: nothing moves until the axes are where they should be.
     resuming: bool,
     catching_up: bool,
-    /// Cycles since there was nothing more to do; since the resumption began.
+    /// Cycles since there was nothing more to do, and since motion resumed.
     idle: u32,
     waited: u32,
 }
@@ -55,7 +55,7 @@ impl Host {
         (self.resuming, self.waited) = (true, 0);
     }
 
-    /// Makes the words of the next cycle. `stop`: the master is about to restart.
+    /// Returns the words of the next cycle. `stop`: the master is about to restart.
     pub(super) fn plan(&mut self, stop: bool, nodes: &[Node]) {
         self.cycle += 1;
         let worst = nodes.iter().map(|node| node.lag.unsigned_abs()).max().unwrap_or(0);
@@ -124,12 +124,12 @@ impl Host {
         &self.words
     }
 
-    /// Whether the axes are at rest.
+    /// Returns whether the axes are at rest.
     pub(super) fn is_still(&self) -> bool {
         self.feed.is_still()
     }
 
-    /// Whether the motion and all its pulses have ended.
+    /// Returns whether the motion and all its pulses have ended.
     pub(super) fn is_done(&self) -> bool {
         self.idle >= PATIENCE
     }

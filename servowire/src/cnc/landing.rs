@@ -57,7 +57,7 @@ fn machine(setup: Setup, cycles: u64) -> (Line, Host, Recorder) {
     (line, host, record)
 }
 
-/// What the device at place `k` has counted, and what the master has of it.
+/// Returns what the device at place `k` has counted, and what the master knows about it.
 fn counted(line: &Line, k: usize) -> (Tally, Tally) {
     let at_master = line.master.tally(k as u8 + 1).unwrap();
     (line.nodes[k].device.counters().master, at_master)
@@ -115,7 +115,7 @@ fn run(devices: usize, cycles: u64, positions: bool, seed: u64) -> u64 {
     sent
 }
 
-/// A tenth of the frames for each number of devices; with `HOSTILE_EVENTS` as many as one likes.
+/// A tenth of the frames for each number of devices; `HOSTILE_EVENTS` sets any other number.
 #[test]
 fn nothing_is_stale_and_every_loss_is_counted() {
     let frames = servowire_world::wanted_events(200_000) as u64;
@@ -126,7 +126,7 @@ fn nothing_is_stale_and_every_loss_is_counted() {
     }
 }
 
-/// Start-up and exchange are on the same wires: all lines start at the first try, and no frame meets another one.
+/// Start-up and exchange share the wires: all lines start at the first attempt, and no frame meets another one.
 #[test]
 fn lines_of_2_to_254_devices_start_at_the_first_try() {
     for devices in [2, 3, 4, 5, 9, 10, 11, 12, 14, 16, 20, 32, 64, 128, 254] {
@@ -144,7 +144,8 @@ fn lines_of_2_to_254_devices_start_at_the_first_try() {
     }
 }
 
-/// 254 devices behind ports that re-time to 25 MHz would meet; the line is refused with the first that would.
+/// The frames of 254 devices with ports that re-time to 25 MHz would meet; the line is refused, naming the first device for
+/// which this is so.
 #[test]
 fn a_line_that_jitter_does_not_carry_is_refused() {
     let physics = Physics { hop_jitter_ns: 5.0, ..QUIET };
@@ -157,7 +158,7 @@ fn a_line_that_jitter_does_not_carry_is_refused() {
     assert!(why.contains("the frame of device 34 comes 240 ns after the one before it, 244 ns are needed"), "{why}");
 }
 
-/// Cables of four devices one by one, from none to the longest: all start at the first try and run.
+/// Each cable of four devices in turn, from none to the longest: all lines start at the first attempt and run.
 #[test]
 fn every_cable_runs() {
     for cable in (0..6).chain((7..=500).step_by(7)).chain([500]) {
@@ -175,9 +176,10 @@ fn every_cable_runs() {
     }
 }
 
-/// 2800 ns more on each way back: a round trip over 500 ns of cable takes 4160 ns, more than the published sum holds. The first
+/// 2800 ns more on every way back: a round trip over 500 ns of cable takes 4160 ns, more than the published sum holds. The
+/// first
 /// device that cannot measure is named: before the exchange if SYNC has gained less than the devices there are must add,
-/// otherwise at its end.
+/// otherwise at the end of the exchange.
 #[test]
 fn a_device_that_cannot_measure_its_cable_is_named() {
     for (cables, early) in [(&[20, 500, 500][..], true), (&[20, 300, 500, 300, 300], false)] {

@@ -22,11 +22,11 @@ use super::wires::{Arrival, BYTE_NS, Hit, NEIGHBOUR_NS, REFLECTION_NS, Wires, ca
 const TRIGGER_NS: u64 = 500;
 /// Preamble of the frames of the exchange.
 const PREAMBLE: usize = 2;
-/// From the end of the master frame until the device has checked it and taken its slice: 119 instructions of the
-/// published receive path, and the table of its CRC.
+/// Time from the end of the master frame until the device has checked it and taken its slice: 119 instructions of the
+/// published receive path, and its CRC table.
 const RECEIVE_NS: f64 = 800.0;
 const DEVICE_FRAME: usize = DeviceFrame::<{ InputSlice::LEN }>::LEN;
-/// Lines for the user that are kept; the rest is counted.
+/// Maximum number of messages kept for the user; further ones are only counted.
 const EVENTS: usize = 50;
 
 pub(super) struct Line {
@@ -39,25 +39,25 @@ pub(super) struct Line {
     now: f64,
     /// When the master needs to be polled.
     asked: f64,
-    /// Devices that a cable leads to.
+    /// Number of devices that a cable leads to.
     plugged: usize,
     /// Start-up frames sent, by kind: DISCOVERY, PARAM, DELAY_REQ, SYNC.
     pub(super) sent: [u64; 4],
     /// When the first cycle began.
     pub(super) first_cycle_ns: Option<u64>,
-    /// Shortest gap between two device frames at the master, in ns; and where the last one ended.
+    /// Shortest gap between two device frames at the master, in ns; and when the last one ended.
     pub(super) gap_ns: f64,
     free: f64,
-    /// The reason of the master's last restart, and the device that has left the line because its line delay is implausible.
+    /// The reason for the master's last restart, and the device that has left the line because its line delay is implausible.
     pub(super) why: Option<String>,
     pub(super) unmeasured: Option<String>,
-    /// Lines for the user: what went wrong, and when; and how many there were.
+    /// Messages for the user on what went wrong and when; and how many there were.
     pub(super) events: Vec<String>,
     pub(super) event_count: u64,
     output: Vec<u8>,
 }
 
-/// The result of a call of [`Line::step`].
+/// The result of a call to [`Line::step`].
 pub(super) enum Progress {
     StartUp,
     Cycle,
@@ -129,7 +129,7 @@ impl Line {
         }
     }
 
-    /// Continues until the master has sent something; `None`: it waits for ever.
+    /// Continues until the master has sent something; `None` if it waits for ever.
     pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
         while let Some((at, event)) = self.queue.pop() {
             self.now = at;
@@ -308,7 +308,7 @@ impl Line {
         self.queue.push(self.now, Event::Master);
     }
 
-    /// Device k measures the line to the next one, which then does the same. Nothing else is on that wire.
+    /// Lets device k measure the line to the next device, which then does the same. There is nothing else on that wire.
     fn measure(&mut self, k: usize, trigger: Trigger, at_ns: f64) {
         let (Some(request), true) = (Device::delay_request(trigger), k + 1 < self.plugged) else { return };
         let mut frame = request.emit();
@@ -420,7 +420,7 @@ impl Line {
         }
     }
 
-    /// What was to happen in a cycle that never came.
+    /// Returns the event planned for a cycle that never came.
     pub(super) fn still_to_come(&self) -> Option<String> {
         let cycles = self.master.counters().cycles;
         let unplug = self.setup.unplug.filter(|(_, when)| *when >= cycles);
@@ -433,7 +433,7 @@ impl Line {
                 .map(|(device, when, _)| format!("cycle {when}, in which the driver of device {device} was to fail")))
     }
 
-    /// What was to happen in this cycle.
+    /// Performs the event planned for this cycle.
     fn incidents(&mut self, cycle: u64) {
         if let Some((device, _)) = self.setup.unplug.filter(|(_, when)| *when == cycle) {
             self.event(format!("cycle {cycle}: the cable in front of device {device} is pulled"));

@@ -1,4 +1,4 @@
-//! A device with its clock, its axis and what the master knows of it.
+//! A device with its clock, its axis and what the master knows about it.
 
 use std::rc::Rc;
 
@@ -13,7 +13,7 @@ use super::periods::{Generator, PERIOD, Periods};
 use super::record::Recorder;
 use super::wires::Arrival;
 
-/// From the capture of a frame's start to the correction of the counter.
+/// Time from the capture of a frame's start to the correction of the counter.
 const HANDLER_NS: f64 = 700.0;
 /// 2^32.
 const WRAP: f64 = 4_294_967_296.0;
@@ -24,28 +24,28 @@ pub(super) struct Node {
     generator: Generator,
     pub(super) axis: Axis,
     pub(super) clock: Clock,
-    /// What the master has asked for, and what the device has made of it.
+    /// What the master has commanded, and what the device has done so far.
     pub(super) asked: Asked,
     pub(super) follower: Follower,
-    /// Asked for before this cycle's word: what the device's frame of this cycle can know of.
+    /// What was commanded before this cycle's word, which is all that the device's frame of this cycle can reflect.
     before: Asked,
-    /// As the device's last frame told: steps missing, faults of the driver.
+    /// What the device's last frame reported: missing steps, faults of the driver.
     pub(super) lag: i16,
     pub(super) status: drv8711::Status,
-    /// Whether the driver took its registers.
+    /// Whether the driver accepted its registers.
     pub(super) set_up: Result<(), servowire_drivers::drv8711::Error>,
-    /// Positions are in the command words; else the published device, which uses the last word again.
+    /// Whether the command words carry positions; otherwise this is the published device, which uses the last word again.
     positions: bool,
     cycle_ns: u64,
-    /// Own counter at the start of cycle 0; `None` outside the IO exchange.
+    /// The device's counter at the start of cycle 0; `None` outside the IO exchange.
     zero: Option<f64>,
     pub(super) truth: Truth,
     heard: bool,
     /// Largest clock error in the IO exchange, in ns.
     pub(super) clock_error_ns: f64,
-    /// Frames that were accepted although a bit of what the CRC-8 covers was wrong.
+    /// Frames accepted although a bit covered by the CRC-8 was wrong.
     pub(super) undetected: u64,
-    /// Frames accepted with a wrong time stamp, which nothing covers.
+    /// Frames accepted with a wrong time stamp, which no check covers.
     pub(super) bad_stamps: u64,
     /// Calls planned before this one are ignored.
     pub(super) call: u64,
@@ -54,19 +54,19 @@ pub(super) struct Node {
 /// What really happened to the frames of the exchange between the master and a device.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Truth {
-    /// Master frames that never reached the device, and those that came again.
+    /// Master frames that never reached the device, and those that arrived again.
     pub(super) lost_out: u32,
     pub(super) again_out: u32,
     /// The same of the device's frames.
     pub(super) lost_back: u32,
     pub(super) again_back: u32,
-    /// Frames taken, at either end, although they came again or are not of the cycle that they were booked in.
+    /// Frames accepted at either end although they are repeats or belong to another cycle.
     pub(super) stale: u64,
 }
 
 /// A master frame of the exchange.
 pub(super) struct Sent {
-    /// As the master sent it.
+    /// The frame as the master sent it.
     pub(super) bytes: Vec<u8>,
     /// The master's time at the start of its cycle.
     pub(super) begin: f64,
@@ -98,7 +98,7 @@ impl Node {
         }
     }
 
-    /// What the master sends this device for `word`.
+    /// Returns what the master sends to this device for `word`.
     pub(super) fn ask(&mut self, word: Pto) -> Slice {
         self.before = self.asked;
         self.axis.tally.asked += u64::from(word.start().is_some());
@@ -106,12 +106,12 @@ impl Node {
         if self.positions { slice } else { Slice::from(word) }
     }
 
-    /// The counter as the device uses it.
+    /// Returns the counter as the device uses it.
     fn counter(&self, now: f64) -> u32 {
         self.clock.at(now).rem_euclid(WRAP) as u32
     }
 
-    /// When the counter shows a value that is near.
+    /// Returns when the counter shows a value that is near.
     pub(super) fn when(&self, counter_ns: u32, now: f64) -> f64 {
         self.clock.when(self.unwrapped(counter_ns, now))
     }
@@ -121,7 +121,7 @@ impl Node {
         value + f64::from(counter_ns.wrapping_sub(value.rem_euclid(WRAP) as u32) as i32)
     }
 
-    /// What the device needs at this time.
+    /// Does what the device needs at this time.
     pub(super) fn poll(&mut self, now: f64) -> Action {
         let action = self.device.poll(self.counter(now), now as u64);
         if let (Action::CycleStart { cycle, start_ns }, None) = (action, self.zero) {
@@ -134,7 +134,7 @@ impl Node {
         action
     }
 
-    /// A start-up frame at a port, whose start is captured at `captured`, `jitter` off.
+    /// Takes a start-up frame at a port; its start is captured at `captured`, with an error of `jitter`.
     pub(super) fn start_up(&mut self, port: PortId, frame: &mut [u8], captured: f64, jitter: f64) -> Reaction {
         let times = FrameTimes {
             sof_ns: self.clock.read(captured + jitter),
@@ -150,12 +150,12 @@ impl Node {
         self.zero.is_some()
     }
 
-    /// Whether a master frame of this exchange has come.
+    /// Returns whether a master frame of this exchange has come.
     pub(super) fn is_heard(&self) -> bool {
         self.heard
     }
 
-    /// A master frame of the exchange was captured at `captured`, `jitter` off, and is looked at now.
+    /// Takes a master frame of the exchange, captured at `captured` with an error of `jitter`, and examines it now.
     pub(super) fn hear(
         &mut self,
         arrival: &Arrival,
@@ -197,7 +197,7 @@ impl Node {
         Some(Axle { cycle, incoming })
     }
 
-    /// No frame of this cycle has come: the follower knows, and the published device makes its last word again.
+    /// No frame of this cycle has come: the follower knows this; the published device repeats its last word.
     pub(super) fn lost(&mut self, cycle: u64) -> Axle {
         if self.positions {
             let _rest = self.follower.next(None);
@@ -208,7 +208,7 @@ impl Node {
         Axle { cycle, incoming }
     }
 
-    /// The axis runs through the cycle after the one that has brought a word, or nothing.
+    /// Runs the axis through the cycle after the one that has brought a word, or none.
     pub(super) fn run(&mut self, axle: &Axle, k: usize, periods: &mut Periods, record: &mut Recorder) {
         let Some(zero) = self.zero else { return };
         let (axis, clock, generator) = (&mut self.axis, &self.clock, &mut self.generator);
@@ -231,25 +231,25 @@ impl Node {
         });
     }
 
-    /// The device's frame. Without positions the steps are 0, as the published device sends them.
+    /// Returns the device's frame. Without positions the steps are 0, as the published device sends them.
     pub(super) fn answer(&mut self, now: f64) -> Option<DeviceFrame<{ InputSlice::LEN }>> {
         let ordered = if self.positions { self.follower.ordered() } else { Some(0) };
         self.device.answer_ordered(self.axis.driver.status(now as u64), ordered)
     }
 
-    /// The master has got the device's frame.
+    /// Notes that the master has received the device's frame.
     pub(super) fn reported(&mut self, input: InputSlice) {
         self.lag = if self.positions { self.before.lag(input.ordered) } else { 0 };
         self.status = input.driver;
     }
 
-    /// What the counter is off from the master's time.
+    /// Returns the error of the counter against the master's time.
     pub(super) fn look_at_clock(&mut self, now: f64, master_ns: f64) {
         let off = (self.clock.at(now) - master_ns + WRAP / 2.0).rem_euclid(WRAP) - WRAP / 2.0;
         self.clock_error_ns = self.clock_error_ns.max(off.abs());
     }
 
-    /// What was wrong with a frame that the device has accepted.
+    /// Counts what was wrong with a frame that the device has accepted.
     fn judge(&mut self, arrival: &Arrival, sent: &Sent) {
         let (frame, sent) = (Rc::as_ref(&arrival.bytes), &sent.bytes);
         let stamp = frame.len().saturating_sub(2);
@@ -263,7 +263,7 @@ impl Node {
         }
     }
 
-    /// The device has left the IO exchange: pulses that are programmed still come.
+    /// Handles that the device has left the IO exchange: pulses already programmed still come.
     pub(super) fn leave(&mut self, periods: &mut Periods) {
         if self.device.state() == State::Exchange {
             return;
@@ -279,7 +279,7 @@ impl Node {
     }
 }
 
-/// The result of a cycle for the axis.
+/// Notes the result of a cycle for the axis.
 pub(super) struct Axle {
     cycle: u64,
     incoming: Option<Incoming>,

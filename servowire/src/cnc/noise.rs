@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-/// A stream of bits of which each is wrong with the same probability.
+/// A stream of bits, each of which is wrong with the same probability.
 ///
 /// Only the distances between errors are drawn, so a clean frame costs a subtraction.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ impl Noise {
         if self.ln_good == 0.0 { u64::MAX } else { (self.random.unit().ln() / self.ln_good) as u64 }
     }
 
-    /// A frame passes this many cables, one after the other.
+    /// Passes a frame over this many cables, one after the other.
     pub(super) fn travel(&mut self, frame: &mut [u8], cables: usize) {
         let bits = frame.len() as u64 * 8 * cables as u64;
         if self.good >= bits {
@@ -39,7 +39,7 @@ impl Noise {
         }
     }
 
-    /// A frame passes a cable; whether it was hit.
+    /// Passes a frame over a cable; returns whether it was hit.
     pub(super) fn pass(&mut self, frame: &mut [u8]) -> bool {
         let bits = frame.len() as u64 * 8;
         if self.good >= bits {
@@ -62,7 +62,7 @@ impl Noise {
 }
 
 impl Noise {
-    /// The same for a frame that others have too.
+    /// The same for a frame that other devices also hold.
     pub(super) fn pass_shared(&mut self, frame: &mut Rc<Vec<u8>>) {
         let bits = frame.len() as u64 * 8;
         if self.good >= bits {
@@ -74,7 +74,7 @@ impl Noise {
     }
 }
 
-/// A small generator of random numbers (Steele, Lea and Flood, 2014), so that a seed gives the same run for ever.
+/// A small generator of random numbers (Steele, Lea and Flood, 2014), so that a seed always gives the same run.
 #[derive(Debug, Clone)]
 pub(super) struct SplitMix64(pub(super) u64);
 
@@ -86,12 +86,12 @@ impl SplitMix64 {
         mixed ^ mixed >> 31
     }
 
-    /// From -`most` to `most`.
+    /// Returns a number from -`most` to `most`.
     pub(super) fn either(&mut self, most: f64) -> f64 {
         (self.unit() - 0.5) * 2.0 * most
     }
 
-    /// Above 0, at most 1.
+    /// Returns a number above 0 and at most 1.
     pub(super) fn unit(&mut self) -> f64 {
         ((self.next() >> 11) + 1) as f64 / (1u64 << 53) as f64
     }

@@ -1,5 +1,5 @@
-//! Generators that remember: what happens in a period of 4 us depends on the state at its start and on the word, and most
-//! periods of a move are alike.
+//! Generators with a memory of periods: what happens in a period of 4 us depends only on the state at its start and on the
+//! word, and most periods of a move are alike.
 
 use std::hash::{BuildHasher, Hasher};
 
@@ -9,36 +9,36 @@ use sorte_proto::pins::Levels;
 
 /// Period of the generator.
 pub(super) const PERIOD: u64 = 4000;
-/// Periods that are remembered; a newer one takes the place of an older one.
+/// Number of periods that are remembered; a newer one replaces an older one.
 const PLACES: usize = 4096;
-/// Changes in a period at most; another one is not remembered.
+/// Maximum number of changes in a remembered period.
 const CHANGES: usize = 8;
 
-/// What is seen of a generator.
+/// What can be seen of a generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
-    /// The word that was to come is in the buffer.
+    /// The expected word is in the buffer.
     Word,
     Step(bool),
     Pins(Levels),
 }
 
-/// A period that some generator has gone through.
+/// A period that some generator has completed.
 #[derive(Debug, Clone, Copy)]
 struct Period {
     before: Channel,
     after: Channel,
-    /// When the word in the buffer was looked at first.
+    /// When the word in the buffer was first read.
     read: u64,
     changes: [(u16, Change); CHANGES],
     count: usize,
-    /// No other period ever has the same.
+    /// A number that no other period ever has.
     serial: u64,
-    /// The period after it when it came last, and the word of that one.
+    /// The period that followed it last time, and the word of that one.
     next: Option<(Pto, Link)>,
 }
 
-/// Where a period is remembered, as long as no other has taken its place.
+/// Where a period is remembered, until another one replaces it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Link {
     place: usize,
@@ -46,7 +46,7 @@ struct Link {
 }
 
 impl Period {
-    /// The generator's next period; `None` if more happens in it than can be remembered.
+    /// Runs the generator's next period; `None` if more happens in it than can be remembered.
     fn new(before: Channel, serial: u64) -> Option<Self> {
         let (mut after, mut read, mut count) = (before, u64::MAX, 0);
         let mut changes = [(0, Change::Word); CHANGES];
@@ -74,7 +74,7 @@ fn change(happening: Activity) -> Option<(u64, Change)> {
     }
 }
 
-/// The periods that are remembered, for all generators.
+/// The remembered periods, shared by all generators.
 pub(super) struct Periods {
     places: Vec<Option<Period>>,
     serial: u64,
@@ -89,7 +89,7 @@ impl Periods {
         self.places.get(link.place)?.as_ref().filter(|period| period.serial == link.serial)
     }
 
-    /// The next period of `channel`. `last`: the one that it comes from, so that it need not be looked for again.
+    /// Returns the next period of `channel`. `last`: the period before it, which may make the search unnecessary.
     fn of(&mut self, last: Option<Link>, channel: &Channel) -> Option<Link> {
         let known = last.and_then(|last| self.at(last)).and_then(|last| last.next);
         if let Some((_, next)) = known.filter(|(word, next)| *word == channel.word() && self.at(*next).is_some()) {
@@ -111,7 +111,7 @@ impl Periods {
     }
 }
 
-/// A quick hash: nobody chooses the numbers to hurt.
+/// A quick hash: nobody chooses these numbers with bad intent.
 #[derive(Debug, Clone, Copy)]
 struct Mix(u64);
 
@@ -154,11 +154,11 @@ impl Hasher for Mix {
 /// A timer with its handler, and how far it has run.
 #[derive(Debug, Clone)]
 pub(super) struct Generator {
-    /// On a time that begins with the present period.
+    /// Its time begins with the present period.
     channel: Channel,
     /// In ns since the start.
     now: u64,
-    /// The period that has just ended, if the channel is as it left it but for the word.
+    /// The period that has just ended, if the channel is unchanged since, except for the word.
     last: Option<Link>,
 }
 
@@ -172,12 +172,13 @@ impl Generator {
         self.now
     }
 
-    /// The word in the buffer has been taken.
+    /// Whether the word in the buffer has been taken.
     pub(super) fn rest(&mut self) {
         self.channel.set_start(None);
     }
 
-    /// Goes on until `until` ns, and tells what happens. `word`: one that is in the buffer from a time on, `until` at most.
+    /// Continues until `until` ns, and reports what happens. `word`: a word that is in the buffer from some time onwards,
+    /// at most `until`.
     pub(super) fn run(
         &mut self,
         until: u64,
@@ -206,7 +207,7 @@ impl Generator {
         self.take(&mut word, &mut tell);
     }
 
-    /// The word gets into the buffer, if it is time; else when.
+    /// Puts the word into the buffer if it is time; otherwise returns when.
     fn take(&mut self, word: &mut Option<(u64, Pto)>, tell: &mut impl FnMut(u64, Change)) -> Option<u64> {
         let (at, pto) = (*word)?;
         if at > self.now {
@@ -218,7 +219,7 @@ impl Generator {
         None
     }
 
-    /// A whole period as it is remembered, if that is the same as going through it.
+    /// Replays a whole remembered period, if that gives the same result as running it.
     fn whole(
         &mut self,
         begin: u64,

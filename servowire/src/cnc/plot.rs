@@ -6,13 +6,13 @@ use std::path::Path;
 
 use crate::drawing::{Chart, Drawn, Share, Sheet, Stroke};
 
-/// Points of a curve.
+/// Maximum number of points in a curve.
 const POINTS: usize = 2000;
-/// A speed is counted over this time at least, in ns: a step in a cycle is no speed.
+/// Minimum time over which a speed is counted, in ns: one step in a cycle is not yet a speed.
 const SPAN: u64 = 250_000;
-/// Samples a second of the sound.
+/// Samples per second of the sound.
 const SAMPLE_RATE: u32 = 44_100;
-/// Steps of a full step at 1/256: what a motor sounds with.
+/// Microsteps of a full step at 1/256, which is the pitch of a motor.
 const MICROSTEPS: f64 = 256.0;
 
 /// Positions of the axes, cycle by cycle, thinned out.
@@ -53,7 +53,7 @@ impl Curves {
         speed.collect()
     }
 
-    /// The first `axes` axes, each with its speed and its position.
+    /// Draws the first `axes` axes, each with its speed and its position.
     pub(super) fn draw(&self, axes: usize) -> Drawn<String> {
         let seconds = |cycle: u64| cycle as f64 * f64::from(self.cycle_ns) * 1e-9;
         let end = self.points.last().map_or(0.0, |(cycle, _)| seconds(*cycle)).max(1e-6);

@@ -1,14 +1,14 @@
-//! Motor drivers that are switched off while their axis has nothing to do, and woken in time.
+//! Switches motor drivers off while their axis has nothing to do, and wakes them in time.
 
 use sorte_proto::drv8711::WAKE_NS;
 use sorte_proto::{Direction, Pto};
 
 use super::program::Program;
 
-/// Cycles more than the chip needs: the pins follow a word with the next cycle, and a step may be early in its own.
+/// Cycles beyond what the chip needs: the pins follow a word in the next cycle, and a step may come early in its own.
 const MARGIN: u32 = 2;
 
-/// The words of a program, with the driver-off word for axes at rest.
+/// Passes on the words of a program, with the driver-off word for axes at rest.
 pub(super) struct Power {
     program: Program,
     /// Cycles at rest after which a driver is switched off; `None`: never.
@@ -20,7 +20,7 @@ pub(super) struct Power {
     idle: Vec<u32>,
     /// The program's words, held back while a driver wakes.
     held: Vec<Pto>,
-    /// Driver-off words so far.
+    /// Number of driver-off words so far.
     pub(super) off: u64,
 }
 
@@ -30,7 +30,7 @@ impl Power {
         Self { program, after, wake, waking: 0, idle: vec![0; axes], held: vec![Pto::default(); axes], off: 0 }
     }
 
-    /// The axis has work that the program does not know about.
+    /// Notes that the axis has work unknown to the program.
     pub(super) fn keep(&mut self, axis: usize) {
         if let (Some(idle), Some(after)) = (self.idle.get_mut(axis), self.after) {
             // A driver that is off stays off until it has been woken.
@@ -38,7 +38,7 @@ impl Power {
         }
     }
 
-    /// The words of the next cycle. A step of an axis whose driver is off holds all axes until it is awake.
+    /// The words of the next cycle. A step of an axis whose driver is off holds back all axes until the driver is awake.
     pub(super) fn next(&mut self, words: &mut [Pto]) {
         let Some(after) = self.after else { return self.program.next(words) };
         if self.waking == 0 {
@@ -71,7 +71,7 @@ impl Power {
     }
 }
 
-/// The word without its step.
+/// Returns the word without its step.
 pub(super) fn rest(word: Pto) -> Pto {
     match word {
         Pto::DriverOff => Pto::DriverOff,

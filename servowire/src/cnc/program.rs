@@ -11,7 +11,7 @@ use step_profile::{Axis, Command, Dance, Group, Motors, MoveState, Note, Paramet
 
 use crate::gcode::{AXES, Steps};
 
-/// The tune of `--dance`: up and down the tones of Table 3, this project's own.
+/// The tune of `--dance`, composed for this project: up and down the tones of Table 3.
 const SONG: [Note; 16] = [
     Note::p250(Tone::Cis, 2500),
     Note::p250(Tone::E, 2500),
@@ -31,11 +31,11 @@ const SONG: [Note; 16] = [
     Note::p250(Tone::Cis, 2500),
 ];
 
-/// One cycle after another.
+/// A program, which gives the words of one cycle after another.
 pub(super) enum Program {
-    /// All axes together: moves of the same length, each in the other direction.
+    /// All axes together: moves of equal length, back and forth.
     Turns { group: Group<'static>, profiles: Vec<Profile<'static>>, steps: u32, done: u64, moves: u64 },
-    /// Each axis its own move at its own speed.
+    /// Each axis makes its own move at its own speed.
     Independent { axes: Vec<(Axis<'static>, Profile<'static>, u32)>, done: u64, moves: u64 },
     /// The tune.
     Dance(Box<Dance<'static>>),
@@ -44,7 +44,7 @@ pub(super) enum Program {
 }
 
 impl Program {
-    /// `moves`: how many; the speeds of `profiles` take turns.
+    /// `moves`: number of moves; they use the speeds of `profiles` in turn.
     pub(super) fn turns(motors: Motors, profiles: Vec<Profile<'static>>, steps: u32, moves: u64) -> Self {
         Self::Turns { group: Group::new(motors), profiles, steps, done: 0, moves }
     }
@@ -66,7 +66,7 @@ impl Program {
         Dance::new(motors, parameters, direction, &SONG).map(|dance| Self::Dance(Box::new(dance)))
     }
 
-    /// The words of the next cycle. Programs of four motors repeat them for the axes after the fourth.
+    /// Returns the words of the next cycle. Programs of four motors repeat them for the axes after the fourth.
     pub(super) fn next(&mut self, words: &mut [Pto]) {
         let commands = match self {
             Self::Dance(dance) => dance.tick(),
@@ -120,10 +120,10 @@ pub(super) struct Follower {
     steps: Steps,
     /// The first step that is not due yet.
     next: Option<AxisPulse>,
-    /// Begin of the next cycle, in ns.
+    /// Start of the next cycle, in ns.
     now: u64,
     directions: [step_profile::Direction; AXES],
-    /// Steps of each axis that are due.
+    /// Number of steps that are due on each axis.
     due: [VecDeque<AxisPulse>; AXES],
 }
 
@@ -133,7 +133,7 @@ impl Follower {
         Self { steps, next, now: 0, directions, due: [const { VecDeque::new() }; AXES] }
     }
 
-    /// At most one step of each axis; where a corner has two in a cycle the second one is in the next.
+    /// Returns at most one step per axis; if a corner has two in a cycle, the second goes into the next.
     fn next(&mut self, words: &mut [Pto]) {
         let begin = self.now;
         self.now += u64::from(step_profile::CYCLE_NS);
@@ -161,7 +161,7 @@ impl Follower {
     }
 }
 
-/// There, and back again.
+/// Moves forwards, and back again.
 fn direction_of(done: u64) -> step_profile::Direction {
     if done % 2 == 1 { step_profile::Direction::Reverse } else { step_profile::Direction::Forward }
 }
@@ -173,7 +173,7 @@ fn level(direction: step_profile::Direction) -> Direction {
     }
 }
 
-/// A command as the wire carries it.
+/// Returns a command as it is on the wire.
 fn word(command: Command) -> Pto {
     match command {
         Command::Disable => Pto::DriverOff,

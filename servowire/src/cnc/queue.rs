@@ -13,7 +13,7 @@ use super::wires::{Arrival, Hit};
 pub(super) enum Event {
     /// The master needs to be polled.
     Master,
-    /// A device needs to be polled, unless it has been since.
+    /// A device needs to be polled, unless that has happened meanwhile.
     Device {
         k: usize,
         call: u64,
@@ -49,7 +49,7 @@ pub(super) enum Place {
     Master { sof: f64 },
 }
 
-/// Future events; those at the same time in the order in which they were added.
+/// Future events; those at the same time come in the order in which they were added.
 #[derive(Default)]
 pub(super) struct Queue {
     heap: BinaryHeap<Due>,
@@ -62,7 +62,7 @@ impl Queue {
         self.heap.push(Due { at, order: self.order, event });
     }
 
-    /// The earliest event and its time.
+    /// Returns the earliest event and its time.
     pub(super) fn pop(&mut self) -> Option<(f64, Event)> {
         self.heap.pop().map(|due| (due.at, due.event))
     }
@@ -89,7 +89,7 @@ impl PartialOrd for Due {
 }
 
 impl Ord for Due {
-    /// The earliest is the greatest, as a heap gives that first.
+    /// Makes the earliest event the greatest, because a heap returns that first.
     fn cmp(&self, other: &Self) -> Ordering {
         other.at.total_cmp(&self.at).then(other.order.cmp(&self.order))
     }

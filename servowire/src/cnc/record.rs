@@ -20,30 +20,30 @@ const BYTE_NS: u64 = 80;
 /// Preamble of the frames of the IO exchange.
 const SHORT: usize = Preamble::Short.bytes().len();
 
-/// The clocks of the devices differ, by this at most; and an axis runs through a cycle at once.
+/// Margin for the difference between the devices' clocks, and for an axis running through a whole cycle at once.
 const SETTLED_NS: u64 = 20_000;
 
-/// Interface of the start-up frames, which are Ethernet frames; and of the others.
+/// Interface of the start-up frames, which are Ethernet frames, and interface of all others.
 const ETHERNET: u32 = 0;
 const EXCHANGE: u32 = 1;
 
-/// Takes events, if they are wanted.
+/// Takes events, if they are to be recorded.
 #[derive(Default)]
 pub(super) struct Recorder {
     vcd: Option<Trace>,
     packets: Option<PcapNgWriter<BufWriter<File>>>,
-    /// Cycles still to be recorded, the present one among them.
+    /// Cycles still to be recorded, including the present one.
     cycles: u64,
-    /// A cycle has begun.
+    /// Notes that a cycle has begun.
     running: bool,
-    /// Nothing is seen later than so long after it happened.
+    /// Nothing is reported later than this after it happened.
     settled_ns: u64,
-    /// The first thing that could not be written.
+    /// The first write error.
     failure: Option<io::Error>,
 }
 
 impl Recorder {
-    /// `cycles`: how many of the IO exchange are recorded, of `cycle_ns` each.
+    /// `cycles`: number of recorded cycles of the IO exchange, each of `cycle_ns`.
     pub(super) fn new(
         devices: usize,
         vcd: Option<&Path>,
@@ -67,7 +67,7 @@ impl Recorder {
         }
     }
 
-    /// A start-up frame at the master.
+    /// Records a start-up frame at the master.
     pub(super) fn start_up(&mut self, at_ns: u64, preamble: Preamble, frame: &[u8], answer: bool) {
         if !self.wants() {
             return;
@@ -76,7 +76,7 @@ impl Recorder {
         self.frame(at_ns, preamble.bytes().len(), frame, answer, name, ETHERNET);
     }
 
-    /// A frame of the IO exchange at the master. The master's own begins a cycle.
+    /// Records a frame of the IO exchange at the master. The master's own frame begins a cycle.
     pub(super) fn exchange(&mut self, at_ns: u64, frame: &[u8], answer: bool) {
         if !answer {
             self.cycles = self.cycles.saturating_sub(u64::from(self.running));
@@ -108,7 +108,7 @@ impl Recorder {
         }
     }
 
-    /// A cycle of an axis.
+    /// Records a cycle of an axis.
     pub(super) fn axis(&mut self, device: usize, run: impl FnOnce(Option<&mut Vec<(u64, Seen)>>)) {
         let Some(trace) = self.vcd.as_mut().filter(|_| self.cycles > 0) else { return run(None) };
         let mut seen = Vec::new();
@@ -116,7 +116,7 @@ impl Recorder {
         trace.axis(device, &seen);
     }
 
-    /// Writes everything.
+    /// Writes everything that is left.
     pub(super) fn finish(mut self) -> io::Result<()> {
         if let Some(trace) = &mut self.vcd {
             let result = trace.flush(u64::MAX).and_then(|()| trace.writer.flush());
@@ -130,7 +130,7 @@ impl Recorder {
     }
 }
 
-/// A file to write into; the error names it.
+/// Creates a file to write into; the error names it.
 pub(super) fn create(path: &Path) -> io::Result<BufWriter<File>> {
     let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
     File::create(path).map(BufWriter::new).map_err(named)

@@ -10,10 +10,10 @@ use super::host::Host;
 use super::line::Line;
 use super::node::Node;
 
-/// Axes that are listed one by one.
+/// Maximum number of axes listed one by one.
 const LISTED: usize = 16;
 
-/// The start-up: what was sent, what was found, and whether the cycle is long enough.
+/// Describes the start-up: what was sent, what was found, and whether the cycle is long enough.
 pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let [discovery, param, delay, sync] = line.sent;
     let ready = line.first_cycle_ns.map_or(0.0, |ns| ns as f64 / 1e6);
@@ -66,7 +66,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     Ok(())
 }
 
-/// The run: steps, clocks, errors.
+/// Describes the run: steps, clocks, errors.
 pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<()> {
     let counters = line.master.counters();
     let seconds = counters.cycles as f64 * f64::from(line.setup.cycle_ns()) * 1e-9;
@@ -86,7 +86,7 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
     Ok(())
 }
 
-/// A line for each axis: the first ones, those with a fault, and the last one.
+/// Writes one line per axis: for the first ones, those with a fault, and the last one.
 fn axes(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     writeln!(
         out,
@@ -125,7 +125,7 @@ fn axes(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     Ok(())
 }
 
-/// What the line did to the frames.
+/// Describes what the line did to the frames.
 fn errors(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let counters = line.master.counters();
     writeln!(
@@ -165,7 +165,7 @@ fn errors(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     Ok(())
 }
 
-/// The tallies of all devices together.
+/// Returns the tallies of all devices together.
 fn tally(of: impl Iterator<Item = Tally>) -> Tally {
     of.fold(Tally::default(), |mut all, one| {
         all.missed += one.missed;
@@ -180,7 +180,7 @@ fn sum(line: &Line, of: fn(&Node) -> u64) -> u64 {
     line.nodes.iter().map(of).sum()
 }
 
-/// Returns the faults, the gravest first; `None` if every step was made on time.
+/// Returns the faults, the most serious first; `None` if every step was made on time.
 pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
     if line.master.state() == State::Error || line.first_cycle_ns.is_none() {
         let last = line.why.as_deref().unwrap_or("no device answers");

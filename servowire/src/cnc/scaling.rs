@@ -1,4 +1,4 @@
-//! Cycle time against devices, cable and payload: a table, and a picture.
+//! Shows cycle time against devices, cable and payload, as a table and as a picture.
 
 use std::io::{self, Write};
 
@@ -8,7 +8,7 @@ use crate::drawing::{Chart, Drawn, Sheet, Stroke};
 
 /// Device counts of the table.
 const DEVICES: [u8; 14] = [1, 2, 3, 4, 5, 8, 10, 16, 32, 64, 100, 128, 200, 254];
-/// Cable between any two devices in ns, at some 5 ns a metre; and bytes of process data to and from each device.
+/// Cable between neighbouring devices in ns, at about 5 ns per metre; and bytes of process data to and from each device.
 const LINES: [(u16, u16, u16); 5] = [(10, 4, 3), (85, 4, 3), (500, 4, 3), (85, 8, 8), (85, 32, 32)];
 
 fn cycle_ns(devices: u8, (cable, output, input): (u16, u16, u16)) -> (u32, Limit, u32) {

@@ -1,4 +1,4 @@
-//! What the machine is built of, and the one plan that all its parts have.
+//! The parts of the machine, and the one plan that they all share.
 
 use sorte_proto::timing::{CNC_CYCLE_NS, Slots, Timing};
 use sorte_proto::{DelayModel, Parameters, device, master};
@@ -7,17 +7,17 @@ use super::axis::Build;
 use super::driver::Fault;
 use super::wires::Physics;
 
-/// Devices that a cycle of 4 us has room for: the published send times are theirs.
+/// Number of devices in a cycle of 4 us, for which the published send times are made.
 const PUBLISHED: usize = 4;
 
 #[derive(Debug, Clone)]
 pub(super) struct Setup {
     pub(super) cables_ns: Vec<u16>,
-    /// Cycle of the IO exchange; `None`: the shortest that the line fits.
+    /// Cycle of the IO exchange; `None`: the shortest that the line allows.
     pub(super) cycle_ns: Option<u32>,
     pub(super) build: Build,
     pub(super) physics: Physics,
-    /// Largest error of the crystals, and largest gain in a second.
+    /// Largest error of the crystals, and its largest change per second.
     pub(super) crystal_ppm: f64,
     pub(super) drift_ppm: f64,
     /// The cable before this device (from 1) is unplugged in this cycle.
@@ -33,7 +33,7 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    /// The line by the rule.
+    /// Returns the line planned by the rule.
     fn ruled(&self) -> Timing<'_> {
         let devices = self.cables_ns.len();
         Timing::new(&self.cables_ns, devices as u8)
@@ -41,7 +41,7 @@ impl Setup {
             .with_jitter_ps((self.physics.hop_jitter_ns * 1000.0).round() as u32)
     }
 
-    /// The line as all its parts see it: the published send times if they fit, otherwise the rule.
+    /// Returns the line as all its parts see it: with the published send times if they fit, otherwise by the rule.
     pub(super) fn timing(&self) -> Timing<'_> {
         let ruled = self.ruled();
         let published = ruled.with_slots(Some(Slots::Published));
@@ -51,18 +51,18 @@ impl Setup {
         if fits { published } else { ruled.with_slots(Some(ruled.slots())) }
     }
 
-    /// Clocks are 2 ns a device off.
+    /// Clocks are off by 2 ns per device.
     fn margin_ns(&self) -> u32 {
         2 * self.cables_ns.len() as u32
     }
 
-    /// Cycle of the IO exchange: whole periods of the generator, with room for the clocks.
+    /// Returns the cycle of the IO exchange: whole periods of the generator, with a margin for the clocks.
     pub(super) fn cycle_ns(&self) -> u32 {
         let needs = self.timing().budget().min_cycle_ns() + self.margin_ns();
         self.cycle_ns.unwrap_or(needs.div_ceil(CNC_CYCLE_NS) * CNC_CYCLE_NS)
     }
 
-    /// Whether the delay field of SYNC is too short, so that this project's extension is needed.
+    /// Returns whether the delay field of SYNC is too short, so that this project's extension is needed.
     pub(super) fn is_long(&self) -> bool {
         let out_ns: u64 = self.cables_ns.iter().map(|ns| u64::from(*ns) + 355).sum();
         out_ns > u64::from(u16::MAX)

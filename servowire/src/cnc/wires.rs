@@ -1,6 +1,7 @@
-//! The wires of the line: what is on them when, and what becomes of it.
+//! The wires of the line: what is on them at which time, and what becomes of it.
 //!
-//! Nothing here knows the protocol or takes a number from its crate: bytes, times, and the figures of the published hardware.
+//! Nothing here knows the protocol or uses a number from its crate: only bytes, times, and the figures of the published
+//! hardware.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -10,21 +11,22 @@ use super::noise::{Noise, SplitMix64};
 
 /// A byte at 100 Mbit/s.
 pub(super) const BYTE_NS: f64 = 80.0;
-/// From the first bit at a port to the first bit that its device sends on: 64 register steps of 5 ns, and 35 ns of hardware.
+/// Time from the first bit at a port to the first bit that its device forwards: 64 register steps of 5 ns, and 35 ns of
+/// hardware.
 const TRANSIT_NS: f64 = 355.0;
-/// The same where a port sends a frame back, as the master measures it, and as a device measures its neighbour.
+/// The same for a port that sends a frame back, as measured by the master, and as measured by a neighbouring device.
 pub(super) const REFLECTION_NS: f64 = 320.0;
 pub(super) const NEIGHBOUR_NS: f64 = 360.0;
-/// No two devices are alike: half a tick of 200 MHz either way.
+/// Devices differ by half a tick of 200 MHz either way.
 const SPREAD_NS: f64 = 2.5;
 /// Longest cable of 100BASE-TX, at 5 ns a metre.
 pub(super) const LONGEST_CABLE_NS: u16 = 500;
 /// Wires forget their frames after this time.
 const FORGOTTEN_NS: f64 = 1e6;
-/// A duplicated frame comes again after this time.
+/// A duplicated frame arrives again after this time.
 const AGAIN_NS: f64 = 6000.0;
 
-/// From the first bit of a frame to the capture of its start, half a byte before the end of 0xD5.
+/// Time from the first bit of a frame to the capture of its start, half a byte before the end of 0xD5.
 pub(super) fn capture_ns(preamble: usize) -> f64 {
     preamble as f64 * BYTE_NS - 40.0
 }
@@ -41,14 +43,14 @@ struct Busy {
 /// What the line does to frames.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Physics {
-    /// The way back over a cable takes so much longer than the way out, in ns.
+    /// How much longer the way back over a cable takes than the way out, in ns.
     pub(super) asymmetry_ns: f64,
-    /// Rms of what each port adds to a frame, in ns.
+    /// Rms jitter that each port adds to a frame, in ns.
     pub(super) hop_jitter_ns: f64,
     /// Largest error of a capture, in ns.
     pub(super) capture_jitter_ns: f64,
     pub(super) bit_error_rate: f64,
-    /// Probabilities that a frame of the exchange is lost on a cable, and that it comes twice.
+    /// Probabilities that a frame of the exchange is lost on a cable, and that it arrives twice.
     pub(super) loss: f64,
     pub(super) duplicates: f64,
 }
@@ -56,19 +58,19 @@ pub(super) struct Physics {
 pub(super) struct Wires {
     cables_ns: Vec<f64>,
     transits_ns: Vec<f64>,
-    /// What is on the wire from each device towards the master.
+    /// Frames on the wire from each device towards the master.
     up: Vec<VecDeque<Busy>>,
     physics: Physics,
     pub(super) noise: Noise,
     random: SplitMix64,
     /// Frames that met another one.
     pub(super) collisions: u64,
-    /// Frames that were lost, and that came twice.
+    /// Frames that were lost, and frames that came twice.
     pub(super) lost: u64,
     pub(super) doubled: u64,
 }
 
-/// A frame at the end of its way: when it began there, and whether it had to be taken for one that came before.
+/// A frame at its destination: when it began there, and whether it is a copy that can only be mistaken for the earlier frame.
 pub(super) struct Arrival {
     pub(super) start: f64,
     pub(super) bytes: Rc<Vec<u8>>,
@@ -95,17 +97,17 @@ impl Wires {
         self.cables_ns.get(k).copied().unwrap_or_default()
     }
 
-    /// The same cable on the way to the master.
+    /// Passes a frame over the same cable, towards the master.
     pub(super) fn back(&self, k: usize) -> f64 {
         self.out(k) + self.physics.asymmetry_ns
     }
 
-    /// Through device k.
+    /// Passes a frame through device k.
     pub(super) fn transit(&mut self, k: usize) -> f64 {
         self.transits_ns.get(k).copied().unwrap_or_default() + self.hop_jitter()
     }
 
-    /// Uniform, as a sampled edge is.
+    /// Uniformly distributed, as for a sampled edge.
     fn hop_jitter(&mut self) -> f64 {
         if self.physics.hop_jitter_ns == 0.0 {
             return 0.0;
@@ -113,12 +115,12 @@ impl Wires {
         self.random.either(self.physics.hop_jitter_ns * 3f64.sqrt())
     }
 
-    /// Error of a capture.
+    /// Returns the error of a capture.
     pub(super) fn capture_jitter(&mut self) -> f64 {
         if self.physics.capture_jitter_ns == 0.0 { 0.0 } else { self.random.either(self.physics.capture_jitter_ns) }
     }
 
-    /// A frame is on the wire from device k towards the master.
+    /// Puts a frame on the wire from device k towards the master.
     pub(super) fn occupy(&mut self, k: usize, start: f64, end: f64, hit: &Hit) {
         let Some(wire) = self.up.get_mut(k) else { return };
         let mut place = wire.len();
@@ -139,7 +141,7 @@ impl Wires {
         }
     }
 
-    /// A device's frame that leaves device k at `sent`, through all devices before it: how it arrives at the master.
+    /// Sends a frame of device k at `sent` through all devices before it, and returns how it arrives at the master.
     pub(super) fn up(&mut self, k: usize, sent: f64, preamble: usize, bytes: Vec<u8>) -> (Vec<Arrival>, Hit) {
         let (mut start, mut bytes, hit) = (sent, bytes, Hit::default());
         let length = (preamble + bytes.len()) as f64 * BYTE_NS;
@@ -164,7 +166,7 @@ impl Wires {
         (arrivals, hit)
     }
 
-    /// A frame of the master at all devices, the first one first; behind a cable that loses it there is nothing.
+    /// Sends a frame of the master to all devices, starting with the first; beyond a cable that loses it nothing arrives.
     pub(super) fn down(&mut self, devices: usize, sent: f64, bytes: Vec<u8>) -> Vec<(usize, Arrival)> {
         let (mut arrivals, mut doubled) = (Vec::with_capacity(devices), false);
         let (mut start, mut bytes) = (sent, Rc::new(bytes));

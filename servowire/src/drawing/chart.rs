@@ -6,7 +6,7 @@ use plotters::prelude::*;
 
 use super::{Area, Drawn, GRID, INK, Panel, SMALL, Stroke, ink, shortened, width_of};
 
-/// The room of the title, of the labels below, and of the margins.
+/// Space for the title, for the labels below, and for the margins.
 const TITLE: i32 = 24;
 const BELOW: i32 = 36;
 const LEFT: i32 = 6;
@@ -24,17 +24,17 @@ pub(crate) struct Chart {
     pub(crate) x: Range<f64>,
     /// If unset, the range of the curves and bars.
     pub(crate) y: Option<Range<f64>>,
-    /// Goes up by factors.
+    /// The axis is logarithmic.
     pub(crate) logarithmic: bool,
-    /// A unit is as long along as it is up: it is a plane.
+    /// A unit has the same length on both axes, as for a path in a plane.
     pub(crate) equal: bool,
     pub(crate) curves: Vec<(Stroke, Vec<(f64, f64)>)>,
-    /// From, to, and the height.
+    /// Bars: from, to, and height.
     pub(crate) bars: Vec<(Range<f64>, f64)>,
 }
 
 impl Chart {
-    /// What goes up and along, and how far along.
+    /// Creates a chart with the quantities on both axes, and the horizontal range.
     pub(crate) fn new(title: impl Into<String>, along: impl Into<String>, x: Range<f64>) -> Self {
         Self { title: title.into(), along: along.into(), x, ..Self::default() }
     }
@@ -46,7 +46,7 @@ impl Chart {
         self
     }
 
-    /// From the lowest to the highest value, with some room.
+    /// Returns the range from the lowest to the highest value, with some margin.
     fn up(&self) -> Range<f64> {
         if let Some(range) = &self.y {
             return range.clone();
@@ -65,7 +65,7 @@ impl Chart {
         }
     }
 
-    /// Both ranges, the shorter one in its plane made longer.
+    /// Returns both ranges; in a plane, the shorter one is extended.
     fn ranges(&self, pixels: (i32, i32)) -> (Range<f64>, Range<f64>) {
         let (x, y) = (self.x.clone(), self.up());
         if !self.equal {
@@ -141,19 +141,19 @@ impl Panel for Chart {
     }
 }
 
-/// Digits after the point needed to tell `labels` labels of a range apart.
+/// Returns the digits after the point needed to tell `labels` labels of a range apart.
 pub(super) fn decimals(range: &Range<f64>, labels: i32) -> usize {
     let step = (range.end - range.start).abs() / f64::from(labels) / 2.0;
     (-step.max(1e-9).log10()).ceil().clamp(0.0, 9.0) as usize
 }
 
-/// Pixels of the widest label of a range.
+/// Returns the pixels of the widest label of a range.
 pub(super) fn widest_of(range: &Range<f64>, labels: i32) -> i32 {
     let digits = decimals(range, labels);
     [range.start, range.end].map(|value| width_of(&fixed(value, digits), SMALL)).into_iter().max().unwrap_or(0)
 }
 
-/// A number with this many digits behind the point, and no sign of nothing.
+/// Formats a number with this many digits after the point, and zero without a sign.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }

@@ -1,4 +1,4 @@
-//! What an SVG says about where things are.
+//! Finds where things are in an SVG.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ fn number(tag: &str, name: &str) -> f64 {
     attribute(tag, name).and_then(|text| text.parse().ok()).unwrap_or(0.0)
 }
 
-/// The room of a text: letters are 0.64 as wide as high, as the digits of wide fonts are.
+/// The space that a text takes: letters are 0.64 times as wide as high, like the digits of wide fonts.
 pub(crate) fn texts(svg: &str) -> Vec<(String, Room)> {
     let elements = svg.split("<text").skip(1);
     let room = |element: &str| {
@@ -44,7 +44,7 @@ pub(crate) fn texts(svg: &str) -> Vec<(String, Room)> {
     elements.map(room).collect()
 }
 
-/// The lines of these colours.
+/// Returns the lines of these colours.
 fn lines(svg: &str, colours: &BTreeSet<String>) -> Vec<Vec<(f64, f64)>> {
     let elements = svg.split("<polyline").skip(1).map(|element| element.split('>').next().unwrap());
     let own = elements.filter(|tag| colours.contains(attribute(tag, "stroke").unwrap_or("")));
@@ -55,7 +55,7 @@ fn lines(svg: &str, colours: &BTreeSet<String>) -> Vec<Vec<(f64, f64)>> {
     own.map(|tag| attribute(tag, "points").unwrap().split_whitespace().filter_map(point).collect()).collect()
 }
 
-/// No text stands on another one, on a curve or beyond the sheet, which is a picture that can be shown.
+/// Checks that no text covers another one or a curve or leaves the sheet, and that the picture can be displayed.
 pub(crate) fn nothing_is_covered(svg: &str) {
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("<style>"), "{svg}");
     assert!(!svg.contains("NaN") && !svg.contains("\"inf"));
@@ -114,7 +114,7 @@ fn what_is_covered_is_seen() {
     assert!(!caught(&svg.replace("</svg>", &text(x as i32 + 20, y as i32 + 10))));
 }
 
-/// Whoever looks at it in the dark sees every colour that is used.
+/// Checks that every colour in use has one for dark screens.
 #[test]
 fn each_colour_has_a_dark_one() {
     let own = |stroke: &Stroke| {

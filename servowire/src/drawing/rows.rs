@@ -1,4 +1,4 @@
-//! A panel of named rows over a common axis: who does what when, or where what went wrong.
+//! A panel of named rows over a common axis: who does what and when, or what went wrong and where.
 
 use std::ops::Range;
 
@@ -11,14 +11,14 @@ const TITLE: i32 = 24;
 const BELOW: i32 = 36;
 /// The height of a row.
 const ROW: i32 = 22;
-/// Names and notes are cut beyond these widths.
+/// Names and notes are cut at these widths.
 const WIDEST: (i32, i32) = (260, 420);
 
-/// Rows below each other.
+/// Rows, one below the other.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Rows {
     pub(crate) title: String,
-    /// What goes along, with its unit.
+    /// The quantity along the axis, with its unit.
     pub(crate) along: String,
     pub(crate) x: Range<f64>,
     pub(crate) each: Vec<Row>,
@@ -27,18 +27,18 @@ pub(crate) struct Rows {
 /// A row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Row {
-    /// To the left of it.
+    /// Text to the left of the row.
     pub(crate) name: String,
-    /// To the right of it.
+    /// Text to the right of the row.
     pub(crate) note: String,
-    /// From when to when something was done.
+    /// Intervals in which something was done.
     pub(crate) bars: Vec<Range<f64>>,
-    /// When something went wrong.
+    /// Instants at which something went wrong.
     pub(crate) faults: Vec<f64>,
 }
 
 impl Rows {
-    /// The height that they need.
+    /// Returns the height that the rows need.
     pub(crate) fn height(&self) -> u32 {
         (TITLE + BELOW + 12 + ROW * self.each.len().max(1) as i32) as u32
     }

@@ -13,14 +13,14 @@ pub(crate) struct Stroke {
     dash: (u32, u32),
 }
 
-/// Points of a curve that are marked, each a few times.
+/// Maximum number of points on a curve that are marked one by one.
 const FEW: usize = 160;
 
-/// What is wrong.
+/// The stroke for whatever is wrong.
 pub(crate) const ALARM: Stroke = Stroke { colour: RGBColor(176, 0, 32), width: 2, dash: (1, 0) };
 
 impl Stroke {
-    /// Wide ones are drawn first, so that thinner ones lie on top.
+    /// Wide strokes are drawn first, so that thinner ones lie on top.
     pub(crate) const ALL: [Self; 4] = [
         Self { colour: RGBColor(200, 90, 0), width: 3, dash: (1, 0) },
         Self { colour: RGBColor(0, 90, 180), width: 2, dash: (12, 6) },
@@ -28,10 +28,10 @@ impl Stroke {
         Self { colour: RGBColor(122, 60, 160), width: 2, dash: (16, 4) },
     ];
 
-    /// A curve that is alone.
+    /// The stroke of a single curve.
     pub(crate) const ONLY: Self = Self { colour: RGBColor(0, 90, 180), width: 2, dash: (1, 0) };
 
-    /// Number `at`, from 0.
+    /// Returns stroke number `at`, from 0.
     pub(crate) fn number(at: usize) -> Self {
         Self::ALL.get(at).copied().unwrap_or(Self { colour: INK, width: 1, dash: (1, 0) })
     }
@@ -66,7 +66,7 @@ impl Stroke {
         Ok(())
     }
 
-    /// Draws a sample `long` pixels from `at` on, and what it stands for.
+    /// Draws a sample of `long` pixels at `at`, and its meaning.
     pub(super) fn sample(self, area: &Area<'_>, (left, y): (i32, i32), long: i32, what: &str) -> Drawn {
         let (drawn, gap) = (self.dash.0 as i32, self.dash.1 as i32);
         let (end, mut from) = (left + long, left);

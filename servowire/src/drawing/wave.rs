@@ -1,4 +1,4 @@
-//! A panel of a line with a frame on it: its levels, its bits, its fields, and what is wrong.
+//! A panel with a frame on a line: its levels, its bits, its fields, and what is wrong.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -10,12 +10,12 @@ use servowire_decode::event::Place;
 use servowire_decode::output::text::shown;
 use servowire_decode::time::Time;
 
-/// Pixels of a bit, so that it can be read.
+/// Pixels per bit, so that it can be read.
 const BIT: u32 = 10;
 const WIDEST: u32 = 4000;
 const LEFT: u32 = 120;
 const RIGHT: u32 = 40;
-/// Heights in pixels: of a channel, of a row of text, and of what is below.
+/// Heights in pixels: of a channel, of a row of text, and of the space below.
 const TRACE: u32 = 56;
 const ROW: u32 = 18;
 const BELOW: u32 = 40;
@@ -23,7 +23,7 @@ const BELOW: u32 = 40;
 /// A clip as a panel.
 pub(crate) struct Wave {
     clip: Clip,
-    /// Labels of fields with their places, in rows in which they do not meet.
+    /// Labels of fields with their places, in rows so that they do not overlap.
     labels: Vec<Label>,
     width: u32,
 }
@@ -44,18 +44,18 @@ impl Wave {
         wave
     }
 
-    /// The width that it needs.
+    /// Returns the width that it needs.
     pub(crate) fn width(&self) -> u32 {
         self.width
     }
 
-    /// The height that it needs.
+    /// Returns the height that it needs.
     pub(crate) fn height(&self) -> u32 {
         let rows = 2 + self.labels.iter().map(|label| label.row as u32 + 1).max().unwrap_or(0);
         TRACE * self.clip.traces.len() as u32 + ROW * rows + BELOW + 12
     }
 
-    /// Microseconds from the start of the frame.
+    /// Returns microseconds from the start of the frame.
     fn us(&self, time: Time) -> f64 {
         (time - self.clip.span().0) as f64 / 1e6
     }
@@ -94,7 +94,7 @@ impl Wave {
         }
     }
 
-    /// The corners of a trace between two heights.
+    /// Returns the corners of a trace between two heights.
     fn corners(&self, trace: &Trace, low: f64, high: f64) -> Vec<(f64, f64)> {
         let height = |level: bool| if level { high } else { low };
         let mut points: Vec<(f64, f64)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Arcs of a part program as chords.
+//! Splits arcs of a part program into chords.
 
 use std::collections::VecDeque;
 
@@ -13,7 +13,7 @@ use super::numbers::Numbers;
 const CHORD: u32 = 20;
 
 impl State {
-    /// Of the axes of the plane.
+    /// Returns a place in the axes of the plane.
     fn flat(&self, place: [f64; AXES]) -> [f64; 2] {
         let [a, b, _] = self.plane;
         [a, b].map(|axis| place.get(axis).copied().unwrap_or_default())
@@ -51,7 +51,7 @@ impl State {
         Ok([f64::midpoint(from[0], to[0]) - y * away, f64::midpoint(from[1], to[1]) + x * away])
     }
 
-    /// Chords; the third axis goes with the angle, for chords differ in that.
+    /// Returns the chords; the third axis follows the angle, because chords differ in angle.
     pub(super) fn arc(
         &mut self,
         to: [f64; AXES],
@@ -95,7 +95,7 @@ impl State {
     }
 }
 
-/// The angle between two places, seen from a center.
+/// Returns the angle between two points, seen from a center.
 fn angle(from: [f64; 2], to: [f64; 2], center: [f64; 2]) -> f64 {
     let [[x0, y0], [x1, y1]] = [from, to].map(|[x, y]| [x - center[0], y - center[1]]);
     (x0 * y1 - y0 * x1).atan2(x0 * x1 + y0 * y1).abs()

@@ -5,9 +5,9 @@ use super::AXES;
 /// A straight line of a part program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Line {
-    /// Where it ends, in mm.
+    /// End point, in mm.
     pub(super) to: [f64; AXES],
-    /// In um/s; `None` for as fast as the machine can.
+    /// Feed in um/s; `None` for as fast as the machine can.
     pub(super) feed: Option<u32>,
 }
 

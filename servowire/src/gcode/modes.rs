@@ -31,7 +31,7 @@ enum Motion {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Once {
     Dwell,
-    /// To a reference, or keep it: which.
+    /// Go to a reference, or store it; and which one.
     Reference(usize),
     Keep(usize),
     Machine,
@@ -41,21 +41,21 @@ enum Once {
 
 /// The modes that stay until a line changes them.
 pub(super) struct State {
-    /// In mm, of the machine.
+    /// Position in mm, in machine coordinates.
     pub(super) at: [f64; AXES],
     /// The offset that G92 adds to the program's coordinates.
     shift: [f64; AXES],
-    /// Of G28 and G30.
+    /// Reference positions of G28 and G30.
     references: [[f64; AXES]; 2],
     motion: Motion,
-    /// The axes of the plane of arcs, and the one along which they are seen.
+    /// The axes of the arc plane, and the axis along which it is viewed.
     pub(super) plane: [usize; AXES],
     /// In mm/min.
     feed: Option<f64>,
-    /// Millimetres in a unit.
+    /// Millimetres per unit.
     pub(super) unit: f64,
     relative: bool,
-    /// G61.1: rest behind each line.
+    /// G61.1: stop after each line.
     stops: bool,
 }
 
@@ -75,13 +75,13 @@ impl Default for State {
     }
 }
 
-/// The group of G80, which posts write beside G0.
+/// The group of G80, which post-processors write in one line with G0.
 const CYCLES: usize = 9;
 
 const SUBSET: &str = "G0 to G4, G17 to G21, G28, G30, G40, G43, G49, G53 to G59, G61, G64, G80, G90 to G92, G94";
 
 impl State {
-    /// Does what a line says; `true` at the end of the program.
+    /// Executes a line; returns `true` at the end of the program.
     pub(super) fn block(&mut self, words: &[Word], items: &mut VecDeque<Item>) -> Result<bool, String> {
         let mut numbers = Numbers::default();
         let (mut once, mut over, mut pause, mut smooth) = (None, false, false, false);
@@ -133,7 +133,7 @@ impl State {
         Ok(over)
     }
 
-    /// A G word: its group, no two of which go together, and what it does in its line alone.
+    /// Executes a G word; returns its group, of which a line may have only one word, and any effect limited to this line.
     fn general(&mut self, number: f64, items: &mut VecDeque<Item>) -> Result<(usize, Option<Once>), String> {
         let arc = |turning| (1, Motion::Arc(turning));
         let tenths = tenths(number);
@@ -160,7 +160,7 @@ impl State {
         Ok((0, Some(once)))
     }
 
-    /// A mode other than that of motion: its group.
+    /// Sets a mode other than the motion mode; returns its group.
     fn mode(&mut self, number: f64, tenths: i64, items: &mut VecDeque<Item>) -> Result<usize, String> {
         Ok(match tenths {
             170 | 180 | 190 => {
@@ -199,7 +199,7 @@ impl State {
         })
     }
 
-    /// Motion and what stands in its place.
+    /// Executes a motion, or what takes its place.
     fn act(&mut self, once: Option<Once>, numbers: &Numbers, items: &mut VecDeque<Item>) -> Result<(), String> {
         let moves = numbers.axes.iter().any(Option::is_some);
         match once {
@@ -250,7 +250,7 @@ impl State {
         Ok(())
     }
 
-    /// Where X, Y and Z lead, in mm of the machine.
+    /// Returns the target of X, Y and Z in machine coordinates, in mm.
     fn target(&self, numbers: &Numbers, machine: bool) -> Result<[f64; AXES], String> {
         let mut to = self.at;
         for (((to, word), shift), name) in to.iter_mut().zip(numbers.axes).zip(self.shift).zip(NAMES) {
@@ -303,7 +303,7 @@ impl State {
     }
 }
 
-/// Codes have one digit behind the point at most: G28.1 is 281.
+/// Codes have at most one digit after the point: G28.1 is 281.
 fn tenths(number: f64) -> i64 {
     (number * 10.0).round() as i64
 }

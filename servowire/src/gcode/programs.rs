@@ -26,7 +26,7 @@ fn near(got: [f64; AXES], want: [f64; AXES]) -> bool {
     got.iter().zip(want).all(|(got, want)| (got - want).abs() < 2e-3)
 }
 
-/// The last place, and the rests in ns.
+/// Returns the last position, and the rests in ns.
 fn follow(text: &str) -> ([f64; AXES], Vec<u64>) {
     let rest = |item: &Item| if let Item::Rest(ns) = item { Some(*ns) } else { None };
     let end = *ends(text).last().unwrap();
@@ -54,7 +54,7 @@ fn arcs_end_where_they_say() {
     assert!((low + 10.0).abs() < 1e-3 && turn.last() == Some(&[10.0, 0.0, -2.0]));
 }
 
-/// However the arc is cut into chords, Z follows its angle.
+/// However the arc is split into chords, Z follows its angle.
 #[test]
 fn a_helix_rises_with_the_angle() {
     for (text, whole) in [
@@ -69,7 +69,8 @@ fn a_helix_rises_with_the_angle() {
     }
 }
 
-/// A quarter of a circle of 10 mm from (10, 0) to (0, 10): its middle is at 45 degrees, or at 225 by the long way.
+/// A quarter circle of 10 mm radius from (10, 0) to (0, 10): its middle is at 45 degrees, or at 225 degrees the long way
+/// round.
 #[test]
 fn arcs_by_their_radius() {
     let far = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
@@ -88,7 +89,7 @@ fn arcs_by_their_radius() {
     }
 }
 
-/// Seen against the third axis: in G18 from X to the left is -Z.
+/// Viewed against the third axis: in G18, left of X is -Z.
 #[test]
 fn arcs_in_three_planes() {
     // Z first, then X: from Z = 5 counter-clockwise a quarter to X = 5.
@@ -137,7 +138,7 @@ fn rests_stops_and_modes_of_the_path() {
     assert_eq!((with(false), with(true)), (2, 1));
 }
 
-/// With the metric millimetre heads and tails of a hobby router's post.
+/// With the metric headers and footers of a hobby router's post-processor.
 #[test]
 fn a_post_of_a_hobby_router() {
     let text = "(Pocket, 6 mm)\nG21\nG90\nG17\nM3 S12000\nG0 Z5.000\nG0 X10.000 Y10.000\nG1 Z-1.500 F300\nG2 X20.000 Y20.000 I10.000 J0.000 F900\n\
@@ -146,7 +147,7 @@ fn a_post_of_a_hobby_router() {
     assert!(lines(text).iter().any(|line| line.feed == Some(15_000)));
 }
 
-/// With program number, line numbers, tool change, tool length and a reference in the way of a machining centre.
+/// With program number, line numbers, tool change, tool length and a reference in the style of a machining centre.
 #[test]
 fn a_post_of_a_machining_centre() {
     let text = "%\nO1001 (PLATE)\nN10 G00 G17 G21 G40 G49 G80 G90\nN20 G91 G28 Z0.\nN30 T1 M06\nN40 G90 G54\nN50 S8000 M03\n\
@@ -166,7 +167,7 @@ fn a_post_in_inches() {
     assert!(items(text).contains(&Item::Deviation(Some(25))));
 }
 
-/// With the checksums of a printer's host.
+/// With the checksums of a 3D printer host.
 #[test]
 fn a_post_with_checksums() {
     let sum = |line: &str| format!("{line}*{}\n", line.bytes().fold(0, |sum, byte| sum ^ byte));
@@ -188,7 +189,7 @@ fn a_post_of_a_laser_cutter() {
     assert!(arc.len() > 10 && arc.iter().all(|[x, y, _]| ((x - 60.0).hypot(y - 40.0) - 10.0).abs() < 1e-3), "{arc:?}");
 }
 
-/// A million lines are read one by one: none is kept.
+/// A million lines are read one by one, and none is kept.
 #[test]
 fn a_long_program_is_not_kept() {
     struct Endless(u64);

@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use step_motion::{AxisSetup, Limits};
 
-/// `X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000`: what an axis has of its own, in mm, minutes for the speed and seconds
-/// for the rest.
+/// `X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000`: the settings of one axis, in mm, with minutes for the speed
+/// and seconds for the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Setup {
     pub(super) axis: usize,
@@ -49,7 +49,7 @@ impl FromStr for Setup {
 }
 
 impl Setup {
-    /// An axis that takes what is not given here from `other`.
+    /// Returns an axis that takes what is not given here from `other`.
     pub(super) fn over(&self, other: AxisSetup) -> Result<AxisSetup, String> {
         let steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
         let per_mm = f64::from(steps_per_m) / 1000.0;

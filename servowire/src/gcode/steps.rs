@@ -1,4 +1,4 @@
-//! Lines as steps, as firmware makes them: planned and cut into segments by the background, and added up by the interrupt.
+//! Turns lines into steps as firmware does: planned and cut into segments by the background, and added up by the interrupt.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -11,11 +11,11 @@ use super::AXES;
 use super::item::{Item, Line};
 use super::program::Program;
 
-/// Lines that are looked ahead.
+/// Number of lines in the look-ahead.
 const AHEAD: usize = 64;
-/// Slots of an axis in the queue.
+/// Slots per axis in the queue.
 const SLOTS: usize = 513;
-/// Motion in each half of the queue, in ns: the machine knows so late that it has come to rest.
+/// Motion in each half of the queue, in ns: this much later the machine knows that it has come to rest.
 const REACH_NS: u32 = 1_000_000;
 
 /// The steps of all axes in the order of time, in ns. A line of the program is read when there is room for it.
@@ -28,14 +28,14 @@ pub(crate) struct Steps {
     deviation: u32,
     /// Nothing moves before a rest of this many ns has ended.
     rest: Option<u64>,
-    /// Nothing follows in the program.
+    /// The program has ended.
     over: bool,
     /// Lines that were read.
     lines: u64,
-    /// When the interrupt comes next, if it does, in ns; and when it came last.
+    /// When the interrupt comes next, if it does, and when it last came, in ns.
     next: Option<u64>,
     now: u64,
-    /// Of one interrupt.
+    /// Steps made in one interrupt.
     pulses: VecDeque<AxisPulse>,
     fault: Option<Fault>,
 }
@@ -107,7 +107,7 @@ impl Steps {
         let _: Result<_, _> = self.axes.push(target, feed.unwrap_or(u32::MAX));
     }
 
-    /// All work of the background until it has to wait; `false` if it is at rest and nothing is to come.
+    /// Does all work of the background until it has to wait; returns `false` if it is at rest and nothing is to come.
     fn plan(&mut self) -> bool {
         loop {
             self.fill();
@@ -131,7 +131,7 @@ impl Steps {
         }
     }
 
-    /// What the interrupt does.
+    /// Does what the interrupt does.
     fn fire(&mut self, now: u64) {
         self.now = now;
         let fired = self.timer.fire();

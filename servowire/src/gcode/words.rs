@@ -1,4 +1,4 @@
-//! A line of a part program as words.
+//! Splits a line of a part program into words.
 
 /// A letter and its number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -7,15 +7,15 @@ pub(super) struct Word {
     pub(super) value: f64,
 }
 
-/// What a line holds.
+/// The content of a line.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Words {
     pub(super) words: Vec<Word>,
-    /// It begins with a slash: it may be left out.
+    /// Whether it begins with a slash, so that it may be skipped.
     pub(super) optional: bool,
 }
 
-/// The words of a line, without its number, its comments and its checksum.
+/// Returns the words of a line, without its number, its comments and its checksum.
 pub(super) fn words(line: &str) -> Result<Words, String> {
     let text = checked(line.trim_start_matches('\u{feff}').trim())?;
     let mut out = Words::default();
@@ -61,7 +61,7 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
     Ok(out)
 }
 
-/// A line in front of its checksum: the exclusive or of its bytes, after an asterisk.
+/// Returns the part of a line before its checksum, which is the exclusive or of its bytes, after an asterisk.
 fn checked(line: &str) -> Result<&str, String> {
     let Some((text, sum)) = line.rsplit_once('*') else { return Ok(line) };
     let Ok(want) = sum.trim().parse::<u8>() else { return Ok(line) };

@@ -1,12 +1,12 @@
-//! Position, speed, acceleration and jerk of moves over time as SVG.
+//! Draws position, speed, acceleration and jerk of moves over time as SVG.
 
 use super::motion::{Move, Sample};
 use crate::drawing::{Chart, Drawn, Sheet, Stroke};
 
-/// A shape has its stroke, wherever it is drawn.
+/// Each shape has its own stroke in all drawings.
 const SHAPES: [&str; 3] = ["sin2", "trapezoid", "s-curve"];
 
-/// What is drawn, in which unit.
+/// The quantity drawn, and its unit.
 type Row = (&'static str, fn(&Sample) -> Option<f64>);
 
 const ROWS: [Row; 4] = [
@@ -20,7 +20,7 @@ fn stroke(name: &str) -> Stroke {
     Stroke::number(SHAPES.iter().position(|known| *known == name).unwrap_or(SHAPES.len()))
 }
 
-/// The moves over one another.
+/// Draws the moves over one another.
 pub(super) fn svg(title: &str, moves: &[Move]) -> Drawn<String> {
     let mut sheet = Sheet::new(title, 1100);
     for made in moves {

@@ -1,4 +1,4 @@
-//! Speed, acceleration and step time of a move as SVG.
+//! Draws speed, acceleration and step time of a move as SVG.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::drawing::{Chart, Drawn, Panel, Sheet, Stroke};
 
 type Points = Vec<(f64, f64)>;
 
-/// What a drawing has along: milliseconds or steps.
+/// The horizontal axis of a drawing: milliseconds or steps.
 type Along = fn(&Stretch) -> Range<f64>;
 
 fn speed(stretches: &[Stretch], along: Along) -> Points {
@@ -23,8 +23,8 @@ fn step_time(stretches: &[Stretch], along: Along) -> Points {
     stretches.iter().flat_map(|s| [(along(s).start, us(s)), (along(s).end, us(s))]).collect()
 }
 
-/// In 10³ steps/s², from the middle of a ramp entry to the middle of the next. Full speed counts as an entry at either
-/// end, and as no acceleration between them.
+/// Returns the acceleration in 10³ steps/s², from the middle of a ramp entry to the middle of the next. Full speed counts
+/// as an entry at each end, with zero acceleration between them.
 fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
     // Half an entry, in the unit of `range`.
     let half = |s: &Stretch, range: &Range<f64>| {
@@ -51,7 +51,7 @@ fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
     points
 }
 
-/// The whole move over time on the left, the ramp up over its steps on the right.
+/// Draws the whole move over time on the left, and the ramp up over its steps on the right.
 pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Drawn<String> {
     let stretches = stretches(profile, steps);
     let k = profile.parameters().steps_per_entry;

@@ -1,4 +1,4 @@
-//! Moves of any shape as curves over time, and how good they are.
+//! Moves of any shape as curves over time, with figures of their quality.
 
 use std::io::{self, Write};
 
@@ -22,21 +22,21 @@ pub(super) struct Sample {
     pub(super) jerk: Option<f64>,
 }
 
-/// A move: its steps, and the curve that they are taken from.
+/// A move: its steps, and the curve from which they are taken.
 pub(super) struct Move {
     pub(super) name: &'static str,
     /// Times of the steps in ns.
     pub(super) steps: Vec<u64>,
     pub(super) curve: Vec<Sample>,
-    /// Farthest that a step is from where the unrounded curve has it, in ns.
+    /// Largest distance of a step from its time on the unrounded curve, in ns.
     error_ns: f64,
 }
 
-/// Points of a curve between two corners.
+/// Number of points on a curve between two corners.
 const POINTS: u64 = 100;
 
 impl Move {
-    /// A trapezoid, or with a jerk limit an S-curve.
+    /// Plans a trapezoid, or an S-curve with a jerk limit.
     pub(super) fn planned(limits: Limits, steps: u32) -> Result<Self, Error> {
         let plan = Plan::new(Clock::NANOSECONDS, limits, steps)?;
         let corners: Vec<u64> = plan.corners().collect();
@@ -61,7 +61,8 @@ impl Move {
         Ok(Self { name, steps: times, curve, error_ns })
     }
 
-    /// The published ramp: levels of speed. The acceleration is that from the middle of a level to the middle of the next.
+    /// Returns the published ramp, which has levels of speed. The acceleration is taken from the middle of a level to the
+    /// middle of the next.
     pub(super) fn sin2(profile: Profile<'_>, steps: u32) -> Self {
         let stretches = stretches(profile, steps);
         let k = f64::from(profile.parameters().steps_per_entry);
@@ -112,7 +113,7 @@ impl Move {
         self.curve.iter().map(|sample| what(sample).abs()).fold(0.0, f64::max)
     }
 
-    /// Time to the greatest speed, in s.
+    /// Returns the time to the greatest speed, in s.
     fn ramp(&self) -> f64 {
         let most = self.most(|sample| sample.speed) * (1.0 - 1e-6);
         self.curve.iter().find(|sample| sample.speed >= most).map_or(0.0, |sample| sample.time)
@@ -139,7 +140,7 @@ fn sample(plan: &Plan, tick: u64, limits: Limits) -> Sample {
     }
 }
 
-/// A line a move.
+/// Prints one line per move.
 pub(super) fn table(moves: &[Move], out: &mut dyn Write) -> io::Result<()> {
     writeln!(
         out,

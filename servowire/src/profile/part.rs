@@ -1,4 +1,4 @@
-//! The steps of a part program: as a table, a line a step, a drawing, and wires.
+//! Shows the steps of a part program: as a table, one line per step, a drawing, or wires.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -21,7 +21,7 @@ const NAMES: [&str; AXES] = ["X", "Y", "Z"];
 /// Length of a STEP pulse in a VCD, in ns.
 const PULSE_NS: u64 = 1000;
 
-/// From DIR to STEP, in ns, unless the axis turns faster than that.
+/// Time from DIR to STEP, in ns, unless the axis reverses faster than that.
 const LEAD_NS: u64 = 1000;
 
 /// Totals of an axis.
@@ -30,7 +30,7 @@ struct Axis {
     steps: u64,
     position: i64,
     last: Option<u64>,
-    /// The shortest time from step to step in one direction, in ns.
+    /// The shortest time between two steps in one direction, in ns.
     shortest: Option<u64>,
 }
 
@@ -46,7 +46,7 @@ impl Axis {
     }
 }
 
-/// As the arguments ask for it.
+/// Shows the steps as the arguments request.
 pub(super) fn write(
     arguments: &Arguments,
     lines: usize,
@@ -92,7 +92,7 @@ pub(super) fn write(
 /// Programs of more lines than this have a progress bar.
 const LONG: usize = 100_000;
 
-/// The lines that were read, on a terminal.
+/// Shows the number of lines read, on a terminal.
 fn bar(lines: usize) -> ProgressBar {
     if lines < LONG || !io::stderr().is_terminal() {
         return ProgressBar::hidden();
@@ -130,7 +130,7 @@ struct Wire {
     step: IdCode,
     dir: IdCode,
     direction: Direction,
-    /// When the last pulse began, and when the one that is high is over.
+    /// When the last pulse began, and when the present one ends.
     last: u64,
     falls: Option<u64>,
 }
@@ -142,11 +142,11 @@ enum Change {
     Step,
 }
 
-/// STEP and DIR of each axis.
+/// Writes STEP and DIR of each axis.
 struct Wires {
     to: Writer<BufWriter<File>>,
     axes: Vec<Wire>,
-    /// Not written yet: when, what, and on which axis.
+    /// Events not yet written: when, what, and on which axis.
     changes: BinaryHeap<Reverse<(u64, Change, usize)>>,
 }
 
@@ -171,7 +171,7 @@ impl Wires {
         Ok(Self { to, axes, changes: BinaryHeap::new() })
     }
 
-    /// Ends the pulses that are over before a time.
+    /// Ends the pulses that end before a time.
     fn until(&mut self, time: u64) -> io::Result<()> {
         while let Some(wire) = self.axes.iter_mut().min_by_key(|wire| wire.falls.unwrap_or(u64::MAX)) {
             let Some(falls) = wire.falls.filter(|falls| *falls <= time) else { break };
@@ -182,7 +182,7 @@ impl Wires {
         Ok(())
     }
 
-    /// Nothing that comes later is before this pulse by more than the lead of DIR.
+    /// Nothing that comes later precedes this pulse by more than the lead of DIR.
     fn add(&mut self, pulse: &AxisPulse) -> io::Result<()> {
         let (at, time) = (usize::from(pulse.axis), pulse.tick);
         let begun = time.saturating_sub(LEAD_NS);
@@ -198,7 +198,7 @@ impl Wires {
         self.write(begun)
     }
 
-    /// Writes what comes before a time.
+    /// Writes all events before a time.
     fn write(&mut self, before: u64) -> io::Result<()> {
         while self.changes.peek().is_some_and(|Reverse((time, ..))| *time < before) {
             let Some(Reverse((time, change, at))) = self.changes.pop() else { break };
@@ -223,20 +223,20 @@ impl Wires {
     }
 }
 
-/// A place of the axes at a time in s.
+/// The positions of the axes at a time in s.
 type Place = (f64, [i64; AXES]);
 
-/// Some of the places of a path, however long it is.
+/// A limited number of positions along a path of any length.
 struct Places {
     kept: Vec<Place>,
     last: Place,
-    /// One in so many is kept.
+    /// One in this many is kept.
     every: u64,
     seen: u64,
 }
 
 impl Places {
-    /// More than a picture shows.
+    /// More than a picture can show.
     const MOST: usize = 1 << 17;
 
     fn new() -> Self {
@@ -265,7 +265,7 @@ impl Places {
     }
 }
 
-/// The path, a step as long in X as in Y, and the positions of the axes over time.
+/// Draws the path, with equal scales for X and Y, and the positions of the axes over time.
 fn draw(places: &[Place]) -> Drawn<String> {
     // A point a pixel is enough.
     let every = (places.len() / 20_000).max(1);

@@ -1,4 +1,4 @@
-//! The published ramp step by step: as records, in figures, and as stretches at the same ramp entry.
+//! Shows the published ramp step by step: as records, in figures, and as stretches at the same ramp entry.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -6,12 +6,12 @@ use std::ops::Range;
 use serde::Serialize;
 use step_profile::{Arithmetic, Profile, RampStep};
 
-/// End of the step's interval, which is its pulse, in ns after the start of cycle 0.
+/// End of the step's interval, where its pulse is, in ns after the start of cycle 0.
 pub(super) fn pulse_ns(step: RampStep) -> u64 {
     step.cycle * u64::from(step_profile::CYCLE_NS) + u64::from(step.sync_time)
 }
 
-/// A step as CSV and JSON have it.
+/// A step as written to CSV and JSON.
 #[derive(Serialize)]
 pub(super) struct Record {
     step: u32,
@@ -71,7 +71,7 @@ pub(super) fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> 
 pub(super) struct Stretch {
     pub(super) first: RampStep,
     pub(super) last: RampStep,
-    /// Start of its first interval and end of its last.
+    /// Start of the first interval and end of the last one.
     pub(super) ms: Range<f64>,
 }
 
@@ -80,7 +80,7 @@ impl Stretch {
         1e6 / f64::from(self.first.t_step)
     }
 
-    /// Numbers of its steps.
+    /// Numbers of the steps.
     pub(super) fn steps(&self) -> Range<f64> {
         f64::from(self.first.index)..f64::from(self.last.index) + 1.0
     }

@@ -1,4 +1,4 @@
-//! The registers of the SICK IP core. The content of its online status is not among them.
+//! The registers of the SICK IP core. The online status is not among them.
 
 use std::fmt;
 

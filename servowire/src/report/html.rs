@@ -1,4 +1,4 @@
-//! A report as a page: one file without anything from elsewhere, for a screen and for paper.
+//! Writes a report as a page: one self-contained file, for a screen and for paper.
 
 use std::fmt::Write as _;
 use std::time::{Duration, UNIX_EPOCH};
@@ -11,7 +11,7 @@ use super::Report;
 use crate::drawing::{Drawn, Sheet, Wave};
 use crate::explain::heading;
 
-/// An instant from here on is one since 1970: the year 2000.
+/// An instant from the year 2000 onwards is counted from 1970.
 const DATED: i128 = 946_684_800 * SECOND as i128;
 
 const STYLE: &str = "
@@ -32,7 +32,7 @@ figure { margin: 0 0 1.5em } svg { max-width: 100%; height: auto } code { overfl
 }
 ";
 
-/// The whole page.
+/// Writes the whole page.
 pub(super) fn page(report: &Report) -> Drawn<String> {
     let mut out = String::new();
     let title = format!("Report of {}", report.file);
@@ -54,7 +54,7 @@ pub(super) fn page(report: &Report) -> Drawn<String> {
     Ok(out)
 }
 
-/// The summary for a reader who reads nothing else.
+/// Writes the summary for a reader who reads nothing else.
 fn verdict(report: &Report, out: &mut String) {
     let sentences: Vec<&String> = report.read.fault.iter().chain(&report.read.refusals).collect();
     if sentences.is_empty() {
@@ -88,7 +88,7 @@ fn about(report: &Report) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// The instant in UTC, where it is one since 1970.
+/// Returns the instant in UTC, if it is counted from 1970.
 fn dated(time: Time) -> Option<String> {
     let seconds = u64::try_from(time.ps() / i128::from(SECOND)).ok().filter(|_| time.ps() >= DATED)?;
     let instant = UNIX_EPOCH.checked_add(Duration::from_secs(seconds))?;
@@ -103,7 +103,7 @@ fn rows(title: &str, rows: &[(&str, String)], out: &mut String) {
     out.push_str("</table>\n");
 }
 
-/// The lines, and the sentences of the recognition: wiring, rate, polarity.
+/// Writes the lines, and the sentences of the recognition: wiring, rate, polarity.
 fn found(report: &Report, out: &mut String) {
     rows("What was found", &report.lines, out);
     for note in &report.read.notes {
@@ -118,7 +118,7 @@ fn figures(report: &Report, out: &mut String) {
     }
 }
 
-/// Each kind of damage once, as it looks on the line.
+/// Draws each kind of damage once, as it looks on the line.
 fn damage(report: &Report, out: &mut String) -> Drawn {
     if report.refused == 0 {
         return Ok(());

@@ -28,12 +28,12 @@ type Done = Result<ExitCode, Fault>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Print {
     Text,
-    /// An object a line.
+    /// One object per line.
     Json,
 }
 
 impl Print {
-    /// Prints something to the user. A reader that closes the pipe has read enough.
+    /// Prints something to the user. If the reader closes the pipe, it has read enough.
     fn say(self, text: impl Display, value: impl FnOnce() -> Value) -> Result<(), Fault> {
         match self {
             Self::Text => terminal::say(format_args!("{text}\n")),
@@ -61,7 +61,7 @@ pub(super) fn read<P: Port>(encoder: &mut Encoder<P>, print: Print) -> Done {
     Ok(ExitCode::SUCCESS)
 }
 
-/// It was read just now, and the alarms are shown beside it.
+/// The position was read just now, and the alarms are shown beside it.
 const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
 
 /// Returns the position and its degrees, if it may be shown; otherwise the reason.
@@ -105,7 +105,7 @@ fn names(almc: Almc) -> Vec<&'static str> {
     almc.iter_names().map(|(name, _)| name).collect()
 }
 
-/// A table in this file, if there is one.
+/// Creates a table in this file, if one is given.
 fn table<'p>(path: Option<&'p Path>, head: &[&str]) -> Result<Option<(csv::Writer<fs::File>, &'p Path)>, Fault> {
     let Some(path) = path else { return Ok(None) };
     let mut csv = csv::Writer::from_writer(fs::File::create(path).map_err(Fault::file(path))?);
@@ -113,7 +113,7 @@ fn table<'p>(path: Option<&'p Path>, head: &[&str]) -> Result<Option<(csv::Write
     Ok(Some((csv, path)))
 }
 
-/// Relays between a master and its encoder, for ever.
+/// Relays between a master and its encoder without end.
 pub(super) fn relay<M: Port, E: Port>(
     master: M,
     encoder: &mut Link<E>,
@@ -191,7 +191,7 @@ pub(super) fn zero_single_turn<P: Port>(encoder: &mut Encoder<P>, yes: bool, tol
     said(&encoder.zero_single_turn_and_shift_commutation_angle(tolerance)?, print)
 }
 
-/// What was read before and after.
+/// The values read before and after.
 fn said(changed: &Changed, print: Print) -> Done {
     let text = format!("before: {}\nafter:  {}", line(&changed.before), line(&changed.after));
     print.say(text, || change(changed))?;

@@ -1,7 +1,8 @@
 //! Requests and answers through a port that gives no times.
 //!
-//! A PC cannot see the 3 us between request and answer: an adapter hands over both at once, milliseconds later. So the echo
-//! of a request is recognised by its content and place, and a request is sent only after everything received has been read.
+//! A PC cannot see the 3 us between request and answer: an adapter hands over both at once, milliseconds later. The echo of
+//! a request is therefore recognised by its content and place, and a request is sent only after everything received has
+//! been read.
 
 use std::io;
 use std::thread;
@@ -175,7 +176,7 @@ const HELD_BACK: Duration = Duration::from_millis(20);
 /// More bytes than any exchange has.
 const MOST_BYTES: usize = 64;
 
-/// Nothing came for now.
+/// Nothing has arrived for now.
 fn is_wait(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

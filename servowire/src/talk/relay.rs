@@ -39,7 +39,7 @@ impl Echo {
         self.until = Instant::now() + ECHO;
     }
 
-    /// Returns whether a byte is one of them.
+    /// Returns whether a byte is one of the bytes sent.
     pub(super) fn is(&mut self, byte: u8) -> bool {
         if Instant::now() > self.until || self.expected.front() != Some(&byte) {
             self.expected.clear();

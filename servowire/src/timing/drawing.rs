@@ -1,9 +1,9 @@
-//! A plan as a drawing: a row for each thing that is done, time to the right.
+//! Draws a plan: one row per action, with time to the right.
 
 use super::{Bar, Plan};
 use crate::drawing::{Drawn, Row, Rows, Sheet};
 
-/// The plan as SVG.
+/// Returns the plan as SVG.
 pub(super) fn svg(plan: &Plan) -> Drawn<String> {
     let us = |ns: i64| ns as f64 / 1000.0;
     let begin = plan.bars.iter().map(|bar| bar.start_ns).min().unwrap_or(0);

@@ -1,6 +1,7 @@
 //! A-format: one encoder, or the encoders of a bus one after the other.
 //!
-//! Encoders and master are those of the crate, each told the times at its own end of the cable; so the plan is what they do.
+//! The encoders and the master are those of the crate, each given the times at its own end of the cable, so the plan shows
+//! what they do.
 
 use std::error::Error;
 
@@ -58,7 +59,7 @@ fn command(text: &str) -> Result<Command, String> {
     named.or(coded).ok_or_else(|| "a name such as ABS40 or STATUS_MT, or a code from 0 to 30".to_owned())
 }
 
-/// Any request with this command: arguments do not change the times.
+/// Returns any request with this command: arguments do not change the times.
 fn operation(command: Command) -> Operation {
     let id = EncoderId::truncate(0);
     Operation::without_arguments(command).unwrap_or(match command {
@@ -119,7 +120,7 @@ impl Arguments {
         Ok(Plan { title, bars, cycle_ns: ready_ns.max(handed_ns), fault_ns })
     }
 
-    /// What the encoders answer, in the order of time.
+    /// Returns the encoders' answers, in the order of time.
     fn responses(&self, request: Request, on_line: Addresses, asked_ns: u64) -> Vec<Heard> {
         let way_ns = 5 * u64::from(self.cable);
         let behaviour = Behaviour::new().with_response_delay_ns(self.turn_around);
@@ -140,7 +141,7 @@ impl Arguments {
     }
 }
 
-/// From when on the next request may leave, after these responses and if nobody answers.
+/// Returns when the next request may be sent, after these responses and if nobody answers.
 fn free(request: Request, on_line: Addresses, line: Line, responses: &[Heard]) -> Result<(u64, u64), Box<dyn Error>> {
     let frame_ns = u64::from(line.rate.bits_ns(FRAME_BITS));
     let frames = || {

@@ -7,7 +7,7 @@ use crate::path_mover::PathMover;
 use crate::queue::{Joint, Queue};
 
 impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
-    /// Plans the stop from there.
+    /// Plans the stop from the end of the block.
     pub(super) fn brake(&mut self) -> Work {
         if let Some(stop) = self.stops.get_mut(self.block) {
             stop.clone_from(&self.work);
@@ -18,7 +18,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// A segment of the stop behind the block.
+    /// Cuts a segment of the stop behind the block.
     pub(super) fn cut_stop(&mut self) -> Work {
         let (Some(writer), Some(queue), Some(stop)) =
             (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis), self.stops.get_mut(self.block))
@@ -52,7 +52,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         self.writers.iter().all(|writer| writer.len <= Queue::<S>::BLOCK)
     }
 
-    /// A block cannot be run: the path is left, and the machine comes to rest where the interrupt does.
+    /// The block cannot be run: the path is abandoned, and the machine comes to rest where the interrupt stops.
     pub(super) fn give_up(&mut self) -> Work {
         self.stage = Stage::Idle;
         self.shorter = 0;

@@ -1,4 +1,4 @@
-//! Blocks: what is cut for each, and how the interrupt is let in.
+//! The blocks of a path: what is cut for each, and how the interrupt is let in.
 
 use core::sync::atomic::Ordering;
 
@@ -10,7 +10,7 @@ use crate::queue::{Joint, Queue, REST};
 use crate::writer::{Writer, tick};
 
 impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
-    /// A block from where those that are out end.
+    /// Begins a block where the blocks already handed out end.
     pub(super) fn begin(&mut self) -> Work {
         let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
         if reach < 4 {
@@ -27,14 +27,14 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// On to the next axis, or to the first one; true if none has had anything.
+    /// Goes on to the next axis, or back to the first one; returns whether no axis has had anything to cut.
     pub(super) fn is_through(&mut self) -> bool {
         self.quiet = self.quiet.saturating_add(1);
         self.axis = self.axis.saturating_add(1).checked_rem(N).unwrap_or(0);
         self.quiet >= N
     }
 
-    /// A segment of the block.
+    /// Cuts a segment of the block.
     pub(super) fn cut_block(&mut self) -> Work {
         let (Some(writer), Some(queue)) = (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis)) else {
             return Work::Later;
@@ -54,7 +54,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// A step comes in the tick in which the block is to end, or in the next one.
+    /// Returns whether a step falls into the tick in which the block is to end, or into the next one.
     pub(super) fn waits_for_a_step(&mut self) -> bool {
         let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1) && self.put_off < PUT_OFF);
         if let Some(due) = next {
@@ -64,7 +64,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         next.is_some()
     }
 
-    /// The end of the block, the same one for all axes.
+    /// Ends the block at the same tick for all axes.
     pub(super) fn join(&mut self) {
         self.until = self.put_joint(self.until, Joint::Block);
         self.joint = self.writers;
@@ -74,7 +74,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         }
     }
 
-    /// An event of all axes at one tick, not before another one; at which.
+    /// Puts an event of all axes at one tick, not before a given one; returns that tick.
     pub(super) fn put_joint(&mut self, at: u64, joint: Joint) -> u64 {
         let last = self.writers.iter().map(|writer| tick(writer.end).saturating_add(1)).max().unwrap_or(at);
         let at = at.max(last);
@@ -84,7 +84,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         at
     }
 
-    /// Lets the interrupt in, after the block before it or from rest.
+    /// Lets the interrupt into the block, after the previous block or from rest.
     pub(super) fn publish(&mut self, end: u64) {
         let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
         if let Some(out) = self.outs.get_mut(self.block) {

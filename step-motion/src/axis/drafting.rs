@@ -10,15 +10,15 @@ use crate::writer::{TICK, Writer, tick};
 
 use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work, coarser};
 
-/// Slots for the steps of a block before those of its stop, at least.
+/// Minimum number of slots for the steps of a block, before those of its stop.
 const LEAST_ROOM: usize = 4;
-/// Nothing that the interrupt tells.
+/// A value that the interrupt never reports.
 pub(super) const UNSEEN: u32 = u32::MAX;
-/// A wait ends so many ticks before a step may come.
+/// A wait ends this many ticks before a step may come.
 const BEFORE: u64 = 2;
 
 impl<const N: usize> Axis<'_, N> {
-    /// Slots for the steps of a block before those of its stop, at most.
+    /// Maximum number of slots for the steps of a block, before those of its stop.
     pub(super) const ROOM: usize = if Queue::<N>::BLOCK > 2 * LEAST_ROOM { Queue::<N>::BLOCK / 2 } else { LEAST_ROOM };
 
     /// Does a slice of the background's work: a segment, the plan of a stop, or a check of the interrupt. Call it until it
@@ -69,7 +69,7 @@ impl<const N: usize> Axis<'_, N> {
         }
     }
 
-    /// Something has been asked for: it is planned at once, where it is known where it begins.
+    /// Takes a new request, and plans it at once if it is known where it begins.
     pub(super) fn asked(&mut self, news: News) {
         self.news = self.news.max(news);
         self.seen = UNSEEN;
@@ -78,7 +78,7 @@ impl<const N: usize> Axis<'_, N> {
         }
     }
 
-    /// Where the interrupt is: in which place of which block, or `None` if it stands; and at which slot.
+    /// Returns where the interrupt is: the block and the place in it, or `None` if it is stopped; and the slot.
     pub(super) fn current(&self) -> (Option<(usize, usize)>, usize) {
         let current = self.queue.current.load(Ordering::Acquire);
         let slot = (current & 0xffff) as usize;
@@ -91,7 +91,7 @@ impl<const N: usize> Axis<'_, N> {
         Queue::<N>::place(slot).is_some_and(|(block, at)| block == self.block && at < out(block))
     }
 
-    /// Takes notice of where the interrupt is. Returns whether it is in a stop that was not requested.
+    /// Reads where the interrupt is. Returns whether the interrupt is in a stop that was not requested.
     pub(super) fn look(&mut self) -> bool {
         let made = self.queue.made.load(Ordering::Acquire);
         #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
@@ -113,7 +113,7 @@ impl<const N: usize> Axis<'_, N> {
         false
     }
 
-    /// The interrupt is in the block that was linked.
+    /// Takes over the linked block: the interrupt has entered it.
     fn go_over(&mut self) {
         self.work.wish_as(&self.mover);
         self.mover.clone_from(&self.work);
@@ -123,7 +123,7 @@ impl<const N: usize> Axis<'_, N> {
         (self.stage, self.told, self.missed) = (Stage::Idle, News::None, 0);
     }
 
-    /// It was beyond the joint before the block was there: once more, further on.
+    /// Discards a block that the interrupt has missed, to be made again further ahead.
     fn miss(&mut self) {
         self.missed = self.missed.saturating_add(1);
         self.forget();
@@ -135,17 +135,17 @@ impl<const N: usize> Axis<'_, N> {
         (self.stage, self.told, self.stop) = (Stage::Idle, News::None, None);
     }
 
-    /// From the end of the stop of a block, where the interrupt stands.
+    /// Continues from the end of a block's stop, where the interrupt has stopped.
     fn recover(&mut self, block: usize, slot: usize) {
         self.forget();
         let Some(out) = self.out.get_mut(block) else { return };
-        // It stands at a slot that counts as one before the stop from now on.
+        // The slot at which it has stopped now counts as one before the stop.
         out.len = usize::MAX;
         (self.end, self.last) = (Writer { len: 0, ..out.rest }, slot);
         self.mover.rest_at(out.position, tick(self.end.end));
     }
 
-    /// The interrupt stands for a halt.
+    /// Confirms a halt once the interrupt has stopped for it.
     fn confirm(&mut self, ticket: u32) -> Work {
         if self.queue.current.load(Ordering::Acquire) != IDLE | ticket << TICKET {
             return Work::Start;
@@ -161,21 +161,22 @@ impl<const N: usize> Axis<'_, N> {
         Work::More
     }
 
-    /// Longest duration of a segment. A block is joined half of that ahead of the interrupt at least.
+    /// Longest duration of a segment. A block is joined at least half of that ahead of the interrupt.
     ///
-    /// A request waits for the interrupt to enter a block that is linked: not longer than its distance then, a segment, and until it is seen.
-    /// From there it acts after two segments and a half. All this is within twice the reach: 0.6 + 0.25 + 0.5 + 0.625.
+    /// A request waits for the interrupt to enter a linked block: at most the distance to it at that time, one segment, and
+    /// the time until this is noticed.
+    /// It then takes effect after two and a half segments. In total this is within twice the reach: 0.6 + 0.25 + 0.5 + 0.625.
     const fn part(&self) -> u64 {
         self.reach as u64 >> 2
     }
 
-    /// A block without a new request is linked when it is this near: a little more than the time between two calls.
+    /// A block without a new request is linked when the interrupt is this near: a little more than the time between two calls.
     fn near(&self) -> u64 {
         u64::from(self.reach).saturating_mul(3) / 5
     }
 
-    /// Begins a block: with what has been asked for, if there is something, behind the next segment that is far enough ahead of the
-    /// interrupt, or else with what follows all that is out. Returns whether there is something to cut.
+    /// Begins a block: if there is a request, with that, behind the next segment that is far enough ahead of the interrupt;
+    /// otherwise with the motion that follows everything handed out. Returns whether there is anything to cut.
     fn begin(&mut self) -> bool {
         self.forget();
         let news = core::mem::replace(&mut self.news, News::None);
@@ -207,7 +208,7 @@ impl<const N: usize> Axis<'_, N> {
         true
     }
 
-    /// Joins behind a segment that is far enough ahead.
+    /// Joins the block behind a segment that is far enough ahead.
     fn join(&mut self, block: usize, place: usize) {
         let Some(out) = self.out.get(block).copied() else { return };
         let mark = |at| self.marks.get(Queue::<N>::slot(block, at)).copied().unwrap_or_default();
@@ -229,14 +230,14 @@ impl<const N: usize> Axis<'_, N> {
         self.work.back_to(out.steps.saturating_sub(steps), tick(self.writer.end), (free, dir));
     }
 
-    /// When the segment in a place ends at the latest, from the begin of its block.
+    /// Returns when the segment at a place ends at the latest, counted from the start of its block.
     fn ends(&self, block: usize, place: usize) -> u64 {
         let len = self.out.get(block).map_or(0, |out| out.len);
         let mut slots = (place..len).filter_map(|at| self.marks.get(Queue::<N>::slot(block, at)));
         slots.find(|mark| mark.end > 0).map_or(u64::MAX, |mark| mark.end)
     }
 
-    /// A segment of the block.
+    /// Cuts a segment of the block.
     fn cut(&mut self) -> Work {
         let (now, before) = (tick(self.writer.end), self.writer.len);
         if before > 0 && self.work.has_steps() && self.is_long_enough(now) {
@@ -265,8 +266,8 @@ impl<const N: usize> Axis<'_, N> {
         Work::More
     }
 
-    /// Returns whether the block is to have no more steps: it has as many as it is to have, and does not come to rest soon after, in
-    /// the slots that a stop would take.
+    /// Returns whether the block gets no more steps: it is long enough, and its motion does not come to rest soon after,
+    /// within the slots that a stop would take.
     fn is_long_enough(&mut self, now: u64) -> bool {
         let len = self.writer.len.saturating_add(3);
         let Some(Tail { mover, writer, steps, .. }) = &self.stop else {
@@ -282,7 +283,7 @@ impl<const N: usize> Axis<'_, N> {
         if len <= Queue::<N>::BLOCK {
             return false;
         }
-        // It has not come to rest: back to where the stop may begin.
+        // It has not come to rest: go back to where the stop may begin.
         self.work.clone_from(mover);
         self.writer = *writer;
         if let Some(out) = self.out.get_mut(self.block) {
@@ -298,7 +299,7 @@ impl<const N: usize> Axis<'_, N> {
         let begin = self.out.get(self.block).map_or(0, |out| tick(out.begin));
         let len = u64::try_from(self.writer.len).unwrap_or(u64::MAX);
         let room = u64::try_from(Queue::<N>::BLOCK).unwrap_or(0).saturating_sub(len);
-        // As many segments in a time as before, and those of the last steps.
+        // Assumes as many segments per time as before, and adds those of the last steps.
         let slots = left.saturating_mul(len).checked_div(now.saturating_sub(begin)).unwrap_or(u64::MAX);
         left <= u64::from(self.reach) << 2 && slots.saturating_add(8) <= room
     }
@@ -315,7 +316,7 @@ impl<const N: usize> Axis<'_, N> {
         }
     }
 
-    /// The block is as long as it is to be: what comes behind it.
+    /// Closes a block that is long enough: its stop comes next.
     fn close(&mut self) {
         let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
         let steps = self.out.get(self.block).map_or(0, |out| out.steps);
@@ -323,7 +324,7 @@ impl<const N: usize> Axis<'_, N> {
         self.stage = Stage::Stop;
     }
 
-    /// A segment of the stop behind the block.
+    /// Cuts a segment of the stop behind the block.
     fn cut_stop(&mut self) -> Work {
         let Some(tail) = &mut self.stop else { return self.complete(None) };
         if core::mem::take(&mut tail.moves) {
@@ -361,7 +362,7 @@ impl<const N: usize> Axis<'_, N> {
         self.complete(Some(rest))
     }
 
-    /// There are too few slots for the stop: once more with fewer segments of it, or with fewer before it.
+    /// Starts again because the stop has too few slots: with fewer segments in it, or with fewer before it.
     fn stop_shorter(&mut self) -> Work {
         if self.coarse > COARSEST {
             self.coarse = coarser(self.coarse);
@@ -376,7 +377,7 @@ impl<const N: usize> Axis<'_, N> {
         self.give_up()
     }
 
-    /// The block cannot be run: what was cut of it is forgotten, and the axis comes to rest where the interrupt does.
+    /// Discards a block that cannot be run: the axis comes to rest where the interrupt stops.
     fn give_up(&mut self) -> Work {
         self.forget();
         self.mover.ask_stop();
@@ -384,7 +385,7 @@ impl<const N: usize> Axis<'_, N> {
         Work::TooFewSlots
     }
 
-    /// The block is there; with where its stop ends, if there is one.
+    /// Completes the block; takes the end of its stop, if it has one.
     fn complete(&mut self, stop: Option<(i64, Writer)>) -> Work {
         let len = self.writer.len;
         if len > Queue::<N>::BLOCK {
@@ -398,7 +399,8 @@ impl<const N: usize> Axis<'_, N> {
         Work::More
     }
 
-    /// Lets the interrupt in. What only goes on waits until it is near, lest there is no room for what is asked for meanwhile.
+    /// Lets the interrupt into the block. A mere continuation waits until the interrupt is near, so that a request made
+    /// meanwhile still finds room.
     fn link(&mut self, running: Option<(usize, usize)>, slot: usize) -> Work {
         if let Some((block, place)) = running {
             if slot > self.joint {

@@ -1,8 +1,8 @@
-//! Steps near a rest, from the first one of them: roots of odd numbers.
+//! The times of steps near a rest, from the first of them: roots of odd numbers.
 
 use crate::real::high;
 
-/// How many steps behind a rest are known by a root.
+/// How many steps after a rest are found by a root.
 const KNOWN: usize = 24;
 
 /// Roots of 1, 3, 5 and so on, in 2^-60.
@@ -43,14 +43,14 @@ const fn roots(degree: u32) -> Roots {
 static SQUARE: Roots = roots(2);
 static CUBE: Roots = roots(3);
 
-/// Where a piece is at rest at its slower end, with the position half of an acceleration times t² or a sixth of a jerk times t³: so
-/// all its steps follow from the first one.
+/// A piece that is at rest at its slower end, where the position is half the acceleration times t² or a sixth of the jerk
+/// times t³: all its steps follow from the first one.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct FromRest {
-    /// The step behind the rest.
+    /// The number of the step next to the rest.
     at: u32,
-    /// The time of the first step on either side.
+    /// Time of the first step on either side.
     first: u64,
     cubic: bool,
 }
@@ -60,7 +60,7 @@ impl FromRest {
         Self { at, first, cubic }
     }
 
-    /// The time of a step, if it is near.
+    /// Returns the time of a step, if it is near the rest.
     pub(super) fn step(&self, count: u32) -> Option<u64> {
         // Steps behind a rest are counted from it, and those before it backwards.
         let far =

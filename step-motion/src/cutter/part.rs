@@ -1,4 +1,4 @@
-//! A piece of a curve in parts of itself, and the segments that fit into it.
+//! A piece of a curve, scaled to its own time and distance, and the segments that fit into it.
 
 use super::near_rest::FromRest;
 use super::stretch::Stretch;
@@ -6,49 +6,51 @@ use crate::curve::{Bend, Curve};
 use crate::phases::{Frame, P};
 use crate::real::{Inverse, Real, THIRD, high};
 
-/// A piece from its slower end. Times are in 2^-64 of its time, ways and speeds in 2^-62 of its way and of that in its time.
+/// A piece seen from its slower end. Times are in 2^-64 of its duration, distances in 2^-62 of its length, and speeds in
+/// 2^-62 of its mean speed.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Part {
-    /// The speed, half the acceleration and a sixth of the jerk at the slower end, which is the end of the piece.
+    /// The speed, half the acceleration and a sixth of the jerk at the slower end, and whether that is the end of the piece.
     speed: u64,
     half: u64,
     pub(super) sixth: u64,
     /// The jerk adds to the acceleration.
     grows: bool,
     pub(super) back: bool,
-    /// Constant speed: there are no parts of it.
+    /// The speed is constant, so nothing is scaled.
     pub(super) even: bool,
-    /// When and where the slower end is: in 2^-32 ticks of the clock, and 2^-64 steps from where the positions are 0.
+    /// Time and position of the slower end: in 2^-32 ticks of the clock, and in 2^-64 steps from position 0.
     begin: i128,
     origin: i128,
-    /// What the piece takes, also as a number to divide by, and what a step takes at its mean speed, in 2^-32 ticks.
+    /// Duration of the piece, also as a divisor, and of a step at its mean speed, in 2^-32 ticks.
     lasts: Real,
     per: Inverse,
     pace: Real,
-    /// Its way, in twice the unit of places, of which a step has 2^`bits`, and as a number to divide by with the power of 2 of its unit; and a step as a part of it.
+    /// Length of the piece in twice the unit of positions (a step has 2^`bits` of those), the same as a divisor with the
+    /// power of 2 of its unit, and a step as a part of the length.
     steps: Real,
     pub(super) bits: u32,
-    /// From where step 0 is made to the slower end, in the unit of places, modulo 2^64.
+    /// Distance from the place of step 0 to the slower end, in the unit of positions, modulo 2^64.
     first: i64,
     way: (Inverse, i32),
     pub(super) step: u64,
     /// How far off a step may be.
     pub(super) off: u64,
-    /// It begins or ends at rest, at a step and without an acceleration or with a constant one.
+    /// The piece begins or ends at rest, at a step, with zero or constant acceleration.
     rest: Option<FromRest>,
 }
 
-/// Fraction bits of a position here.
+/// Fraction bits of a position in this file.
 const P2: i32 = 2 * P;
-/// And of one that is to be as exact as a step is.
+/// Fraction bits of a position that has to be as exact as a step.
 const FINEST: i32 = 44;
-/// Intervals within a segment are below 2^28 ticks, so that three of them are no overflow.
+/// Intervals within a segment are below 2^28 ticks, so that three of them do not overflow.
 pub(super) const LONGEST: u64 = 1 << 60;
-/// And all of a segment.
+/// Maximum duration of a segment.
 pub(super) const ALL: u64 = 1 << 62;
 
-/// A position, the speed and half the acceleration there.
+/// A position, with the speed and half the acceleration at it.
 struct Place {
     p: u64,
     v: u64,
@@ -62,9 +64,9 @@ pub(super) struct Spot {
     pub(super) time: u64,
     pub(super) p: u64,
     pub(super) half: u64,
-    /// The speed, to divide by.
+    /// The speed, as a divisor.
     pub(super) v: Inverse,
-    /// How far it is from the slower end, in parts of a step, and 2^-32 ticks a step.
+    /// Its distance from the slower end in parts of a step, and the pace there in 2^-32 ticks per step.
     pub(super) way: u64,
     pub(super) pace: u64,
 }
@@ -91,7 +93,8 @@ impl Part {
         rest: None,
     };
 
-    /// Of a piece with its end, or of what is left of it where the curve was joined.
+    /// Creates the part from a piece and its end, or from what is left of the piece after the point where the curve was
+    /// joined.
     pub(super) fn new(curve: &Curve, frame: &Frame, (piece, end): (&crate::curve::Piece, Real), off: Real) -> Self {
         let begin = piece.time.max(curve.skipped.0);
         let first = piece.after(begin - piece.time);
@@ -148,7 +151,7 @@ impl Part {
         origin.wrapping_sub(1 << (bits.wrapping_sub(1) & 63))
     }
 
-    /// Takes notice of it if the slower end is a rest at a step; false if it is none.
+    /// Records whether the slower end is a rest at a step, and returns that.
     pub(super) fn looks_for_rest(&mut self) -> bool {
         self.rest = self.beside_rest();
         self.rest.is_some()
@@ -166,12 +169,12 @@ impl Part {
         Some(FromRest::new(at, self.search(first, None, 0), self.half == 0))
     }
 
-    /// When the piece begins.
+    /// Returns when the piece begins.
     pub(super) const fn entry(&self) -> u64 {
         if self.back { u64::MAX } else { 0 }
     }
 
-    /// The place at a time; `None` at rest.
+    /// Returns the place at a time; `None` at rest.
     pub(super) fn spot(&self, time: u64) -> Option<Spot> {
         let Place { p, v, half } = self.at(time);
         if v == 0 {
@@ -181,18 +184,18 @@ impl Part {
         Some(Spot { time, p, half, v, way: self.steps.part(p << 1), pace: self.pace.over(v) })
     }
 
-    /// Parts of a step from the slower end to where step `count` is made.
+    /// Distance from the slower end to the place of step `count`, in parts of a step.
     pub(super) const fn place(&self, count: u32) -> i64 {
         let at = ((count as i64) << (self.bits & 63)).wrapping_sub(self.first);
         if self.back { at.wrapping_neg() } else { at }
     }
 
-    /// A part of the piece in 2^-32 ticks.
+    /// Converts a part of the piece's time to 2^-32 ticks.
     pub(super) const fn ticks(&self, part: u64) -> u64 {
         self.lasts.part(part)
     }
 
-    /// 2^-32 ticks as a part of the piece; the greatest number from all of it on.
+    /// Converts 2^-32 ticks to a part of the piece's time; the greatest number for its whole time or more.
     pub(super) fn part_of(&self, ticks: u64) -> u64 {
         let part = self.per.of(ticks);
         let up = self.lasts.exponent().saturating_sub(63);
@@ -206,14 +209,14 @@ impl Part {
         }
     }
 
-    /// 2^-64 steps from the slower end to where step `count` (from 0) is made; below 0 or beyond the other end if it was due when a
-    /// request came.
+    /// Distance from the slower end to the place of step `count` (from 0), in 2^-64 steps; below 0 or beyond the other end
+    /// if the step was due when a request came.
     fn away(&self, count: u32) -> i128 {
         let at = (i128::from(count) << P2).saturating_add(1 << (P2 - 1)).saturating_sub(self.origin);
         if self.back { at.saturating_neg() } else { at }
     }
 
-    /// The same as a part of the way.
+    /// Returns the same distance as a part of the piece's length.
     fn target(&self, count: u32) -> u64 {
         let (way, unit) = self.way;
         let away = self.away(count).max(0);
@@ -222,25 +225,25 @@ impl Part {
         way.of(u64::try_from(away).unwrap_or(u64::MAX)) >> 2
     }
 
-    /// A time on the clock, in 2^-32 ticks.
+    /// Converts a time of the piece to the clock, in 2^-32 ticks.
     #[inline(never)]
     pub(super) fn tick(&self, time: u64) -> i128 {
         let since = if self.lasts.exponent() < 64 { self.ticks(time).into() } else { self.lasts.times(time, -64) };
         if self.back { self.begin.saturating_sub(since) } else { self.begin.saturating_add(since) }
     }
 
-    /// The fourth derivative has the same sign from end to end, that of the acceleration.
+    /// Returns whether the fourth derivative keeps the sign of the acceleration from end to end.
     pub(super) const fn is_bent_one_way(&self) -> bool {
         !self.grows || self.sixth == 0 || self.speed == 0
     }
 
-    /// w² and y of a segment, as far as they add up in its fourth derivative.
+    /// Combines w² and y for the fourth derivative of a segment: their sum, or the greater one if their signs differ.
     pub(super) fn bend(&self, w: u64, y: u64) -> u64 {
         let square = high(w, w);
         if self.grows { square.max(y) } else { square.saturating_add(y) }
     }
 
-    /// Up to `left` steps at constant speed.
+    /// Returns up to `left` steps at constant speed.
     pub(super) fn cruise(&self, count: u32, left: u32, time: u64) -> Stretch {
         let interval = self.pace.to_fixed(0);
         let away = self.away(count);
@@ -269,7 +272,7 @@ impl Part {
         }
     }
 
-    /// The time from the slower end to a step, by Newton's method from the `last` one, unless it is known.
+    /// Returns the time from the slower end to a step: by Newton's method from the `last` one, unless it is known.
     pub(super) fn search(&self, count: u32, last: Option<u64>, near: u64) -> u64 {
         if let Some(time) = self.rest.filter(|_| near > 0).and_then(|rest| rest.step(count)) {
             return time;
@@ -298,7 +301,7 @@ impl Part {
         time
     }
 
-    /// At least the time for a way.
+    /// Returns at least the time that a distance takes.
     fn guess(&self, way: u64) -> u64 {
         // While the acceleration fades to 0 it makes two thirds at least of what it would make.
         let more = if self.grows { way } else { way.saturating_add(way >> 1) };
@@ -319,7 +322,7 @@ impl Part {
     }
 }
 
-/// A sum that ends at the greatest number, or a difference that ends at 0.
+/// Adds or subtracts, saturating at the greatest number or at 0.
 pub(super) fn along(x: u64, by: u64, up: bool) -> u64 {
     if up { x.saturating_add(by) } else { x.saturating_sub(by) }
 }

@@ -5,16 +5,17 @@ use super::part::{ALL, LONGEST, Part, Spot, along};
 use super::stretch::Stretch;
 use crate::real::{Inverse, high, middle, upper};
 
-/// A segment has so many steps at most; one of a stop that is only a precaution has more.
+/// Maximum number of steps in a segment; a segment of a stop that is only a precaution may have more.
 const MOST: u32 = 512;
 const MOST_COARSE: u32 = 2048;
-/// As few are no better than steps that are searched.
+/// A segment this short has no advantage over steps found one by one.
 const FEW: u32 = 4;
-/// How often another end is tried.
+/// How many other ends are tried.
 const TRIES: u8 = 6;
 
 impl Part {
-    /// The steps from a place on, as many as a segment may have: where it ends, too. `count` steps have been made, and `left` are left of
+    /// Returns a segment that begins at a place and has as many steps as it may, and where it ends. `count` steps have been
+    /// made, and `left` are left of
     /// the piece.
     pub(super) fn many(
         &self,
@@ -47,7 +48,7 @@ impl Part {
         long = long.min(longest);
         for _ in 0..TRIES {
             let whole = long >= limit;
-            // Two of about the same length, not a long one and a short one.
+            // Makes two of about the same length, rather than a long one and a short one.
             long = if whole { limit } else { long.min((limit >> 1).saturating_add(1)) };
             let end = self.spot(along(begin.time, long, !self.back))?;
             let off = self.off_by(begin, &end);
@@ -59,7 +60,7 @@ impl Part {
             let way = end.way.abs_diff(begin.way);
             let mut steps = way.checked_sub(first).map_or(0, |rest| (rest >> self.bits).saturating_add(1));
             if whole && u64::from(left) <= steps.saturating_add(1) {
-                // The last one is there but for rounding.
+                // The last step lies here, apart from rounding.
                 steps = left.into();
             }
             let steps = u32::try_from(steps).unwrap_or(u32::MAX).min(left);
@@ -75,7 +76,7 @@ impl Part {
                 let half = i128::from(self.ticks(off) >> 1);
                 stretch.first = stretch.first.wrapping_add(if self.back { half } else { half.wrapping_neg() });
             }
-            // It grows with the fourth power of the time, and by itself while the axis slows down.
+            // The error grows with the fourth power of the time, and by itself while the axis slows down.
             let by = log(most).saturating_sub(log(off)).saturating_sub(if self.back { 256 } else { 0 }) >> 2;
             return Some((
                 Stretch { count: u16::try_from(steps).ok()?, ..stretch },
@@ -86,18 +87,18 @@ impl Part {
         None
     }
 
-    /// The way from one position to another in the direction of motion; `None` if that is behind.
+    /// Returns the distance from one position to another in the direction of motion; `None` if the other is behind.
     fn ahead(&self, from: u64, to: i64) -> Option<u64> {
         let to = u64::try_from(to);
         if self.back { from.checked_sub(to.unwrap_or(0)) } else { to.ok()?.checked_sub(from) }
     }
 
-    /// About the time that a segment may take; `None` for a few steps. From one step of that speed: the time that it takes, and half of
-    /// the change of speed.
+    /// Estimates the time that a segment may take; `None` if it would have only a few steps. The estimate starts from one
+    /// step at that speed: the time that it takes, and half of the change of speed.
     fn about(&self, step: u64, begin: &Spot, most: u64) -> Option<u64> {
         let w = begin.v.of(high(begin.half, step));
         let y = if self.sixth == 0 { 0 } else { begin.v.of(high(high(self.sixth, step), step)) };
-        // It grows with the fourth power.
+        // The error grows with the fourth power.
         let one =
             log(step).saturating_add(log(w)).saturating_add(log(self.bend(w, y))).saturating_sub(2 * 64 * 256 + 430);
         let steps = log(most).saturating_sub(one) >> 2;
@@ -111,12 +112,13 @@ impl Part {
         Some(along(d, high(d, by), false).max(d >> 2))
     }
 
-    /// How far off a segment is at most: way⁴ / 384 of the greatest fourth derivative.
+    /// Returns how far off a segment is at most: distance⁴ / 384 times the greatest fourth derivative.
     ///
-    /// That is (10 a j v - 15 a³) / v⁷. With d the time of the way at the lower speed, w = a d / v and y = j d² / v it is d (15 w³ + 10 w y) / 384,
-    /// or with the greater of both terms where they have different signs. Here w is half of that, and y a sixth.
+    /// That is (10 a j v - 15 a³) / v⁷. With d the time of the distance at the lower speed, w = a d / v and y = j d² / v it
+    /// is d (15 w³ + 10 w y) / 384,
+    /// or only the greater of the two terms if they have different signs. In the code w is half of that value, and y a sixth.
     ///
-    /// In words of 32 bits, rounded up.
+    /// Computed in 32-bit words and rounded up.
     fn off_by(&self, from: &Spot, to: &Spot) -> u64 {
         let word = |x: u64| word(x).saturating_add(1);
         let slow = if self.back { to.v } else { from.v };
@@ -130,7 +132,8 @@ impl Part {
         (off >> 2).saturating_add(off >> 4)
     }
 
-    /// A segment of the way between two places and its first step, in 2^-`bits` steps; from the paces at both, and the time.
+    /// Returns the segment that joins two places, from the pace at each and the time between them; `way` and `first` step
+    /// are in 2^-`bits` steps.
     fn join(&self, [from, to]: [&Spot; 2], way: u64, first: u64) -> Option<Stretch> {
         if to.pace >= LONGEST {
             return None;
@@ -164,12 +167,12 @@ impl Part {
 const SIXTH: u32 = u32::MAX / 6 + 1;
 const THIRD: u32 = u32::MAX / 3 + 1;
 
-/// The upper half of a number.
+/// Returns the upper half of a number.
 const fn word(x: u64) -> u32 {
     (x >> 32) as u32
 }
 
-/// A number times a part.
+/// Multiplies a number by a fraction.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -181,7 +184,7 @@ const fn times(x: i64, part: u32) -> i64 {
     (x >> 32).wrapping_mul(part as i64).wrapping_add(low as i64)
 }
 
-/// The logarithm of base 2, in 256ths: straight between the powers of 2, at most 22 too small.
+/// Returns the base-2 logarithm in 256ths, linear between the powers of 2: at most 22 too small.
 #[inline(never)]
 fn log(x: u64) -> i32 {
     let zeros = x.leading_zeros();
@@ -189,7 +192,8 @@ fn log(x: u64) -> i32 {
     i32::try_from(u64::from(63_u32.saturating_sub(zeros)) << 8 | part).unwrap_or(0)
 }
 
-/// A number times a power of 2, which is in 256ths: straight between the whole ones, at most 6 per cent too much.
+/// Multiplies a number by a power of 2 whose exponent is in 256ths, linear between whole exponents: at most 6 per cent too
+/// much.
 fn power(x: u64, by: i32) -> u64 {
     let part = u64::from(by.rem_euclid(256).unsigned_abs());
     let x = x.saturating_add(high(x, part << 56));

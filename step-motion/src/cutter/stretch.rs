@@ -1,26 +1,26 @@
-//! What a cutter gives: a stretch of steps.
+//! Stretches of steps, which a cutter returns.
 
-/// A stretch of steps. Times are in 2^-32 ticks, of the clock for the first step, differences after it.
+/// A stretch of steps. Times are in 2^-32 ticks, on the clock for the first step, and as differences after it.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Stretch {
     pub(crate) count: u16,
-    /// When its first step is made.
+    /// Time of its first step.
     pub(crate) first: i128,
-    /// The second step after the first one, and the differences of that.
+    /// The interval from the first step to the second, and its first and second differences.
     pub(crate) differences: [i64; 3],
 }
 
-/// What is divided by 3 without a rest is multiplied by this, modulo 2^64.
+/// Multiplying by this, modulo 2^64, divides a multiple of 3 by 3.
 const THIRD: u64 = 0xaaaa_aaaa_aaaa_aaab;
 
 impl Stretch {
-    /// When its last step is made, each interval added as the interrupt does.
+    /// Returns the time of its last step, adding each interval as the interrupt does.
     pub(crate) fn last(&self) -> i128 {
         self.time(self.count.saturating_sub(1))
     }
 
-    /// When a step is made, from 0. All of it takes less than 2^63, however great the parts of the sum are.
+    /// Returns the time of a step, counted from 0. The total is less than 2^63, however large the terms of the sum are.
     #[expect(clippy::cast_possible_wrap, reason = "modulo 2^64")]
     fn time(&self, n: u16) -> i128 {
         let [interval, add, bend] = self.differences;
@@ -34,7 +34,7 @@ impl Stretch {
         self.first.wrapping_add(more.into())
     }
 
-    /// The steps before a time, of which the first one is one, and those that are left.
+    /// Splits the stretch into the steps before a time, at least the first one, and the steps that are left.
     pub(crate) fn split(self, until: i128) -> (Self, Option<Self>) {
         if self.last() < until {
             return (self, None);

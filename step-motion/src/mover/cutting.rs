@@ -1,4 +1,4 @@
-//! Steps of an axis as stretches, for [`Axis`](crate::Axis): what has been asked for is planned when it says so.
+//! Cuts the steps of an axis into stretches, for [`Axis`](crate::Axis), which decides when a request is planned.
 
 use crate::cutter::{Demand, Slice, Stretch};
 use crate::phases::Phases;
@@ -14,9 +14,9 @@ pub(crate) enum Cut {
     Steps(Stretch, Direction),
     /// Only part of the work was done.
     More,
-    /// The next step is later.
+    /// The next step comes later.
     Later,
-    /// There is no step to come.
+    /// No step is to come.
     Rest,
 }
 
@@ -33,12 +33,12 @@ pub(crate) enum News {
 }
 
 impl Mover {
-    /// For [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
+    /// Prepares the mover for [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
     pub(crate) const fn cutting(self) -> Self {
         Self { cuts: true, ..self }
     }
 
-    /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
+    /// Returns the next steps as a stretch, if they begin before a tick; use it in place of [`pulse`](Self::pulse).
     pub(crate) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
         let Some(due) = self.due else { return Cut::Rest };
         if due >= until {
@@ -73,7 +73,7 @@ impl Mover {
         self.free
     }
 
-    /// The tick at which the plan under way ends; the greatest for one without end.
+    /// The tick at which the present plan ends; the greatest number if it has no end.
     pub(crate) fn over(&self) -> u64 {
         if self.phases.frame.endless { u64::MAX } else { self.phases.end().div_ceil(self.clock.moment(1)) }
     }
@@ -83,7 +83,7 @@ impl Mover {
         self.due.is_some()
     }
 
-    /// Returns whether steps are to come: of the plan under way, or of one that is to follow.
+    /// Returns whether steps are to come, from the present plan or one that follows it.
     pub(crate) fn has_more(&self) -> bool {
         self.due.is_some() || self.has_work()
     }
@@ -98,7 +98,7 @@ impl Mover {
         }
     }
 
-    /// Plans the request, from a tick onwards. Returns whether there is another plan.
+    /// Plans the request from a tick onwards. Returns whether the plan has changed.
     pub(crate) fn pursue(&mut self, news: News, now: u64) -> bool {
         match news {
             News::None => return false,
@@ -109,8 +109,8 @@ impl Mover {
         true
     }
 
-    /// Before the last steps of the plan under way, at a tick; `free` is the one after the last step that is left, and DIR may be
-    /// another one if none is.
+    /// Takes back the last steps of the present plan, as of a tick; `free` is the tick after the last step that remains. If
+    /// none remains, DIR may differ.
     pub(crate) fn back_to(&mut self, steps: u32, now: u64, (free, dir): (u64, Option<Direction>)) {
         let back = i64::from(steps);
         let back = if self.direction.dir() { back } else { back.wrapping_neg() };
@@ -119,19 +119,19 @@ impl Mover {
         self.due = Some(now.saturating_add(1).max(free));
     }
 
-    /// What has been asked of another one, too.
+    /// Takes over the requests made to another mover.
     pub(crate) const fn wish_as(&mut self, other: &Self) {
         (self.wish, self.halted) = (other.wish, other.halted);
     }
 
-    /// At rest at a position since a tick, after a stop that nobody asked for.
+    /// Records that the axis has been at rest at a position since a tick, after a stop that was not requested.
     pub(crate) fn rest_at(&mut self, position: i64, now: u64) {
         (self.commanded, self.due, self.wish.quick) = (position, None, None);
         self.free = now.saturating_add(1);
         self.rest(self.clock.moment(now));
     }
 
-    /// Halted at a position, DIR not known.
+    /// Records a halt at a position; DIR is unknown then.
     pub(crate) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
         self.halt(now);
         (self.commanded, self.halted, self.dir) = (position, was_moving, None);

@@ -10,17 +10,19 @@ use servowire_core::Direction;
 use super::{Aim, Mover};
 
 impl Mover {
-    /// The moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the caller's
-    /// clock says: an earlier or later time would plan steps that are over, or make those that are missing in a burst.
+    /// Returns the moment of a request. An axis that moves is somewhere between its last step and the next one, whatever
+    /// the caller's
+    /// clock says: an earlier time would plan steps that have already been made, and a later one would make the missing
+    /// steps in a burst.
     pub(super) fn moment(&self, now: u64) -> u64 {
         let now = now.max(self.free.saturating_sub(1));
         self.clock.moment(self.due.map_or(now, |due| now.min(due)))
     }
 
-    /// A request that changes the present motion, unless that is a quick stop. Returns whether there is another plan.
+    /// Plans a request that changes the present motion, unless that is a quick stop. Returns whether the plan has changed.
     pub(super) fn change(&mut self, now: u64) -> bool {
         let moment = self.moment(now);
-        // A stop that is under way is the same one whoever asks for it.
+        // A stop under way stays the same, whichever request causes it.
         let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
         let other = !self.is_moving(moment) || self.wish.quick.is_none() && !same;
         if other {
@@ -29,13 +31,13 @@ impl Mover {
         other
     }
 
-    /// A quick stop has been asked for.
+    /// Plans a quick stop.
     pub(super) fn stop_quickly(&mut self, now: u64) {
         let moment = self.moment(now);
         if let Some(bounds) = self.wish.quick.filter(|_| self.is_moving(moment)) {
             self.replan_within(moment, &bounds);
         } else {
-            // It is over for who says so: his clock may be ahead.
+            // To the caller the motion has ended: the caller's clock may be ahead.
             self.change(now);
         }
     }
@@ -44,14 +46,14 @@ impl Mover {
         self.phases.frame.endless || moment < self.phases.end()
     }
 
-    /// At rest, the position of the plan is 0 where the motor is.
+    /// Plans a rest, with position 0 where the motor is.
     pub(super) fn rest(&mut self, moment: u64) {
         self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
         (self.stepper, self.left) = (Stepper::new(), None);
     }
 
-    /// Ends a plan, and continues to the aim if that is elsewhere.
+    /// Ends a plan, and continues to the aim if the axis is not there.
     pub(super) fn go_on(&mut self) {
         let end = self.phases.end();
         if self.has_work() {
@@ -74,7 +76,7 @@ impl Mover {
         self.replan_within(moment, &bounds);
     }
 
-    /// From the state at a moment to the aim.
+    /// Plans from the state at a moment to the aim.
     fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
         let moment = moment.max(self.phases.frame.begin);
         if self.is_moving(moment) {
@@ -83,19 +85,19 @@ impl Mover {
             self.anew(moment, bounds);
         }
         if self.due.is_none() && self.has_work() {
-            // No step on the way to rest: what follows begins there.
+            // There is no step on the way to rest, so the next plan begins there.
             self.anew(self.phases.end(), bounds);
         }
     }
 
-    /// Begins with the plan that there is.
+    /// Starts the plan that has just been made.
     pub(super) fn adopt(&mut self) {
         self.origin = self.commanded;
         (self.stepper, self.left) = (Stepper::new(), None);
         let Phases { curve, frame } = &self.phases;
         let begin = frame.begin.div_ceil(self.clock.moment(1));
         let due = if self.cuts {
-            // Not after the next step is enough.
+            // Any tick that is not after the next step is good enough.
             self.all = if frame.endless { u32::MAX } else { steps(frame.last(curve)) };
             (self.all > 0).then_some(begin)
         } else {
@@ -109,7 +111,7 @@ impl Mover {
         }
     }
 
-    /// Plans on from the motion that there is. Positions count from the steps made.
+    /// Plans on from the present motion. Positions are counted from the steps made.
     fn onward(&mut self, moment: u64, bounds: &Bounds) {
         let Phases { curve, frame } = &self.phases;
         let (state, last) = (frame.within(curve, moment), if self.braking { frame.last(curve) } else { 0 });
@@ -122,10 +124,10 @@ impl Mover {
         self.braking = !self.plan(self.direction, start, frame, bounds);
         if self.braking {
             let Phases { curve, frame } = self.phases.anew(frame);
-            // A stop has always room.
+            // A stop always has room.
             let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
             if again {
-                // Rounding makes no step more of a stop within higher limits.
+                // Rounding must not add a step to a stop within higher limits.
                 frame.to = Some(frame.last(curve).min(last.saturating_sub(made)));
             }
         }
@@ -139,7 +141,7 @@ impl Mover {
         (self.due, self.turn) = (None, None);
         let mut begin = moment.max(end);
         if let Some(last) = self.free.checked_sub(1) {
-            // The axis has come to rest up to half a step behind that step, and begins at it.
+            // The axis has come to rest up to half a step beyond that step, but the plan begins at the step.
             let half = (Real::ONE.half() / bounds.v).to_fixed(0);
             begin = begin.max(self.clock.moment(last).saturating_add(half));
         }
@@ -165,7 +167,7 @@ impl Mover {
         }
     }
 
-    /// Puts a plan to the aim in the place of the one that there is; false if that is a stop, or cannot be reached any more.
+    /// Replaces the present plan by one to the aim; returns false if the aim is a stop, or can no longer be reached.
     fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
         let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
         let Phases { curve, frame } = self.phases.anew(frame);
@@ -185,7 +187,7 @@ impl Mover {
         plan_into(curve, start, goal, &bounds).is_ok()
     }
 
-    /// What to do in this direction; `None` if that is a stop.
+    /// Returns what to do in this direction; `None` for a stop.
     fn goal(&self, direction: Direction, bounds: &Bounds) -> Option<(Want, Bounds)> {
         if self.wish.held || self.wish.percent == 0 {
             return None;
@@ -207,13 +209,13 @@ impl Mover {
     }
 }
 
-/// Where a plan leads.
+/// The goal of a plan.
 enum Want {
     At(i64),
     Speed(Real),
 }
 
-/// Steps from here to there in a direction; `None` if there is behind.
+/// Returns the steps from a position to a target in a direction; `None` if the target is behind.
 fn ahead(position: i64, target: i64, direction: Direction) -> Option<u32> {
     let steps = match direction {
         Direction::Forward => target.checked_sub(position)?,
@@ -222,7 +224,7 @@ fn ahead(position: i64, target: i64, direction: Direction) -> Option<u32> {
     u32::try_from(steps).ok().filter(|steps| *steps <= u32::MAX / 2)
 }
 
-/// The end of a range in a direction.
+/// Returns the end of a range in a direction.
 const fn edge((low, high): (i64, i64), direction: Direction) -> i64 {
     match direction {
         Direction::Forward => high,

@@ -5,11 +5,11 @@ use crate::limits::Bounds;
 use crate::real::Real;
 use servowire_core::Direction;
 
-/// 1 less the cosine of an angle that is none.
+/// 1 less the cosine of an angle too small to count as a corner.
 const STRAIGHT: Real = Real::fixed(1, 20);
 
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// Distance that an axis moves, in units.
+    /// Returns the distance that an axis moves, in units.
     pub(super) fn way(&self, axis: usize, steps: i32) -> Real {
         let scale = self.axes.get(axis).map_or(1, |axis| axis.steps_per_m);
         Real::new(steps.unsigned_abs().into()) * self.unit / Real::new(scale.into())
@@ -37,7 +37,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (Bounds::new(v, a, j), feed)
     }
 
-    /// The speed at which axes that turn round at a corner have their pause between both steps, whatever they do there within their limits:
+    /// The speed at which axes that reverse at a corner have their pause between the two steps, whatever they do there
+    /// within their limits:
     /// half a step at the axis's speed v takes t if v t + a t² / 2 is half a step.
     pub(super) fn turning(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real)) -> Real {
         let mut most = Real::HUGE;
@@ -57,8 +58,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         most
     }
 
-    /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
-    /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits. a is what the axes allow in the direction in which the corner turns.
+    /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines, which is 1 for
+    /// straight on. 1 - s is computed as (1 - s²) / (1 + s), which avoids cancellation. a is the acceleration that the axes
+    /// allow in the direction in which the corner turns.
     ///
     /// Chords of a circle are bounded by its radius, however small they are: with l the shorter line, v² = a l/2 s / sqrt(1 - s²), which
     /// is a r.

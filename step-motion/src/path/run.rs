@@ -1,7 +1,7 @@
-//! Lines that are run through in one curve, and what is planned along them.
+//! Runs of lines that one curve covers, and the plans along them.
 //!
-//! A curve with a limit of jerk has the acceleration 0 at both ends. So that it need not be 0 at every joint, lines that nearly allow the
-//! same, and whose corners need no lower speed, are a run: one curve leads along all of them.
+//! A jerk-limited curve has acceleration 0 at both ends. So that it need not be 0 at every joint, lines with nearly the
+//! same limits, whose corners need no lower speed, form a run: one curve leads along all of them.
 
 use super::{Course, Path};
 use crate::curve::Curve;
@@ -9,30 +9,31 @@ use crate::limits::Bounds;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
 
-/// Lines from one of the queue on.
+/// Consecutive lines of the queue.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
     /// Lines after the first one.
     more: usize,
     length: Real,
-    /// What all of them allow.
+    /// The limits that hold on all of them.
     bounds: Bounds,
 }
 
-/// How much more of an acceleration or jerk a line may allow than another one of the same run.
+/// How much more acceleration or jerk a line may allow than another one of the same run.
 const ALIKE: Real = Real::fixed(3, 1);
-/// And of a speed.
+/// How much more speed it may allow.
 const EQUAL: Real = Real::fixed(129, 7);
 
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// What a line allows with a part of the requested speeds; without one, all that its axes do.
+    /// Returns what a line allows at a fraction of the requested speeds; without a fraction, all that its axes allow.
     fn allowed(&self, at: usize, part: Option<Real>) -> Option<Bounds> {
         let line = self.line(at)?;
         Some(part.map_or(line.bounds, |part| line.bounds(part)))
     }
 
-    /// The run that begins at line `at`, where the speed is no more than `speed` or than its lines allow, with an acceleration and jerk under
-    /// way: limits below those would have it jump. It has `most` lines after the first one at most.
+    /// Returns the run that begins at line `at`, with a speed of at most `speed` and of what its lines allow, and with an
+    /// acceleration and jerk under way: limits below these would make them jump. It has at most `most` lines after the
+    /// first one.
     fn run(&self, at: usize, part: Option<Real>, speed: Real, held: [Real; 2], most: usize) -> Option<Run> {
         let mut last = self.line(at)?;
         let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
@@ -61,10 +62,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(run)
     }
 
-    /// From a motion at a place on line `at`, or so far before it. With `part` of the requested speeds; without one it brakes at once, and
-    /// may come to rest before the end. `None` if rounding leaves no solution.
+    /// Plans from a motion at a place on line `at`, or a distance before it. With `part` it keeps to that fraction of the
+    /// requested speeds; without, it brakes at once and may come to rest before the end. `None` if rounding leaves no
+    /// solution.
     ///
-    /// Also the limits of the run. `present` are those of the motion; a brake under way keeps them if lines have come that allow less.
+    /// Also returns the limits of the run. `present` are those of the motion; braking under way keeps them if lines have
+    /// been added that allow less.
     pub(crate) fn course(
         &self,
         at: usize,
@@ -128,7 +131,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         })
     }
 
-    /// Which line is a distance behind the start of line `at`, and how far it goes on from there.
+    /// Returns the line that lies a distance beyond the start of line `at`, and the place on it.
     pub(crate) fn locate(&self, at: usize, mut way: Real) -> (usize, Real) {
         let last = self.len.saturating_sub(1);
         for i in at..last {
@@ -141,7 +144,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, way)
     }
 
-    /// From the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
+    /// Plans from the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
     pub(crate) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<(Course, Bounds)> {
         let line = self.line(at)?;
         Some(self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None, false)).unwrap_or_else(
@@ -165,13 +168,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, self.line(last).map_or(Real::ZERO, |line| line.length))
     }
 
-    /// The speed at which line `at` is to end so that all that follow can slow down in time: from the last one back.
+    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time; worked out from the
+    /// last line back.
     pub(crate) fn exit(&self, at: usize, part: Real) -> Real {
         self.slow_down(at, part, greatest)
     }
 
-    /// The greatest speed at which line `at` may end, whatever was asked for: one from which each run that follows can be
-    /// left at its corner's speed or, which takes less way than some speeds between, come to rest at its end.
+    /// Returns the greatest speed at which line `at` may end, whatever was requested: one from which each run that follows
+    /// can be
+    /// left at its corner's speed or, which takes less distance than some speeds between, come to rest at its end.
     fn most(&self, at: usize) -> Real {
         let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
         self.slow_down(at, Real::HUGE, fastest)

@@ -9,7 +9,7 @@ use crate::real::Real;
 use super::PathMover;
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
-    /// The motion from which a new plan starts; `None` if the plan that there is ends before it, at the end of the line.
+    /// Returns the motion from which a new plan starts; `None` if the present plan ends before that, at the end of the line.
     pub(super) fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
         let line = self.line.as_ref()?;
         let moment = self.clock().moment(self.tick(now));
@@ -28,19 +28,20 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some((motion, Start { place, before, moment, offset: Real::ZERO, ..start }))
     }
 
-    /// How what runs leaves its lines.
+    /// Returns how the present motion leaves its lines.
     pub(super) const fn leaving(&self) -> Leaving {
         Leaving { more: self.more, exit: self.exit, bounds: None }
     }
 
-    /// On which line and where on it a stop ends, and how it leaves the lines of its first curve; `None` at rest.
+    /// Returns the line and the place on it where a stop ends, and how the stop leaves the lines of its first curve; `None`
+    /// at rest.
     pub(super) fn end_of_stop(&self, now: u64) -> Option<((usize, Real), Leaving)> {
         self.line.as_ref()?;
         if self.stopping {
             return self.path.end_of_cut().map(|end| (end, self.leaving()));
         }
         let here = self.here(now);
-        // Without speed there is no way to rest: a step that is due, as its tick is the nearest one, is not made any more.
+        // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
         if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
             return None;
         }
@@ -59,7 +60,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some((if left.exit.is_zero() { end } else { rest(left.exit) }, left))
     }
 
-    /// Leaves the path at a place, and the lines up to one at a speed.
+    /// Ends the path at a place, and records how the lines before it are left.
     pub(super) fn leave_at(&mut self, (end, left): ((usize, Real), Leaving), now: u64) {
         self.path.cut(end, self.begun(), self.made, left);
         if !self.stopping {
@@ -69,7 +70,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.settle();
     }
 
-    /// The way on after a request.
+    /// Plans the rest of the motion after a request.
     pub(super) fn replan(&mut self, now: u64) {
         // A stop that is under way is the same one whoever asks for it.
         if self.stopping || self.line.is_some() && self.braking && self.part().is_none() {
@@ -86,7 +87,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.settle();
     }
 
-    /// Plans the rest of the line that runs.
+    /// Plans the rest of the running line.
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
         let part = self.part();
@@ -110,7 +111,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
-    /// Puts a curve in the place of the one that runs, unless rounding has left it without the steps that are left.
+    /// Replaces the running curve, unless rounding has left the new one without the remaining steps.
     pub(super) fn adopt(&mut self, course: &Course, start: Start<N>, bounds: Bounds) {
         let Some(first) = self.path.line(0) else { return };
         let whole = course.more > 0 || course.whole;
@@ -144,7 +145,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         (self.line, self.origin, self.made, self.left) = (Some(line), self.commanded, [0; N], [None; N]);
     }
 
-    /// Takes lines out that are over, and begins the next one.
+    /// Takes out lines that have ended, and begins the next one.
     pub(super) fn settle(&mut self) {
         for _ in 0..=M {
             let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };

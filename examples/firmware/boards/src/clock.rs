@@ -1,12 +1,12 @@
-//! A clock for a driver and for who judges what it has read.
+//! A clock for a driver, and for the code that judges its readings.
 
 use core::cell::Cell;
 
 use servowire_core::{ClockError, TickRate, TimeBase};
 use servowire_drivers::Clock;
 
-/// Time from a counter of `BITS` bits that wraps, at which several may look: references are clocks. Somebody has to look within half of
-/// its range.
+/// Time from a counter of `BITS` bits that wraps. Several users may read it through references, and one of them has to read
+/// it within half of its range.
 pub struct Counter<const BITS: u32> {
     counter: fn() -> u32,
     time: Cell<TimeBase<BITS>>,
@@ -18,12 +18,12 @@ impl<const BITS: u32> Counter<BITS> {
         Self { counter, time: Cell::new(TimeBase::new(rate, counter())) }
     }
 
-    /// The time, for one who may not have looked for too long: it stands for that long then.
+    /// Returns the time for a caller that may have waited too long: time then stands still until the counter catches up.
     pub fn latest_ns(&self) -> u64 {
         self.look().or_else(|_| self.look()).unwrap_or_default()
     }
 
-    /// Waits for so long.
+    /// Waits for this long.
     pub fn pause(&self, ns: u64) {
         let until_ns = self.latest_ns().saturating_add(ns);
         while self.latest_ns() < until_ns {}
@@ -57,7 +57,7 @@ mod tests {
         let (mut driver, mut judge) = (&clock, &clock);
         TICKS.fetch_add(0x0080, Ordering::Relaxed);
         assert_eq!(driver.now_ns(), Ok(8_000));
-        // Over the end of the counter.
+        // Across the wrap of the counter.
         TICKS.fetch_add(0x0200, Ordering::Relaxed);
         assert_eq!((judge.now_ns(), driver.now_ns(), clock.latest_ns()), (Ok(40_000), Ok(40_000), 40_000));
         // More than half of its range.

@@ -5,20 +5,20 @@ use servowire_core::{
 };
 use servowire_drivers::Error;
 
-/// What switches the power to a motor.
+/// The power stage of a motor.
 pub trait Outputs {
-    /// The field stands at this electrical angle.
+    /// Sets the field to this electrical angle.
     fn on(&mut self, field: Angle);
     /// No current.
     fn off(&mut self);
 }
 
-/// What a control loop asks of an angle.
+/// What a control loop requires of an angle.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits<T> {
-    /// How old the evidence may be, and with which alarms.
+    /// How old the evidence may be, and which alarms it may carry.
     pub policy: Policy<T>,
-    /// How the encoder sits on the motor.
+    /// How the encoder is mounted on the motor.
     pub commutation: Commutation,
     /// What motor and load can do to the shaft.
     pub max_acceleration: Acceleration,
@@ -27,8 +27,8 @@ pub struct Limits<T> {
 }
 
 /// Reads the feedback cell in an interrupt, and switches the outputs off whenever the angle must not be used: no evidence, or too old,
-/// or with an alarm; a speed that is not known; a clock that goes wrong. They come on again with the next good angle; what waits for
-/// a person, does so outside.
+/// or with an alarm; an unknown speed; a faulty clock. They come on again with the next good angle; a latch that a person
+/// has to reset belongs outside.
 pub struct Control<'a, F: Shaft, O, const W: usize> {
     reader: ShaftReader<'a, F, W>,
     outputs: O,
@@ -36,13 +36,13 @@ pub struct Control<'a, F: Shaft, O, const W: usize> {
 }
 
 impl<'a, F: Shaft + Words<W>, O: Outputs, const W: usize> Control<'a, F, O, W> {
-    /// With the outputs off.
+    /// Creates the loop with the outputs off.
     pub fn new(reader: ShaftReader<'a, F, W>, mut outputs: O, limits: Limits<F::Tolerated>) -> Self {
         outputs.off();
         Self { reader, outputs, limits }
     }
 
-    /// The interrupt. Whether the outputs are on.
+    /// The interrupt. Returns whether the outputs are on.
     #[inline]
     pub fn interrupt(&mut self, now_ns: Result<u64, ClockError>) -> bool {
         let Limits { policy, commutation, max_acceleration, max_error } = self.limits;
@@ -61,8 +61,8 @@ impl<'a, F: Shaft + Words<W>, O: Outputs, const W: usize> Control<'a, F, O, W> {
     }
 }
 
-/// Puts what was read into the cell of a control interrupt, if it was read, and judges it as that does. After a failure what is in the
-/// cell gets old.
+/// Puts a successful reading into the cell of a control interrupt, and judges it as the interrupt does. After a failure the
+/// content of the cell grows old.
 ///
 /// # Errors
 /// Why there is no position.

@@ -5,7 +5,7 @@ use core::fmt;
 use crate::oscillator::Source;
 use crate::pins::Board;
 
-/// What an image says first: itself and its version, from what it runs, its rates, and the board with its pins.
+/// The first output of an image: its name and version, its clock source, its rates, and the board with its pins.
 #[derive(Debug, Clone, Copy)]
 pub struct FirstLine {
     /// The name of the image.
@@ -14,11 +14,11 @@ pub struct FirstLine {
     pub version: &'static str,
     /// The board.
     pub board: &'static Board,
-    /// Of the core, Hz.
+    /// Core clock, Hz.
     pub core_hz: u32,
-    /// From what it runs.
+    /// Source of the clock.
     pub source: Source,
-    /// Of the encoder's line, bit/s.
+    /// Bit rate of the encoder's line, bit/s.
     pub bits_per_second: u32,
 }
 

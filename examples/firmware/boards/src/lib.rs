@@ -1,5 +1,7 @@
-//! What the firmware images share, and what of them runs on a host too: pin tables that are checked at compile time, clock trees made
-//! from the crystal, the first line of the console, what a master says of its readings, the control interrupt, and a machine of several axes under commands.
+//! Code that the firmware images share and that also runs on a host: pin tables that are checked at compile time, clock
+//! trees made
+//! from the crystal, the first line of the console, the report of a master's readings, the control interrupt, and a machine
+//! of several axes under commands.
 #![no_std]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects))]
 

@@ -1,10 +1,10 @@
-//! What a UART says of a damaged byte.
+//! A UART's report of a damaged byte.
 
 use core::fmt;
 
 use embedded_io::ErrorKind;
 
-/// A unit of the line that cannot be used.
+/// A unit on the line that cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineFault {
     /// Its stop bit is 0.

@@ -5,10 +5,10 @@ use core::str::SplitAsciiWhitespace;
 
 use step_motion::{Axes, Error, Work};
 
-/// Longest line that is typed.
+/// Longest line that can be typed.
 const MOST: usize = 64;
 
-/// The axes, and the line that is being typed. Each line is answered by `ok` or by why it is refused:
+/// The axes, and the line being typed. Each line is answered by `ok` or by why it is refused:
 ///
 /// | line | does |
 /// |---|---|
@@ -47,8 +47,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Machine<'q, N, M, S> {
         Self { axes, line: [0; MOST], len: 0, was_at_rest: true }
     }
 
-    /// Does a slice of the background's work; takes what was typed. Returns whether the interrupt has to be started. Says where the
-    /// axes are whenever they have come to rest, with the number of pulses that were `late`.
+    /// Does a slice of the background's work, and takes typed input. Returns whether the interrupt has to be started.
+    /// Prints where the axes are whenever they have come to rest, with the number of pulses that were `late`.
     ///
     /// # Errors
     /// Those of `console`.
@@ -75,7 +75,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Machine<'q, N, M, S> {
         Ok(work == Work::Start)
     }
 
-    /// A byte that was typed; at the end of a line, what has become of it.
+    /// Takes a typed byte; at the end of a line, returns the result of the line.
     fn hear(&mut self, byte: u8) -> Option<Result<(), Refused>> {
         if byte != b'\n' && byte != b'\r' {
             if let Some(place) = self.line.get_mut(self.len) {
@@ -137,13 +137,13 @@ mod tests {
 
     static QUEUE: AxesQueue<2, 129> = AxesQueue::new();
 
-    /// Types a line and runs until the machine is at rest; what the console has said, and the steps made.
+    /// Types a line and runs until the machine is at rest; returns the console's output and the steps made.
     fn run(machine: &mut Machine<'_, 2, 8, 129>, timer: &mut AxesTimer<'_, 2, 129>, typed: &str) -> (String, [u32; 2]) {
         let (mut said, mut steps) = (String::new(), [0_u32; 2]);
         for byte in typed.bytes() {
             machine.turn(Some(byte), &mut said, 0).unwrap();
         }
-        // A machine that is at rest asks for no start any more.
+        // A machine at rest no longer asks for a start.
         let mut quiet = 0;
         while quiet < 10_000 {
             quiet += 1;

@@ -1,15 +1,16 @@
 //! Starting a crystal that may be missing.
 
-/// From what a core runs.
+/// The clock source of a core.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
     /// The crystal: the rates are exact.
     Crystal,
-    /// The internal oscillator, some 1 % off: the crystal does not start.
+    /// The internal oscillator, about 1 % off, because the crystal does not start.
     Internal,
 }
 
-/// Starts the crystal, looks at it `looks` times at the most, and says from what the core can run. `set` switches it on and off. A
+/// Starts the crystal, checks it at most `looks` times, and returns the clock source for the core. `set` switches it on and
+/// off. A
 /// crystal that does not start is switched off again.
 pub fn start(mut set: impl FnMut(bool), is_ready: impl FnMut() -> bool, looks: u32) -> Source {
     set(true);
@@ -20,7 +21,7 @@ pub fn start(mut set: impl FnMut(bool), is_ready: impl FnMut() -> bool, looks: u
     Source::Internal
 }
 
-/// Looks at something `looks` times at the most. Whether it got ready.
+/// Polls something at most `looks` times. Returns whether it became ready.
 pub fn waited(mut is_ready: impl FnMut() -> bool, looks: u32) -> bool {
     (0..looks).any(|_| is_ready())
 }
@@ -39,7 +40,7 @@ mod tests {
             (u32::MAX, Source::Internal, 100),
         ] {
             let (on, seen) = (Cell::new(false), Cell::new(0));
-            // A register that is ready at the look with this number, counted from 1.
+            // A register that is ready when it is polled for the n-th time, counted from 1.
             let is_ready = || {
                 seen.set(seen.get() + 1);
                 on.get() && seen.get() >= ready_at

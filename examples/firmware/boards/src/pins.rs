@@ -1,13 +1,13 @@
-//! Which pins an image uses on a board.
+//! The pins that an image uses on a board.
 
 use core::fmt;
 
 /// A pin that an image drives or reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pin {
-    /// Of the processor, as its maker calls it: `PB3`, `GPIO 2`.
+    /// Name of the processor's pin, as in its data sheet: `PB3`, `GPIO 2`.
     pub name: &'static str,
-    /// What is wired to it.
+    /// The signal wired to it.
     pub signal: &'static str,
     /// Where it is on the board.
     pub at: &'static str,
@@ -16,7 +16,7 @@ pub struct Pin {
 /// A board: its pin table and its crystal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Board {
-    /// As printed on it.
+    /// Name as printed on the board.
     pub name: &'static str,
     /// The crystal, Hz.
     pub crystal_hz: u32,
@@ -27,19 +27,19 @@ pub struct Board {
 }
 
 impl Pin {
-    /// A pin `name` of the processor, which is `at` this place of the board and wired to `signal`.
+    /// Creates a pin `name` of the processor, which is `at` this place on the board and wired to `signal`.
     pub const fn new(name: &'static str, signal: &'static str, at: &'static str) -> Self {
         Self { name, signal, at }
     }
 }
 
 impl Board {
-    /// A board that has no power stage, nor is mistaken for one that has; [checked](Self::checked).
+    /// Creates a board without a power stage that cannot be mistaken for one with it; [checked](Self::checked).
     pub const fn plain(name: &'static str, crystal_hz: u32, pins: &'static [Pin]) -> Self {
         Self { name, crystal_hz, pins, power_stage: &[] }.checked()
     }
 
-    /// This board, if its table may be: in a `const` it does not compile otherwise.
+    /// Returns this board if its table is permitted; otherwise a `const` does not compile.
     ///
     /// # Panics
     /// If a pin is in the table twice or switches a power stage.

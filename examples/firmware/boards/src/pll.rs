@@ -1,11 +1,11 @@
 //! The PLL of an STM32: crystal / M x N / R.
 
-/// What a PLL can do, by the data sheet of the chip: the least and the most of each.
+/// The limits of a PLL from the data sheet of the chip: minimum and maximum of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PllLimits {
-    /// Into the phase comparator, Hz.
+    /// Input of the phase comparator, Hz.
     pub input_hz: (u32, u32),
-    /// Of the oscillator in it, Hz.
+    /// Its oscillator, Hz.
     pub vco_hz: (u32, u32),
     /// Divider before it.
     pub m: (u32, u32),
@@ -29,12 +29,13 @@ pub struct Pll {
     pub m: u32,
     /// Multiplier.
     pub n: u32,
-    /// Divider behind it: 2, 4, 6 or 8.
+    /// Divider after it: 2, 4, 6 or 8.
     pub r: u32,
 }
 
 impl Pll {
-    /// The settings that make exactly `out_hz` of `in_hz`, with the highest frequency into the comparator. `None` if there are none.
+    /// Returns the settings that make exactly `out_hz` from `in_hz`, with the highest frequency at the comparator. `None`
+    /// if there are none.
     #[must_use]
     pub const fn solve(limits: PllLimits, in_hz: u32, out_hz: u32) -> Option<Self> {
         let mut m = limits.m.0;
@@ -53,7 +54,7 @@ impl Pll {
 }
 
 impl PllLimits {
-    /// The settings that make exactly `out_hz` of `in_hz`: in a `const` it does not compile otherwise.
+    /// Returns the settings that make exactly `out_hz` from `in_hz`; otherwise a `const` does not compile.
     ///
     /// # Panics
     /// If there are none.
@@ -67,7 +68,7 @@ impl PllLimits {
     }
 }
 
-/// The multiplier with which the oscillator runs at `vco_hz`.
+/// Returns the multiplier with which the oscillator runs at `vco_hz`.
 #[expect(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, reason = "m is not 0; n is within limits")]
 const fn multiplier(limits: PllLimits, in_hz: u32, m: u32, vco_hz: u64) -> Option<u32> {
     let (scaled, in_hz, m) = (vco_hz * m as u64, in_hz as u64, m as u64);

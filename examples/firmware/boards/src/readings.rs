@@ -1,4 +1,4 @@
-//! From a reading of a master to its console.
+//! Passes a master's readings on to its console.
 
 use core::fmt::{self, Display, Write};
 
@@ -7,10 +7,10 @@ use servowire_drivers::Error;
 
 use crate::report::Report;
 
-/// A position that is printed is no older than this.
+/// A printed position is no older than this.
 const MAX_AGE_NS: u64 = 200_000;
 
-/// The encoder's end of a feedback cell and the end of who judges what is in it, and the report.
+/// The encoder's end of a feedback cell, the end that judges its content, and the report.
 pub struct Readings<'a, F: Feedback, const W: usize> {
     writer: Writer<'a, F, W>,
     reader: Reader<'a, F, W>,
@@ -19,19 +19,19 @@ pub struct Readings<'a, F: Feedback, const W: usize> {
 }
 
 impl<'a, F: Feedback<Sample: Display, Doubt: Display> + Words<W>, const W: usize> Readings<'a, F, W> {
-    /// One good reading in `every` is said, beginning with the first.
+    /// Creates readings that report one good one in `every`, beginning with the first.
     pub fn new(cell: &'a mut Cell<F, W>, every: u32) -> Self {
         let (writer, reader) = cell.split();
         Self { writer, reader, policy: Policy::new(MAX_AGE_NS), report: Report::new(every) }
     }
 
-    /// A position that is said may be this old; 200 us at first.
+    /// Sets the permitted age of a printed position; 200 us at first.
     #[must_use]
     pub fn with_max_age_ns(self, max_age_ns: u64) -> Self {
         Self { policy: Policy::new(max_age_ns), ..self }
     }
 
-    /// What came of a reading. Whether a good one was said.
+    /// Takes the result of a reading. Returns whether a good one was printed.
     ///
     /// # Errors
     /// Those of the console.

@@ -1,8 +1,8 @@
-//! What a master says.
+//! Prints a master's report.
 
 use core::fmt::{self, Display, Write};
 
-/// Readings so far; some of the positions are said, and all faults.
+/// Counts readings, and prints some of the positions and all faults.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Report {
     every: u32,
@@ -11,12 +11,13 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// One good reading in so many is said, beginning with the first.
+    /// Creates a report that prints one good reading in this many, beginning with the first.
     pub(crate) const fn new(every: u32) -> Self {
         Self { every, good: 0, bad: 0 }
     }
 
-    /// A reading was good. If it is one to be said it is judged: a position, or why there is none. Whether it was said.
+    /// Counts a good reading. If it is to be printed, it is judged: the line has a position, or why there is none. Whether
+    /// it was said.
     ///
     /// # Errors
     /// Those of the console.
@@ -36,7 +37,7 @@ impl Report {
         Ok(said)
     }
 
-    /// A reading failed.
+    /// Reports a failed reading.
     ///
     /// # Errors
     /// Those of the console.

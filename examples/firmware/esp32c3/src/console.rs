@@ -7,10 +7,10 @@ use esp_hal::Blocking;
 use esp_hal::peripherals::USB_DEVICE;
 use esp_hal::usb_serial_jtag::UsbSerialJtag;
 
-/// Looks at a full FIFO before a character is dropped: nobody has opened the port.
+/// How often a full FIFO is polled before a character is dropped: nobody has opened the port.
 const LOOKS: u32 = 20_000;
 
-/// Prints; what nobody takes is lost.
+/// Prints; output that nobody reads is lost.
 pub struct Console(UsbSerialJtag<'static, Blocking>);
 
 impl Console {
@@ -30,7 +30,7 @@ impl fmt::Write for Console {
     }
 }
 
-/// Says where; the watchdog begins again.
+/// Prints the location; the watchdog then restarts the image.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     // SAFETY: whoever had the port is gone.

@@ -25,12 +25,13 @@ esp_bootloader_esp_idf::esp_app_desc!();
 const RATE: BitRate = BitRate::Mbit2_5;
 const CORE_HZ: u32 = 160_000_000;
 const TIMER_HZ: u32 = 16_000_000;
-/// The UART begins with its next bit clock. No interrupt comes; a miss of the flash cache is all that can come between. A tick of the
+/// The UART begins with its next bit clock. There are no interrupts; only a miss of the flash cache can come in between. A
+/// tick of the
 /// clock is 62.5 ns.
 const WORST: Worst = Worst { uart_start_ns: 400, wake_ns: 1_000, clock_ns: 63 };
-/// Longer than anything here waits.
+/// Longer than any wait here.
 const WATCHDOG_MS: u64 = 1_000;
-/// One position in so many is printed.
+/// One position in this many is printed.
 const PRINTED: u32 = 4_096;
 
 /// The pins; no power stage is near.
@@ -57,7 +58,7 @@ fn main() -> ! {
         Config::default().with_baudrate(bits_per_second).with_rx(RxConfig::default().with_fifo_full_threshold(1));
     let uart = Uart::new(p.UART1, config).expect("32 clocks a bit").with_tx(p.GPIO4).with_rx(p.GPIO6);
     let de = DirectionPin::new(Output::new(p.GPIO5, Level::Low, OutputConfig::default()), WORST);
-    // Somebody has to look at its lower 32 bits every 134 s.
+    // Its lower 32 bits have to be read every 134 s.
     let ticks = Counter::<32>::new(TickRate::of::<TIMER_HZ>(), || SystemTimer::unit_value(Unit::Unit0) as u32);
     let mut clock = &ticks;
     let mut encoder = Driver::new(uart, de, clock, Line::new(RATE)).expect("1.6 us fit four bits");

@@ -1,4 +1,4 @@
-//! What is of the RP2350 and its board alone.
+//! Code specific to the RP2350 and its board.
 
 pub use rp235x_hal as hal;
 use servowire_boards::{Board, Pin};
@@ -45,7 +45,7 @@ pub fn connect_usb() {
     usb.main_ctrl().modify(|_, w| w.phy_iso().clear_bit());
 }
 
-/// What the boot ROM wants to see.
+/// The block that the boot ROM requires.
 #[unsafe(link_section = ".start_block")]
 #[used]
 pub static IMAGE_DEF: hal::block::ImageDef = hal::block::ImageDef::secure_exe();

@@ -18,9 +18,9 @@ use crate::frames::{self, Frames};
 use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
 
-/// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
+/// Time from the end of one transaction to the beginning of the next, in addition to what the protocol requires.
 const PAUSE_NS: u64 = 20_000;
-/// One position in so many is printed.
+/// One position in this many is printed.
 const PRINTED: u32 = 16;
 /// By how much the end time of a block may be late.
 const LATENCY_NS: u32 = 2_000;
@@ -40,7 +40,7 @@ const fn rate_of(rate: BitRate) -> Option<Rate> {
 
 type Encoders<'a> = Driver<Frames<'a>, &'a Clock>;
 
-/// Does what was typed, and says what came of it.
+/// Executes a typed command, and prints the result.
 fn command(encoders: &mut Encoders<'_>, command: Command, console: &mut Console) -> fmt::Result {
     let ea = EncoderAddress::ZERO;
     match command {
@@ -71,7 +71,7 @@ fn say(console: &mut Console, what: &str, error: impl Display) -> fmt::Result {
     writeln!(console, "{what}: {error}")
 }
 
-/// Reads the position of encoder 0 for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
+/// Reads the position of encoder 0 without end; prints every sixteenth, and every fault. Executes commands typed meanwhile.
 ///
 /// # Panics
 /// At 16 Mbit/s, or if a clock does not start.
@@ -100,12 +100,12 @@ pub fn master(image: &'static str, rate: BitRate) -> ! {
 
 /// From the end of a request to the answer.
 const TURN_NS: u32 = 2_800;
-/// A frame that comes later than this is not of the request before.
+/// A frame that comes later than this does not belong to the previous request.
 const FRAME_GAP_NS: u64 = 8_000;
-/// The next request comes so much later, or more.
+/// The next request comes at least this much later.
 const LATER_NS: u64 = 50_000;
 
-/// An encoder, and the answer that it has ready.
+/// An encoder, and the answer that it has prepared.
 struct Ahead {
     device: Device<1>,
     position: u32,
@@ -114,7 +114,7 @@ struct Ahead {
 }
 
 impl Ahead {
-    /// Holds what the encoder will answer to a command frame, which starts it; a copy of the encoder hears it. The shaft moves.
+    /// Holds the encoder's answer to a command frame, which starts it; a copy of the encoder prepares it. The shaft moves.
     fn hold(&mut self, command_frame: u16, now_ns: u64) {
         self.position += 1;
         self.device.set_position(self.position, 7);
@@ -125,7 +125,7 @@ impl Ahead {
     }
 }
 
-/// Encoder 0, whose shaft turns on by one with every answer.
+/// Encoder 0, whose shaft turns by one count with every answer.
 ///
 /// As with T-Format the answer to the request that came last is made ahead, if it had one frame, and the receiver starts it. All others
 /// are answered when they are ready.

@@ -2,11 +2,11 @@
 
 use crate::port::{Prepared, Receiver, Transmitter, Unit};
 
-/// Answers made ahead, which the receiver starts whatever the processor does then.
+/// Answers prepared ahead, which the receiver starts whatever the processor is doing then.
 pub struct Answering {
     transmitter: Transmitter,
     receiver: Receiver,
-    /// The unit that starts what the transmitter holds.
+    /// The unit that starts the transmission held.
     expected: Option<u16>,
 }
 
@@ -16,14 +16,15 @@ impl Answering {
         Self { transmitter, receiver, expected: None }
     }
 
-    /// The next unit of the line, and whether what is held is on its way; if that waits for another unit it is gone.
+    /// Returns the next unit of the line, and whether the held answer is on its way; an answer that waits for another unit
+    /// is dropped.
     pub fn take(&mut self) -> Option<(Unit, bool)> {
         let unit = self.receiver.take()?;
         let Some(expected) = self.expected.take() else { return Some((unit, false)) };
         self.receiver.expect(None);
         let started = unit.framed && unit.content == expected;
         if started {
-            // The receiver has started it, or was told too late to expect it.
+            // The receiver has started it, or was told about it too late.
             self.transmitter.start();
         } else {
             self.transmitter.discard();
@@ -31,7 +32,7 @@ impl Answering {
         Some((unit, started))
     }
 
-    /// Whether an answer is ready.
+    /// Returns whether an answer is ready.
     pub const fn is_ready(&self) -> bool {
         self.expected.is_some()
     }

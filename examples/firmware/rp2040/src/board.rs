@@ -24,15 +24,15 @@ use crate::last_words::Before;
 use crate::port::{self, Receiver, Transmitter};
 use crate::programs::{Rate, SYSTEM_HZ};
 
-/// All that an image uses.
+/// Everything that an image uses.
 pub struct Board {
     /// The console at the pins.
     pub uart: Uart,
     /// The USB socket.
     pub usb: UsbBusAllocator<UsbBus>,
-    /// What was said first.
+    /// The first output.
     pub first: FirstLine,
-    /// Why the run before has ended, if the watchdog ended it.
+    /// Why the previous run ended, if the watchdog ended it.
     pub before: Option<Before>,
     /// Time.
     pub clock: Clock,
@@ -42,12 +42,12 @@ pub struct Board {
     pub receiver: Receiver,
     /// For [`port::RingReceiver`].
     pub channel: Channel<CH0>,
-    /// Has to be fed, or the chip begins again.
+    /// Has to be fed, or the chip restarts.
     pub watchdog: Watchdog,
 }
 
 pub(crate) const CONSOLE_BAUD: u32 = 1_000_000;
-/// Longer than anything here waits.
+/// Longer than any wait here.
 const WATCHDOG_MS: u32 = 1_000;
 
 /// 12 MHz x 120 / 6 / 2 = 120 MHz.
@@ -55,7 +55,7 @@ const PLL_120MHZ: PLLConfig =
     PLLConfig { vco_freq: crate::hal::fugit::HertzU32::MHz(1440), refdiv: 1, post_div1: 6, post_div2: 2 };
 
 impl Board {
-    /// Sets everything up for units of `bits` bits between start and stop bit at `rate`, and says the first line.
+    /// Sets everything up for units of `bits` bits between start and stop bit at `rate`, and prints the first line.
     ///
     /// # Panics
     /// If called twice, or if a clock does not start.

@@ -1,4 +1,4 @@
-//! What is of the RP2040 and its board alone.
+//! Code specific to the RP2040 and its board.
 
 pub use rp2040_hal as hal;
 use servowire_boards::{Board, Pin};
@@ -40,7 +40,7 @@ macro_rules! usb_bus {
 }
 pub(crate) use usb_bus;
 
-/// The second stage of the boot: sets the flash up.
+/// The second boot stage: sets up the flash.
 #[unsafe(link_section = ".boot2")]
 #[used]
 pub static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;

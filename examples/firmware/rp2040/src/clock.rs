@@ -6,7 +6,7 @@ use servowire_core::TickRate;
 
 use crate::programs::SYSTEM_HZ;
 
-/// A clock at which somebody has to look every 69 ms, or it misses a turn of the timer.
+/// A clock that has to be read every 69 ms, or it misses a wrap of the timer.
 pub type Clock = Counter<24>;
 
 /// Starts at 0. The system clock must be [`SYSTEM_HZ`].

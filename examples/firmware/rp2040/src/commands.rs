@@ -1,8 +1,8 @@
-//! What is typed at the console of a master.
+//! Commands typed at the console of a master.
 
 use crate::console::Console;
 
-/// A line that was typed. Numbers are hexadecimal.
+/// A typed line. Numbers are hexadecimal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
     /// `read ADDRESS`: of the EEPROM.
@@ -26,7 +26,7 @@ pub enum Command {
 /// Longest line.
 const MOST: usize = 32;
 
-/// A line that is being typed.
+/// A line being typed.
 #[derive(Default)]
 pub struct Typed {
     line: [u8; MOST],
@@ -34,7 +34,7 @@ pub struct Typed {
 }
 
 impl Typed {
-    /// What was typed, when a line has ended.
+    /// Returns the command once its line has ended.
     pub fn take(&mut self, console: &mut Console) -> Option<Command> {
         while let Some(byte) = console.read() {
             if byte != b'\n' && byte != b'\r' {

@@ -1,4 +1,5 @@
-//! The console: GPIO 0 and 1 with 1,000,000 baud, 8N1, and a serial port at the USB socket. Both say the same, and hear.
+//! The console: GPIO 0 and 1 with 1,000,000 baud, 8N1, and a serial port at the USB socket. Both print the same, and accept
+//! input.
 
 use core::fmt::{self, Write};
 
@@ -19,9 +20,9 @@ use crate::last_words::Before;
 pub type Uart =
     UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
 
-/// For tests at home; a product has a number of its own.
+/// For private tests; a product needs its own number.
 const TEST: UsbVidPid = UsbVidPid(0x1209, 0x0001);
-/// Some lines, until the port has taken them.
+/// Holds some lines until the port has taken them.
 const LINES: usize = 1_024;
 
 /// Both consoles.
@@ -36,8 +37,8 @@ pub struct Console {
 }
 
 impl Console {
-    /// Takes the place of the console at the pins, which has said the first line and why the run before has ended; the port says them
-    /// whenever it is opened.
+    /// Replaces the console at the pins, which has printed the first line and why the previous run ended; the port prints
+    /// these whenever it is opened.
     ///
     /// # Panics
     /// If called twice.
@@ -55,7 +56,7 @@ impl Console {
         Self { uart, device, port, open: false, first, before }
     }
 
-    /// What the USB host asks for: to be called every few milliseconds.
+    /// Handles the USB host's requests; call it every few milliseconds.
     pub fn poll(&mut self) {
         self.device.poll(&mut [&mut self.port]);
         let open = self.port.dtr();
@@ -69,7 +70,7 @@ impl Console {
         self.open = open;
     }
 
-    /// What was typed at either.
+    /// Returns what was typed at either console.
     pub fn read(&mut self) -> Option<u8> {
         let mut byte = [0];
         let heard = self.uart.read_raw(&mut byte).is_ok() || matches!(self.port.read(&mut byte), Ok(1));
@@ -77,7 +78,7 @@ impl Console {
     }
 }
 
-/// The port alone. What does not fit is lost: nobody takes it.
+/// The port alone. Anything that does not fit is lost, because nobody reads it.
 struct Port<'a>(&'a mut Console);
 
 impl Write for Port<'_> {

@@ -14,8 +14,8 @@ pub const BITS: u8 = 16;
 /// Frames of the longest response, and some noise.
 const MOST: usize = 8;
 
-/// Transmitter and receiver of units of [`BITS`] bits. Frames are given when the line is quiet again, with the times at which they ended:
-/// this processor takes longer for one than the line.
+/// Transmitter and receiver of units of [`BITS`] bits. Frames are returned when the line is quiet again, with the times at
+/// which they ended: this processor takes longer per frame than the line.
 pub struct Frames<'a> {
     transmitter: Transmitter,
     receiver: RingReceiver,
@@ -29,7 +29,7 @@ pub struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
-    /// A port made of these. `clock` is that of the driver; a frame of its rate lasts `frame_ns`.
+    /// Creates a port from these. `clock` is that of the driver; a frame of its rate lasts `frame_ns`.
     pub fn new(transmitter: Transmitter, receiver: RingReceiver, clock: &'a Clock, frame_ns: u32) -> Self {
         let frame_ns = frame_ns.into();
         Self { transmitter, receiver, clock, frame_ns, block: [None; MOST], len: 0, next: 0, end_ns: 0 }

@@ -1,4 +1,5 @@
-//! What a panic says: at once at the pins, and after the watchdog has begun the image again, for who has only the USB port then.
+//! The text of a panic: printed at once at the pins, and again after the watchdog has restarted the image, for users who
+//! have only the USB port.
 
 use core::fmt::{self, Write};
 use core::mem::MaybeUninit;
@@ -21,7 +22,7 @@ struct Kept {
 #[unsafe(link_section = ".uninit.last_words")]
 static mut KEPT: MaybeUninit<Kept> = MaybeUninit::uninit();
 
-/// Why the image was begun again.
+/// Why the image was restarted.
 #[derive(Clone, Copy)]
 pub struct Before {
     text: [u8; MOST],
@@ -29,14 +30,14 @@ pub struct Before {
 }
 
 impl Before {
-    /// What the run before has left, if its watchdog ended it: its panic, or nothing. To be asked once, by the start.
+    /// Returns what the previous run has left, if the watchdog ended it: its panic, or nothing. Call it once, at the start.
     pub fn take(watchdog: &pac::WATCHDOG) -> Option<Self> {
         let kept = (&raw mut KEPT).cast::<Kept>();
         // SAFETY: nobody else has it but a panic, after which nothing runs; all words of it are numbers, whatever RAM held.
         let Kept { magic, len, text } = unsafe { ptr::read_volatile(kept) };
         // SAFETY: as above.
         unsafe { ptr::write_volatile(&raw mut (*kept).magic, 0) };
-        // The boot ROM begins an image by the watchdog too, when it was flashed.
+        // The boot ROM also starts a newly flashed image through the watchdog.
         let ours = watchdog.scratch2().read().bits() == MAGIC && watchdog.reason().read().timer().bit_is_set();
         // SAFETY: the register is for whatever a program likes.
         watchdog.scratch2().write(|w| unsafe { w.bits(MAGIC) });
@@ -85,7 +86,7 @@ impl Write for LastWords {
     }
 }
 
-/// Says where; the watchdog begins again.
+/// Prints the location; the watchdog then restarts the image.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

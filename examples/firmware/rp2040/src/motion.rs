@@ -15,7 +15,7 @@ use crate::hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use crate::hal::{Sio, Watchdog};
 use crate::steps::{self, AXES, SLOTS, TICK_HZ};
 
-/// Lines that are looked ahead.
+/// Number of lines in the look-ahead.
 const LINES: usize = 8;
 /// Steps in a metre: 80 in a millimetre.
 const STEPS_PER_M: u32 = 80_000;
@@ -24,9 +24,9 @@ const SPEED: u32 = 5_000;
 const ACCELERATION: u32 = 200_000;
 /// Ticks between steps in different directions: 20 us.
 const REVERSAL_PAUSE: u32 = TICK_HZ / 50_000;
-/// Half of the time in which a request takes effect: 4 ms.
+/// Half of the time within which a request takes effect: 4 ms.
 const REACH: u32 = TICK_HZ / 50;
-/// Longer than anything here waits.
+/// Longer than any wait here.
 const WATCHDOG_MS: u32 = 1_000;
 
 static QUEUE: AxesQueue<AXES, SLOTS> = AxesQueue::new();

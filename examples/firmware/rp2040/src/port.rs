@@ -27,11 +27,11 @@ pub struct Transmitter {
     fifo: Tx<(PIO0, SM0)>,
     machine: StateMachine<(PIO0, SM0), Running>,
     block: PIO<PIO0>,
-    /// The instruction at which something is held.
+    /// The instruction at which a transmission is held.
     holds_at: u32,
 }
 
-/// The words that make the transmitter send something: made ahead, they only have to be written.
+/// The words that make the transmitter send something: prepared ahead, they only have to be written.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Prepared {
     words: [u32; MOST_WORDS],
@@ -39,7 +39,8 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Start-stop units of `bits` bits, with `gap_bits` idle bits between them; 126 line bits in all at the most. The driver is on for
+    /// Start-stop units of `bits` bits, with `gap_bits` idle bits between them; 126 line bits in total at most. The driver
+    /// is on for
     /// one idle bit before them, so that the line is settled at the start bit. `wait_cycles`: cycles of the state machine from the flag
     /// to that.
     pub fn new(units: impl Iterator<Item = u16>, bits: u32, gap_bits: u32, wait_cycles: u32) -> Self {
@@ -78,8 +79,8 @@ impl Prepared {
 }
 
 impl Transmitter {
-    /// Makes the transmitter hold a message until it is started, in place of what it holds. What does not fit into the FIFO goes in
-    /// while the end of the message before is sent.
+    /// Makes the transmitter hold a message until it is started, replacing the one held. Words that do not fit into the
+    /// FIFO follow while the end of the previous message is sent.
     #[inline]
     pub fn hold(&mut self, prepared: &Prepared) {
         self.discard();
@@ -88,7 +89,7 @@ impl Transmitter {
         }
     }
 
-    /// Drops what is held.
+    /// Drops the message held.
     #[inline]
     pub fn discard(&mut self) {
         if self.is_holding() {
@@ -97,12 +98,12 @@ impl Transmitter {
         }
     }
 
-    /// Whether something is held, and was not started.
+    /// Returns whether a message is held and has not been started.
     fn is_holding(&self) -> bool {
         self.machine.instruction_address() == self.holds_at
     }
 
-    /// Starts what is held, unless the receiver has done so.
+    /// Starts the message held, unless the receiver has done so.
     #[inline]
     pub fn start(&mut self) {
         if self.is_holding() {
@@ -148,13 +149,13 @@ impl Receiver {
         self.fifo.read().map(|word| Unit::of(word, self.bits))
     }
 
-    /// A unit with this content starts what the transmitter holds, from the unit on that comes next; with `None` none does.
+    /// Makes a unit with this content start the transmission held, beginning with the next unit; with `None` no unit does.
     #[inline]
     pub fn expect(&mut self, content: Option<u16>) {
         // Below its unit a word of the receiver is 0.
         const NEVER: u32 = 1;
         let unit = content.map_or(NEVER, |content| (1 << self.bits | u32::from(content)) << (31 - self.bits));
-        // The receiver takes all that was written with the next unit.
+        // The receiver takes everything written with the next unit.
         while !self.expected.write(unit) {}
     }
 }
@@ -168,7 +169,7 @@ struct Ring([u32; RING]);
 
 const _: () = assert!(size_of::<Ring>() == 256 && align_of::<Ring>() == 256);
 
-/// Units of the receiver, which DMA writes into a ring whatever the processor does.
+/// Units of the receiver, which DMA writes into a ring independently of the processor.
 pub struct RingReceiver {
     ring: *const u32,
     /// The next to take.
@@ -188,7 +189,7 @@ impl RingReceiver {
         let ring = singleton!(: Ring = Ring([0; RING])).expect("one receiver");
         let ring = core::ptr::from_mut(ring).cast::<u32>();
         let fifo = &receiver.fifo;
-        // SAFETY: the channel is owned, and so is the ring, which nobody reads but by volatile access below.
+        // SAFETY: the channel is owned, and so is the ring, which is read only by the volatile access below.
         let dma = unsafe { &*pac::DMA::ptr() };
         dma.ch(0).ch_read_addr().write(|w| unsafe { w.bits(fifo.fifo_address() as u32) });
         dma.ch(0).ch_write_addr().write(|w| unsafe { w.bits(ring as u32) });

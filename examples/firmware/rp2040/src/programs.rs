@@ -1,4 +1,4 @@
-//! The PIO programs. They are written for any number of cycles a bit, so that every rate has a whole divider at 120 MHz.
+//! The PIO programs. They work with any number of cycles per bit, so that every rate has a whole divider at 120 MHz.
 
 use pio::{
     Assembler, InSource, IrqIndexMode, JmpCondition, MovDestination, MovOperation, MovSource, OutDestination, Program,
@@ -11,9 +11,9 @@ pub const SYSTEM_HZ: u32 = 120_000_000;
 /// A bit rate as the state machines make it: 120 MHz / `divider` / `cycles`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rate {
-    /// Cycles of the state machine a bit, 4..=17.
+    /// Cycles of the state machine per bit, 4..=17.
     pub cycles: u8,
-    /// System clocks a cycle.
+    /// System clocks per cycle.
     pub divider: u16,
 }
 
@@ -47,7 +47,7 @@ pub const START: u8 = 0;
 /// ```
 ///
 /// Automatic pull, 32 bits, shift right. The number of bits must not be a multiple of 32: `out null` would take the next
-/// word then. Send an idle bit more.
+/// word then. Sends one more idle bit.
 pub fn transmitter(rate: Rate) -> Program<32> {
     let mut a = Assembler::<32>::new_with_side_set(SideSet::new(false, 1, false));
     let (mut begin, mut delay, mut bit, mut end) = (a.label(), a.label(), a.label(), a.label());
@@ -65,11 +65,11 @@ pub fn transmitter(rate: Rate) -> Program<32> {
     a.assemble_with_wrap(end, begin)
 }
 
-/// Where the transmitter of [`transmitter`] holds, counted from its begin.
+/// Where the program of [`transmitter`] holds, counted from its start.
 pub const HOLDS_AT: u32 = 2;
 
 /// Receives start-stop units of `bits` bits; the word holds them and the stop bit in its highest bits, the stop bit on top. A word
-/// that is the one in X sets the flag [`START`]: X is what the processor has written last.
+/// that is the one in X sets the flag [`START`]: X is the last word written by the processor.
 ///
 /// ```text
 /// begin:  wait 1 pin 0

@@ -27,14 +27,14 @@ pub const SLOTS: usize = 257;
 
 /// DIR of the first axis; one pin each.
 pub const DIR: u8 = 2;
-/// What changes with each step of the first axis.
+/// Pin that changes with each step of the first axis.
 pub const TOGGLE: u8 = 4;
 /// STEP of the first axis.
 pub const STEP: u8 = 6;
 
 /// System clocks in a cycle of the state machines.
 const DIVIDER: u16 = 3;
-/// Cycles in a tick: as many as an event takes at least, so that two axes may step a tick apart.
+/// Cycles per tick: the minimum for an event, so that two axes may step a tick apart.
 const CYCLES: u32 = 4;
 /// Ticks in a second.
 pub const TICK_HZ: u32 = SYSTEM_HZ / DIVIDER as u32 / CYCLES;
@@ -43,10 +43,10 @@ pub const TICK_HZ: u32 = SYSTEM_HZ / DIVIDER as u32 / CYCLES;
 const WAIT_BITS: u8 = 28;
 /// The longest wait in one word, in ticks.
 const LONGEST: u32 = (1 << WAIT_BITS) / CYCLES - 1;
-/// Before the first event of a motion, in ticks: meanwhile the FIFO fills up.
+/// Wait before the first event of a motion, in ticks, in which the FIFO fills up.
 const LEAD: u32 = TICK_HZ / 10_000;
 
-/// Sets the levels of DIR and of what changes with each step, after a wait.
+/// Sets the levels of DIR and of the pins that change with each step, after a wait.
 ///
 /// ```text
 /// begin:  out x, 28
@@ -107,7 +107,7 @@ pub fn start(
     let _running = events.with(axis(first, sm1, 0)).with(axis(second, sm2, 1)).sync().start();
     let feed = Feed { timer, fifo, levels: 0, wait: LEAD, words: 0 };
     free(|cs| FEED.borrow(cs).set(Some(feed)));
-    // SAFETY: the handler has all that it needs.
+    // SAFETY: the handler has everything that it needs.
     unsafe { cortex_m::peripheral::NVIC::unmask(pac::Interrupt::PIO0_IRQ_0) };
 }
 
@@ -126,19 +126,19 @@ fn axis<SM: StateMachineIndex>(
     machine
 }
 
-/// On its way to the handler.
+/// Holds it on its way to the handler.
 static FEED: Mutex<Cell<Option<Feed>>> = Mutex::new(Cell::new(None));
 /// How often the FIFO was empty during a motion.
 static LATE: AtomicU32 = AtomicU32::new(0);
 
-/// How often a pulse was late so far.
+/// Returns how often a pulse has been late so far.
 pub fn late() -> u32 {
     LATE.load(Ordering::Relaxed)
 }
 
 /// Lets the interrupt begin: there is room in the FIFO.
 pub fn begin() {
-    // SAFETY: the handler ends it, and only then the background begins anew.
+    // SAFETY: the handler ends it, and only then does the background start again.
     unsafe { &*PIO0::ptr() }.sm_irq(0).irq_inte().modify(|_, w| w.sm0_txnfull().set_bit());
 }
 
@@ -157,7 +157,7 @@ pub struct Feed {
 impl Feed {
     /// The next word: there is room for it.
     fn feed(&mut self) {
-        // A wait for the first word of a motion is none for a pulse. One is seen twice, until there is a word.
+        // A wait for the first word of a motion does not delay a pulse. One is seen twice, until there is a word.
         if self.fifo.has_stalled() {
             self.fifo.clear_stalled_flag();
             if self.words == 2 {
@@ -182,7 +182,7 @@ impl Feed {
     }
 }
 
-/// What the handler of `PIO0_IRQ_0` has to do. It keeps `own`, which is `None` at first.
+/// What the handler of `PIO0_IRQ_0` has to do. It keeps its data in `own`, which is `None` at first.
 pub fn fire(own: &mut Option<Feed>) {
     if own.is_none() {
         *own = free(|cs| FEED.borrow(cs).take());

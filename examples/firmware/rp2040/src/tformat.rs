@@ -18,9 +18,9 @@ use crate::port::{RingReceiver, Unit};
 use crate::programs::{self, Rate};
 use crate::uart::{self, Uart};
 
-/// From the end of one transaction to the beginning of the next.
+/// Time from the end of one transaction to the beginning of the next.
 const PAUSE_NS: u64 = 20_000;
-/// One position in so many is printed.
+/// One position in this many is printed.
 const PRINTED: u32 = 16;
 
 const fn rate_of(rate: BitRate) -> Rate {
@@ -32,7 +32,7 @@ const fn rate_of(rate: BitRate) -> Rate {
 
 type Encoder<'a> = Driver<Uart, Automatic, &'a Clock>;
 
-/// Does what was typed, and says what came of it.
+/// Executes a typed command, and prints the result.
 fn command(encoder: &mut Encoder<'_>, command: Command, console: &mut Console) -> fmt::Result {
     let page = Page::truncate(0);
     let (address, byte) = match command {
@@ -59,7 +59,7 @@ fn say(console: &mut Console, what: &str, error: Failure<Uart, Automatic>) -> fm
     writeln!(console, "{what}: {error}")
 }
 
-/// Reads the position of the encoder for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
+/// Reads the position of the encoder without end; prints every sixteenth, and every fault. Executes commands typed meanwhile.
 ///
 /// # Panics
 /// If a clock does not start.
@@ -90,13 +90,13 @@ const TURNS: Abm = Abm::truncate(7);
 const TURN_NS: u32 = 3_000;
 /// The same of an answer that is made while the end of its request comes, and hardly ready in time.
 const LEAST_TURN_NS: u32 = 2_000;
-/// A field that comes later than this is not of the request before.
+/// A field that comes later than this does not belong to the previous request.
 const FIELD_GAP_NS: u64 = 8_000;
 
-/// The next request comes so much later, or more.
+/// The next request comes at least this much later.
 const LATER_NS: u64 = 50_000;
 
-/// An encoder, and the answer that it has ready.
+/// An encoder, and the answer that it has prepared.
 struct Ahead {
     device: Device<1>,
     line: Answering,
@@ -115,7 +115,7 @@ impl Ahead {
         self.line.hold(&uart::prepared(reply.emit().as_bytes(), wait_cycles), (*last).into());
     }
 
-    /// A request is over, or damaged beyond that: answers it if that is not on its way yet.
+    /// Handles a complete or damaged request: answers it, unless the answer is already on its way.
     fn ended(&mut self, bytes: &[u8], now_ns: u64, started: bool) -> Option<Request> {
         let request = Request::parse(bytes).ok();
         let reply = match request {
@@ -129,7 +129,7 @@ impl Ahead {
     }
 }
 
-/// Fields of a request with this control field.
+/// Returns the number of fields in a request with this control field.
 const fn fields(control_field: u8) -> usize {
     const READ: u8 = DataId::ReadEeprom.control_field().get();
     const WRITE: u8 = DataId::WriteEeprom.control_field().get();
@@ -140,11 +140,12 @@ const fn fields(control_field: u8) -> usize {
     }
 }
 
-/// An encoder whose shaft turns on by one with every answer.
+/// An encoder whose shaft turns by one count with every answer.
 ///
-/// The answer has to begin 3 us after the request, and this processor needs longer to make one. So the answer to the request that came
-/// last is made ahead and held by the transmitter, and the receiver starts it when the request comes again, whatever the processor
-/// does then. Of a request with several fields the answer is made while the last one comes. All others are answered when they are
+/// The answer has to begin 3 us after the request, and this processor needs longer to make one. The answer to the latest
+/// request is therefore prepared ahead and held by the transmitter, and the receiver starts it when the request comes
+/// again, whatever the processor is doing then. The answer to a request with several fields is made while the last field
+/// arrives. All others are answered when they are
 /// ready.
 ///
 /// # Panics
@@ -195,5 +196,5 @@ pub fn encoder(image: &'static str, rate: BitRate) -> ! {
     }
 }
 
-/// Fields of a request that is over: what comes behind it is not looked at.
+/// Fields of a complete request: anything after it is ignored.
 const OVER: usize = usize::MAX;

@@ -14,12 +14,12 @@ pub const BITS: u8 = 8;
 pub struct Uart {
     transmitter: Transmitter,
     receiver: RingReceiver,
-    /// Taken from the ring, and not read yet.
+    /// Units taken from the ring but not read yet.
     next: Option<Unit>,
 }
 
 impl Uart {
-    /// A UART made of these.
+    /// Creates a UART from these.
     pub const fn new(transmitter: Transmitter, receiver: RingReceiver) -> Self {
         Self { transmitter, receiver, next: None }
     }

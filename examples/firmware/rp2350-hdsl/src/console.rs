@@ -1,4 +1,4 @@
-//! Core 1: what uses the position. Here it prints it ten times a second; a current loop would take the angle in its interrupt.
+//! Core 1 uses the position. Here it prints it ten times a second; a current loop would take the angle in its interrupt.
 
 use core::fmt::Write;
 use core::sync::atomic::Ordering;
@@ -17,11 +17,11 @@ use crate::{FIRST, FRAME, LATE};
 
 type Uart = UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
 
-/// The age that a position may have: three frames.
+/// The permitted age of a position: three frames.
 const FRESH: Policy = Policy::new(3 * RUNNING.ns());
 const PERIOD_NS: u64 = 100_000_000;
 
-/// What is said first: the board, and why the run before has ended, if the watchdog ended it.
+/// The first output: the board, and why the previous run ended, if the watchdog ended it.
 pub fn begin(uart: &mut Uart, before: Option<Before>) {
     let _ = write!(uart, "{FIRST}, {} positions a second\r\n", 1_000_000_000 / RUNNING.ns());
     if let Some(before) = before {
@@ -29,8 +29,8 @@ pub fn begin(uart: &mut Uart, before: Option<Before>) {
     }
 }
 
-/// A line in each period, and at once when the position comes or goes: the position, or why there is none. It never ends, and the
-/// watchdog is fed as long as core 0 goes on too.
+/// A line in each period, and at once when the position comes or goes: the position, or why there is none. It never ends,
+/// and feeds the watchdog as long as core 0 is running too.
 pub fn run(mut uart: Uart, watchdog: Watchdog, mut feedback: Reader<'_, Evidence, 10>, now_ns: impl Fn() -> u64) -> ! {
     let mut frame = u32::MAX;
     let (mut next_ns, mut late, mut known) = (now_ns(), 0, false);

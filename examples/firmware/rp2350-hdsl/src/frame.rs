@@ -1,4 +1,4 @@
-//! H-frames as the player takes them: a pair of DI and DE for each of the eight samples of a bit, two bits a word.
+//! H-frames as the player takes them: a pair of DI and DE for each of the eight samples of a bit, two bits per word.
 //!
 //! ```text
 //!  bit 0      26 27        99 100     102        108
@@ -23,7 +23,7 @@ const WORDS: usize = STARTING.bits as usize / 2;
 /// How long an H-frame is.
 #[derive(Clone, Copy)]
 pub struct Length {
-    /// Even, for two bits are a word; divisible by three, for that is a whole number of nanoseconds.
+    /// Even, because a word holds two bits; divisible by three, because that makes a whole number of nanoseconds.
     pub bits: u32,
 }
 
@@ -44,16 +44,16 @@ impl Length {
     }
 }
 
-/// A frame in memory, from which DMA plays it. All but its head stays as it was painted.
+/// A frame in memory, from which DMA plays it. Everything except its head stays as it was drawn.
 pub struct Frame([AtomicU32; WORDS]);
 
 impl Frame {
-    /// With nothing driven.
+    /// Creates a frame with nothing driven.
     pub const fn new() -> Self {
         Self([const { AtomicU32::new(0) }; WORDS])
     }
 
-    /// Paints all that follows the head, to the end of the longest frame.
+    /// Draws everything after the head, to the end of the longest frame.
     pub fn paint(&self, answered: bool) {
         let tail = |trailer| Tail { trailer, stuffing: Stuffing::MAX }.bits().map(Some);
         let released = core::iter::repeat_n(None, FILLER.len() as usize);

@@ -1,8 +1,9 @@
-//! What puts frames on the line and takes samples off it: two state machines and four channels of DMA, without the processor.
+//! Puts frames on the line and takes samples from it with two state machines and four DMA channels, without the processor.
 //!
-//! A channel plays a frame; when it is through, another gives it the address of the next one, from a ring of addresses. So it is
-//! with the samples: a block of them ends with the window of an answer, and lasts from one window to the next. The processor has
-//! to write a head before its frame begins; if it is late, there is no address, nothing is played, and everything begins anew.
+//! One channel plays a frame; when it has finished, another gives it the address of the next one, from a ring of addresses.
+//! The samples work the same way: a block of them ends with the window of an answer, and lasts from one window to the next.
+//! The processor has
+//! to write a head before its frame begins; if it is late, there is no address, nothing is played, and everything restarts.
 
 use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
 
@@ -27,7 +28,7 @@ const RO: u8 = 4;
 
 /// Frames and blocks of samples in memory.
 const DEPTH: usize = 4;
-/// Addresses in a ring: this many blocks can be counted before the count begins anew.
+/// Addresses in a ring: this many blocks can be counted before the count wraps.
 const RING: usize = 32;
 /// Bits from the beginning of a frame to the end of its window.
 const WINDOW_END_BITS: u32 = Head::BITS + 1 + WINDOW as u32;
@@ -39,7 +40,7 @@ pub const WINDOW_END_NS: u64 = WINDOW_END_BITS as u64 * 320 / 3;
 
 const _: () = assert!(RUNNING.bits % 4 == 0 && STARTING.bits % 4 == 0 && WINDOW % 4 == 0 && WINDOW_END_BITS == 99);
 
-/// A ring that DMA walks round: it lies on a multiple of its size.
+/// A ring for DMA, aligned to a multiple of its size.
 #[repr(align(128))]
 struct Ring([AtomicU32; RING]);
 
@@ -65,7 +66,7 @@ static BLOCKS: [[AtomicU32; BLOCK]; DEPTH] = [const { [const { AtomicU32::new(0)
 static FRAMES: Ring = Ring::new();
 static SAMPLES: Ring = Ring::new();
 
-/// Channels of DMA: what moves words, and what tells it where the next ones are.
+/// DMA channels: the one that moves words, and the one that tells it where the next words are.
 const PLAY: usize = 0;
 const NEXT_FRAME: usize = 1;
 const TAKE: usize = 2;
@@ -91,7 +92,8 @@ pub struct FrontEnd {
 }
 
 impl FrontEnd {
-    /// With these, of which the channels 0 to 3 of DMA are used. The caller has taken DMA and the block out of reset.
+    /// Creates the front end from these parts; it uses DMA channels 0 to 3. The caller has taken DMA and the block out of
+    /// reset.
     pub fn new(pio: PIO<PIO0>, dma: DMA, machines: (UninitStateMachine<Player>, UninitStateMachine<Sampler>)) -> Self {
         for frame in &SILENT {
             frame.paint(false);
@@ -105,7 +107,7 @@ impl FrontEnd {
         Self { pio, dma, machines }
     }
 
-    /// Begins with a frame that is not answered; its first bit goes out before this returns.
+    /// Starts with a frame that is not answered; its first bit goes out before this returns.
     ///
     /// # Panics
     /// If the instruction memory of the block is full.
@@ -139,11 +141,11 @@ impl FrontEnd {
         SILENT[0].set_head(first);
         FRAMES.set(0, SILENT[0].address());
         FRAMES.set(1, 0);
-        // What was told before the channels began has to be in memory.
+        // Everything written before the channels start has to be in memory.
         compiler_fence(Ordering::SeqCst);
         let channels = Channels(self.dma);
         channels.start(player_tx.fifo_address() as u32, sampler_rx.fifo_address() as u32);
-        // The player's FIFO is full before it begins.
+        // The player's FIFO is full before it starts.
         while !player_tx.is_full() {}
         player_tx.clear_stalled_flag();
         Line {
@@ -181,11 +183,11 @@ impl Line {
         FRAMES.set(number, frame.address());
     }
 
-    /// Waits for the end of the window of a frame, and gives its samples, a byte a bit. The frames are asked for one by one; `next` is the
-    /// length of the one after this.
+    /// Waits for the end of a frame's window, and returns its samples, one byte per bit. Call it for one frame after the
+    /// other; `next` is the length of the frame after this one.
     #[inline]
     pub fn window(&mut self, number: u32, next: Length) -> Result<[u32; WINDOW / 4], Late> {
-        // A block is whole when the one after it has begun.
+        // A block is complete when the next one has begun.
         let begun = |channels: &Channels| channels.blocks().wrapping_sub(number + 1) % RING as u32;
         while begun(&self.channels) == 0 {}
         self.channels.set_length(next);
@@ -241,7 +243,7 @@ impl Channels {
             self.addresses(NEXT_BLOCK, &SAMPLES, self.ch(TAKE).ch_al2_write_addr_trig().as_ptr() as u32);
             self.0.multi_chan_trigger().write(|w| w.bits(1 << NEXT_FRAME | 1 << NEXT_BLOCK));
         }
-        // They are under way when both rings were read once; what is told now is for those that follow.
+        // The channels are running once both rings have been read; entries written now are for the following frames.
         while !self.is_busy(PLAY) || !self.is_busy(TAKE) {}
         self.set_length(STARTING);
     }

@@ -11,7 +11,7 @@ use crate::FRAME;
 use crate::frame::{RUNNING, STARTING};
 use crate::front_end::{Late, Line, WINDOW_END_NS};
 
-/// Keeps the link until the processor or DMA is late. `first`: the head of a RESET frame, which the line sends already, since
+/// Runs the link until the processor or DMA is late. `first`: the head of a RESET frame, which the line sends already, since
 /// `start_ns`.
 pub fn run(
     line: &mut Line,
@@ -23,11 +23,11 @@ pub fn run(
     let (mut number, mut begin_ns, mut length) = (0_u32, start_ns, STARTING);
     loop {
         FRAME.store(number, Ordering::Relaxed);
-        // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
+        // The next head is sent before the answer of this frame has arrived, which leaves a whole frame of time for it.
         let ahead = master.ahead();
-        // What may follow from an answer takes longer than its frame leaves, so one goes between that nobody looks at: while the
-        // link starts the same frame once more, at its end a RESET more than it asks for. Not while it waits for VSYNC, of which
-        // no frame may be left out.
+        // Handling an answer takes longer than its frame leaves, so an unused frame goes in between: while the link starts,
+        // the same frame once more; at its end, one RESET more than requested. Not while it waits for VSYNC, when no frame
+        // may be skipped.
         let between = match master.state() {
             State::Running if ahead.is_none() => Some(*first),
             State::Start | State::Learn | State::Check | State::IdReq => Some(master.transmission()),
@@ -42,7 +42,7 @@ pub fn run(
         begin_ns += length.ns();
         length = next;
         number = number.wrapping_add(1);
-        // The line cannot wait; who uses the position can.
+        // The line cannot wait; the user of the position can.
         if ahead.is_none() {
             let at = if between.is_some() { number.wrapping_add(1) } else { number };
             line.send(at, &master.transmission());

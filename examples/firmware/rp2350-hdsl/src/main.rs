@@ -33,7 +33,7 @@ use servowire_boards::{Board, FirstLine, Pin as BoardPin, Source};
 use front_end::FrontEnd;
 use last_words::Before;
 
-/// What the boot ROM wants to see.
+/// The block that the boot ROM requires.
 #[unsafe(link_section = ".start_block")]
 #[used]
 pub static IMAGE_DEF: hal::block::ImageDef = hal::block::ImageDef::secure_exe();
@@ -41,7 +41,7 @@ pub static IMAGE_DEF: hal::block::ImageDef = hal::block::ImageDef::secure_exe();
 const CRYSTAL_HZ: u32 = 12_000_000;
 const CONSOLE_BAUD: u32 = 1_000_000;
 const SYSTEM_HZ: u32 = 150_000_000;
-/// Longer than a start of the link and a line of the console take.
+/// Longer than the start of the link and a console line take.
 const WATCHDOG_MS: u32 = 100;
 
 /// The pins, of a Raspberry Pi Pico 2; no power stage is near.
@@ -66,7 +66,7 @@ const FIRST: FirstLine = FirstLine {
 
 static CORE1_STACK: Stack<2048> = Stack::new();
 
-/// How often the link was begun anew because this program was late.
+/// How often the link was restarted because this program was late.
 pub static LATE: AtomicU32 = AtomicU32::new(0);
 /// Changes with every frame: core 0 is at work.
 pub static FRAME: AtomicU32 = AtomicU32::new(0);

@@ -23,7 +23,7 @@ pub fn play() -> Program<32> {
     program(&PLAY, Wrap { source: 0, target: 0 })
 }
 
-/// The sampler. X says for how many bits it waits, less one.
+/// The sampler. X holds the number of bits to wait, less one.
 pub fn sample() -> Program<32> {
     program(&SAMPLE, Wrap { source: 1, target: 1 })
 }

@@ -1,8 +1,8 @@
-//! The program runs from RAM: flash takes many clocks where its cache misses, and that would be within a frame.
+//! The program runs from RAM: a miss of the flash cache takes many clocks, which would fall within a frame.
 
 use core::arch::global_asm;
 
-// Copies the program before anything of it is called; in assembler, for it must itself be in flash and call nothing.
+// Copies the program before any of it is called; in assembler, because it must itself be in flash and call nothing.
 global_asm!(
     ".section .boot, \"ax\"",
     ".global __pre_init",

@@ -10,22 +10,23 @@ use stm32_metapac::{FLASH, RCC};
 
 /// The crystal of the board: 12 MHz on a Feather, 8 on many others, 25 on a Netduino Plus 2.
 pub const CRYSTAL_HZ: u32 = 12_000_000;
-/// The usual 168 MHz makes 2.5 Mbit/s 1.18 % slow; of 160 MHz it is exact.
+/// With the usual 168 MHz, 2.5 Mbit/s would be 1.18 % slow; with 160 MHz it is exact.
 pub const CORE_HZ: u32 = 160_000_000;
 /// APB2, of USART1.
 pub const APB2_HZ: u32 = CORE_HZ / 2;
 /// APB1, of USART2.
 pub const APB1_HZ: u32 = CORE_HZ / 4;
 
-/// Looks at a ready bit before it is given up: some milliseconds.
+/// How often a ready bit is polled before it is given up: some milliseconds.
 const LOOKS: u32 = 100_000;
-/// Of the oscillator in the chip.
+/// Frequency of the oscillator in the chip.
 const INTERNAL_HZ: u32 = 16_000_000;
 
 const OF_CRYSTAL: Pll = PllLimits::STM32F4.exact(CRYSTAL_HZ, CORE_HZ);
 const OF_INTERNAL: Pll = PllLimits::STM32F4.exact(INTERNAL_HZ, CORE_HZ);
 
-/// 160 MHz, APB1 40 MHz, APB2 80 MHz, and from what; `None` if no PLL gets ready, as in an emulator without a clock tree.
+/// Sets 160 MHz, APB1 40 MHz, APB2 80 MHz, and returns the clock source; `None` if no PLL becomes ready, as in an emulator
+/// without a clock tree.
 pub fn start() -> Option<Source> {
     let source = servowire_boards::start(|on| RCC.cr().modify(|w| w.set_hseon(on)), || RCC.cr().read().hserdy(), LOOKS);
     let (input, pll) = match source {
@@ -57,7 +58,7 @@ pub fn start() -> Option<Source> {
     waited(|| RCC.cfgr().read().sws() == Sw::PLL1_P, LOOKS).then_some(source)
 }
 
-/// Time from the SysTick, which counts 24 bits down with an eighth of the core clock. Somebody has to look at it every 0.4 s.
+/// Time from the SysTick, which counts 24 bits down with an eighth of the core clock. It has to be read every 0.4 s.
 pub fn ticks(mut timer: SYST) -> Counter<24> {
     timer.set_clock_source(SystClkSource::External);
     timer.set_reload(0x00ff_ffff);

@@ -14,7 +14,7 @@ pub mod watchdog;
 pub const POWER_STAGES: &[&str] =
     &["PA7", "PA8", "PA9", "PA10", "PB0", "PB1", "PB10", "PB11", "PB13", "PB14", "PB15", "PC6", "PC7", "PC8"];
 
-/// Says where; the watchdog begins again.
+/// Prints the location; the watchdog then restarts the image.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

@@ -12,7 +12,7 @@ use tformat::{Address, BitRate, EvidenceCell, Page};
 use servowire_stm32f405::clock::{CORE_HZ, CRYSTAL_HZ};
 use servowire_stm32f405::{POWER_STAGES, clock, stack, uart, watchdog};
 
-/// Where they are is up to the board.
+/// Their places depend on the board.
 const PINS: &[Pin] = &[
     Pin::new("PB6", "DI", "USART1"),
     Pin::new("PB8", "DE and /RE", "GPIO"),
@@ -36,7 +36,7 @@ fn line() -> Line {
     }
 }
 
-/// One position in so many is printed.
+/// One position in this many is printed.
 const PRINTED: u32 = 16;
 
 #[cortex_m_rt::entry]

@@ -1,4 +1,4 @@
-//! How much stack was used: it is filled with a pattern before `main`, and looked through.
+//! Measures how much stack was used: the stack is filled with a pattern before `main` and searched later.
 
 use core::ptr;
 
@@ -16,7 +16,7 @@ fn bounds() -> (*mut u32, *mut u32) {
     (&raw mut _stack_end, &raw mut _stack_start)
 }
 
-/// Fills what is not used yet.
+/// Fills the unused part.
 #[inline(always)]
 pub fn paint() {
     let (mut at, _) = bounds();
@@ -28,7 +28,7 @@ pub fn paint() {
     }
 }
 
-/// The most that was in use so far, in bytes.
+/// Returns the largest use so far, in bytes.
 pub fn used() -> usize {
     let (mut at, end) = bounds();
     // SAFETY: as above; reading what may be in use is harmless.

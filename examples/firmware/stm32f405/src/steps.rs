@@ -21,16 +21,16 @@ pub const SLOTS: usize = 257;
 /// A timer of APB1 counts twice as fast as the bus, which is slower than the core.
 pub const TICK_HZ: u32 = APB1_HZ * 2;
 
-/// Of port C: the first STEP, and the first DIR.
+/// Pins of port C: the first STEP, and the first DIR.
 const STEP: u32 = 0;
 const DIR: u32 = 3;
 const PINS: usize = 6;
 const ALL: u32 = (1 << AXES) - 1;
 /// A pulse of 2 us.
 const PULSE: u32 = TICK_HZ / 500_000;
-/// From a start to the first event: 25 us.
+/// Time from a start to the first event: 25 us.
 const LEAD: u32 = TICK_HZ / 40_000;
-/// An event whose interrupt comes more than 10 us behind its time is late; the handler before it may have taken 6.
+/// An event whose interrupt comes more than 10 us after its time is late; the previous handler may have taken 6.
 const LATE_TICKS: u32 = TICK_HZ / 100_000;
 
 /// Channels of the timer: the next event, and the end of the pulses.
@@ -39,11 +39,11 @@ const END: usize = 1;
 
 /// The interrupt half of the motion.
 pub type Timer = AxesTimer<'static, AXES, SLOTS>;
-/// On its way to the handler.
+/// Holds it on its way to the handler.
 static TIMER: Mutex<Cell<Option<Timer>>> = Mutex::new(Cell::new(None));
 static LATE: AtomicU32 = AtomicU32::new(0);
 
-/// How many events were late so far.
+/// Returns how many events have been late so far.
 pub fn late() -> u32 {
     LATE.load(Ordering::Relaxed)
 }
@@ -60,7 +60,7 @@ pub fn start(timer: Timer) {
     free(|cs| TIMER.borrow(cs).set(Some(timer)));
     TIM2.arr().write_value(u32::MAX);
     TIM2.cr1().modify(|w| w.set_cen(true));
-    // SAFETY: the handler has all that it needs.
+    // SAFETY: the handler has everything that it needs.
     unsafe { cortex_m::peripheral::NVIC::unmask(Interrupt::TIM2) };
 }
 
@@ -86,7 +86,7 @@ fn clear(channel: usize) {
     });
 }
 
-/// What the handler of TIM2 has to do. It keeps `own`, which is `None` at first.
+/// What the handler of TIM2 has to do. It keeps its data in `own`, which is `None` at first.
 pub fn fire(own: &mut Option<Timer>) {
     if own.is_none() {
         *own = free(|cs| TIMER.borrow(cs).take());
@@ -102,11 +102,11 @@ pub fn fire(own: &mut Option<Timer>) {
     }
 }
 
-/// What is due, and when something is due next.
+/// Makes the events that are due, and sets the time of the next.
 #[inline(always)]
 fn event(timer: &mut Timer) {
     let due = TIM2.ccr(EVENT).read();
-    // All that follows comes later by as much, and not in a burst; STEP may have fallen only now.
+    // Everything after it is delayed by as much, without a burst; STEP may have fallen only now.
     let now = TIM2.cnt().read();
     if now.wrapping_sub(due) > LATE_TICKS {
         LATE.store(late() + 1, Ordering::Relaxed);

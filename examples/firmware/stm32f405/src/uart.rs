@@ -60,7 +60,7 @@ const RING: usize = 32;
 const FAULTY: u16 = 0x100;
 
 static BYTES: [AtomicU16; RING] = [const { AtomicU16::new(0) }; RING];
-/// Bytes that were received so far, and bytes that were taken.
+/// Counts of bytes received and of bytes taken so far.
 static RECEIVED: AtomicUsize = AtomicUsize::new(0);
 static TAKEN: AtomicUsize = AtomicUsize::new(0);
 
@@ -158,7 +158,7 @@ impl OutputPin for DriverEnable {
 pub struct Console(());
 
 impl Console {
-    /// For a panic: whoever had it is gone.
+    /// For a panic: its previous owner no longer runs.
     pub const fn last_words() -> Self {
         Self(())
     }

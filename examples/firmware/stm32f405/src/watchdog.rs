@@ -1,4 +1,4 @@
-//! The independent watchdog: it begins the image again if nothing has been read for a second.
+//! The independent watchdog: it restarts the image if nothing has been read for a second.
 
 use stm32_metapac::IWDG;
 use stm32_metapac::iwdg::vals::{Key, Pr};
@@ -15,7 +15,7 @@ pub fn start() {
     feed();
 }
 
-/// Has to come before the second is over.
+/// Feeds it; call this before the second has passed.
 pub fn feed() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }

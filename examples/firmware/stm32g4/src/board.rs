@@ -1,4 +1,4 @@
-//! The board for which the images are built: its pin table is all that they get of the chip.
+//! The board for which the images are built: they can use only the pins in its table.
 
 #[cfg(feature = "b-g431b-esc1")]
 compile_error!(

@@ -12,12 +12,12 @@ use crate::board::{self, BOARD, Parts};
 
 /// 2.5 Mbit/s are 64 clocks of it, exactly.
 pub const CORE_HZ: u32 = 160_000_000;
-/// Of the oscillator in the chip.
+/// Frequency of the oscillator in the chip.
 const INTERNAL_HZ: u32 = 16_000_000;
-/// Looks at the crystal before it is given up: some 50 ms; the data sheet says 2 ms.
+/// How often the crystal is polled before it is given up: about 50 ms; the data sheet says 2 ms.
 const LOOKS: u32 = 100_000;
 
-/// Time from the cycle counter, which has to be looked at every 13 s. Copies have the same origin.
+/// Time from the cycle counter, which has to be read every 13 s. Copies have the same origin.
 #[derive(Clone, Copy)]
 pub struct Cycles(TimeBase<32>);
 
@@ -45,11 +45,11 @@ const fn pll(source: PllSource, hz: u32) -> Pll {
 const OF_CRYSTAL: Pll = pll(PllSource::HSE, board::CRYSTAL_HZ);
 const OF_INTERNAL: Pll = pll(PllSource::HSI, INTERNAL_HZ);
 
-/// What an image begins with.
+/// What an image starts with.
 pub struct Start {
     /// Its part of the chip.
     pub parts: Parts,
-    /// From what the core runs.
+    /// Clock source of the core.
     pub source: Source,
     /// Time.
     pub clock: Cycles,

@@ -26,7 +26,7 @@ const MAX_ACCELERATION: Acceleration = Acceleration::from_turns_per_s2(2_000).ex
 /// Of the electrical angle.
 const MAX_ERROR: Angle = Angle::from_millidegrees(5_000);
 
-/// Stands for a power stage: a pin that is high while the angle may be used, and the angle itself.
+/// Stands in for a power stage: a pin that is high while the angle may be used, and the angle itself.
 struct Enable(Output<'static>);
 
 static FIELD: AtomicU32 = AtomicU32::new(0);

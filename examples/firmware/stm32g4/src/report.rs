@@ -1,4 +1,4 @@
-//! The rhythm of an image, and what its console says once a second.
+//! The timing of an image, and its console output once a second.
 
 use core::fmt::Display;
 
@@ -13,7 +13,7 @@ use crate::board::BOARD;
 use crate::clocks::CORE_HZ;
 use crate::control;
 
-/// Readings of a second.
+/// Readings per second.
 pub const READ_HZ: u32 = 5_000;
 
 /// The first line.
@@ -23,7 +23,7 @@ pub fn first_line(image: &'static str, source: Source, bits_per_second: u32) {
     info!("{}", Display2Format(&line));
 }
 
-/// Longer than anything here waits.
+/// Longer than any wait here.
 const WATCHDOG_US: u32 = 100_000;
 
 /// When to read, and the readings since the last report.
@@ -48,7 +48,7 @@ impl Report {
         self.watchdog.pet();
     }
 
-    /// Counts a reading; says every second what came of the last one.
+    /// Counts a reading; prints the result of the last one every second.
     pub fn reading<S: Display, E: Display>(&mut self, position: &Result<S, E>) {
         match position {
             Ok(_) => self.good += 1,

@@ -18,7 +18,7 @@ impl fmt::Write for Console {
     }
 }
 
-/// The console, for a panic: whoever had it is gone.
+/// The console, for a panic: its previous owner no longer runs.
 struct LastWords(lpuart::LPUART2);
 
 impl fmt::Write for LastWords {
@@ -31,7 +31,7 @@ impl fmt::Write for LastWords {
     }
 }
 
-/// Says where; the watchdog begins again.
+/// Prints the location; the watchdog then restarts the image.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

@@ -23,7 +23,7 @@ use crate::uart::Uart;
 use crate::watchdog::Watchdog;
 
 const RATE: BitRate = BitRate::Mbit2_5;
-/// PLL 3 by 6; of the crystal's 24 MHz 2.5 Mbit/s would be 9.6 clocks a bit.
+/// PLL 3 divided by 6; with the crystal's 24 MHz, 2.5 Mbit/s would be 9.6 clocks per bit.
 const UART_HZ: u32 = 80_000_000;
 const ENCODER_BAUD: Baud = Baud::compute(UART_HZ, RATE.bits_per_second());
 const CONSOLE_BAUD: Baud = Baud::compute(UART_HZ, 1_000_000);
@@ -31,7 +31,7 @@ const _: () = assert!(ENCODER_BAUD.value(UART_HZ) == RATE.bits_per_second(), "ex
 /// The UART begins with its next bit clock. No interrupt comes, and the program is in memory without waits. A tick of the clock is
 /// 1.7 ns.
 const WORST: Worst = Worst { uart_start_ns: 400, wake_ns: 400, clock_ns: 2 };
-/// One position in so many is printed.
+/// One position in this many is printed.
 const PRINTED: u32 = 4_096;
 
 /// The pins; no power stage is near.
@@ -66,7 +66,7 @@ fn main() -> ! {
     start(&mut uart, &ENCODER_BAUD);
     let de = gpio4.output(pins.p2).expect("pin 2 is of GPIO 4");
     de.clear();
-    // Somebody has to look at it every 3.5 s.
+    // It has to be read every 3.5 s.
     let cycles = Counter::<32>::new(TickRate::of::<ARM_FREQUENCY>(), DWT::cycle_count);
     let mut clock = &cycles;
     let pin = DirectionPin::new(de, WORST);

@@ -1,11 +1,11 @@
-//! The encoder's UART. It has no FIFO switched on, for the HAL's would tell of two bytes and not of one; the driver reads faster than
-//! bytes come.
+//! The encoder's UART. Its FIFO is off, because the HAL's FIFO would report two bytes but not one; the driver reads faster
+//! than bytes arrive.
 
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use servowire_boards::LineFault;
 use teensy4_bsp::hal::lpuart::{Lpuart, Status};
 
-/// A UART that goes on after an overrun.
+/// A UART that continues after an overrun.
 pub struct Uart(pub Lpuart);
 
 impl ErrorType for Uart {

@@ -2,7 +2,7 @@
 
 use teensy4_bsp::ral::{self, wdog};
 
-/// Restarts the chip a second after it was fed.
+/// Restarts the chip a second after it was last fed.
 pub struct Watchdog(wdog::WDOG1);
 
 impl Watchdog {
@@ -14,7 +14,7 @@ impl Watchdog {
         Self(watchdog)
     }
 
-    /// Another second.
+    /// Feeds it for another second.
     pub fn feed(&mut self) {
         ral::write_reg!(wdog, self.0, WSR, 0x5555);
         ral::write_reg!(wdog, self.0, WSR, 0xaaaa);

@@ -26,7 +26,7 @@ pub(super) enum Row {
     End,
 }
 
-/// The address at the front, the rest, and whether a colon separates them.
+/// Returns the address at the front, the rest, and whether a colon separates them.
 fn address(line: &str) -> Option<(u64, &str, usize, bool)> {
     let bare = line.trim_start();
     let bare = bare.strip_prefix("0x").unwrap_or(bare);
@@ -106,7 +106,7 @@ impl Dump {
     }
 }
 
-/// Whether the text beside the bytes matches only if the bytes of each word are read in reverse.
+/// Returns whether the text beside the bytes matches only if the bytes of each word are read in reverse.
 fn is_swapped(rest: &str, columns: usize) -> bool {
     let Some((groups, text)) = rest.split_at_checked(columns) else { return false };
     let (groups, text) = (groups.split_whitespace().collect::<Vec<_>>(), text.trim());
@@ -121,7 +121,7 @@ fn is_swapped(rest: &str, columns: usize) -> bool {
     begins(&swapped) && !begins(&straight)
 }
 
-/// The part of a row that is bytes: up to the text in bars, or after two blanks.
+/// Returns the part of a row that holds bytes: up to the text between bars or after two blanks.
 fn hex_part(rest: &str, colon: bool) -> &str {
     let rest = rest.split(['|', '>']).next().unwrap_or_default();
     let rest = rest.trim_start();

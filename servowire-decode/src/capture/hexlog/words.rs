@@ -42,7 +42,7 @@ fn titled(text: &str) -> Option<Said> {
     Some(said)
 }
 
-/// A line whose bytes follow no other words than times and the sender.
+/// Reads a line whose bytes follow only times and the sender.
 fn bare(text: &str) -> Result<Vec<Said>, String> {
     if let Some(bytes) = string(text) {
         return Ok(vec![Said { bytes: bytes?, ..Said::default() }]);
@@ -88,7 +88,7 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
     Ok(out.into_iter().map(|said| Said { time, ..said }).collect())
 }
 
-/// The time given by a line, in the words before its bytes: a date with a time of day, a time of day, seconds with a
+/// Returns the time of a line from the words before its bytes: a date with a time of day, a time of day, seconds with a
 /// fraction, or a number with its unit.
 fn moment(words: &[&str]) -> Option<Time> {
     let bare = |word: &&str| word.trim_matches(['[', ']', '(', ')', ':']).replace(',', ".");
@@ -115,7 +115,7 @@ fn clock(word: &str) -> Option<Time> {
         .then_some(time::from_decimal(seconds)? + (hours * 60 + minutes) * 60 * SECOND)
 }
 
-/// The sender, from a word that names it.
+/// Returns the sender from a word that names it.
 pub(in crate::capture) fn speaker(word: &str) -> Option<Direction> {
     match mark(word, false) {
         Some(Mark::Speaker(direction)) => Some(direction),
@@ -137,8 +137,8 @@ fn without_remarks(text: &str) -> String {
     out
 }
 
-/// A date, a time of day, seconds with a fraction, or one of these in brackets. `followed`: other words follow, so
-/// `22:23:52` need not be three bytes.
+/// Returns whether a word is a date, a time of day, seconds with a fraction, or one of these in brackets. `followed`: other
+/// words follow, so `22:23:52` may be a time instead of three bytes.
 fn is_stamp(word: &str, followed: bool) -> bool {
     let (bare, bracketed) = match word.strip_prefix(['[', '(']) {
         Some(inside) => (inside.trim_end_matches([']', ')', ':']), true),

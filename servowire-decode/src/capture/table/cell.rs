@@ -28,7 +28,7 @@ pub(super) fn word(text: &[u8]) -> Option<u64> {
     if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) { u64::from_str_radix(digits, 16).ok() } else { None }
 }
 
-/// A number; `comma`: the decimal mark.
+/// Reads a number; `comma`: whether the decimal mark is a comma.
 pub(super) fn number(text: &[u8], comma: bool) -> Option<f64> {
     let text = std::str::from_utf8(text).ok()?.trim();
     match text {
@@ -40,7 +40,7 @@ pub(super) fn number(text: &[u8], comma: bool) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-/// A time in parts of a second (`divisor` of them) in picoseconds.
+/// Converts a time in fractions of a second (`divisor` of them per second) to picoseconds.
 pub(crate) fn time(text: &str, divisor: i64) -> Option<Time> {
     let text = text.trim();
     if let Some(time) = time::from_decimal(text) {
@@ -53,10 +53,10 @@ pub(crate) fn time(text: &str, divisor: i64) -> Option<Time> {
     None
 }
 
-/// The first of January 1970 in that count of days.
+/// 1 January 1970 in this count of days.
 const EPOCH: i64 = 719_469;
 
-/// `2022-06-24T18:51:08.852112100+00:00`, since 1970 on the clock of the place.
+/// Reads `2022-06-24T18:51:08.852112100+00:00` as the time since 1970 in local time.
 pub(crate) fn date(text: &str) -> Option<Time> {
     let (day, clock) = text.trim().split_once(['T', ' '])?;
     let mut parts = day.splitn(3, '-').map(str::parse::<i64>);

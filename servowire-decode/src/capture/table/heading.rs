@@ -8,12 +8,12 @@ use crate::time::{self, Time};
 /// Maximum number of lines without numbers in a heading.
 pub(super) const LONGEST: usize = 512;
 
-/// When a row was taken.
+/// How the time of a row is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Times {
-    /// By a column, in this fraction of a second.
+    /// In a column, in this fraction of a second.
     Column { index: usize, divisor: i64 },
-    /// By a column of dates.
+    /// In a column of dates.
     Dates { index: usize },
     /// At a fixed interval, in picoseconds.
     Steps { start: Time, period: f64 },
@@ -32,7 +32,7 @@ pub(super) struct Heading {
     fixed: Option<Times>,
 }
 
-/// Whether a line is a row of data: nearly all cells are numbers, levels or dates.
+/// Returns whether a line is a row of data: nearly all cells are numbers, levels or dates.
 pub(super) fn is_row(line: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(line) else { return false };
     let text = text.trim().trim_end_matches([',', ';', '\t']);
@@ -70,7 +70,7 @@ fn split(line: &[u8], separator: u8) -> Vec<&[u8]> {
     line.split(|byte| *byte == separator).map(<[u8]>::trim_ascii).collect()
 }
 
-/// Cells of a line of text, where names in quotes may hold the separator.
+/// Returns the cells of a line of text, in which quoted names may contain the separator.
 pub(crate) fn titles(line: &str, separator: u8) -> Vec<String> {
     let (mut out, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     for letter in line.chars() {
@@ -125,8 +125,8 @@ fn is_units(cells: &[String]) -> bool {
 }
 
 impl Heading {
-    /// Reads the lines above the first row. `None` if they give neither times nor a rate, and the rate is not known
-    /// (`knows`) either.
+    /// Reads the lines above the first row. Returns `None` if they give neither times nor a rate, and the rate is not known
+    /// otherwise (`knows`).
     pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]], knows: Option<u64>) -> Option<Self> {
         let lines: Vec<String> = above.iter().map(|line| String::from_utf8_lossy(line).into_owned()).collect();
         let (remarks, lines): (Vec<&str>, Vec<&str>) =
@@ -231,8 +231,8 @@ impl Heading {
         Some(Times::Steps { start: Time::from_ps((start * 1e12) as i128), period: period * 1e12 })
     }
 
-    /// Picks the column of times if nothing identifies it: the first that grows from one row to the next, with another
-    /// beside it.
+    /// Picks the column of times if nothing identifies it: the first column that increases from row to row and is not the
+    /// only one.
     fn growing(&self, rows: &[&[u8]]) -> Option<usize> {
         let [first, second] = rows else { return None };
         let numbers = |row: &[u8]| -> Vec<Option<f64>> {
@@ -269,7 +269,7 @@ impl Heading {
         split(row, self.separator)
     }
 
-    /// Whether a column may hold a channel: it is not a column of times.
+    /// Returns whether a column may hold a channel: it is not a column of times.
     pub(super) fn may_be_channel(&self, index: usize) -> bool {
         let name = self.names.get(index).map_or("", String::as_str);
         self.time.is_none_or(|(time, _)| time != index) && !is_time(name) && !["x", "X", "#"].contains(&name)

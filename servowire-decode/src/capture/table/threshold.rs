@@ -1,12 +1,13 @@
-//! Levels of voltages, also where the line drifts.
+//! Finds levels from voltages, even if the line drifts.
 //!
-//! Between two levels that stay where they are the threshold does not move. Where all of the line is shifted, as by a probe that warms up
-//! or an input that is coupled by a capacitor, it goes along: with the middle of what swings, and, where nothing swings, with
-//! what is slowly shifted. A line with a third level (nobody drives it) is not taken for one that drifts.
+//! While both levels stay where they are, the threshold does not move. If the whole line shifts, for example because a
+//! probe warms up or an input is AC-coupled, the threshold follows: the middle of the swing, or, while nothing swings, the
+//! slow shift itself. A line with a third level (while nobody drives it) is not mistaken for a drifting one.
 
-/// Values that are looked at together.
+/// Values that are examined together.
 const WINDOW: usize = 512;
-/// The parts of the swing, as divisors or shares: the hysteresis; what moves the threshold; what is flat; what swings.
+/// Fractions of the swing, as divisors or shares: the hysteresis, the shift that moves the threshold, the limit for flat,
+/// and the limit for swinging.
 const HYSTERESIS: f64 = 20.0;
 const MOVES: f64 = 8.0;
 const FLAT: f64 = 0.2;
@@ -17,14 +18,14 @@ const SWINGS: (f64, f64) = (0.75, 1.6);
 pub(crate) struct Threshold {
     middle: f64,
     swing: f64,
-    /// Whether it goes along with the line; not where the user has said it.
+    /// Whether it follows the line; not if the user has set it.
     follows: bool,
     window: Window,
-    /// The mean of the window before, if it was flat.
+    /// The mean of the previous window, if that was flat.
     flat: Option<f64>,
 }
 
-/// The values since the last look.
+/// The values since the last check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Window {
     count: usize,
@@ -61,9 +62,9 @@ impl Window {
 }
 
 impl Threshold {
-    /// Half-way between the levels of some values, in their order, or as the user has it.
+    /// Finds the threshold half-way between the levels of some values, given in their order, or takes the user's.
     pub(crate) fn find(values: &mut [f64], said: Option<f64>) -> Self {
-        // What is beyond the instrument's range was at its end at least.
+        // A value beyond the instrument's range was at least at the end of it.
         let inside = |value: &&f64| value.abs() < f64::MAX;
         let bottom = values.iter().filter(inside).copied().fold(f64::INFINITY, f64::min);
         let top = values.iter().filter(inside).copied().fold(f64::NEG_INFINITY, f64::max);
@@ -74,19 +75,19 @@ impl Threshold {
         }
         let local = Self::local(values);
         values.sort_by(f64::total_cmp);
-        // The few values beyond are overshoot.
+        // The few values beyond these are overshoot.
         let at = |share: usize| values.get(values.len() * share / 200).copied().unwrap_or(0.0);
         let (least, most) =
             (at(1), values.get(values.len().saturating_sub(1 + values.len() / 200)).copied().unwrap_or(0.0));
         let (middle, swing) = match local {
-            // The line drifts already: it never swings as far as all of it goes.
+            // The line is already drifting: no single swing covers the whole range.
             Some((middle, swing)) if said.is_none() && swing * 1.3 < most - least => (middle, swing),
             _ => (said.unwrap_or(f64::midpoint(least, most)), most - least),
         };
         Self { middle, swing, follows: said.is_none(), window: Window::EMPTY, flat: None }
     }
 
-    /// How far the line swings within a window, and around which middle at first; none of fewer than a few windows.
+    /// Returns how far the line swings within a window, and its middle at the beginning; `None` if there are too few windows.
     fn local(values: &[f64]) -> Option<(f64, f64)> {
         let windows: Vec<Window> = values.chunks_exact(WINDOW).map(Window::of).collect();
         let mut spreads: Vec<f64> = windows.iter().map(Window::spread).collect();
@@ -96,7 +97,7 @@ impl Threshold {
         Some((first.middle(), swing))
     }
 
-    /// The level of a voltage after another level.
+    /// Returns the level of a voltage after another level.
     pub(crate) fn level(&self, volts: f64, before: Option<bool>) -> bool {
         let near = self.swing / HYSTERESIS;
         match before {
@@ -106,7 +107,7 @@ impl Threshold {
         }
     }
 
-    /// Goes along with a line of which this is the next voltage.
+    /// Follows the line, whose next voltage this is.
     pub(crate) fn follow(&mut self, volts: f64) {
         if !self.follows || volts.abs() >= f64::MAX {
             return;
@@ -143,7 +144,7 @@ mod tests {
         (0..samples).map(|k| (said(k).unwrap_or(true), volts(k, said(k)))).collect()
     }
 
-    /// Samples whose level is wrong.
+    /// Counts samples whose level is wrong.
     fn wrong(line: &[(bool, f64)], said: Option<f64>) -> usize {
         let first = 16_384.min(line.len());
         let mut values: Vec<f64> = line.iter().take(first).map(|(_, volts)| *volts).collect();
@@ -168,26 +169,26 @@ mod tests {
         let noise = |k: usize| (k.wrapping_mul(0x2545_f491) >> 9 & 63) as f64 / 1000.0;
         for (what, drift) in [
             ("none", 0.0),
-            // Three times its swing, up and down, from the beginning on.
+            // By three times its swing, up and down, from the beginning.
             ("up", 6.0),
             ("down", -6.0),
         ] {
             let volts = |k: usize, level| driven(level) + drift * k as f64 / 300_000.0 + noise(k);
             assert_eq!(wrong(&line(300_000, volts), None), 0, "{what}");
-            // Only after what is looked at first.
+            // Only after the values that are examined first.
             let volts =
                 |k: usize, level| driven(level) + drift * k.saturating_sub(50_000) as f64 / 300_000.0 + noise(k);
             assert_eq!(wrong(&line(300_000, volts), None), 0, "{what}, later");
         }
         let hum = |k: usize, level| driven(level) + 1.5 * (k as f64 / 20_000.0).sin() + noise(k);
         assert_eq!(wrong(&line(300_000, hum), None), 0);
-        // A threshold that the user has said stays.
+        // A threshold set by the user stays.
         assert!(wrong(&line(300_000, |k, level| driven(level) + 6.0 * k as f64 / 300_000.0), Some(0.0)) > 10_000);
     }
 
     #[test]
     fn a_third_level_is_no_drift() {
-        // Driven to 1 and -1; at rest nobody does, and it is a little above 0.
+        // Driven to 1 and -1; at rest nobody drives it, and it is a little above 0.
         let volts = |_: usize, level: Option<bool>| level.map_or(0.25, |level| driven(Some(level)));
         assert_eq!(wrong(&line(300_000, volts), None), 0);
     }

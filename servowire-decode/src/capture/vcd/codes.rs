@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-/// The meaning of a code: channels, starting from its last bit.
+/// The meaning of a code: its channels, starting with the last bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Code {
     pub(super) first: u16,
     pub(super) width: u16,
 }
 
-/// Codes of variables. Almost all have one or two letters.
+/// The codes of all variables. Almost all have one or two letters.
 #[derive(Debug, Default)]
 pub(super) struct Codes {
     pub(super) short: Vec<Option<Code>>,

@@ -7,7 +7,7 @@ use super::codes::{Code, Codes};
 use crate::capture::input::Input;
 use crate::fault::{At, Fault};
 
-/// A longer header cannot be one.
+/// A longer header cannot belong to a VCD.
 const LONGEST: usize = 1 << 26;
 /// Maximum number of channels.
 const CHANNELS: usize = 65_535;
@@ -31,7 +31,7 @@ struct Variable {
     name: String,
     code: Vec<u8>,
     width: u16,
-    /// Number of the lowest bit, and whether numbers fall towards it.
+    /// Number of the lowest bit, and whether the numbers decrease towards it.
     lowest: i32,
     falls: bool,
 }
@@ -82,7 +82,7 @@ impl Words<'_> {
         }
     }
 
-    /// The words of a command up to its `$end`.
+    /// Reads the words of a command up to its `$end`.
     fn body(&mut self) -> Result<Vec<Vec<u8>>, Fault> {
         let mut words = Vec::new();
         loop {

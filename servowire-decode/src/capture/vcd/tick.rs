@@ -11,7 +11,7 @@ pub(super) struct Tick {
 }
 
 impl Tick {
-    /// A unit in femtoseconds.
+    /// Creates it from a unit in femtoseconds.
     pub(super) fn new(femtoseconds: u128) -> Self {
         let whole = (femtoseconds % 1000 == 0).then_some(femtoseconds / 1000);
         Self { femtoseconds, picoseconds: whole.and_then(|unit| u64::try_from(unit).ok()) }

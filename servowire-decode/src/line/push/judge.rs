@@ -15,25 +15,24 @@ use crate::settings::{Options, Settings};
 const PREVIEW: usize = 1 << 16;
 /// The same of a single channel.
 const PREVIEW_OF_ONE: usize = 1 << 12;
-/// What a line needs at its last chance: a request whose answer came.
+/// Score that a line needs at its last chance: a request whose answer came.
 const LEAST: i64 = 4;
-/// Channels that are tried in one survey, the busiest first.
+/// Maximum number of channels tried in one survey, the busiest first.
 const MOST_TRIED: usize = 4096;
-/// A channel in which nothing was found is examined again after this many times the edges by which it was judged.
+/// A channel in which nothing was found is examined again after this many times the edges that it was judged by.
 const PATIENCE: u64 = 8;
 
 impl PushDecoder {
-    /// Whether it is time for a survey.
+    /// Returns whether it is time for a survey.
     pub(super) fn is_due(&self) -> bool {
         match &self.held {
-            // Of each channel only the first edges are looked at.
+            // Only the first edges of each channel are examined.
             Some(held) => held.len() >= PREVIEW.min(self.names.len() * PREVIEW_OF_ONE),
             None => self.due || self.kept >= MOST_KEPT,
         }
     }
 
-    /// Judges the changes held back if there are twice as many as the last time, and keeps holding them back if no line is
-    /// certain.
+    /// Judges the changes held back if there are twice as many as last time; if no line is certain, they stay held back.
     pub(super) fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
         let held = self.held.as_ref().map_or(0, Vec::len);
         if held < FEWEST || held < 2 * self.tried {
@@ -65,7 +64,7 @@ impl PushDecoder {
             _ => Vec::new(),
         };
         let all = self.candidates.lines(readings, &judged, &edges);
-        // The last chance of what is not certain, or the only one where the user says that it is a line.
+        // The last chance of an uncertain line, or the only one if the user says that it is a line.
         let last = !early && self.found.is_empty() && (end || self.only.is_some() && self.candidates.is_asked_for());
         let (taken, passed) = self.choose(all, last);
         if early && taken.is_empty() {
@@ -74,7 +73,7 @@ impl PushDecoder {
         if last && many > MOST_TRIED && taken.iter().all(|found| !found.is_certain()) {
             out.note(&Note::Channels { file: self.file.clone(), moving: many, tried: MOST_TRIED });
         }
-        // What sounds in a line that is decoded already is no second one.
+        // A copy of a line that is already decoded is not a second line.
         for found in passed {
             for tap in &found.taps {
                 self.pass(tap.channel, None);
@@ -88,8 +87,8 @@ impl PushDecoder {
         if first { self.replay(out) } else { Ok(()) }
     }
 
-    /// The open channels with enough edges to be judged, only the busiest if there are too many; and how many have
-    /// edges.
+    /// Returns the open channels with enough edges to be judged (only the busiest if there are too many), and how many
+    /// channels have edges.
     fn moving(&self) -> (Vec<u16>, usize) {
         let mut moving: Vec<(u16, usize)> = Vec::new();
         for (channel, state) in (0_u16..).zip(&self.states) {
@@ -105,8 +104,8 @@ impl PushDecoder {
         (moving.into_iter().map(|(channel, _)| channel).collect(), many)
     }
 
-    /// Stops keeping the edges of channels that were judged by enough of them, and of all channels if there are too many in
-    /// all.
+    /// Stops keeping the edges of channels that were judged by enough of them, and of all channels if there are too many
+    /// edges in total.
     fn let_go(&mut self, judged: &[u16]) {
         for &channel in judged {
             if let Some(State::Open(edges)) = self.states.get(usize::from(channel)) {
@@ -127,7 +126,7 @@ impl PushDecoder {
         }
     }
 
-    /// The pair of channels that the user named.
+    /// Returns the pair of channels that the user named.
     fn said_pair(&self) -> Option<Found> {
         let channels = self.candidates.pair()?;
         let edges = |channel: u16| match self.states.get(usize::from(channel)) {
@@ -138,8 +137,8 @@ impl PushDecoder {
         self.candidates.read_pair(channels, [&edges(requests)?, &edges(answers)?])
     }
 
-    /// Lines that are good enough; only the best line gets the last chance. After them come the channels that only repeat
-    /// what is decoded.
+    /// Returns the lines that are good enough; only the best line gets the last chance. The channels that only repeat a
+    /// decoded line come second.
     fn choose(&self, all: Vec<Found>, last: bool) -> (Vec<Found>, Vec<Found>) {
         let bit = |found: &Found| 1_000_000_000_000 / i64::from(found.speech.rate.max(1));
         let again = |found: &Found| {
@@ -161,7 +160,7 @@ impl PushDecoder {
         (taken, passed)
     }
 
-    /// Edges that are kept of a channel.
+    /// Returns the number of edges kept of a channel.
     fn edges_of(&self, channel: u16) -> usize {
         self.states
             .get(usize::from(channel))
@@ -220,7 +219,7 @@ impl PushDecoder {
         Ok(())
     }
 
-    /// Reports what a line is if it differs from what the user said.
+    /// Returns what a line really is, if it differs from what the user said.
     fn rather(&self, found: &Found) -> Option<Found> {
         let [tap] = *found.taps.as_slice() else { return None };
         let Some(State::Open(edges)) = self.states.get(usize::from(tap.channel)) else { return None };

@@ -1,21 +1,22 @@
-//! Fields whose edges are all near to the grid of their speaker: bits and fit in one pass, in whole numbers.
+//! Reads fields whose edges are all near the grid of their speaker: bits and fit in one pass, in integers.
 
 use super::super::spikes::Edge;
 use super::reading::{Fit, Read};
 use crate::time::Time;
 
-/// Parts of a bit, in binary digits, in which places are counted, and those of distances whose squares are added up.
+/// Fraction bits of places, in bits of the line, and of the distances whose squares are added up.
 const PART: u32 = 48;
 const COARSE: u32 = 20;
 const ONE: i64 = 1 << PART;
-/// So far from its place, in parts of a bit, is an edge that is near to it. Even on the grid of a bit length that is a little
-/// different, as it is after this speech, the edge is that of the same bit.
+/// How far from its place, in fractions of a bit, an edge may be to count as near. Even on the grid of the slightly
+/// different bit length after this speech, the edge then belongs to the same bit.
 const NEAR: i64 = ONE * 15 / 100;
-/// An edge that is nearer than this is where it should be.
+/// An edge nearer than this counts as exactly in its place.
 const EXACT: i64 = ONE >> 12;
 /// Bits without a field after which another speaker may follow.
 pub(super) const OTHER_SPEAKER: u32 = 3;
-/// Longer fields, in bits, are not read here, nor bits of which a picosecond is fewer parts: those would be counted too coarsely.
+/// Fields longer than this, in bits, are not read here, nor are bits of which a picosecond is a smaller fraction: these
+/// would be counted too coarsely.
 const LONGEST: u32 = 30;
 const FEWEST: i64 = 1 << 20;
 /// A field on the grid by which it was read.
@@ -30,7 +31,7 @@ pub(super) struct Even {
 }
 
 impl Even {
-    /// The same on the grid of bits of `bit` picoseconds, of which the one by which it was read has `ratio`.
+    /// Returns the same on the grid of bits of `bit` picoseconds; the one used for reading is `ratio` times that.
     #[inline]
     pub(super) fn read(self, bit: f64, ratio: f64) -> Read {
         let shift = ((self.places + self.off) * ratio - self.places) * self.share;
@@ -42,7 +43,7 @@ impl Even {
 #[derive(Debug, Clone, Copy)]
 struct Field {
     first: Time,
-    /// Each edge turns all bits from its place on.
+    /// Each edge inverts all bits from its place onwards.
     bits: u32,
     edges: u32,
     off: i64,
@@ -58,14 +59,14 @@ impl Field {
     }
 }
 
-/// How the edges of a speaker are taken.
+/// How the edges of a speaker are interpreted.
 #[derive(Debug, Clone, Copy)]
 struct Grid {
-    /// Parts of a bit in a picosecond.
+    /// Fractions of a bit per picosecond.
     per: i64,
     /// Picoseconds of a field that is longer than any.
     longest: i64,
-    /// From this place on a falling edge is that of the next field, and from this one on that of another speaker.
+    /// The place from which a falling edge belongs to the next field, and the place from which it belongs to another speaker.
     last: i64,
     other: i64,
 }
@@ -79,7 +80,7 @@ impl Grid {
         (field_bits + OTHER_SPEAKER < LONGEST && per >= FEWEST).then_some(Self { per, longest, last, other })
     }
 
-    /// Where an edge lies in a field that began at `first`, in parts of a bit.
+    /// Returns where an edge lies in a field that began at `first`, in fractions of a bit.
     #[inline]
     fn place(self, edge: &Edge, first: Time) -> i64 {
         let time = edge.time.after(first);
@@ -88,8 +89,8 @@ impl Grid {
     }
 }
 
-/// Reads the fields of a speaker, of `field_bits` bits of `bit` picoseconds, and measures how they lie; `None` where an edge is far
-/// from its place, or a spike or a low level is where none should be.
+/// Reads the fields of a speaker, of `field_bits` bits of `bit` picoseconds, and measures how they lie; `None` if an edge
+/// is far from its place, or if there is a spike or low level where there should be none.
 pub(super) fn read(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<Even>) -> Option<Fit> {
     let grid = Grid::new(field_bits, bit)?;
     fields.clear();
@@ -125,8 +126,8 @@ pub(super) fn read(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<E
     (spikes == 0).then_some(fit)
 }
 
-/// Reads the fields of the next speaker whose edges are all where they should be, so that nothing has to be measured: how many
-/// edges these are.
+/// Reads the fields of the next speaker if all edges are exactly in their places, so that nothing has to be measured;
+/// returns the number of edges.
 pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<Even>) -> Option<usize> {
     let grid = Grid::new(field_bits, bit)?;
     fields.clear();
@@ -160,7 +161,7 @@ pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<
     (spikes == 0).then_some(count)
 }
 
-/// The field has no more edges. It ends high.
+/// Ends a field that has no more edges. It ends high.
 #[inline]
 fn close(field: Field, field_bits: u32, fit: &mut Fit, fields: &mut Vec<Even>) -> Option<()> {
     let Field { first, bits, edges, off, squares, places, spread, both } = field;

@@ -1,26 +1,26 @@
-//! Fields on the grid of their speaker.
+//! Reads fields on the grid of their speaker.
 
 use super::super::spikes::Edge;
 use super::reading::{Read, nearest};
 use crate::time::Time;
 
-/// Bits of a speaker.
+/// The bit timing of a speaker.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speaker {
-    /// Of a field, with start bit and delimiter.
+    /// Bits of a field, including start bit and delimiter.
     field_bits: u32,
-    /// Picoseconds of a bit, and bits of a picosecond.
+    /// Picoseconds per bit, and bits per picosecond.
     bit: f64,
     per: f64,
-    /// Picoseconds of a field, and from its first edge to where a falling edge is that of the next one.
+    /// Picoseconds of a field, and from its first edge to the point after which a falling edge belongs to the next field.
     pub(super) field: i64,
     last: i64,
-    /// The place in a field, in bits, from which on an edge is none of its grid.
+    /// The place in a field, in bits, after which an edge does not belong to its grid.
     inside: f64,
 }
 
 impl Speaker {
-    /// Fields of `field_bits` bits of `bit` picoseconds.
+    /// Creates the timing of fields of `field_bits` bits of `bit` picoseconds.
     pub(super) fn new(field_bits: u32, bit: f64) -> Self {
         let whole = f64::from(field_bits);
         Self {
@@ -34,12 +34,12 @@ impl Speaker {
     }
 }
 
-/// So far from its place is an edge that is near to it at most, and the start of a field from a bit of the line, in bits: both
-/// together are less than the half at which the edge would be that of another bit of the line.
+/// Maximum distance, in bits, of an edge that counts as near its place, and of the start of a field from a bit of the line:
+/// their sum is less than half a bit, at which the edge would belong to another bit of the line.
 const NEAR: f64 = 0.2;
 const ALIGNED: f64 = 0.25;
 
-/// The first field on its grid, and the edges of the next one. Its start bit begins with the first edge.
+/// Reads the first field on its grid, and returns the edges of the next one. Its start bit begins with the first edge.
 #[inline]
 pub(super) fn read(edges: &[Edge], speaker: Speaker) -> Option<(Read, &[Edge])> {
     let Speaker { field_bits, bit, per, last, inside, .. } = speaker;
@@ -79,19 +79,19 @@ pub(super) fn read(edges: &[Edge], speaker: Speaker) -> Option<(Read, &[Edge])> 
     Some((Read { bits, start: first.time + (shift * bit) as i64, spikes, is_even: level && off < NEAR }, next))
 }
 
-/// The bits of a line on which one speaks, put together from his fields.
+/// The bits of a line while one speaker sends, assembled from its fields.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     start: Option<Time>,
     bits: u128,
-    /// Whether they are the same as by the edges.
+    /// Whether they are the same as the edges give.
     is_even: bool,
 }
 
 impl Line {
     pub(super) const IDLE: Self = Self { start: None, bits: u128::MAX, is_even: true };
 
-    /// The next field.
+    /// Adds the next field.
     #[inline]
     pub(super) fn add(&mut self, read: &Read, speaker: Speaker) {
         let start = *self.start.get_or_insert(read.start);
@@ -102,13 +102,13 @@ impl Line {
         self.bits &= !zeros.checked_shl(at).unwrap_or(0);
     }
 
-    /// Bits of the line from the start of a field on, the first in bit 0.
+    /// Returns the bits of the line from the start of a field, the first in bit 0.
     pub(super) fn bits(self, edges: &[Edge], start: Time, speaker: Speaker) -> u128 {
         if self.is_even && self.start == Some(start) { self.bits } else { line_bits(edges, start, speaker.per) }
     }
 }
 
-/// Bits of a line from `start` on, of which a picosecond has `per`.
+/// Returns the bits of a line from `start`, with `per` bits per picosecond.
 #[cold]
 fn line_bits(edges: &[Edge], start: Time, per: f64) -> u128 {
     let place = |edge: &Edge| nearest(edge.time.after(start) as f64 * per);

@@ -10,16 +10,16 @@ const OFF: f64 = 0.065;
 const STEPS: i32 = 26;
 /// Mean square distance from the grid, in bits, up to which a known bit length is kept.
 const GOOD_FIT: f64 = 0.02;
-/// Mean square distance up to which the bit length heard last is taken without looking at the others.
+/// Mean square distance up to which the most recent bit length is used without examining the others.
 const PERFECT_FIT: f64 = 2e-4;
 /// Penalty per edge for a bit length far from the nominal one, as a fraction of the squared deviation in nominal bits:
 /// clocks are off by 2 %, and edges of a coarse or shaky recording by 0.07 of a bit. This matters because three edges fit
 /// many grids.
 const UNLIKELY: f64 = (0.07 * 0.07) / (0.02 * 0.02);
-/// Speakers whose bit lengths are remembered.
+/// Number of speakers whose bit lengths are remembered.
 const SPEAKERS: usize = 4;
 
-/// Sums over the edges of a field, whose first edge lies at 0.
+/// Adds up the edges of a field, whose first edge lies at 0.
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     count: f64,
@@ -46,8 +46,8 @@ impl Sums {
     }
 }
 
-/// How the edges lie on the grids of their fields of `field_bits`, of bits of `bit` picoseconds; each field has an offset of its
-/// own.
+/// Measures how the edges lie on the grids of their fields of `field_bits`, with bits of `bit` picoseconds; each field has
+/// its own offset.
 fn measure(edges: &[Edge], field_bits: u32, bit: f64) -> Fit {
     let mut fit = Fit { misfit: 0.0, above: 0.0, below: 0.0 };
     let Some((first, rest)) = edges.split_first() else { return fit };
@@ -88,13 +88,13 @@ fn measure(edges: &[Edge], field_bits: u32, bit: f64) -> Fit {
 pub(super) struct Found {
     /// In picoseconds.
     pub(super) bit: f64,
-    /// Whether it was measured, not only the best of all.
+    /// Whether it was measured, rather than only the best of those tried.
     pub(super) is_sure: bool,
-    /// As these edges alone tell it, in picoseconds, if they do.
+    /// The bit length by these edges alone, in picoseconds, if they determine it.
     pub(super) alone: Option<f64>,
     /// Mean square distance of the edges from the grid, in bits.
     pub(super) misfit: f64,
-    /// The bit length by which fields were read already, if they were.
+    /// The bit length by which the fields have already been read, if they have.
     pub(super) read_by: Option<f64>,
 }
 
@@ -105,8 +105,8 @@ pub(super) struct Tried {
     next: Vec<Even>,
 }
 
-/// The bit length that fits the edges: one that was heard before if it does, else the best around `nominal`. What was `heard` is
-/// led by that of the last speaker.
+/// Returns the bit length that fits the edges: a known one if it does, otherwise the best around `nominal`. In `heard`, the
+/// last speaker's comes first.
 pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec<f64>, tried: &mut Tried) -> Found {
     let mut best: Option<(Fit, usize)> = None;
     let mut read_by = None;
@@ -123,7 +123,7 @@ pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec
         }
     }
     if let Some((fit, at)) = best {
-        // The last one heard comes first.
+        // The most recent one comes first.
         if let Some(before) = heard.get_mut(..=at).filter(|before| before.len() > 1) {
             before.rotate_right(1);
         }
@@ -142,7 +142,7 @@ pub(super) fn fit(edges: &[Edge], field_bits: u32, nominal: f64, heard: &mut Vec
     found
 }
 
-/// The best of all bit lengths around `nominal`.
+/// Returns the best of all bit lengths around `nominal`.
 fn search(edges: &[Edge], field_bits: u32, nominal: f64) -> Found {
     let step = OFF / f64::from(STEPS);
     let against = UNLIKELY / edges.len().max(1) as f64;

@@ -1,6 +1,6 @@
-//! What was measured of a line while its fields were received.
+//! What was measured on a line while its fields were received.
 
-/// Many measurements of the same.
+/// Many measurements of the same quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Many {
     count: f64,
@@ -11,7 +11,7 @@ struct Many {
 impl Many {
     const NONE: Self = Self { count: 0.0, sum: 0.0, squares: 0.0 };
 
-    /// The mean, and how far it may be off, if there are enough.
+    /// Returns the mean and its standard error, if there are enough measurements.
     fn mean(self) -> Option<(f64, f64)> {
         let mean = self.sum / self.count;
         let variance = (self.squares / self.count - mean * mean).max(0.0);
@@ -19,10 +19,10 @@ impl Many {
     }
 }
 
-/// Measurements that a mean needs, and standard errors by which it may be off.
+/// Minimum number of measurements for a mean, and the number of standard errors by which it may be off.
 const FEWEST: f64 = 6.0;
 const SURE: f64 = 4.0;
-/// Clocks that differ by less are not told apart.
+/// Clocks that differ by less than this are not told apart.
 const SAME_CLOCK: f64 = 0.002;
 
 /// Bit rates measured on a line, relative to the nominal one.
@@ -34,11 +34,11 @@ pub struct Rates {
     pub most: f64,
     sum: f64,
     weight: f64,
-    /// Of who speaks after a pause, as a controller does, and of who answers at once.
+    /// Rates of the end that speaks after a pause, as a controller does, and of the end that answers at once.
     ends: [Many; 2],
     /// Spikes dropped so far.
     pub spikes: u64,
-    /// Edges that stayed.
+    /// Edges that were kept.
     pub edges: u64,
     /// Spikes that were dropped near a rising edge, and near a falling one.
     pub spikes_at: [u64; 2],
@@ -82,7 +82,7 @@ impl Rates {
         Self { spikes, edges, ..Self::default() }
     }
 
-    /// An edge that stays, and the spikes dropped before it.
+    /// Counts an edge that is kept, and the spikes dropped before it.
     #[inline]
     pub(crate) fn count_edge(&mut self, spikes: u32) {
         self.spikes += u64::from(spikes);
@@ -96,7 +96,7 @@ impl Rates {
         self.weigh(rate, 1.0);
     }
 
-    /// The rate of one end of the line, of that which `answers` or of the other one.
+    /// Adds the rate of one end of the line: the one that `answers`, or the other one.
     #[inline]
     pub(super) fn spoke(&mut self, answers: bool, rate: f64) {
         let [asking, answering] = &mut self.ends;
@@ -113,7 +113,7 @@ impl Rates {
         differ.then(|| [1.0 + asking.min(answering), 1.0 + asking.max(answering)])
     }
 
-    /// A rate counts in the mean.
+    /// Adds a rate to the mean.
     pub(super) fn weigh(&mut self, rate: f64, weight: f64) {
         self.sum += rate * weight;
         self.weight += weight;

@@ -31,7 +31,7 @@ impl Ring {
         self.around
     }
 
-    /// Whether a piece is being written.
+    /// Returns whether a piece is being written.
     pub(super) fn is_inside(&self) -> bool {
         self.inside.is_some()
     }

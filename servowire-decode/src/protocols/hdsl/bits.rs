@@ -1,4 +1,4 @@
-//! Edges of the pair as bits, with the time of each.
+//! Converts edges of the pair to bits, with the time of each.
 
 mod again;
 mod grid;
@@ -15,50 +15,51 @@ use crate::time::{Clock, Time};
 
 pub(super) use again::{Again, RESET};
 
-/// Samples of a bit on a grid of samples.
+/// Samples per bit on a grid of samples.
 pub(super) const SAMPLES: u64 = 8;
 /// Longest run that is taken bit by bit; a longer one is a pause.
 pub(super) const PAUSE: u64 = 200;
-/// A speaker's bit may be so far from the nominal one, in per cent.
+/// How far a speaker's bit may be from the nominal one, in per cent.
 const OFF: i64 = 6;
-/// An edge so far from the grid, in per cent of a bit, is that of another speaker.
+/// An edge at least this far from the grid, in per cent of a bit, comes from another speaker.
 const ELSEWHERE: i64 = 30;
-/// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
+/// An edge within one part in this many of a bit is on the grid: neither the grid nor the bit length is adjusted to it.
 const ON_GRID: i64 = 32;
-/// Heads that are measured, and two of so many after them.
+/// How many heads are measured first, and out of how many two are measured after that.
 const MEASURED: u64 = 256;
 const SOME: u64 = 16;
-/// The distance of two heads, in parts of a bit, is known to be whole bits if it is so far from them at most.
+/// The distance of two heads counts as whole bits if it is at most this far from them, in bits.
 const WHOLE: f64 = 0.3;
-/// Edges whose mean distance from the grid is more than this part of a bit may be on the wrong side of it now and then.
+/// If the mean distance of edges from the grid is more than one part in this many of a bit, some edges may fall on the
+/// wrong side.
 const JITTERY: i64 = 13;
-/// Edges over which this is a mean, as a power of two.
+/// Number of edges in this mean, as a power of two.
 const JITTER_EDGES: u32 = 6;
-/// Edges after longer runs than this tell nothing of the bit length.
+/// Edges after runs longer than this say nothing about the bit length.
 pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
-/// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
+/// Fraction bits of the bit length in picoseconds, and of positions in bits.
 const FINE: u32 = 16;
 const PART: u32 = 40;
-/// How much the distance of an edge from the grid moves the bit length, in parts of a picosecond, by the bits of the run
-/// before it: 0.06 of it after one bit. Longer runs than these tell nothing.
+/// How much the distance of an edge from the grid changes the bit length, in fractions of a picosecond, for each length of
+/// the preceding run in bits: 0.06 of it after one bit. Longer runs say nothing.
 const ADAPT: [i64; 11] = {
     const ONE: i64 = (6 << FINE) / 100;
     [0, ONE, ONE / 2, ONE / 3, ONE / 4, ONE / 5, ONE / 6, ONE / 7, ONE / 8, ONE / 9, ONE / 10]
 };
 
-/// Bits of the line. The grid follows the edges of whoever drives.
+/// Bits of the line. The grid follows the edges of the present driver.
 pub(super) struct Bits {
     spikes: Spikes,
-    /// The nominal length in picoseconds, and in parts of them.
+    /// The nominal length of a bit in picoseconds, and in fractions of a picosecond.
     nominal: i64,
     fine: i64,
-    /// The present length in parts of a picosecond, and its inverse as it was not long ago.
+    /// The present length in fractions of a picosecond, and a recent value of its inverse.
     bit: i64,
     inverse: i64,
     inverse_of: i64,
-    /// The mean distance of edges from the grid in picoseconds, by the power of two of `JITTER_EDGES`.
+    /// The mean distance of edges from the grid in picoseconds, times 2^`JITTER_EDGES`.
     jitter: i64,
-    /// Where the grid has the last edge, and the level since.
+    /// Where the last edge lies on the grid, and the level since.
     last: Option<(Time, bool)>,
     /// 64 bits each, the first in bit 0.
     words: Vec<u64>,
@@ -67,9 +68,9 @@ pub(super) struct Bits {
     end: u64,
     /// Places of edges.
     marks: Vec<Mark>,
-    /// The one that was asked for last: the next question is about one near it.
+    /// The mark looked up last: the next look-up is near it.
     asked: Cell<usize>,
-    /// Bit after a pause too long for its bits to be kept.
+    /// The bit after a pause that was too long to keep its bits.
     pub(super) paused: Option<u64>,
     heard: Heard,
 }
@@ -82,11 +83,11 @@ pub(super) struct Mark {
     pub(super) time: Time,
     /// The level after it.
     pub(super) level: bool,
-    /// Up to the next mark all edges lie on a grid of samples.
+    /// The grid of samples on which all edges up to the next mark lie.
     pub(super) grid: Option<Grid>,
 }
 
-/// Where edges lie that have no marks of their own.
+/// Where edges without their own marks lie.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
     /// Number of the sample at the mark.
@@ -94,7 +95,7 @@ pub(super) struct Grid {
     pub(super) clock: Clock,
 }
 
-/// What was heard of the line: edges, spikes, and heads with the time and the bits from one to the next.
+/// Measurements of the line: edges, spikes, and heads with the time and the bits between them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Heard {
     edges: u64,
@@ -144,7 +145,7 @@ impl Bits {
         self.inverse = (1_i64 << (PART + FINE)) / self.bit.max(1);
     }
 
-    /// What was measured of the line.
+    /// Returns the measurements of the line.
     pub(super) fn rates(&self) -> Rates {
         let mut rates = Rates::of(self.heard.edges, self.heard.spikes);
         if self.heard.bits > 0 {
@@ -154,13 +155,13 @@ impl Bits {
         rates
     }
 
-    /// The mean length of a bit in picoseconds, by the heads.
+    /// Returns the mean length of a bit in picoseconds, measured from the heads.
     pub(super) fn mean(&self) -> f64 {
         let Heard { time, bits, .. } = self.heard;
         if bits > 0 { time as f64 / bits as f64 } else { self.nominal as f64 }
     }
 
-    /// The heads at two bits are so many bits of the same clock apart.
+    /// Notes that the heads at two bits are this many bits of the same clock apart.
     pub(super) fn learn(&mut self, heads: Range<u64>, bits: u64) {
         self.measure(self.time(heads.end) - self.time(heads.start), bits as i64);
     }
@@ -169,7 +170,7 @@ impl Bits {
         (self.heard.time, self.heard.bits) = (self.heard.time.saturating_add(time), self.heard.bits + bits);
     }
 
-    /// A head begins at bit `at`: the first ones are all measured, later only some. All frames are whole bits.
+    /// Notes a head at bit `at`: the first ones are all measured, later only some. All frames are whole bits.
     pub(super) fn heard_head(&mut self, at: u64) {
         self.heard.heads += 1;
         if self.heard.heads > MEASURED && self.heard.heads % SOME > 1 {
@@ -186,7 +187,7 @@ impl Bits {
         }
     }
 
-    /// Whether edges are so far from the grid that bits which hold may be wrong all the same.
+    /// Returns whether edges are so far from the grid that bits may be wrong although they pass their checks.
     pub(super) fn is_jittery(&self) -> bool {
         (self.jitter >> JITTER_EDGES) * JITTERY > self.nominal
     }
@@ -205,14 +206,14 @@ impl Bits {
         }
     }
 
-    /// The line has not changed until `time`: what is certain of it becomes bits.
+    /// The line has not changed until `time`: turns the certain part of it into bits.
     pub(super) fn reach(&mut self, time: Time) {
         for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge.time, edge.level, edge.spikes);
         }
     }
 
-    /// The capture ends at `time`; the last level is held for some bits so that what it began can be read.
+    /// The capture ends at `time`; the last level is held for some bits so that a frame under way can be read.
     pub(super) fn finish(&mut self, time: Time, hold: f64) {
         self.reach(time + self.length() as i64);
         if let Some((since, level)) = self.last {
@@ -234,7 +235,7 @@ impl Bits {
             self.pause(time, before, level);
             return;
         }
-        // Half a bit, where another speaker begins, always goes the same way.
+        // Half a bit, where another speaker begins, is always rounded the same way.
         let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
         let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
         self.jitter -= self.jitter >> JITTER_EDGES;
@@ -243,7 +244,7 @@ impl Bits {
             Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
                 self.jitter += off.abs();
                 self.adapt(off * part);
-                // The grid follows half-way.
+                // The grid moves half-way to the edge.
                 time - (off >> 1)
             }
             _ => time,
@@ -261,7 +262,7 @@ impl Bits {
         self.marks.push(Mark { bit: self.end, time, level, grid: None });
     }
 
-    /// An edge after a pause.
+    /// Takes an edge after a pause.
     #[cold]
     fn pause(&mut self, time: Time, before: bool, level: bool) {
         self.paused = Some(self.end + PAUSE);
@@ -270,7 +271,7 @@ impl Bits {
         self.mark(time, level);
     }
 
-    /// The bit becomes longer by this many parts of a picosecond.
+    /// Lengthens the bit by this many fractions of a picosecond.
     #[inline]
     fn adapt(&mut self, parts: i64) {
         let most = self.fine / 100 * OFF;
@@ -304,18 +305,18 @@ impl Bits {
         }
     }
 
-    /// Number of the bit after the last one.
+    /// Returns the number of the bit after the last one.
     pub(super) fn end(&self) -> u64 {
         self.end
     }
 
-    /// Up to 128 bits from bit `at` on.
+    /// Returns up to 128 bits from bit `at` onwards.
     pub(super) fn window(&self, at: u64) -> Window {
         let len = self.end.saturating_sub(at).min(128) as u32;
         Window::from_bits(self.load(at), len).unwrap_or(Window::EMPTY)
     }
 
-    /// 128 bits from bit `at` on; after the end they are 0.
+    /// Returns 128 bits from bit `at` onwards; they are 0 after the end.
     pub(super) fn load(&self, at: u64) -> u128 {
         let from = at.saturating_sub(self.first);
         let word = |k: u64| usize::try_from(from / 64 + k).ok().and_then(|k| self.words.get(k)).copied().unwrap_or(0);
@@ -326,7 +327,7 @@ impl Bits {
         }
     }
 
-    /// When a bit begins.
+    /// Returns when a bit begins.
     pub(super) fn time(&self, at: u64) -> Time {
         let is_after = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
         let mut mark = self.asked.get().min(self.marks.len());
@@ -346,7 +347,7 @@ impl Bits {
         time + ((at as i64 - bit as i64) as f64 * self.length()) as i64
     }
 
-    /// When bit `at` begins by the clock of who speaks then: the edge before it may be somebody else's.
+    /// Returns when bit `at` begins by the clock of the speaker after it: the edge before it may belong to another speaker.
     pub(super) fn time_by_next(&self, at: u64) -> Time {
         let bits = self.load(at.saturating_sub(1));
         let edge = u64::from((bits ^ bits >> 1).trailing_zeros());
@@ -354,7 +355,7 @@ impl Bits {
         self.time(at + edge) - (edge as f64 * self.length()) as i64
     }
 
-    /// The last bit up to `at` that differs from the one before it; `first` where none does.
+    /// Returns the last bit up to `at` that differs from the previous one; `first` if none does.
     fn last_edge(&self, first: u64, at: u64) -> u64 {
         // Runs on a grid are short.
         let from = first.max(at.saturating_sub(LONGEST_RUN as u64)).max(self.first);
@@ -368,7 +369,7 @@ impl Bits {
         Place::Time { start, end: start + ((bits.end - bits.start) as f64 * self.length()) as i64 }
     }
 
-    /// Bits before `at` are no longer of interest.
+    /// Forgets the bits before `at`.
     pub(super) fn forget(&mut self, at: u64) {
         let words = (at.saturating_sub(self.first) / 64).min(self.words.len() as u64);
         if words < 64 {

@@ -1,4 +1,4 @@
-//! Bits of the link into frames, answers and messages.
+//! Decodes bits of the link to frames, answers and messages.
 
 mod answer;
 mod heads;
@@ -22,41 +22,41 @@ use crate::event::{Direction, Field, NO_RESPONSE, Place};
 use crate::sink::Sink;
 use crate::time::Time;
 
-/// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
+/// Bits that must be available before a frame is looked for: longest head, direction switch, delay, answer.
 const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
-/// Bits that are taken together where there are enough.
+/// Bits that are taken together if there are enough.
 const MANY: u64 = 16 * NEED;
-/// Bits that are kept to say what there was instead of a frame.
+/// Bits that are kept to report what came instead of a frame.
 const KEPT: u64 = 4096;
-/// Frames for which a line is taken as shaky after a second look has helped.
+/// Number of frames for which a line counts as shaky after a second look has helped.
 const SHAKY: u8 = 32;
 
-/// Good words and checks from which an answer is where it was looked for.
+/// Minimum number of good words and checks for an answer to be where it was looked for.
 const GOOD: usize = 10;
-/// Answers from which the delay is learned, and bits in which they are.
+/// Number of answers from which the delay is learned, and of bits that contain them.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
-/// So many answers that hold in another place say that the delay has changed.
+/// After this many answers that are valid in another place, the delay has changed.
 const MOVED: u8 = 3;
-/// Of an encoder whose identifier was not seen: 11 bits of acceleration, 40 of position.
+/// Assumed for an encoder whose identifier was not seen: 11 bits of acceleration, 40 of position.
 const WIDEST: EncoderId = EncoderId::truncate(0x001d3);
 
-/// Two answers between which the running disparity does not go on.
+/// Two answers between which the running disparity is not continuous.
 #[derive(Debug, Clone, Copy)]
 struct Break {
-    /// Their numbers.
+    /// Numbers of their events.
     ends: u64,
     begins: u64,
-    /// Whether all words of either that may be the wrong one are under a check: of the secondary channel or the acceleration, and of the
-    /// vertical channel.
+    /// Whether all suspect words of each are covered by a check: in the first by the one of the secondary channel or the
+    /// acceleration, in the second by the one of the vertical channel.
     tail_is_checked: bool,
     front_is_checked: bool,
-    /// Whether the V-frame of the first has a bad check in channel 2, if it was another one.
+    /// Whether the V-frame of the first has a bad check in channel 2, if the second belongs to another V-frame.
     first_failed: Option<bool>,
 }
 
-/// Where an answer is: the delay of the link and its own in bits, how well it holds there, and whether another one holds
-/// where none was so far.
+/// Where an answer is: the delay of the link and its own delay in bits, how valid it is there, and whether one is valid in
+/// a place where none has been so far.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     usual: u32,
@@ -65,7 +65,8 @@ struct Placed {
     elsewhere: bool,
 }
 
-/// An answer to compare with the next: the running disparity of its words, its number, and whether it is good by itself.
+/// An answer to compare with the next: the running disparity of its words, the number of its event, and whether it is good
+/// by itself.
 #[derive(Debug, Clone, Copy)]
 struct Neighbour {
     chain: Chain,
@@ -77,26 +78,26 @@ struct Neighbour {
 pub(super) struct Decoder {
     /// The bit at which to go on.
     next: u64,
-    /// The last head, its bits, and how far it was from the one before.
+    /// The last head, its number of bits, and its distance from the previous one.
     head: Option<u64>,
     head_len: u64,
     apart: Option<u64>,
-    /// The head before it, and where its frame's answer was over; the head whose frame was looked at again.
+    /// The head before it, the end of the answer in that frame, and the head whose frame was examined again.
     before: Option<u64>,
     after: u64,
     again: Option<u64>,
-    /// Up to here all edges lie on the grid of that head, those of later answers too, which have grids of their own.
+    /// Up to here all edges lie on the grid of that head, even those of later answers, which have their own grids.
     laid: u64,
-    /// So many frames are looked at again whether they fail or not: it helped not long ago.
+    /// Number of frames still to be examined again even if they do not fail, because that has recently helped.
     shaky: u8,
     delay: Option<u32>,
     /// Time from the end of a head to its answer, in picoseconds.
     lag: Option<i64>,
-    /// So many answers in a row hold elsewhere.
+    /// Number of consecutive answers that were valid in another place.
     elsewhere: u8,
-    /// `None` only if there were encoders that it cannot follow.
+    /// `None` only for an encoder that it cannot follow.
     fast: Option<FastPosition>,
-    /// The identifier, or how far safe positions reached as long as it is not known.
+    /// The identifier, and the range of the safe positions as long as it is unknown.
     id: Option<EncoderId>,
     reach: Reach,
     quality: Quality,
@@ -105,20 +106,20 @@ pub(super) struct Decoder {
     at: Option<u8>,
     messages: Messages,
     heads: HeadRules,
-    /// The last frame carried a nibble; the number of its head, if the one before did not.
+    /// Whether the last frame carried a nibble; and the number of its head's event, if the frame before did not.
     talks: bool,
     lone: Option<u64>,
     /// Frames since the last head without a nibble.
     since_quiet: u8,
     beginnings: Beginnings,
-    /// The answer before, if no frame lies between.
+    /// The previous answer, if there is no frame in between.
     chain: Option<Neighbour>,
     breaks: Vec<Break>,
-    /// Whether a check of the last V-frame failed, of each channel; none while one is not complete.
+    /// Whether a check failed in each channel of the last V-frame; `None` while it is incomplete.
     failed: Option<[bool; 2]>,
     /// The first event of this V-frame.
     begun: Option<u64>,
-    /// VSYNC where it was not due, or not where it was.
+    /// Unexpected or missing VSYNCs.
     strays: u8,
     said: Said,
 }
@@ -159,24 +160,24 @@ impl Decoder {
         }
     }
 
-    /// Number of the first event of which later frames may still tell.
+    /// Returns the number of the first event that later frames may still affect.
     fn settled(&self) -> u64 {
         let open =
             [self.begun, self.lone, self.chain.map(|chain| chain.number), self.breaks.first().map(|first| first.ends)];
         open.into_iter().flatten().min().unwrap_or(u64::MAX)
     }
 
-    /// Bits from which on frames are looked for.
+    /// Returns the number of bits from which frames are looked for.
     pub(super) fn enough(&self) -> u64 {
         self.next + if self.delay.is_none() { LESSON } else { MANY }
     }
 
-    /// Whether it is known where answers are.
+    /// Returns whether the place of the answers is known.
     pub(super) fn is_running(&self) -> bool {
         self.delay.is_some()
     }
 
-    /// Takes the frames of which all bits are there.
+    /// Takes the frames whose bits are all available.
     pub(super) fn take(&mut self, bits: &mut Bits, out: &mut dyn Sink) -> io::Result<()> {
         self.take_from(bits, NEED, out)
     }
@@ -184,7 +185,7 @@ impl Decoder {
     /// Takes what is left.
     pub(super) fn finish(&mut self, bits: &mut Bits, out: &mut dyn Sink) -> io::Result<()> {
         self.take_from(bits, u64::from(Head::BITS), out)?;
-        // No later head says that one is missing: the last edges are looked at again for it.
+        // No later head shows that one is missing, so the last edges are examined again for it.
         while self.looks_behind_the_last(bits) {
             self.take_from(bits, u64::from(Head::BITS), out)?;
         }
@@ -192,7 +193,7 @@ impl Decoder {
         self.said.give(u64::MAX, out)
     }
 
-    /// Takes all frames that are there; fewer than `need` bits are kept for the next time.
+    /// Takes all available frames; fewer than `need` bits are kept for the next call.
     fn take_from(&mut self, bits: &mut Bits, need: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.next + need <= bits.end() {
             let at = self.next;
@@ -220,7 +221,7 @@ impl Decoder {
             bits.heard_head(at);
             self.missed(bits, at);
             if self.at != due {
-                // It is not the frame that it seemed to be.
+                // It is not the frame that it appeared to be.
                 heads = self.heads;
                 broken = heads.check(found.head, bits.window(at), self.at);
             }
@@ -235,7 +236,7 @@ impl Decoder {
                 if !whole {
                     break;
                 }
-                // In a link that runs, no frame asks for a pattern or the identifier.
+                // In a running link no frame asks for a pattern or the identifier.
                 let start_up = symbol.ok().filter(|symbol| symbol.is_start_up() && !found.head.byte.first());
                 self.next = self.answer(start_up, bits, at, len, running);
                 self.after = self.next;
@@ -255,7 +256,7 @@ impl Decoder {
         }
     }
 
-    /// Frames that were not heard: the fast position and the V-frame go on without them.
+    /// Accounts for frames that were not heard: the fast position and the V-frame continue without them.
     fn lose(&mut self, frames: u8) {
         for _ in 0..frames {
             self.step(None);
@@ -265,7 +266,7 @@ impl Decoder {
         self.lose_v_frame();
     }
 
-    /// Forgets where in a V-frame the next frame is.
+    /// Forgets the place of the next frame in its V-frame.
     fn lose_v_frame(&mut self) {
         (self.at, self.failed, self.begun, self.strays) = (None, None, None, 0);
         if let Some(fast) = &mut self.fast {
@@ -274,15 +275,15 @@ impl Decoder {
         self.settle(None);
     }
 
-    /// Where the answer behind bit `from` is.
+    /// Returns where the answer after bit `from` is.
     fn place_of_answer(&self, start_up: bool, bits: &Bits, from: u64) -> Placed {
         let line = |delay: u32| bits.window(from + u64::from(delay));
         let usual = match self.delay {
             Some(delay) => delay,
             None => usual_delay(bits, from),
         };
-        // The delay of a cable does not change, but it need not be whole bits. What is perfect is where it is; of a
-        // damaged answer some words, or all, may hold a bit beside it by chance, so there the time decides.
+        // The delay of a cable does not change, but it need not be whole bits. A perfect answer is certainly in its place;
+        // some or all words of a damaged answer may be valid one bit beside it by chance, so the time decides there.
         let since = |delay: u32| bits.time_by_next(from + u64::from(delay)) - released(bits, from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
         let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !start_up;
@@ -301,7 +302,7 @@ impl Decoder {
         Placed { usual, delay: best.0, score: best.1, elsewhere }
     }
 
-    /// The answer to the head of `len` bits at bit `at`, which may be damaged; where to go on.
+    /// Takes the answer to the head of `len` bits at bit `at`, which may be damaged; returns where to continue.
     fn answer(
         &mut self,
         start_up: Option<MasterSymbol>,
@@ -391,14 +392,14 @@ impl Decoder {
         }
     }
 
-    /// A message that the master ends with this symbol.
+    /// Takes a symbol of the master, which may end a message.
     fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place) {
         if let Some(field) = symbol.ok().and_then(|symbol| self.messages.asked(symbol)) {
             self.said.push(event(place, Direction::Request, "message", vec![field], Ok(())));
         }
     }
 
-    /// A message that the encoder ends with this byte, or with one that cannot be read.
+    /// Takes a byte of the encoder, or an unreadable one, which may end a message.
     fn message_in(&mut self, byte: Option<EncoderByte>, place: Place) {
         let symbol = byte.and_then(|byte| byte.symbol().ok());
         let Some(result) = self.messages.answered(symbol) else { return };
@@ -407,12 +408,13 @@ impl Decoder {
     }
 }
 
-/// When the line is free behind the direction switch, the bit before bit `from`, by the clock of the head.
+/// Returns when the line is released after the direction switch, the bit before bit `from`, by the clock of the head.
 fn released(bits: &Bits, from: u64) -> Time {
     bits.time(from.saturating_sub(RESET + 1)) + ((RESET + 1) as f64 * bits.mean()) as i64
 }
 
-/// The delay at which most of the answers after the heads of `LEARNED` frames hold, the first of them before bit `from`.
+/// Returns the delay at which most answers to the heads of `LEARNED` frames are valid; the first of these heads ends before
+/// bit `from`.
 fn usual_delay(bits: &Bits, from: u64) -> u32 {
     let delays = 0..=u32::from(Delay::MAX.get()) + 1;
     let mut sums = vec![0; delays.clone().count()];
@@ -429,13 +431,13 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     best.map_or(0, |(delay, _)| delay)
 }
 
-/// The heads in the first bits of a link, from that of `len` bits at bit `at` on.
+/// Returns the heads in the first bits of a link, starting with the one of `len` bits at bit `at`.
 fn heads_from(bits: &Bits, at: u64, len: u64) -> Vec<(u64, u64)> {
     let next = |(at, len): &(u64, u64)| next_head(bits, at + len);
     std::iter::successors(Some((at, len)), next).take_while(|(head, _)| head - at <= LESSON).collect()
 }
 
-/// Where the next head begins, at bit `from` or later, and its bits.
+/// Returns where the next head begins, at bit `from` or later, and its number of bits.
 fn next_head(bits: &Bits, from: u64) -> Option<(u64, u64)> {
     (from..(bits.end() + 1).saturating_sub(Head::BITS.into()))
         .find_map(|at| find_head(bits.window(at)).map(|found| (at, u64::from(found.len))))

@@ -4,7 +4,7 @@ use hdsl::{EncoderId, Error, PositionBits};
 
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Verdict};
 
-/// The class of a check, and what it found.
+/// The class of a check, and what the check found.
 pub(super) type Refused = (&'static str, String);
 
 pub(super) fn refusal(error: Error) -> Refused {
@@ -25,7 +25,7 @@ pub(super) fn event(
     Event::new(place, Some(direction), kind, fields, verdict)
 }
 
-/// A position of 40 bits by its name in the register map, which also says where it begins again if the encoder is known.
+/// Creates a 40-bit position under its name in the register map, and with the value at which it wraps if the encoder is known.
 pub(super) fn position(name: &'static str, raw: u64, id: Option<EncoderId>) -> Position {
     let bits = id.and_then(|id| id.check().ok()).map_or(40, PositionBits::get);
     let counts = id.map_or_else(|| i64::try_from(raw).unwrap_or(i64::MAX), |id| id.position(raw));

@@ -1,4 +1,4 @@
-//! Events that later frames may still refuse.
+//! Holds events that later frames may still refuse.
 
 use std::collections::VecDeque;
 use std::io;
@@ -33,7 +33,7 @@ impl Said {
         }
     }
 
-    /// What good events from number `from` on hold as `name` is not certain.
+    /// Marks the field `name` as uncertain in the good events from number `from` onwards.
     pub(super) fn withhold(&mut self, from: u64, name: &str) {
         let first = self.first;
         let events = (first..).zip(&mut self.events).filter(|(number, event)| *number >= from && event.verdict.is_ok());

@@ -58,7 +58,7 @@ pub(super) fn request(group: &Frames, result: Result<Request, Error>) -> Event {
     })
 }
 
-/// The content bits of a field of a request: the byte of a memory data frame stands behind its sync and frame code.
+/// Returns the content bits of a field in a request: the byte of a memory data frame comes after its sync and frame code.
 fn place_in_request(operation: Operation, name: &str) -> Option<(u32, u32)> {
     let (first, last) = match (operation, name) {
         (_, "EA") => return Some((5, 7)),
@@ -73,7 +73,7 @@ fn place_in_request(operation: Operation, name: &str) -> Option<(u32, u32)> {
     Some((16 * first + 5, 16 * last + 12))
 }
 
-/// The content bits of a field of a reply; the data begin behind the 16 of the information field.
+/// Returns the content bits of a field in a reply; the data begin after the 16 bits of the information field.
 fn place_in_reply(layout: Layout, name: &str) -> Option<(u32, u32)> {
     let data = |first: u32, bits: u32| Some((16 + first, 15 + first + bits));
     let abs = u32::from(layout.abs_bits());
@@ -128,7 +128,7 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
     widths: Widths,
-    /// By address: what the type word said, once the line has carried it.
+    /// By address: the content of the type word, once it has been seen on the line.
     hints: [Option<Resolution>; 8],
     motion: [Motion; 8],
 }
@@ -174,7 +174,7 @@ impl Encoder {
         });
         event.position = position;
         event.delay = delay;
-        // Whose a damaged reply is tells the request, unless it was for all.
+        // The request shows whose a damaged reply is, unless it addressed all encoders.
         let only = asked.filter(|request| !request.command().is_multi_response()).map(|request| request.ea);
         event.address = result.ok().map(|response| response.ea).or(only).map(|ea| ea.get().into());
         event
@@ -206,7 +206,7 @@ impl Encoder {
         let Some(resolution) = self.resolution(response.ea) else {
             return Some(Position { name: "ABS", counts, span: Some(1 << bits), per_turn: None });
         };
-        // Where the fields put the shaft, for looking at. What else speaks against it stands beside it.
+        // Shows the position given by the fields. Any other reason against it is shown beside it.
         let shown = Tolerated::SINGLE_TURN.status(EncoderStatus::all()).alarms(Alm::all());
         match Evidence::of(response, resolution, 0).at(0, Policy::new(0).tolerating(shown)) {
             Ok(_) => Some(Position {
@@ -232,7 +232,7 @@ impl Encoder {
             Some(Data::Status { pm_alm, .. }) if pm_alm.bits() != 0 => fields.push(Field::flags("PM-ALM", &pm_alm, 2)),
             Some(Data::Eeprom { data, address }) => {
                 fields.push(Field::hex("address", address, 2));
-                // While the memory is busy the data say nothing.
+                // While the memory is busy, the data mean nothing.
                 if !response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY)) {
                     fields.push(Field::hex("data", data, 4));
                     if address == TypeWord::EEPROM_ADDRESS && response.command() == Some(Command::EepromRead) {
@@ -259,7 +259,7 @@ impl Encoder {
         }
     }
 
-    /// The widths as the user gave them, else as the type word of this encoder has them.
+    /// Returns the widths as the user gave them, otherwise from the type word of this encoder.
     fn resolution(&self, ea: EncoderAddress) -> Option<Resolution> {
         let hint = self.hints.get(usize::from(ea.get())).copied().flatten();
         let (st, mt) = self.widths.or(hint.map(|hint| (hint.st_bits(), hint.mt_bits())))?;
@@ -267,7 +267,7 @@ impl Encoder {
     }
 }
 
-/// No reply came to the request at `place` until `now`.
+/// Reports that no reply came to the request at `place` by `now`.
 pub(super) fn silence(request: Request, place: Place, timeout: i64, now: Time, asked: bool) -> Event {
     let kind = request.command().name();
     let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
@@ -275,7 +275,7 @@ pub(super) fn silence(request: Request, place: Place, timeout: i64, now: Time, a
     Event { fields: vec![Field::number("EA", ea)], address: Some(ea.into()), ..silence }
 }
 
-/// The content bits as vendor documents print them, the first bit of the line in bit 15.
+/// Returns the content bits as vendor documents print them, with the first bit of the line in bit 15.
 fn words(group: &Frames) -> Field {
     Field::digits("words", group.contents().iter().map(|content| content.reverse_bits()), 4)
 }

@@ -1,4 +1,4 @@
-//! Frames that make a request or a reply.
+//! Frames that make up a request or a reply.
 
 use nikon_aformat::inspect::Kind;
 use nikon_aformat::{Error, RawResponse, Request, RequestFrame};
@@ -9,12 +9,12 @@ use crate::protocols::group::Group;
 pub(super) type Frames = Group<u16, { RawResponse::MAX_FRAMES }>;
 
 impl Frames {
-    /// By its first frame.
+    /// Returns the kind, judged by the first frame.
     pub(super) fn kind(&self) -> Kind {
         self.contents().first().map_or(Kind::Other, |first| Kind::of(*first))
     }
 
-    /// The frames of the request, as far as they are there.
+    /// Parses the frames of the request received so far.
     pub(super) fn request(&self) -> Result<Request, Error> {
         let mut frames = Vec::with_capacity(self.len());
         for (frame, content) in (0..).zip(self.contents()) {
@@ -26,7 +26,7 @@ impl Frames {
         Request::parse(&frames)
     }
 
-    /// Frames of the whole request, as its first frame has it.
+    /// Returns the number of frames in the whole request, according to its first frame.
     pub(super) fn request_frames(&self) -> usize {
         let first = self.contents().first().map(|content| RequestFrame::from_content(*content));
         let expected = first.and_then(Result::ok).map(Request::expected_frames);

@@ -7,20 +7,20 @@ use rtex_block::{BlockSize, LEN, LEN32};
 
 use crate::capture::hexlog::Burst;
 
-/// Blocks after which it is asked again whether the shape still holds.
+/// Number of blocks after which the shape is checked again.
 const WINDOW: usize = 64;
-/// Bytes by which size and byte order are recognised.
+/// Number of bytes from which size and byte order are recognised.
 const SAMPLE: usize = WINDOW * LEN32;
 
 /// Collects the bytes of a log into blocks.
 pub(super) struct Blocks {
-    /// The size that the user has said.
+    /// The size given by the user.
     said: Option<usize>,
     shape: Option<LogShape>,
     size: usize,
     /// Bytes of most lines or records.
     line: usize,
-    /// Blocks go on from one line to the next, as the lines do not hold whole ones.
+    /// Blocks continue from one line to the next, because the lines do not hold whole blocks.
     flow: bool,
     /// Bytes still to be skipped before the first block.
     skip: usize,
@@ -28,15 +28,15 @@ pub(super) struct Blocks {
     rest: Vec<u8>,
     at: usize,
     began: Burst,
-    /// Part of the present block is lost.
+    /// Whether part of the present block is lost.
     lost: bool,
-    /// The last blocks as they were read, and how many of them are what no encoder writes, or NOPs.
+    /// The last blocks as they were read, and how many of them no drive or master would write, or are NOPs.
     window: Vec<u8>,
     seen: usize,
     unsound: usize,
 }
 
-/// A block as a log has it, with the line in which it begins.
+/// A block as it is in the log, with the line in which it begins.
 pub(super) type Piece = Burst;
 
 impl Blocks {
@@ -58,12 +58,12 @@ impl Blocks {
         }
     }
 
-    /// The shape that was found, and the size that is taken.
+    /// Returns the shape that was found, and the size in use.
     pub(super) fn shape(&self) -> (Option<LogShape>, usize) {
         (self.shape, self.size)
     }
 
-    /// Whether the log ends inside a block.
+    /// Returns whether the log ends inside a block.
     pub(super) fn is_open(&self) -> bool {
         self.flow && self.rest.len() > self.at && self.skip == 0
     }
@@ -72,12 +72,12 @@ impl Blocks {
     pub(super) fn look_at(&mut self, sample: &[Burst]) {
         let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
         self.line = most_common(read().map(Vec::len));
-        // What a line has held that is spoilt, or too short or long, does not matter, but its place does.
+        // The content of a line that is damaged, or too short or long, does not matter, but its place does.
         let line = vec![0; self.line];
         let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
         let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
         let bytes: Vec<u8> = lines.flatten().copied().collect();
-        // NOPs from before the start tell nothing: so the end of what is there, which has more than them.
+        // NOPs from before the start say nothing, so the end of the sample counts, which holds more than NOPs.
         let known = bytes.chunks(SAMPLE).find_map(LogShape::guess);
         let from_last = bytes.len().saturating_sub(SAMPLE) / LEN32 * LEN32;
         let shape = known.or_else(|| LogShape::guess(bytes.get(from_last..).unwrap_or_default()));
@@ -86,16 +86,16 @@ impl Blocks {
         self.flow |= halves;
     }
 
-    /// Cuts in this shape from now on, after this many bytes.
+    /// Cuts blocks of this shape from now on, after skipping this many bytes.
     fn take(&mut self, shape: Option<LogShape>, skip: usize) {
-        // Lines or records of one block are what they are; a size is guessed where the lines allow both.
+        // Lines or records of one block give the size; it is guessed only if the lines allow both sizes.
         let guessed = shape.map_or(LEN, |shape| shape.size.bytes());
         self.size = self.said.unwrap_or(guessed).max(1);
         (self.shape, self.skip) = (shape, skip);
         self.flow = shape.is_some_and(|shape| shape.skip > 0) || self.line % self.size != 0 && shape.is_some();
     }
 
-    /// A line or record; a line that does not have its length is a piece of its own, and its block is lost.
+    /// Takes a line or record; a line of another length is returned as it is, and its block is lost.
     pub(super) fn feed(&mut self, burst: &Burst) -> Option<Piece> {
         if !self.flow {
             (self.rest, self.at, self.began) = (burst.bytes.clone(), 0, Burst { bytes: Vec::new(), ..burst.clone() });
@@ -114,7 +114,7 @@ impl Blocks {
         None
     }
 
-    /// Drops a line, and with it the block of which it is part.
+    /// Drops a line, and with it the block that it is part of.
     pub(super) fn lose(&mut self) {
         if !self.flow {
             return;
@@ -127,7 +127,8 @@ impl Blocks {
         self.lost = self.at < self.rest.len();
     }
 
-    /// The next block of what was fed, from `line` on; in a log whose lines hold whole blocks also what is left of one.
+    /// Returns the next block of the bytes fed, from `line` onwards; in a log whose lines hold whole blocks, also the rest
+    /// of one.
     pub(super) fn next(&mut self, line: &Burst) -> Option<Piece> {
         loop {
             let skipped = self.skip.min(self.rest.len() - self.at);
@@ -148,17 +149,17 @@ impl Blocks {
         }
     }
 
-    /// The bytes of a piece in the order of a block.
+    /// Returns the bytes of a piece in the order of a block.
     pub(super) fn in_order(&self, bytes: &[u8]) -> Vec<u8> {
         let word = self.shape.map_or(1, |shape| shape.word);
         bytes.chunks(word).flat_map(|word| word.iter().rev()).copied().collect()
     }
 
-    /// Whether the shape still holds, after one more block as it was read; `sound` if an encoder may write it and it tells something. Where the last ones are
-    /// of another shape, the log goes on in that.
+    /// Checks whether the shape still holds after one more block as it was read; `sound`: an encoder may write it and it
+    /// says something. If the last blocks have another shape, the log continues in that.
     pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Option<LogShape> {
         self.window.extend_from_slice(read);
-        // A block that was cut short does not move the ones behind it.
+        // A block that was cut short does not shift the following ones.
         self.window.resize(self.window.len().next_multiple_of(self.size), 0);
         self.seen += 1;
         self.unsound += usize::from(!sound);
@@ -173,13 +174,13 @@ impl Blocks {
         }
         let other = LogShape::guess(&window).filter(|other| *other != now)?;
         let size = other.size.bytes();
-        // The window begins with a block of the old shape, and ends where the bytes go on that are still to come.
+        // The window begins with a block of the old shape, and ends where the next bytes continue.
         self.take(Some(other), (other.skip + size - window.len() % size) % size);
         Some(other)
     }
 }
 
-/// The length that most lines have; of several the longest.
+/// Returns the length that most lines have; if there are several, the longest.
 fn most_common(lengths: impl Iterator<Item = usize>) -> usize {
     let mut counts = HashMap::new();
     lengths.for_each(|len| *counts.entry(len).or_insert(0_usize) += 1);

@@ -1,10 +1,10 @@
-//! The fields of a block, as they are shown.
+//! Describes the fields of a block as they are shown.
 
 use rtex_block::inspect::{self, Report};
 
 use crate::event::{Field, Value};
 
-/// The code, then all that is not 0; with `zeros` also that.
+/// Adds the code, then all fields that are not 0; with `zeros` also those that are.
 pub(super) fn whole(report: &Report, block: &[u8], zeros: bool, fields: &mut Vec<Field>) {
     let (flags, others): (Vec<_>, Vec<_>) = report.fields().partition(is_flag);
     let shown = |field: &inspect::Field| {
@@ -19,7 +19,7 @@ pub(super) fn whole(report: &Report, block: &[u8], zeros: bool, fields: &mut Vec
     fields.extend(data.iter().map(field));
 }
 
-/// The code, and what changed.
+/// Adds the code, and what has changed.
 pub(super) fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
     let code = report.fields().find(|field| matches!(field.value, inspect::Value::Code(_)));
     fields.extend(code.as_ref().map(field));
@@ -52,7 +52,7 @@ fn is_flag(field: &inspect::Field) -> bool {
     matches!(field.first, 2 | 3)
 }
 
-/// Bytes 2-3 as one field.
+/// Returns bytes 2-3 as one field.
 fn flag_field(flags: &[inspect::Field], block: &[u8], name: &'static str) -> Field {
     let raw = block.get(2..4).map_or(0, |bytes| bytes.iter().rev().fold(0, |raw, &byte| raw << 8 | u64::from(byte)));
     let set = flags.iter().filter(|f| f.value == inspect::Value::Bit(true)).map(|f| f.name).collect();

@@ -37,7 +37,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
     widths: Widths,
-    /// By the last ENID on the line.
+    /// The widths implied by the last ENID on the line.
     hint: Option<Resolution>,
     enid: Option<u8>,
     motion: Motion,
@@ -48,7 +48,7 @@ impl Encoder {
         Self { widths, hint: None, enid: None, motion: Motion::default() }
     }
 
-    /// An answer as it was on the line, to `id` where the request was read.
+    /// An answer as it was on the line, to `id` if the request was read.
     pub(super) fn answer(
         &mut self,
         frame: &Frame,
@@ -162,7 +162,7 @@ impl Encoder {
         self.hint = Resolution::from_enid(enid).map(|hint| hint.resolution);
     }
 
-    /// The widths as the user gave them, else as the encoder ID suggests.
+    /// Returns the widths as the user gave them, otherwise as the encoder ID suggests.
     fn resolution(&self) -> Option<Resolution> {
         let (abs, abm) = self.widths.or(self.hint.map(|hint| (hint.abs_bits(), hint.abm_bits())))?;
         Resolution::new(abs, abm).ok()
@@ -172,14 +172,15 @@ impl Encoder {
 const NOTHING: AllData =
     AllData { sf: StatusField::empty(), abs: Abs::truncate(0), enid: 0, abm: Abm::truncate(0), almc: Almc::empty() };
 
-/// Where the fields put the shaft, for looking at. Other reasons against its use are shown beside it: alarms, damage, another
+/// Returns the position given by the fields, for display. Other reasons against its use are shown beside it: alarms,
+/// damage, another
 /// encoder ID.
 fn shown(full: AllData, resolution: Resolution, tolerated: Tolerated) -> Result<Sample, Doubt> {
     let fields = AllData { abs: full.abs, abm: full.abm, ..NOTHING };
     Evidence::of(Response::ReadAll(fields), resolution, 0).at(0, Policy::new(0).tolerating(tolerated))
 }
 
-/// What an answer says that hardly goes together; `before`: the encoder ID until now.
+/// Returns contradictions in an answer; `before`: the encoder ID until now.
 fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
     let mut out = Vec::new();
     let enid = match response {
@@ -193,7 +194,7 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
         ));
     }
     if let Response::ReadAll(full) = response {
-        // Encoders that leave SF at 0 do so always.
+        // Encoders that leave SF at 0 always do so.
         if full.sf.bits() != 0 && !full.sf.agrees_with(full.almc) {
             out.push(format!("SF contradicts ALMC: {} is expected", StatusField::of_alarms(full.almc)));
         }
@@ -201,7 +202,7 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
     out
 }
 
-/// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
+/// Reports that no answer came to the request at `place` by `now`; `asked`: whether the next request came instead.
 pub(super) fn silence(request: Request, place: Place, now: Time, asked: bool) -> Event {
     let kind = kind(Some(request.data_id()));
     group::silence(place, kind, "answer", ANSWER_TIMEOUT, now, asked, "no encoder")
@@ -211,10 +212,10 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
     Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
 }
 
-/// With the places of its fields, of which these are on the line.
+/// Adds the places of its fields, of which these are on the line.
 fn located(mut event: Event, frame: &Frame, parts: &[Part]) -> Event {
     let Some(spans) = frame.spans() else { return event };
-    // The fields come in the order of the line, but for those that have no place.
+    // The fields come in the order of the line, except those without a place.
     let mut rest = parts.iter();
     for field in &mut event.fields {
         let mut behind = rest.clone();
@@ -237,7 +238,7 @@ struct Part {
     last: u32,
 }
 
-/// The values of requests and of answers, by the data ID; of none where it is not known.
+/// Returns the values in a request or an answer with this data ID; none if the ID is unknown.
 fn parts(id: Option<DataId>, direction: Direction) -> &'static [Part] {
     type Both = [Vec<Part>; 2];
     static ALL: LazyLock<[(DataId, Both); 9]> =
@@ -260,14 +261,14 @@ fn gathered(names: &[&'static str]) -> Vec<Part> {
     parts
 }
 
-/// The data ID as it displays itself, written once and not for every frame.
+/// Returns the data ID as it displays itself, formatted once rather than for every frame.
 fn kind(id: Option<DataId>) -> &'static str {
     static NAMES: LazyLock<[(DataId, String); 9]> = LazyLock::new(|| DataId::ALL.map(|id| (id, id.to_string())));
     let name = |id| NAMES.iter().find(|(known, _)| *known == id).map(|(_, name)| name.as_str());
     id.and_then(name).unwrap_or("ID ?")
 }
 
-/// What a reset does: one of ten has to be seen ten times to have an effect.
+/// Describes what a reset does, and how many requests it takes.
 fn effect(id: DataId) -> Option<Field> {
     id.effect().map(|effect| Field::text("effect", format_args!("{effect}, one of {}", id.repeats())))
 }

@@ -1,4 +1,4 @@
-//! Fields that make a frame, and the request that waits for one.
+//! Fields that make up a frame, and the request that waits for one.
 
 use tformat::{ControlField, DataId, Error, Request, Response, Window};
 
@@ -8,20 +8,20 @@ use crate::protocols::group::Group;
 use crate::protocols::plausible;
 use crate::time::Time;
 
-/// More fields without a pause are no frame.
+/// More fields than this without a pause are not a frame.
 pub(super) const MOST_FIELDS: usize = 16;
 
-/// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
+/// Twice the nominal time, in picoseconds: a frame that begins later and looks like a request is one.
 pub(super) const LATE_ANSWER: i64 = 6_000_000;
 
-/// An answer begins within this time, nominally 3 us, in picoseconds.
+/// An answer begins within this time, in picoseconds; nominally after 3 us.
 pub(super) const ANSWER_TIMEOUT: i64 = 20_000_000;
 
 /// Fields that followed each other.
 pub(super) type Frame = Group<u8, MOST_FIELDS>;
 
 impl Frame {
-    /// Bytes without times.
+    /// Creates a frame from bytes without times.
     pub(super) fn of_log(line: u64, bytes: &[u8]) -> Self {
         let mut frame = Self::default();
         frame.line = Some(line);
@@ -39,7 +39,7 @@ impl Frame {
         frame
     }
 
-    /// What makes a sound answer of the bits on the line: one more at a place, or one less.
+    /// Returns what would make the bits on the line a sound answer: one bit more at some place, or one less.
     pub(super) fn slipped_bit(&self, request: Request) -> Option<&'static str> {
         let len = 10 * u32::from(request.data_id().response_fields());
         plausible::slipped_bit(self.raw, len, |bits| {
@@ -47,14 +47,14 @@ impl Frame {
         })
     }
 
-    /// The bits of the line as long as the whole answer to `request` is.
+    /// Returns the bits of the line over the length of the whole answer to `request`.
     fn answer_line(&self, request: Request) -> Option<(u128, u32)> {
         let len = 10 * u32::from(request.data_id().response_fields());
         let mask = 1_u128.checked_shl(len)?.wrapping_sub(1);
         (self.raw != 0).then_some((self.raw & mask, len))
     }
 
-    /// Whether one bit the other way would make a sound answer.
+    /// Returns whether flipping one bit would make a sound answer.
     pub(super) fn is_one_bit_off(&self, request: Request) -> bool {
         self.answer_line(request).is_some_and(|(bits, len)| {
             let sound =
@@ -63,24 +63,24 @@ impl Frame {
         })
     }
 
-    /// Whether the line looks idle where the answer should end.
+    /// Returns whether the line looks idle where the answer should end.
     pub(super) fn ends_idle(&self, request: Request) -> bool {
         let ones = |(bits, len): (u128, u32)| (bits << (128 - len)).leading_ones();
-        // The delimiter is a one by itself.
+        // The delimiter is always a one.
         self.answer_line(request).map_or(0, ones) > plausible::CUT_BITS
     }
 
-    /// The data ID that the first field asks for or answers.
+    /// Returns the data ID that the first field requests or answers.
     pub(super) fn data_id(&self) -> Result<DataId, Error> {
         ControlField::parse(self.first())?.data_id()
     }
 
-    /// The first field, 0 if it is missing.
+    /// Returns the first field, or 0 if it is missing.
     pub(super) fn first(&self) -> u8 {
         self.contents().first().copied().unwrap_or_default()
     }
 
-    /// The bits of the line from the first start bit on, as far as the fields tell: idle line between them.
+    /// Returns the bits of the line from the first start bit, rebuilt from the fields, with idle line between them.
     pub(super) fn line(&self, bit: i64) -> Option<Window> {
         let mut bits = u128::MAX;
         for (byte, start) in self.contents().iter().zip(self.starts()) {
@@ -100,17 +100,17 @@ impl Frame {
     }
 }
 
-/// A request that waits for its answer.
+/// A request that is waiting for its answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pending {
-    /// None where the request was damaged.
+    /// `None` if the request was damaged.
     pub(super) request: Option<Request>,
     pub(super) place: Place,
 }
 
 impl Pending {
-    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins or for
-    /// something else.
+    /// Returns whether a frame is not the answer but the next request: it is a request, and either begins too late for an
+    /// answer or asks for something else.
     pub(super) fn is_asked_again(&self, frame: &Frame) -> bool {
         let late = self.place.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
         let other = self.request.is_some_and(|request| frame.data_id().is_ok_and(|id| id != request.data_id()));
@@ -120,19 +120,20 @@ impl Pending {
             && frame.data_id().is_ok_and(|id| frame.len() == usize::from(id.request_fields()))
     }
 
-    /// Fields of the answer that begins with these bytes.
+    /// Returns the number of fields in the answer that begins with these bytes.
     pub(super) fn answer_fields_of(&self, bytes: &[u8]) -> usize {
         self.answer_fields(bytes.first().copied().unwrap_or_default())
     }
 
-    /// The answer alone, if these bytes are it after the request: a receiver that is always on hears that first.
+    /// Returns the answer alone, if these bytes are the request followed by it: a receiver that is always on hears the
+    /// request first.
     pub(super) fn without_echo<'a>(&self, bytes: &'a [u8]) -> &'a [u8] {
         let echo = self.request.map(Request::emit);
         let rest = echo.and_then(|echo| bytes.strip_prefix(echo.as_bytes()));
         rest.filter(|rest| rest.len() == self.answer_fields_of(rest)).unwrap_or(bytes)
     }
 
-    /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
+    /// Returns the number of fields in the answer that begins with `cf`: as `cf` says or, if it is damaged, as requested.
     pub(super) fn answer_fields(&self, cf: u8) -> usize {
         let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
         let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::ReadAll);

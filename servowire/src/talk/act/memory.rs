@@ -1,4 +1,4 @@
-//! Backup and restore of the memory.
+//! Backs up and restores the memory.
 
 use std::fs;
 use std::io::Write;
@@ -84,7 +84,7 @@ pub(in crate::talk) fn restore<P: Port>(
     end.map(|()| ExitCode::SUCCESS)
 }
 
-/// Where the memory is saved before it is overwritten: beside the file, with the time.
+/// Returns where the memory is saved before it is overwritten: beside the file, with the time.
 fn beside(file: &Path, before: &Backup) -> PathBuf {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     file.with_file_name(format!("{name}.before-{}.json", before.date().replace(':', "-")))

@@ -1,4 +1,4 @@
-//! `talk watch`: positions one after the other, with the figures of the line.
+//! `talk watch`: shows positions one after the other, with figures of the line.
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
@@ -15,7 +15,7 @@ use crate::talk::encoder::Encoder;
 use crate::talk::fault::Fault;
 use crate::talk::port::Port;
 
-/// Least, most and mean of times.
+/// Minimum, maximum and mean of times.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Times {
     count: u32,
@@ -42,13 +42,13 @@ impl Times {
     }
 }
 
-/// What came of all readings.
+/// The results of all readings.
 #[derive(Debug, Default)]
 struct Figures {
     good: u64,
-    /// By class of error.
+    /// Keyed by class of error.
     bad: BTreeMap<&'static str, u64>,
-    /// From the request to the answer, and from one request to the next.
+    /// Times from the request to the answer, and from one request to the next.
     answers: Times,
     cycles: Times,
 }
@@ -58,7 +58,7 @@ impl Figures {
         self.bad.values().sum()
     }
 
-    /// In two lines, the first one where there is something to say.
+    /// Prints the figures in two lines; the first only if there is something to say.
     fn text(&self) -> String {
         let Self { good, bad, answers, cycles } = self;
         let mut said = Vec::new();
@@ -85,7 +85,7 @@ impl Figures {
     }
 }
 
-/// The class of what went wrong, as statistics have it.
+/// Returns the class of what went wrong, as used in statistics.
 fn class(fault: &Fault) -> &'static str {
     match fault {
         Fault::Encoder(error) => error.class().name(),
@@ -94,7 +94,7 @@ fn class(fault: &Fault) -> &'static str {
     }
 }
 
-/// Waits for the rest of a period; whether somebody wants it to end.
+/// Waits for the rest of a period; returns whether the user wants to end.
 fn rest(period: Duration, begin: Instant) -> bool {
     while !interrupt::asked() {
         let left = period.saturating_sub(begin.elapsed());
@@ -106,7 +106,7 @@ fn rest(period: Duration, begin: Instant) -> bool {
     true
 }
 
-/// Reads until it is enough, the port is gone, or somebody wants it to end.
+/// Reads until the count is reached, the port is gone, or the user ends it.
 pub(in crate::talk) fn watch<P: Port>(encoder: &mut Encoder<P>, watch: &Watch, print: Print) -> Done {
     let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut figures, begin) = (Figures::default(), Instant::now());

@@ -27,14 +27,14 @@ static BOARD: Board =
     const { Board { name: "STM32F405RG", crystal_hz: CRYSTAL_HZ, pins: PINS, power_stage: POWER_STAGES }.checked() };
 
 const CONSOLE_BAUD: u32 = 1_000_000;
-/// Lines that are looked ahead.
+/// Number of lines in the look-ahead.
 const LINES: usize = 8;
 /// Steps/s, steps/s² and steps in a metre of each axis: 80 steps/mm, Z 400.
 const MACHINE: [(u32, u32, u32); AXES] =
     [(20_000, 400_000, 80_000), (20_000, 400_000, 80_000), (10_000, 200_000, 400_000)];
 /// Ticks between steps in different directions: 20 us.
 const REVERSAL_PAUSE: u32 = TICK_HZ / 50_000;
-/// Half of the time in which a request takes effect: 4 ms.
+/// Half of the time within which a request takes effect: 4 ms.
 const REACH: u32 = TICK_HZ / 250;
 
 static QUEUE: AxesQueue<AXES, SLOTS> = AxesQueue::new();

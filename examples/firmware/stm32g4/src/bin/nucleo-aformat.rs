@@ -30,7 +30,7 @@ bind_interrupts!(struct Interrupts {
 control_interrupt!(Evidence);
 
 const RATE: BitRate = BitRate::Mbit2_5;
-/// Clocks of the SPI a bit: 20 MHz.
+/// SPI clocks per bit: 20 MHz.
 const PER_BIT: u8 = 8;
 const SAMPLING: Sampling = match Sampling::new(Order::MsbFirst8, PER_BIT, 16, RATE.bits_per_second()) {
     Ok(sampling) => sampling,

@@ -1,20 +1,20 @@
-//! A second look at the edges of a frame that failed, as a receiver samples it: its clock runs through from head to head, and the
-//! answer has one place between its bits. So edges may be off by nearly half a bit.
+//! A second look at the edges of a frame that failed, as a receiver samples it: its clock runs on from head to head, and
+//! the answer has one fixed offset from it. Edges may then be off by nearly half a bit.
 
 use hdsl::frame::{ANSWER_BITS, DELAY_RESERVE_BITS};
 
 use super::{Bits, SAMPLES};
 use crate::time::Time;
 
-/// Bits from the end of a head to TRAILER, of which the first two are not driven.
+/// Bits from the end of a head to TRAILER; the first two are not driven.
 const TO_TRAILER: f64 = (1 + ANSWER_BITS + DELAY_RESERVE_BITS) as f64;
-/// So far, in bits, a head may lie from where the mean length of a bit has it, by jitter alone.
+/// How far, in bits, jitter alone may move a head from where the mean bit length puts it.
 const SAME_CLOCK: f64 = 0.25;
-/// Edges in SYNC, where they lie, and bits from CYCLE RESET on, before which an EXTRA window may end anywhere.
+/// Places of the edges in SYNC, and of the bits from CYCLE RESET onwards; before CYCLE RESET an EXTRA window may end anywhere.
 const SYNC: [u64; 4] = [0, 2, 3, 4];
 pub(in super::super) const RESET: u64 = 17;
 
-/// The clock of a master: when a head began, its bits, and the length of one in picoseconds.
+/// The clock of a master: when a head began, its number of bits, and the length of a bit in picoseconds.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Beat {
     start: Time,
@@ -22,31 +22,31 @@ pub(in super::super) struct Beat {
     bit: f64,
 }
 
-/// What is laid anew.
+/// What is placed on the grid again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum Again {
-    /// The answer alone: what comes after it stays as it is.
+    /// Only the answer: everything after it stays as it is.
     Answer,
-    /// All that follows.
+    /// Everything that follows.
     Rest,
 }
 
 impl Bits {
-    /// The clock of the head of `len` bits at bit `at`; `before`: where one was that the same clock sent.
+    /// Returns the clock of the head of `len` bits at bit `at`; `before`: an earlier head sent by the same clock.
     pub(in super::super) fn beat(&self, at: u64, len: u64, before: Option<u64>) -> Beat {
         let mean = self.mean();
         let start = self.head_start(at, len, mean);
         let bit = before.map_or(mean, |before| {
             let time = (start - self.head_start(before, len.min(at - before), mean)) as f64;
             let bits = (time / mean).round().max(1.0);
-            // The mean of many heads is nearer than two of them, unless the clock has moved.
+            // The mean of many heads is more exact than two of them, unless the clock has drifted.
             if (time - bits * mean).abs() < SAME_CLOCK * mean { mean } else { time / bits }
         });
         let end = self.time(at + len);
         Beat { start, len: ((end - start) as f64 / bit).round().max(0.0) as u64, bit }
     }
 
-    /// When a head began, by all its edges.
+    /// Returns when a head began, according to all its edges.
     fn head_start(&self, at: u64, len: u64, bit: f64) -> Time {
         let begin = self.time(at);
         let mean = |offs: &[f64]| offs.iter().sum::<f64>() / offs.len().max(1) as f64;
@@ -61,7 +61,7 @@ impl Bits {
         begin + mean(&offs.collect::<Vec<_>>()) as i64
     }
 
-    /// Edges from `from` on, before `to`, and the level after each.
+    /// Returns the edges from `from` to before `to`, and the level after each.
     fn edges(&self, from: Time, to: Time) -> Vec<(Time, bool)> {
         let first = self.marks.partition_point(|mark| mark.time < from).saturating_sub(1);
         let marks = self.marks.get(first..).unwrap_or_default();
@@ -84,7 +84,7 @@ impl Bits {
         edges
     }
 
-    /// Lays the edges from the head at bit `at` on anew.
+    /// Places the edges from the head at bit `at` onwards on the grid again.
     pub(in super::super) fn lay(&mut self, at: u64, beat: Beat, what: Again) {
         let Beat { start, len, bit } = beat;
         let len = len as f64;
@@ -95,9 +95,9 @@ impl Bits {
         let phase = phase(&edges.iter().map(|(time, _)| place(*time)).filter(|place| of_answer(*place)));
         let olds: Vec<u64> = edges.iter().map(|(time, _)| self.nearest_mark(*time)).collect();
         let Some(first) = self.marks.iter().rposition(|mark| mark.bit <= at) else { return };
-        // At the end of a capture the level after the last edge was bits already.
+        // At the end of a capture the level after the last edge has already become bits.
         let held = olds.last().filter(|_| self.last.is_none()).map(|last| self.end.saturating_sub(*last));
-        // A stretch on a grid goes on to the next mark.
+        // A stretch on a grid continues to the next mark.
         let begins = self.marks.get(first).is_some_and(|mark| mark.bit == at);
         self.marks.truncate(first + usize::from(!begins));
         self.truncate(at);
@@ -107,7 +107,7 @@ impl Bits {
             let off = if of_answer(now) { phase } else { 0.0 };
             let whole = (now - off).round();
             let count = match before {
-                // As far from the edge before it as it was.
+                // It keeps its distance from the previous edge.
                 Some((_, Some(last))) if what == Again::Answer => old.saturating_sub(last),
                 _ => (at + whole.max(0.0) as u64).saturating_sub(self.end),
             };
@@ -125,7 +125,7 @@ impl Bits {
         }
     }
 
-    /// The number of the bit that begins at an edge.
+    /// Returns the number of the bit that begins at an edge.
     fn nearest_mark(&self, time: Time) -> u64 {
         let mark = self.marks.partition_point(|mark| mark.time <= time).saturating_sub(1);
         let Some(mark) = self.marks.get(mark) else { return 0 };
@@ -135,7 +135,7 @@ impl Bits {
             })
     }
 
-    /// Bits from `at` on are gone.
+    /// Removes the bits from `at` onwards.
     fn truncate(&mut self, at: u64) {
         let left = at.saturating_sub(self.first);
         self.words.truncate(left.div_ceil(64) as usize);
@@ -147,7 +147,8 @@ impl Bits {
     }
 }
 
-/// The mean of all places between two bits, -0.5 to 0.5: on a circle, so by their distances from the first, then from their mean.
+/// Returns the mean of all offsets from a bit boundary, -0.5 to 0.5. They lie on a circle, so it uses their distances from
+/// the first, then from their mean.
 fn phase(places: &(impl Iterator<Item = f64> + Clone)) -> f64 {
     let within = |place: f64| place - place.round();
     let mut phase = places.clone().next().map_or(0.0, within);

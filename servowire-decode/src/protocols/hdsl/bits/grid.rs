@@ -1,35 +1,35 @@
-//! Bits of packed samples, eight at once: the same bits that its edges one by one would give.
+//! Turns packed samples into bits, eight at once: the same bits that the edges one by one would give.
 //!
-//! A controller that samples by its own clock, or a dump of its logic, has eight samples per bit, and the edges of a speaker
-//! all lie at the same one of them. As long as that holds, the edges lie on the grid, nothing follows them, and 64 samples
-//! are eight bits.
+//! A controller that samples by its own clock, or a dump of its logic, has eight samples per bit, and all edges of a
+//! speaker lie at the same sample within a bit. As long as that holds, the edges lie on the grid, which need not be
+//! adjusted, and 64 samples are eight bits.
 
 use super::{Bits, FINE, Grid, JITTER_EDGES, LONGEST_RUN, Mark, ON_GRID, PAUSE, SAMPLES};
 use crate::capture::samples::Samples;
 
 /// The first sample of each bit.
 const FIRST: u64 = 0x0101_0101_0101_0101;
-/// How far samples were taken.
+/// How far the samples were taken.
 pub(in super::super) struct Taken {
-    /// The number of the first sample after it.
+    /// The number of the first sample not taken.
     pub(in super::super) next: u64,
-    /// Where the line changed last, and the level since.
+    /// Where the line last changed, and the level since.
     pub(in super::super) since: u64,
     pub(in super::super) level: bool,
 }
 
-/// The first samples of eight bits together, the first in bit 0.
+/// Gathers the first samples of eight bits, the first in bit 0.
 fn gather(word: u64) -> u64 {
     (word & FIRST).wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
-/// The edges of eight bits after `level`, the first in bit 0; none where one is not on the grid.
+/// Returns the edges of eight bits after `level`, the first in bit 0; `None` if an edge is not on the grid.
 fn edges_in(word: u64, level: bool) -> Option<u64> {
     let edges = word ^ (word << 1 | u64::from(level));
     (edges & !FIRST == 0).then(|| gather(edges))
 }
 
-/// Whether each edge of eight bits, of which there is at least one, is at most `longest` bits after the one before.
+/// Returns whether each of the edges in eight bits, at least one, is at most `longest` bits after the previous one.
 fn are_near(edges: u64, longest: u64) -> bool {
     if longest >= SAMPLES - 1 {
         return true;
@@ -40,14 +40,14 @@ fn are_near(edges: u64, longest: u64) -> bool {
 }
 
 impl Bits {
-    /// Whether `samples` has about eight samples per bit.
+    /// Returns whether `samples` has about eight samples per bit.
     pub(in super::super) fn may_be_on_grid(&self, samples: &Samples<'_>) -> bool {
         let period = 1_000_000_000_000 * SAMPLES as i64 / samples.clock().rate() as i64;
         (period - self.nominal).abs() * 100 <= self.nominal
     }
 
-    /// Takes samples from number `at` on as long as they are on the grid of the last change, that at sample `since`, and
-    /// at most `most` bits are there then.
+    /// Takes samples from number `at` onwards as long as they are on the grid of the last change, at sample `since`, and
+    /// until there are `most` bits.
     pub(in super::super) fn on_grid(&mut self, samples: &Samples<'_>, since: u64, at: u64, most: u64) -> Option<Taken> {
         let clock = samples.clock();
         let (changed, mut level) = self.spikes.last_change()?;
@@ -110,7 +110,7 @@ impl Bits {
         Some(Taken { next, since, level })
     }
 
-    /// The longest run that is on the grid whatever its time was rounded to.
+    /// Returns the longest run that is on the grid however its time was rounded.
     fn longest_run(&self, samples: &Samples<'_>) -> u64 {
         let bit = (1_000_000_000_000 << FINE) * i128::from(SAMPLES) / i128::from(samples.clock().rate());
         let off = (bit - i128::from(self.bit)).unsigned_abs().max(1);
@@ -119,7 +119,7 @@ impl Bits {
         (room / off).min(LONGEST_RUN as u128) as u64
     }
 
-    /// Up to 63 bits, the first in bit 0.
+    /// Appends up to 63 bits, the first in bit 0.
     fn append(&mut self, bits: u64, count: u64) {
         let used = self.end % 64;
         if used == 0 {

@@ -1,4 +1,4 @@
-//! Answers of a link that runs: their words, the running disparity between them, their V-frames.
+//! Answers of a running link: their words, the running disparity between them, their V-frames.
 
 use hdsl::frame::ANSWER_BITS;
 use hdsl::inspect::{Expected, inspect};
@@ -20,9 +20,9 @@ const BETWEEN: &str =
     "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
 const STRAY: &str = "VSYNC is expected in every eighth answer, and only there";
 const SWITCH: &str = "the switch bit is not the inverse of the bit before it";
-/// The first of the words that the check of the acceleration covers; the one behind them is of the secondary channel.
+/// The first of the words that the check of the acceleration covers; the word after them belongs to the secondary channel.
 const ACCELERATION: u8 = 3;
-/// The answer at hand is the last of a V-frame of which the others are not known.
+/// The present answer is the last of a V-frame whose other answers are unknown.
 const LAST: u8 = 8;
 
 impl Decoder {
@@ -36,7 +36,7 @@ impl Decoder {
             None => Ok(()),
             Some(error) => Err(refusal(error)),
         };
-        // Words that are all good, but not one after the other, may each be the wrong one.
+        // If all words are good but cannot follow each other, any of them may be the wrong one.
         let doubtful = report.error().is_none() && !chain.holds();
         self.step(answer.delta_delta().ok().filter(|_| !doubtful));
         let sound = verdict.is_ok();
@@ -71,7 +71,7 @@ impl Decoder {
         self.v_frame(answer, place);
     }
 
-    /// The fast position, if a receiver may use it: the same verdict.
+    /// Returns the fast position, if a receiver may use it, by the receiver's own rules.
     fn sample(&self) -> Option<Sample> {
         let sample = self.fast?.evidence(0, 0).at(0, Policy::new(u64::MAX)).ok()?;
         let raw = u64::from_le_bytes(sample.position().to_le_bytes());
@@ -93,7 +93,7 @@ impl Decoder {
         fields
     }
 
-    /// Follows VSYNC of an answer that is good so far; one that is not due is passed over, but not two.
+    /// Follows VSYNC of an answer that is good so far; one unexpected VSYNC is ignored, but not two.
     fn follow(&mut self, vsync: bool) -> Result<(), Refused> {
         let due = self.at.map(|at| at == 7);
         if due.is_none_or(|due| due == vsync) {
@@ -110,7 +110,7 @@ impl Decoder {
         Err(("vsync", STRAY.to_owned()))
     }
 
-    /// Whether an answer goes on from the one before.
+    /// Checks whether an answer continues the running disparity of the previous one.
     fn join(&mut self, next: Neighbour) {
         let begins_with_plus = next.chain.before() == Some(RunningDisparity::Plus);
         if next.sound && begins_with_plus && self.beginnings.are_anew() {
@@ -120,7 +120,7 @@ impl Decoder {
         let Some(goes_on) = before.chain.goes_on_in(next.chain) else { return };
         let (ends, begins) = (before.number, next.number);
         if !before.sound || !next.sound {
-            // A damaged one of which the words do not tell where may be damaged just here.
+            // A damaged answer whose words do not show the place may be damaged just here.
             let tells = |it: Neighbour| it.sound || !it.chain.holds();
             if !goes_on && self.beginnings.are_carried() && tells(before) && tells(next) {
                 self.said.refuse(ends, ("disparity", TAIL.to_owned()));
@@ -145,8 +145,8 @@ impl Decoder {
         self.beginnings.note(before.chain, next.chain);
     }
 
-    /// With the checks of the V-frame it is known on which side of a break a bit was flipped, if the words there that may be the wrong
-    /// one are under them: the last word of an answer is of channel 2, the first of the next of channel 1.
+    /// The checks of the V-frame show on which side of a break a bit was flipped, if they cover the suspect words there:
+    /// the last word of an answer belongs to channel 2, the first word of the next to channel 1.
     pub(super) fn settle(&mut self, failed: Option<[bool; 2]>) {
         for Break { ends, begins, tail_is_checked, front_is_checked, first_failed } in std::mem::take(&mut self.breaks)
         {
@@ -204,7 +204,7 @@ impl Decoder {
         event.position = safe.ok().map(|raw| position("VPOS", raw, self.id));
         self.said.push(event);
         let failed = [is_damage(safe.err()), is_damage(second.err())];
-        // One of its bytes is wrong, and none says which.
+        // One of its bytes is wrong, but it is unknown which.
         for name in ["VERT", "SEC"].into_iter().zip(failed).filter_map(|(name, failed)| failed.then_some(name)) {
             self.said.withhold(self.begun.unwrap_or(u64::MAX), name);
         }
@@ -213,7 +213,7 @@ impl Decoder {
     }
 }
 
-/// The symbol, or the five bits of one without a meaning.
+/// Returns the symbol, or its five bits if it has no meaning.
 fn encoder_symbol(byte: EncoderByte) -> Field {
     match byte.symbol() {
         Ok(symbol) => Field::text("SYMBOL", symbol),
@@ -221,7 +221,7 @@ fn encoder_symbol(byte: EncoderByte) -> Field {
     }
 }
 
-/// Whether the block was damaged, as opposed to one that says there is no position.
+/// Returns whether the block was damaged, rather than saying that there is no position.
 fn is_damage(error: Option<Error>) -> bool {
     error.is_some_and(|error| matches!(error, Error::InvalidWord { .. } | Error::WrongKind { .. } | Error::Crc { .. }))
 }

@@ -1,4 +1,4 @@
-//! Heads of frames: where one is, where one should have been, and what they say.
+//! Heads of frames: where they are, where one should have been, and what they contain.
 
 use std::ops::Range;
 
@@ -16,24 +16,24 @@ const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
 const PAUSED: &str = "the line is idle here, although frames should follow each other without end";
 /// Nibbles of the shortest message: a byte and its check.
 const SHORTEST_MESSAGE: u8 = 6;
-/// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of that, and how far a
-/// length may be off where other speakers were in between.
+/// Bits between the heads of two frames: the shortest frame, the longest one with its stuffing, a block of stuffing, and
+/// how far a length may be off if other speakers came in between.
 const SHORTEST: u64 = H_FRAME_BITS as u64;
 const LONGEST: u64 = 273 + 4;
 const STUFFING: u64 = STUFFING_BITS as u64;
 const SLACK: u64 = 8;
-/// Bits behind an answer in which there may be another head.
+/// Bits after an answer in which there may be another head.
 const BEHIND: u64 = Head::BITS as u64 + 8;
 
 impl Decoder {
-    /// A head with its request, and what is `wrong` with it; whether it is one of a running link that was damaged.
+    /// Reports a head with its request, and what is `wrong` with it; returns whether it is a damaged head of a running link.
     pub(super) fn head(&mut self, found: FoundHead, wrong: Option<BrokenRule>, bits: &Bits, at: Range<u64>) -> bool {
         let symbol = found.head.byte.symbol();
         let trailer = self.head.is_some() && self.heads.is_end_damaged(front(bits, at.start));
         let place = bits.place(at.clone());
         let damaged = wrong.is_some() && self.delay.is_some();
         let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
-        // Heads that were not heard may have gone on with it.
+        // Unheard heads may have continued it.
         if let Some(number) = self.lone.take().filter(|_| !talks && self.since_quiet < SHORTEST_MESSAGE) {
             self.said.refuse(number, ("lone", LONE.to_owned()));
         }
@@ -43,7 +43,7 @@ impl Decoder {
         let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
         let extra = if found.head.extra_bits > 0 { window_bits(bits, &at) } else { 0 };
         let event = event(place, Direction::Request, "H-frame", master(found.head, symbol, extra), wrong);
-        // All of it is in the last word, PARA.
+        // Everything is in the last word, PARA.
         let mut event = event.locate(|name| {
             let coded = matches!(name, "SYMBOL" | "FIRST" | "MSYNC") && found.len >= 10;
             coded.then(|| Span::even(place, found.len, found.len - 10, found.len - 1))
@@ -54,13 +54,13 @@ impl Decoder {
         damaged
     }
 
-    /// The head before that at `at`, if it is not far away.
+    /// Returns the head before the one at `at`, if it is not far away.
     pub(super) fn before(&self, at: u64) -> Option<u64> {
         self.before.filter(|before| at - before < 4 * LONGEST)
     }
 
-    /// Whether the head at `at`, where one was due or not, has a rule `broken` or something else wrong before it: then the edges are
-    /// looked at again, once.
+    /// Returns whether something is wrong at or before the head at `at`, such as a `broken` rule or a head that was not
+    /// due: the edges are then examined again, once.
     pub(super) fn looks_again(&mut self, bits: &mut Bits, at: u64, broken: bool) -> bool {
         let Some(last) = self.head.filter(|last| self.is_running() && self.again != Some(*last)) else { return false };
         let fails = broken || !self.is_one_frame(bits, at - last, at) || !ends_with_trailer(front(bits, at));
@@ -71,7 +71,7 @@ impl Decoder {
         true
     }
 
-    /// Whether the edges behind the last head, which no other one followed, are looked at again.
+    /// Returns whether the edges after the last head, which no other head followed, are examined again.
     pub(super) fn looks_behind_the_last(&mut self, bits: &mut Bits) -> bool {
         let last = self.head.filter(|last| self.is_running() && self.again != Some(*last));
         let Some(last) = last.filter(|_| bits.paused.is_none() && self.after + BEHIND <= bits.end()) else {
@@ -87,7 +87,7 @@ impl Decoder {
         (self.again, self.next, self.laid) = (Some(last), self.after, bits.end());
     }
 
-    /// Frames follow each other for ever: says where one should have been before the head at `at`.
+    /// Reports where a frame should have been before the head at `at`: frames follow each other without end.
     pub(super) fn missed(&mut self, bits: &mut Bits, at: u64) {
         self.before = self.head;
         let Some(last) = self.head.replace(at) else {
@@ -120,7 +120,8 @@ impl Decoder {
         }
     }
 
-    /// Whether what looks like a head at `at`, but breaks a rule, lies where none is due: bits of an answer or of a damaged head.
+    /// Returns whether something like a head at `at`, which breaks a rule, lies where none is due: it is then part of an
+    /// answer or of a damaged head.
     pub(super) fn is_stray(&self, bits: &Bits, at: u64) -> bool {
         let (Some(last), Some(usual)) = (self.head.filter(|_| self.is_running()), self.apart) else { return false };
         let apart = at - last;
@@ -128,8 +129,8 @@ impl Decoder {
         !(1..=4).any(is_due) && filled(bits, self.head_len, at).abs_diff(apart) > SLACK / 2
     }
 
-    /// Whether nothing is missing between the last head and that at `at`: frames may have any length, but two of them do not
-    /// fit, or it is that of the frame before, or stuffing fills it.
+    /// Returns whether nothing is missing between the last head and the one at `at`: a frame may have any length, but here
+    /// two frames would not fit, or the length is the same as before, or stuffing fills it.
     fn is_one_frame(&self, bits: &Bits, apart: u64, at: u64) -> bool {
         apart <= LONGEST
             && (apart + SLACK < 2 * SHORTEST
@@ -138,8 +139,8 @@ impl Decoder {
     }
 }
 
-/// The bits of a frame with a head of so many, by the stuffing in front of the next one at bit `at`: without any it has so many
-/// bits more than its head.
+/// Returns the bits of a frame whose head has `head` bits, judging by the stuffing before the next head at bit `at`:
+/// without stuffing, a frame has a fixed number of bits more than its head.
 fn filled(bits: &Bits, head: u64, at: u64) -> u64 {
     let blocks = (1..=u64::from(Stuffing::MAX.get())).take_while(|k| {
         let from = at.saturating_sub(STUFFING * k);
@@ -148,8 +149,9 @@ fn filled(bits: &Bits, head: u64, at: u64) -> u64 {
     head + SHORTEST - u64::from(Head::BITS) + STUFFING * blocks.count() as u64
 }
 
-/// Learns the length of a bit from the first frames of a link: `heads` has the bits at which they begin, and those of the heads.
-/// Where an encoder speaks in between, a frame may be read a bit too long or too short.
+/// Learns the length of a bit from the first frames of a link: `heads` has the bits at which they begin, and the number of
+/// bits in each head.
+/// If an encoder speaks in between, a frame may be read one bit too long or too short.
 pub(super) fn learn(bits: &mut Bits, heads: &[(u64, u64)]) {
     for pair in heads.windows(2) {
         let [(at, len), (next, _)] = *pair else { continue };
@@ -160,19 +162,20 @@ pub(super) fn learn(bits: &mut Bits, heads: &[(u64, u64)]) {
     }
 }
 
-/// The heads at these bits, and the line that each begins.
+/// Returns the heads at these bits, and the bits of the line from each of them.
 pub(super) fn parsed(bits: &Bits, heads: &[(u64, u64)]) -> Vec<(ParsedHead, Window)> {
     let head = |at: u64| find_head(bits.window(at)).map(|found| (found.head, bits.window(at)));
     heads.iter().filter_map(|(at, _)| head(*at)).collect()
 }
 
-/// What is in front of a head.
+/// Returns the bits before a head.
 fn front(bits: &Bits, at: u64) -> Window {
     let from = at.saturating_sub(FRONT_BITS.into());
     Window::from_bits(bits.load(from), (at - from) as u32).unwrap_or(Window::EMPTY)
 }
 
-/// Bits of the EXTRA window in a head: its edge lies somewhere in the last of them, so the time from SYNC to CYCLE RESET tells.
+/// Returns the bits of the EXTRA window in a head: its edge lies somewhere in the last of them, so the time from SYNC to
+/// CYCLE RESET is what counts.
 fn window_bits(bits: &Bits, head: &Range<u64>) -> u32 {
     let (sync, reset) = (bits.time(head.start), bits.time(head.end - RESET));
     let whole = ((reset - sync) as f64 / bits.mean()).round() as u32;

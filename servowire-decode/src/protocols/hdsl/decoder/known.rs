@@ -1,21 +1,21 @@
-//! What can be known of a link whose beginning was not recorded.
+//! What can be known about a link whose beginning was not recorded.
 
 use hdsl::{Answer, QualityMonitor, QualityRule, VFrame};
 
 /// Bits of a safe position on the line.
 const BITS: u32 = 40;
 
-/// How far safe positions reached. The width of an encoder that was not asked for it is not known: where the fast position goes
-/// further than any safe one, it may as well have begun again at the other end.
+/// The range of the safe positions so far. If the width of an encoder has not been read on the line, it is unknown: a fast
+/// position beyond all safe ones may just as well have wrapped to the other end.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Reach {
-    /// Bits of the largest position without a sign, and of the smallest one with it.
+    /// Bits of the largest non-negative position, and of the lowest negative one.
     upwards: u32,
     downwards: u32,
 }
 
 impl Reach {
-    /// Bits of a position of 40 bits, and whether it has a sign.
+    /// Returns how many bits a 40-bit position needs, and whether it is negative.
     fn size(position: u64) -> (u32, bool) {
         let unused = u64::BITS - BITS;
         let negative = position >> (BITS - 1) & 1 == 1;
@@ -23,7 +23,7 @@ impl Reach {
         (u64::BITS - (magnitude << unused >> unused).leading_zeros(), negative)
     }
 
-    /// The next safe position.
+    /// Takes the next safe position.
     pub(super) fn note(&mut self, safe: u64) {
         let (bits, negative) = Self::size(safe);
         // The smallest negative position has no bits: the sign itself is one.
@@ -31,20 +31,20 @@ impl Reach {
         *most = bits.max(*most);
     }
 
-    /// Whether a position lies where safe ones have been.
+    /// Returns whether a position lies in the range of the safe ones.
     pub(super) fn holds(self, position: u64) -> bool {
         let (bits, negative) = Self::size(position);
         if negative { bits < self.downwards } else { bits <= self.upwards }
     }
 }
 
-/// The quality monitor of the receiver, whose value is known from the beginning of a link on, or once it must be at its limit
-/// whatever it was.
+/// The quality monitor of the receiver. Its value is known from the beginning of a link, or once it must be at its limit
+/// whatever it was before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quality {
     monitor: QualityMonitor,
     known: bool,
-    /// Whether this V-frame brought a penalty, and how many before it did not.
+    /// Whether this V-frame brought a penalty, and how many earlier ones did not.
     begun: u8,
     clean: u8,
 }
@@ -56,7 +56,7 @@ impl Default for Quality {
 }
 
 impl Quality {
-    /// Each good V-frame adds two: from the least to the most.
+    /// Each good V-frame adds two: this many lead from the minimum to the maximum.
     const LIMIT: u8 = QualityMonitor::MAX / 2;
 
     pub(super) fn of_a_new_link() -> Self {
@@ -67,12 +67,12 @@ impl Quality {
         self.monitor.count_answer(at, answer);
     }
 
-    /// The receiver may have heard more than the capture shows.
+    /// Forgets the value: the receiver may have heard more than the capture shows.
     pub(super) fn forget(&mut self) {
         (self.known, self.clean) = (false, 0);
     }
 
-    /// The V-frame is over.
+    /// Counts a completed V-frame.
     pub(super) fn count_v_frame(&mut self, frame: &VFrame) {
         self.monitor.count_v_frame(frame);
         let due = self.begun.saturating_add(2).min(QualityMonitor::MAX);
@@ -84,7 +84,7 @@ impl Quality {
         self.begun = self.monitor.value();
     }
 
-    /// QM, if it is known.
+    /// Returns QM, if it is known.
     pub(super) fn value(self) -> Option<u8> {
         self.known.then(|| self.monitor.value())
     }
@@ -99,7 +99,7 @@ mod tests {
         let mut reach = Reach::default();
         reach.note(0xff_fffe);
         assert!(reach.holds(0xff_ffff) && reach.holds(0));
-        // One more: 25 bits, or 0 again. One below 0: the top of 24 bits, or a sign.
+        // One above: 25 bits, or a wrap to 0. One below 0: the maximum of 24 bits, or a negative position.
         assert!(!reach.holds(0x100_0000) && !reach.holds(0xff_ffff_ffff));
         reach.note(0xff_ffff_fff0);
         assert!(reach.holds(0xff_ffff_fff8) && !reach.holds(0xff_ffff_ff00));

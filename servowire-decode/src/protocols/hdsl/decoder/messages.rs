@@ -1,6 +1,6 @@
 //! Messages of the parameter channel, symbol by symbol.
 //!
-//! A short message may be sent while a long one waits for its answer; an answer says itself which of the two it is.
+//! A short message may be sent while a long one waits for its answer; an answer itself says which of the two it belongs to.
 
 use hdsl::message::{LongAnswer, RemoteRegister, Request, Responder, ShortRequest};
 use hdsl::{EncoderSymbol, Error, MasterSymbol};
@@ -10,10 +10,10 @@ use crate::event::Field;
 /// Both directions of the channel.
 pub(super) struct Messages {
     requests: Responder,
-    /// The short request that waits for its answer, and whether a long one does.
+    /// The short request that is waiting for its answer, and whether a long one is.
     short: Option<ShortRequest>,
     long: bool,
-    /// Of the answer so far.
+    /// Symbols of the answer so far.
     nibbles: Vec<u8>,
 }
 
@@ -22,7 +22,7 @@ impl Messages {
         Self { requests: Responder::new(), short: None, long: false, nibbles: Vec::new() }
     }
 
-    /// The next symbol of the master; the request that it ends.
+    /// Takes the next symbol of the master; returns the request that it completes.
     pub(super) fn asked(&mut self, symbol: MasterSymbol) -> Option<Field> {
         let request = self.requests.receive(symbol)?;
         match request {
@@ -32,7 +32,7 @@ impl Messages {
         Some(Field::text("message", request))
     }
 
-    /// The next symbol of the encoder, if there is one; what became of the answer that it ends.
+    /// Takes the next symbol of the encoder, if there is one; returns the result of the answer that it ends.
     pub(super) fn answered(&mut self, symbol: Option<EncoderSymbol>) -> Option<Result<Field, Error>> {
         if let Some(EncoderSymbol::Data(nibble)) = symbol {
             self.nibbles.push(nibble.get());
