@@ -15,7 +15,7 @@ const KEPT: i64 = 4_000_000_000;
 /// Fewer changes than these are always kept.
 const MOST: usize = 1 << 17;
 
-/// The events for which the line is wanted.
+/// The events around which the line is kept.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Wanted {
     /// The first frame of each class of error.

@@ -9,7 +9,7 @@ pub(crate) fn columns() -> Option<usize> {
     Some(width.0.into())
 }
 
-/// Writes to the standard output at once; a reader that closes the pipe is not a fault.
+/// Writes to the standard output at once; it is not a fault if the reader closes the pipe.
 pub(crate) fn say(text: fmt::Arguments) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_fmt(text).and_then(|()| out.flush()) {

@@ -29,7 +29,7 @@ pub enum Work {
     Later,
     /// The axis is at rest at its target.
     Rest,
-    /// The stop that would be needed takes more slots than the [`Queue`] has. The axis comes to rest.
+    /// The stop after the queued motion needs more slots than the [`Queue`] has. The axis comes to rest.
     TooFewSlots,
 }
 
@@ -94,8 +94,8 @@ pub struct Axis<'q, const N: usize> {
     told: News,
     /// The stop behind it, while it is being cut.
     stop: Option<Tail>,
-    /// Slots for the steps of a block and the exactness of its stop, as the previous block had room for; and the best
-    /// exactness that is allowed.
+    /// Slots for the steps of a block and the exactness of its stop, adapted to the room that the previous block had; and
+    /// the best exactness allowed.
     room: usize,
     coarse: u32,
     finest: u32,

@@ -1,4 +1,4 @@
-//! Pieces of constant jerk, one after the other.
+//! Curves made of consecutive pieces of constant jerk.
 
 use crate::real::{Real, THIRD};
 use crate::slope::Slope;

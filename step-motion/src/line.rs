@@ -109,7 +109,7 @@ pub struct LinePulses<const N: usize> {
 pub(super) enum Steps {
     /// One by one: the time of the next step is known.
     Single,
-    /// In stretches: that there is a next step is known, but not before its line begins.
+    /// In stretches: it is known whether there is a next step, but only once its line has begun.
     Stretches,
 }
 

@@ -250,8 +250,8 @@ impl Mover {
     }
 
     /// Slows down to rest within other limits, for example higher ones for a limit switch, and forgets the target. Moves
-    /// are refused until it is at rest. If its own limits, or those of a quick stop in progress, are higher, those are
-    /// used: a quick stop is never longer than a normal one.
+    /// are refused until it is at rest. Its own limits, or those of a quick stop in progress, are used where they are
+    /// higher: a quick stop is never longer than a normal one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.ask_quick_stop(limits);
         self.stop_quickly(now);

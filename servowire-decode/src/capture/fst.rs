@@ -13,7 +13,7 @@ use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::time::Time;
 
-/// Number of parts in which the file is read, so that it is never in memory as a whole.
+/// Number of parts in which the file is read, so that it is never held in memory as a whole.
 const PARTS: u64 = 64;
 /// Maximum number of channels.
 const CHANNELS: usize = 65_535;

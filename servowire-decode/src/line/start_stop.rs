@@ -41,7 +41,7 @@ pub trait StartStop {
     /// The line has been idle until `now`: a frame that can no longer continue ends.
     fn rest(&mut self, now: Time, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// Returns whether no frame is under way.
+    /// Returns whether the line is between two frames.
     fn is_between(&self) -> bool;
 
     /// The recording ends, at `end`.

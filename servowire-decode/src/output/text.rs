@@ -19,7 +19,7 @@ const FEWEST: usize = 40;
 const WIDEST: usize = 24;
 /// Fields that hardly ever change are shown only when they do.
 const STEADY: &[&str] = &["ENID", "delay"];
-/// A good check field is covered by the verdict.
+/// A good check field is not shown, because the verdict covers it.
 const CHECKED: &str = "CRC";
 
 const REFUSED: &str = "REFUSED";

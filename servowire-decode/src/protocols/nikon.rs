@@ -1,7 +1,7 @@
 //! Nikon A-format: combines frames of a half-duplex line into requests and replies.
 //!
 //! Requests and replies begin with different sync codes. A command data frame says how many memory data frames follow;
-//! the frames of a reply follow each other without a pause, and their number tells the layout if the command leaves it
+//! the frames of a reply follow each other without a pause, and their number determines the layout if the command leaves it
 //! open. A multi-response request is followed by the replies of several encoders.
 
 mod describe;

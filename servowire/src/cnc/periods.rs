@@ -38,7 +38,7 @@ struct Period {
     next: Option<(Pto, Link)>,
 }
 
-/// Where a period is remembered, until another one replaces it.
+/// Where a period is stored, until another one replaces it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Link {
     place: usize,

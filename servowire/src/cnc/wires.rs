@@ -1,4 +1,4 @@
-//! The wires of the line: what is on them at which time, and what becomes of it.
+//! The wires of the line: what is on them and when, and what happens to it.
 //!
 //! Nothing here knows the protocol or uses a number from its crate: only bytes, times, and the figures of the published
 //! hardware.

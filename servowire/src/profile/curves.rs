@@ -3,7 +3,7 @@
 use super::motion::{Move, Sample};
 use crate::drawing::{Chart, Drawn, Sheet, Stroke};
 
-/// Each shape has its own stroke in all drawings.
+/// Each shape has the same stroke in all drawings.
 const SHAPES: [&str; 3] = ["sin2", "trapezoid", "s-curve"];
 
 /// The quantity drawn, and its unit.

@@ -17,7 +17,7 @@ impl Report {
     }
 
     /// Counts a good reading. If it is to be printed, it is judged: the line has a position, or why there is none. Whether
-    /// it was said.
+    /// it was printed.
     ///
     /// # Errors
     /// Those of the console.

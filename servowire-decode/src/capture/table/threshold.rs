@@ -97,7 +97,7 @@ impl Threshold {
         Some((first.middle(), swing))
     }
 
-    /// Returns the level of a voltage after another level.
+    /// Returns the level of a voltage, given the previous level.
     pub(crate) fn level(&self, volts: f64, before: Option<bool>) -> bool {
         let near = self.swing / HYSTERESIS;
         match before {
