@@ -108,7 +108,8 @@ impl Backup {
 
     /// Reads a file.
     ///
-    /// # Errors What is wrong with it, in words.
+    /// # Errors
+    /// What is wrong with it, in words.
     pub fn parse(text: &str) -> Result<Self, String> {
         serde_json::from_str(text).map_err(|error| error.to_string())
     }
