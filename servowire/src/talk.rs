@@ -160,7 +160,7 @@ fn encoder_id(text: &str) -> Result<u8, String> {
 }
 
 impl Arguments {
-    /// Does what was asked.
+    /// Runs the command.
     pub fn run(&self) -> ExitCode {
         match self.perform() {
             Ok(code) => code,

@@ -174,7 +174,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Self { finest: EXACT, ..self }
     }
 
-    /// Steps of each axis made so far, forward less reverse ones.
+    /// Steps of each axis made so far, forward minus reverse.
     pub fn commanded(&self) -> [i64; N] {
         let mut commanded = self.path.commanded();
         for ((at, made), queue) in commanded.iter_mut().zip(self.made).zip(&self.queue.axes) {

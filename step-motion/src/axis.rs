@@ -241,7 +241,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self
     }
 
-    /// Steps made so far, forward less reverse ones.
+    /// Steps made so far, forward minus reverse.
     pub fn commanded(&self) -> i64 {
         #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
         let since = self.queue.made.load(Ordering::Acquire).wrapping_sub(self.made) as i32;

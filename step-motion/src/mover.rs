@@ -167,7 +167,7 @@ impl Mover {
         Some(pulse)
     }
 
-    /// Steps commanded so far, forward less reverse ones. This does not say whether the motor followed.
+    /// Steps commanded so far, forward minus reverse. This does not say whether the motor followed.
     pub const fn commanded(&self) -> i64 {
         self.commanded
     }

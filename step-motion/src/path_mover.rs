@@ -135,7 +135,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some(pulse)
     }
 
-    /// Steps commanded so far of each axis, forward less reverse ones. This does not say whether the motors followed.
+    /// Steps commanded so far of each axis, forward minus reverse. This does not say whether the motors followed.
     pub const fn commanded(&self) -> [i64; N] {
         self.commanded
     }

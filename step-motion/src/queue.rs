@@ -150,7 +150,7 @@ pub struct Queue<const N: usize> {
     pub(crate) slots: [Slot; N],
     /// Where the reader is.
     pub(crate) current: AtomicU32,
-    /// Steps made, forward less reverse ones, modulo 2^32.
+    /// Steps made, forward minus reverse, modulo 2^32.
     pub(crate) made: AtomicU32,
     /// The ticket of a halt if not 0: no further step.
     pub(crate) halt: AtomicU32,

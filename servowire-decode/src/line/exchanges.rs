@@ -53,7 +53,7 @@ struct Told<P> {
     dip_bits: f64,
 }
 
-/// Second attempts that may fail to help.
+/// Number of second attempts that may still fail to help.
 const LUCK: u32 = 24;
 /// If none are left, one failure in this many gets a second attempt, because the line may have changed.
 const NOW_AND_THEN: u32 = 16;

@@ -28,7 +28,7 @@ pub(super) struct Host {
     /// Set after the master has restarted: nothing moves until the axes are where they should be.
     resuming: bool,
     catching_up: bool,
-    /// Cycles since there was nothing more to do, and since motion resumed.
+    /// Cycles since the last work was done, and since motion resumed.
     idle: u32,
     waited: u32,
 }

@@ -151,7 +151,7 @@ impl Part {
         origin.wrapping_sub(1 << (bits.wrapping_sub(1) & 63))
     }
 
-    /// Records whether the slower end is a rest at a step, and returns that.
+    /// Checks whether the slower end is a rest at a step; records and returns the result.
     pub(super) fn looks_for_rest(&mut self) -> bool {
         self.rest = self.beside_rest();
         self.rest.is_some()

@@ -1,4 +1,5 @@
-//! A second look at the edges of a frame that failed, as a receiver samples it: its clock runs on from head to head, and
+//! Reads the edges of a failed frame a second time, in the way a receiver samples them: its clock runs on from head to
+//! head, and
 //! the answer has one fixed offset from it. Edges may then be off by nearly half a bit.
 
 use hdsl::frame::{ANSWER_BITS, DELAY_RESERVE_BITS};
