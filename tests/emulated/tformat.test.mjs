@@ -23,7 +23,7 @@ test('T-Format EEPROM and turns', () =>
     clocks: 48,
     ms: 60,
     typed: ['read 5', 'write 5 a5', 'read 5', 'lose multi-turn reference', 'nonsense'],
-    said: ['EEPROM 05: ff', 'EEPROM 05: a5', 'EEPROM 05: a5', 'turns: 0', '?'],
+    said: ['EEPROM 05: ff', 'EEPROM 05: a5', 'EEPROM 05: a5', 'ABM: 0', '?'],
     write: [0x32, 0x05, 0xa5, 0x32 ^ 0x05 ^ 0xa5],
     reset: [0x62],
     repeats: 10,

@@ -43,8 +43,8 @@ fn command(encoder: &mut Encoder<'_>, command: Command, console: &mut Console) -
         Command::LoseMultiTurnReference => {
             let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1);
             return match encoder.run(&mut zero) {
-                Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
-                Err(error) => say(console, "turns", error),
+                Ok(multi) => writeln!(console, "ABM: {}", multi.abm.get()),
+                Err(error) => say(console, "ABM", error),
             };
         }
         Command::Unknown => return console.write_str("?\n"),

@@ -56,8 +56,9 @@ pub struct Bench {
     pub seen: Seen,
     /// Requests that the encoder believed and nobody sent like that: damage that it cannot see, or another speaker.
     pub forged_requests: u32,
-    /// The three fields that the encoder heard last: of which transmission, and where in it.
+    /// The three fields that the encoder heard last: of which transmission, and where in it; and whether they were damaged.
     fields: [Option<(Id, u16)>; 3],
+    damaged: [bool; 3],
     /// Bytes that the encoder heard and that the host did not send like that or not then: its count of resets may have begun
     /// again.
     pub misheard: u32,
@@ -106,6 +107,7 @@ impl Bench {
             seen: Seen::default(),
             forged_requests: 0,
             fields: [None; 3],
+            damaged: [false; 3],
             misheard: 0,
             misread: 0,
             moves: true,
@@ -321,6 +323,10 @@ impl Bench {
                 let to_memory =
                     |sent: &tformat::device::Transmission| matches!(sent.frame.as_bytes(), [0x32 | 0xea, ..]);
                 self.forged_requests += u32::from(sent.as_ref().is_some_and(to_memory) && twice(&self.fields, place));
+                // Two wrong bits in one column, which the XOR does not see, make a request for another cell or of another byte.
+                let damaged = unit.damaged || self.damaged.contains(&true);
+                self.forged_requests += u32::from(sent.as_ref().is_some_and(to_memory) && damaged);
+                self.damaged = [self.damaged[1], self.damaged[2], unit.damaged];
                 self.fields.rotate_left(1);
                 self.fields[2] = Some(place);
                 if let Some(sent) = sent {
