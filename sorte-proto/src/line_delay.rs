@@ -111,25 +111,38 @@ impl LineDelay {
         u16::from_le_bytes([low, high])
     }
 
-    /// The line delay in ns: as [`published`](Self::published), and 0 for a cable so short that truncation of the round trips,
-    /// or a tick of the counter, makes it negative.
+    /// The line delay in ns, as [`published`](Self::published) where that does not wrap.
     ///
     /// # Errors
     /// [`Error::ImplausibleRoundTrip`] with the longest if that is 4096 ns or more: sixteen of them do not fit the published
-    /// 16 bits (some 350 m of cable); with the mean if that is shorter than the forwarding time by more than a tick of 5 ns, and
-    /// another 15 ns if round trips are truncated.
+    /// 16 bits (some 350 m of cable); with the mean if that is shorter than the forwarding time.
     pub const fn checked(&self) -> Result<u16, Error> {
         if self.max >= 4096 {
             return Err(Error::ImplausibleRoundTrip { rtt_ns: self.max });
         }
         let mean = if self.model.shift_samples { self.sum } else { self.sum >> 4 };
-        let forward = self.model.forward_ns as u32;
-        let lacks = if self.model.shift_samples { TICK_NS.saturating_add(CUT_NS) } else { TICK_NS };
-        match mean.checked_sub(forward) {
+        match mean.checked_sub(self.model.forward_ns as u32) {
             #[expect(clippy::cast_possible_truncation, reason = "sixteen below 4096 at most, and their mean is")]
             Some(twice) => Ok((twice >> 1) as u16),
-            None if mean.saturating_add(lacks) >= forward => Ok(0),
             None => Err(Error::ImplausibleRoundTrip { rtt_ns: mean }),
+        }
+    }
+
+    /// The line delay in ns that master and device use: as [`checked`](Self::checked), and 0 for a cable so short that
+    /// truncation of the round trips, or a tick of the counter, makes it negative.
+    ///
+    /// # Errors
+    /// Those of [`checked`](Self::checked), but a mean may be shorter than the forwarding time by a tick of 5 ns, and by
+    /// another 15 ns if round trips are truncated.
+    pub const fn measured(&self) -> Result<u16, Error> {
+        let lacks = if self.model.shift_samples { TICK_NS.saturating_add(CUT_NS) } else { TICK_NS };
+        match self.checked() {
+            Err(Error::ImplausibleRoundTrip { rtt_ns })
+                if self.max < 4096 && rtt_ns.saturating_add(lacks) >= self.model.forward_ns as u32 =>
+            {
+                Ok(0)
+            }
+            checked => checked,
         }
     }
 }
@@ -153,28 +166,30 @@ mod tests {
         assert_eq!(of(DelayModel::MASTER, [320; 16]).checked(), Ok(0));
         // 360 / 16 is cut to 22 sixteen times: 352 is less than the forwarding time, and the published result wraps.
         let device = of(DelayModel::DEVICE, [360; 16]);
-        assert_eq!((device.checked(), device.published()), (Ok(0), 65532));
+        assert_eq!(device.checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 352 }));
+        assert_eq!((device.measured(), device.published()), (Ok(0), 65532));
         assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
         // A tick less, and 15 ns of each that is cut, are a cable of no length; more is none at all.
-        assert_eq!(of(DelayModel::MASTER, [315; 16]).checked(), Ok(0));
-        assert_eq!(of(DelayModel::MASTER, [314; 16]).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 314 }));
+        assert_eq!(of(DelayModel::MASTER, [315; 16]).measured(), Ok(0));
+        assert_eq!(of(DelayModel::MASTER, [314; 16]).measured(), Err(Error::ImplausibleRoundTrip { rtt_ns: 314 }));
         let mut cut = [367; 16];
         cut[..12].fill(351);
-        assert_eq!(of(DelayModel::DEVICE, cut).checked(), Ok(0));
+        assert_eq!(of(DelayModel::DEVICE, cut).measured(), Ok(0));
         cut[12] = 351;
-        assert_eq!(of(DelayModel::DEVICE, cut).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 339 }));
+        assert_eq!(of(DelayModel::DEVICE, cut).measured(), Err(Error::ImplausibleRoundTrip { rtt_ns: 339 }));
         let whole = DelayModel { shift_samples: false, ..DelayModel::DEVICE };
-        assert_eq!(of(whole, [355; 16]).checked(), Ok(0));
-        assert_eq!(of(whole, [354; 16]).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 354 }));
+        assert_eq!(of(whole, [355; 16]).measured(), Ok(0));
+        assert_eq!(of(whole, [354; 16]).measured(), Err(Error::ImplausibleRoundTrip { rtt_ns: 354 }));
     }
 
     /// Sixteen round trips of 4096 ns do not fit the published 16 bits, sixteen of 4095 do.
     #[test]
     fn the_longest_round_trip_is_4095_ns() {
         for model in [DelayModel::MASTER, DelayModel::DEVICE] {
-            assert!(of(model, [4095; 16]).checked().is_ok());
+            assert!(of(model, [4095; 16]).measured().is_ok());
             let mut one = [500; 16];
             one[7] = 4096;
+            assert_eq!(of(model, one).checked(), of(model, one).measured());
             assert_eq!(of(model, one).checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 4096 }));
         }
     }
@@ -190,14 +205,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn checked_and_published_agree_in_the_range_of_the_registers(rtt in prop_oneof![
+        fn measured_and_published_agree_in_the_range_of_the_registers(rtt in prop_oneof![
             proptest::array::uniform16(300u32..5000),
             proptest::array::uniform16(300u32..400),
         ]) {
             for model in [DelayModel::MASTER, DelayModel::DEVICE] {
                 let delay = of(model, rtt);
                 let mean = rtt.iter().sum::<u32>() / 16;
-                match delay.checked() {
+                match delay.measured() {
                     Ok(ns) => {
                         let negative = delay.published() >= 0x7f00;
                         prop_assert_eq!(ns, if negative { 0 } else { delay.published() });

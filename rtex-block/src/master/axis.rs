@@ -11,7 +11,7 @@ use asking::{Main, Sub};
 use super::config::{AxisConfig, StopCategory};
 use super::counter::Turn;
 use super::counters::Counters;
-use super::echo::{Arrival, EchoWatch};
+use super::echo::{Arrival, EchoWatch, TURN};
 use super::heard::Heard;
 use super::profile_move::ProfileMove;
 use super::servo_off::{ActiveCode, ServoOff};
@@ -199,7 +199,9 @@ impl Axis {
             Err(SwitchOnError::Alarm)
         } else if !status.contains(StatusFlags::SERVO_READY) {
             Err(SwitchOnError::NotReady)
-        } else if self.main.needs_servo_off && (self.main.slot.asking().is_some() || !self.main.quiet.is_kept()) {
+        } else if self.passive <= TURN
+            || self.main.needs_servo_off && (self.main.slot.asking().is_some() || !self.main.quiet.is_kept())
+        {
             Err(SwitchOnError::Busy)
         } else {
             Ok(())

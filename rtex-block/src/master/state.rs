@@ -74,7 +74,7 @@ impl core::error::Error for StopReason {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AxisState {
-    /// Servo_On = 0, waiting for Servo_Ready, and for Servo_Active = 0 as in `SwitchingOff`.
+    /// Waiting for Servo_Ready, Servo_On = 0.
     Starting,
     /// Ready, Servo_On = 0.
     Off,
@@ -87,8 +87,7 @@ pub enum AxisState {
     /// Energised and at rest after a stop of category 2, until [`Axis::clear`](super::Axis::clear); set-points are not
     /// accepted.
     Held(StopReason),
-    /// Servo_On = 0, waiting for Servo_Active = 0 for more than a turn of the counter: until then a drive may still report its
-    /// earlier activity.
+    /// Servo_On = 0, waiting for Servo_Active = 0.
     SwitchingOff,
     /// Servo_On = 0 until [`Axis::clear`](super::Axis::clear).
     Stopped(StopReason),
@@ -126,7 +125,8 @@ pub enum SwitchOnError {
     /// Servo_Ready is 0.
     NotReady,
     /// A request is pending that changes the position or the state of the drive, or positions from before such a request may
-    /// still come.
+    /// still come; or Servo_Active has not been 0 for more than a turn of the counter since the servo was last on, so that
+    /// activity from before may still be reported.
     Busy,
 }
 

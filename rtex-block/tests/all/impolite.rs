@@ -244,8 +244,7 @@ fn servo_active_that_does_as_it_likes() {
         let from = pair.now;
         pair.until("over", |pair| pair.axis.state() != AxisState::SwitchingOff);
         assert_eq!(pair.axis.state(), state);
-        // Off is told a turn of the counter later.
-        assert!(pair.now - from <= 18, "{}", pair.now - from);
+        assert!(pair.now - from <= 14, "{}", pair.now - from);
         (0..5).for_each(|_| pair.update());
         assert_eq!(pair.axis.disobeys(), late == 40);
     }

@@ -22,7 +22,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
         "start-up    DISCOVERY {discovery}, PARAM {param}, DELAY_REQ {delay}, SYNC {sync}; first cycle after {ready:.2} ms"
     )?;
     let cables_ns = &line.setup.cables_ns;
-    let measured = line.master.line_delay().checked();
+    let measured = line.master.line_delay().measured();
     for (k, node) in line.nodes.iter().enumerate().take(LISTED) {
         let Some(place) = node.device.assignment() else {
             writeln!(out, "  device {}  not found", k + 1)?;

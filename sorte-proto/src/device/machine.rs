@@ -134,7 +134,7 @@ impl Device {
         if self.is_last() {
             return Ok(0);
         }
-        if self.line.is_complete() { self.line.checked() } else { Err(Error::ImplausibleRoundTrip { rtt_ns: 0 }) }
+        if self.line.is_complete() { self.line.measured() } else { Err(Error::ImplausibleRoundTrip { rtt_ns: 0 }) }
     }
 
     /// The SYNC frame heard last.

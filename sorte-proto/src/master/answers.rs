@@ -85,7 +85,7 @@ impl Master {
     fn cycle_of(&mut self, address: DeviceAddress, sof_ns: u64) -> Result<Option<u64>, Error> {
         let Cycles { present, before, hop_ns, .. } = &mut self.cycles;
         let Some(present) = present else { return Err(Error::WrongState) };
-        let (hops, first) = (u32::from(address.hops_before()), u32::from(self.line.checked().unwrap_or_default()));
+        let (hops, first) = (u32::from(address.hops_before()), u32::from(self.line.measured().unwrap_or_default()));
         let path_ns = hop_ns.saturating_mul(hops).saturating_add(first);
         let arrives = self.config.slots.send_ns(address, path_ns).saturating_add(path_ns.into());
         let arrives = arrives.saturating_add(CAPTURE_NS.into()).saturating_sub(TRIGGER_NS.into());
@@ -183,7 +183,7 @@ impl Master {
             return Ok(());
         }
         self.is_fresh(sof_ns)?;
-        let first = self.line.checked().unwrap_or_default();
+        let first = self.line.measured().unwrap_or_default();
         let gained = answer.time_stamp_ns.wrapping_sub(self.sync_stamp_ns);
         let devices = self.network.devices();
         // Each adds its transit and the cable behind it; the last one has none.

@@ -320,7 +320,7 @@ impl Master {
             let request = Outgoing::DelayReq(DelayReq::of_master(self.place(SAMPLES.into())));
             return self.send(now_ns, request, self.config.frame_period_ns);
         }
-        match self.line.checked() {
+        match self.line.measured() {
             Ok(_) => self.enter(State::Sync, now_ns),
             Err(error) => self.fail(error),
         }
@@ -349,7 +349,7 @@ impl Master {
         let frames = self.config.sync_frames;
         if self.frame < frames {
             self.catch_up(now_ns, self.config.sync_period_ns);
-            let (line, place) = (self.line.checked().unwrap_or_default(), self.place(frames));
+            let (line, place) = (self.line.measured().unwrap_or_default(), self.place(frames));
             let frame = Sync::of_master(self.time_ns(self.next_ns), line, place);
             self.sync_stamp_ns = frame.time_stamp_ns;
             let gap = if place == Place::Last { LOOK_NS } else { self.config.sync_period_ns.into() };

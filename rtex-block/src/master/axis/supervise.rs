@@ -3,14 +3,11 @@
 use super::Axis;
 use crate::error::Error;
 use crate::header::MacId;
-use crate::master::echo::TURN;
 use crate::master::profile_move::MoveStage;
 use crate::master::state::{AxisState, StopReason};
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::response::Response;
 use crate::status::StatusFlags;
-
-const READY_OR_ACTIVE: StatusFlags = StatusFlags::SERVO_READY.union(StatusFlags::SERVO_ACTIVE);
 
 impl Axis {
     /// Checks for silence, refusals and alarms, and checks readiness, activity and the limit of the state. An alarm counts
@@ -71,11 +68,11 @@ impl Axis {
         let [alarm, ready, active] =
             [StatusFlags::ALARM, StatusFlags::SERVO_READY, StatusFlags::SERVO_ACTIVE].map(|flag| status.contains(flag));
         match self.state {
-            AxisState::Starting if ready && !active && !alarm && self.passive > TURN => self.enter(AxisState::Off, 0),
+            AxisState::Starting if ready && !active && !alarm => self.enter(AxisState::Off, 0),
             AxisState::Starting | AxisState::Stopped(_) => {}
             _ if alarm => self.fail(StopReason::Alarm),
             AxisState::Off if !ready => self.enter(AxisState::Starting, self.config.limits.ready.unwrap_or(0)),
-            AxisState::SwitchingOff if !active && self.passive > TURN => self.enter(AxisState::Off, 0),
+            AxisState::SwitchingOff if !active => self.enter(AxisState::Off, 0),
             _ if self.state.is_servo_on() && !ready => self.fail(StopReason::NotReady),
             AxisState::SwitchingOn if active => self.enter(AxisState::On, 0),
             _ if self.is_energised() && !active => self.fail(StopReason::NotActive),
@@ -100,16 +97,12 @@ impl Axis {
 
     /// Checks the limit of the present state.
     fn wait(&mut self, on_time: Option<&Response>) {
-        let status = || on_time.map_or(self.status(), |response| response.status);
         let reason = match self.state {
             AxisState::Starting if self.config.limits.ready.is_none() => return,
-            AxisState::Starting => match status() {
-                status if status.contains(StatusFlags::ALARM) => StopReason::Alarm,
-                // The turn of the counter that is waited for now belongs to no limit.
-                status if status & READY_OR_ACTIVE == StatusFlags::SERVO_READY => return,
-                _ => StopReason::ReadyTimeout,
-            },
-            AxisState::SwitchingOff if !status().contains(StatusFlags::SERVO_ACTIVE) => return,
+            AxisState::Starting => {
+                let status = on_time.map_or(self.status(), |response| response.status);
+                if status.contains(StatusFlags::ALARM) { StopReason::Alarm } else { StopReason::ReadyTimeout }
+            }
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
             AxisState::Stopping(reason) => reason,

@@ -132,7 +132,9 @@ fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
         }
         Outgoing::Sync(frame) => {
             let mut frame = frame.emit();
-            assert!(Rewriter::sync(0, Status::LAST).pass(&mut frame).is_ok());
+            for n in 1..=devices {
+                assert!(Rewriter::sync(0, last_of(n, devices)).pass(&mut frame).is_ok());
+            }
             frame.to_vec()
         }
         Outgoing::Param(frame) => frame.emit().to_vec(),
