@@ -25,6 +25,7 @@
 //! ```
 
 mod detection;
+mod echo;
 mod eeprom;
 mod line;
 mod reset;
@@ -39,11 +40,12 @@ use crate::request::Request;
 use crate::response::Response;
 
 pub use detection::Detection;
+pub use echo::parse_echoed;
 pub use eeprom::EepromAccess;
 pub use line::Line;
 pub use reset::Reset;
 pub use servowire_core::{ErrorRate, Polling};
-pub use transaction::{DriverOff, Exchange, Progress, Transaction, Transmission, parse_echoed};
+pub use transaction::{DriverOff, Exchange, Progress, Transaction, Transmission};
 pub use turns::MultiTurnZero;
 pub use zero::SingleTurnZero;
 

@@ -323,3 +323,97 @@ fn a_failed_answer_is_known_after_its_event_was_taken() {
     remote.bus().frame();
     assert!(remote.poll_long().unwrap().is_some());
 }
+
+/// Memory with a record of what is written.
+struct Memory {
+    bytes: [u8; Registers::LEN],
+    written: Vec<(u8, Vec<u8>)>,
+}
+
+impl RegisterBus for Memory {
+    type Error = ();
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), ()> {
+        let from = usize::from(address);
+        bytes.copy_from_slice(&self.bytes[from..from + bytes.len()]);
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), ()> {
+        self.written.push((address, bytes.to_vec()));
+        Ok(())
+    }
+}
+
+/// What a remote receiver writes over its bus, byte for byte.
+#[test]
+fn accesses_of_a_remote_receiver() {
+    let remote = |dialect: Dialect, bytes: &[(usize, u8)]| {
+        let mut memory = Memory { bytes: [0; Registers::LEN], written: Vec::new() };
+        for (address, value) in bytes {
+            memory.bytes[*address] = *value;
+        }
+        RemoteReceiver::new(dialect, memory)
+    };
+    let written = |mut remote: RemoteReceiver<Memory>| core::mem::take(&mut remote.bus().written);
+
+    // Events: those that were read are cleared.
+    let mut bus = remote(Dialect::TI, &[(0x04, 0x08), (0x05, 0x22), (0x3d, 0x41)]);
+    let events = Events { drive: Event::from_bits_retain(0x0822), safe: EventS::from_bits_retain(0x41) };
+    assert_eq!(bus.take_events(), Ok(events));
+    assert_eq!(written(bus), [(0x04, vec![0, 0]), (0x3d, vec![0])]);
+
+    // Short messages, free (FRES, bit 0 of 53h) and not.
+    let (read, write) = (ShortRequest::Read(RemoteRegister::SRSSI), ShortRequest::Write(RemoteRegister::PING, 0xa5));
+    let mut bus = remote(Dialect::TI, &[(0x53, 0xfe)]);
+    assert_eq!(bus.start_short(read), Err(BusError::Link(Error::Busy)));
+    assert_eq!(written(bus), []);
+    let mut bus = remote(Dialect::TI, &[(0x53, 0x01)]);
+    bus.start_short(read).unwrap();
+    bus.start_short(write).unwrap();
+    let want = [(0x3d, vec![0]), (0x40, vec![0xfc]), (0x3d, vec![0]), (0x37, vec![0xa5]), (0x40, vec![0x7f])];
+    assert_eq!(written(bus), want);
+    let mut bus = remote(Dialect::TI, &[(0x3d, 0xfe), (0x37, 0x07)]);
+    assert_eq!((bus.poll_short(), written(bus)), (Ok(None), vec![]));
+    let mut bus = remote(Dialect::TI, &[(0x3d, 0x01), (0x37, 0x07)]);
+    assert_eq!((bus.poll_short(), written(bus)), (Ok(Some(7)), vec![(0x3d, vec![0x00])]));
+
+    // Long messages, free (FREL, bit 1 of 51h) and not.
+    let request = crate::bench::write_file(6, b"42");
+    let mut bus = remote(Dialect::TI, &[(0x51, 0xfd)]);
+    assert_eq!(bus.start_long(&request), Err(BusError::Link(Error::Busy)));
+    assert_eq!(written(bus), []);
+    let mut bus = remote(Dialect::TI, &[(0x51, 0x02)]);
+    bus.start_long(&request).unwrap();
+    bus.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+    let want = [
+        (0x05, vec![0]),
+        (0x20, b"42".to_vec()),
+        (0x2a, vec![0x80, 0x06]),
+        (0x28, vec![0xb5, 0x31]),
+        (0x2c, vec![1]),
+        (0x05, vec![0]),
+        (0x28, vec![0xcc, 0x81]),
+        (0x2c, vec![1]),
+    ];
+    assert_eq!(written(bus), want);
+    let mut bus = remote(Dialect::TI, &[(0x05, 0xfd), (0x28, 0xcc)]);
+    assert_eq!((bus.poll_long(), written(bus)), (Ok(None), vec![]));
+    // ANS; the ends of reading 0, 2, 4 and 8 bytes, and of writing.
+    let mut bus = remote(Dialect::TI, &[(0x05, 0x12)]);
+    assert_eq!(bus.poll_long(), Err(BusError::Link(Error::NotAccepted { tries: 1 })));
+    assert_eq!(written(bus), [(0x05, vec![0])]);
+    for (header, len) in [(0xc0, 0), (0xc4, 2), (0xc8, 4), (0xcc, 8), (0x8c, 0)] {
+        let mut bytes = vec![(0x05, 0x02), (0x28, header)];
+        bytes.extend((0..8).map(|at| (0x20 + at, b'0' + u8::try_from(at).unwrap())));
+        let mut bus = remote(Dialect::TI, &bytes);
+        assert_eq!(bus.poll_long().unwrap().unwrap().as_bytes(), &b"01234567"[..len]);
+        assert_eq!(written(bus), [(0x05, vec![0])]);
+    }
+    // A refusal: class and detail as the dialect orders them.
+    for (dialect, first, second) in [(Dialect::SICK, 0x10, 0x40), (Dialect::TI, 0x40, 0x10)] {
+        let mut bus = remote(dialect, &[(0x05, 0x02), (0x28, 0xe4), (0x20, first), (0x21, second)]);
+        let error = hdsl::message::ResourceError::NOT_THERE;
+        assert_eq!(bus.poll_long(), Err(BusError::Link(Error::Resource { error })));
+    }
+}

@@ -15,7 +15,8 @@ use crate::status::Alm;
 ///    clear, so that afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
 ///    If an encoder is chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
 /// 2. The write is sent **once**; after 30 ms STATUS is read. MEMERR must still be clear.
-/// 3. What was written is read back, even if the response to the write is missing.
+/// 3. What was written is read back, even if the response to the write is missing. A value that differs must be read twice: its
+///    CRC-8 may be right by chance.
 ///
 /// | it ends with | the encoder |
 /// |---|---|
@@ -33,6 +34,8 @@ pub struct VerifiedWrite {
     phase: Phase,
     /// MEMERR is set; it may have been set before.
     doubtful: bool,
+    /// The value last read back that is not the one written.
+    other: Option<u32>,
     tries: u16,
     end: Option<Step<()>>,
 }
@@ -67,13 +70,14 @@ impl VerifiedWrite {
             Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),
             _ => Back::Id(Request::new(ea, Operation::IdRead1)),
         };
-        Self { write, back, ea, phase: Phase::Ready, doubtful: false, tries: 0, end: None }
+        Self { write, back, ea, phase: Phase::Ready, doubtful: false, other: None, tries: 0, end: None }
     }
 
     /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<()> {
         self.tries = 0;
         self.doubtful = false;
+        self.other = None;
         self.end = None;
         let Request { ea, operation } = self.write.request();
         self.ea = ea;
@@ -177,25 +181,42 @@ impl VerifiedWrite {
         match &mut self.back {
             Back::Word { read, data } => match read.receive(outcome, ready_ns) {
                 Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
-                Step::Done { value, ready_ns } if value != *data => Step::Failed { error: Error::NotDone, ready_ns },
+                Step::Done { value, ready_ns } if value != *data => {
+                    let request = read.begin();
+                    self.differs(value.into(), request, ready_ns)
+                }
                 step => step.and_then(|_, ready_ns| Step::Done { value: (), ready_ns }),
             },
             Back::Id(request) => {
                 let request = *request;
-                match outcome.ok().and_then(|response| same(written, request, response)) {
+                match outcome.ok().and_then(|response| read_back(written, request, response)) {
+                    Some(Read { got, want }) if got != want => self.differs(got, request, ready_ns),
                     // Whether it was stored is what MEMERR would say.
-                    Some(true) if self.doubtful => Step::Failed { error: Error::EffectUnknown, ready_ns },
-                    Some(true) => Step::Done { value: (), ready_ns },
-                    Some(false) => Step::Failed { error: Error::NotDone, ready_ns },
+                    Some(_) if self.doubtful => Step::Failed { error: Error::EffectUnknown, ready_ns },
+                    Some(_) => Step::Done { value: (), ready_ns },
                     None => self.again(request, Error::EffectUnknown, ready_ns),
                 }
             }
         }
     }
+
+    /// Something else is stored if it is read twice in a row.
+    fn differs(&mut self, got: u32, request: Request, ready_ns: u64) -> Step<()> {
+        if self.other.replace(got) == Some(got) {
+            return Step::Failed { error: Error::NotDone, ready_ns };
+        }
+        self.again(request, Error::EffectUnknown, ready_ns)
+    }
 }
 
-/// Returns whether a response shows what was written; `None` if it is inconclusive.
-fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
+/// What was read back, and what was written.
+struct Read {
+    got: u32,
+    want: u32,
+}
+
+/// Returns what a response shows; `None` if it is inconclusive.
+fn read_back(written: Request, asked: Request, response: Response) -> Option<Read> {
     let own = response.ea == asked.ea || !asked.command().answers_with_own_address();
     if response.command() != Some(asked.command()) || !own || is_busy(response) {
         return None;
@@ -204,9 +225,9 @@ fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
         (
             Operation::IdWrite1 { id: want } | Operation::IdWrite2 { id: want } | Operation::SetAddress2 { id: want },
             Data::Id { id },
-        ) => Some(id == want),
+        ) => Some(Read { got: id.get(), want: want.get() }),
         (Operation::CoefficientWrite { coefficient: want }, Data::Coefficient { coefficient }) => {
-            Some(coefficient == want)
+            Some(Read { got: coefficient.get(), want: want.get() })
         }
         _ => None,
     }

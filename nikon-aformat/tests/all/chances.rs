@@ -1,9 +1,22 @@
 //! Frames of two responses, or one that came twice, whose CRC-8 is right by chance: no response is lost through them.
 
 use nikon_aformat::bus::{Addresses, Outcome};
-use nikon_aformat::{BitOrder, Command, EncoderAddress, Operation, Request, Resolution, Response};
+use nikon_aformat::master::BusTransaction;
+use nikon_aformat::{BitOrder, Command, EncoderAddress, Expected, Operation, Request, Resolution, Response};
 
 use crate::transactions::{FRAME_NS, LINE, bus, ea, ended, response, start};
+
+/// A bus that has heard, frame by frame, half of one response and all of the next, if the CRC-8 over the first four of these frames is
+/// right by chance.
+pub fn by_chance(expected: &Expected, first: &[u16], second: &[u16]) -> Option<BusTransaction> {
+    let frames: Vec<_> = first[..2].iter().chain(second).copied().collect();
+    Response::parse_words(expected, &frames[..4], BitOrder::LsbFirst).ok()?;
+    let mut bus = bus(0b111, LINE);
+    for (k, content) in (1..).zip(frames) {
+        let _ = bus.hear(&[Some(content)], 10_000 + k * FRAME_NS);
+    }
+    Some(bus)
+}
 
 /// A shaft at rest: inside the responses of a bus that lost nothing there may be another sound one, made of the end of one
 /// response and the start of the next, in every cycle again. All turns and positions that make one are heard.
@@ -40,15 +53,8 @@ fn a_response_is_not_lost_in_the_rest_of_another() {
         let first = response(Command::Abs40Mt, 0, position).emit().contents().to_vec();
         let sent = response(Command::Abs40Mt, 1, 0x1234);
         let second = sent.emit().contents().to_vec();
-        let chance: Vec<_> = first[..2].iter().chain(&second[..2]).copied().collect();
-        if Response::parse_words(&expected, &chance, BitOrder::LsbFirst).is_err() {
-            continue;
-        }
+        let Some(bus) = by_chance(&expected, &first, &second) else { continue };
         chances += 1;
-        let mut bus = bus(0b111, LINE);
-        for (k, content) in (1..).zip(first[..2].iter().chain(&second)) {
-            let _ = bus.hear(&[Some(*content)], 10_000 + k * FRAME_NS);
-        }
         assert_eq!(bus.bus().of(ea(1)), Outcome::Good(sent), "{position:#x}");
         assert_eq!((bus.bus().of(ea(0)), bus.bus().damaged()), (Outcome::Missing, 1), "{position:#x}");
     }

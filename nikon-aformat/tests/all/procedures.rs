@@ -102,9 +102,14 @@ const WRITE: Operation = match UserAddress::new(0x42) {
 
 #[test]
 fn a_word_is_written_once_and_read_back() {
-    for (data, end) in [
-        (0x1234, Step::Done { value: (), ready_ns: 99 }),
-        (0x1235, Step::Failed { error: Error::NotDone, ready_ns: 99 }),
+    // The CRC-8 of a value that differs may be right by chance: it counts once it has been read twice in a row.
+    let again = send(EA, Operation::EepromRead { address: 0x43 }, 99 + MS);
+    let ends = [Step::Done { value: (), ready_ns: 99 }, Step::Failed { error: Error::NotDone, ready_ns: 99 }];
+    for (values, end) in [
+        (&[0x1234_u16] as &[_], ends[0]),
+        (&[0x1235, 0x1234], ends[0]),
+        (&[0x1235, 0x1235], ends[1]),
+        (&[0x1235, 0x1236, 0x1235, 0x1235], ends[1]),
     ] {
         for lost in [false, true] {
             let mut write = eeprom_write();
@@ -118,7 +123,10 @@ fn a_word_is_written_once_and_read_back() {
                 assert_eq!(write.receive(echo, 60), send(EA, Operation::Status, 60 + 30 * MS));
                 assert_eq!(write.receive(idle(), 70), other);
             }
-            assert_eq!(read_back(&mut write, 99, data), end);
+            for (k, data) in values.iter().enumerate() {
+                let last = k + 1 == values.len();
+                assert_eq!(read_back(&mut write, 99, *data), if last { end } else { again }, "{values:x?} {k}");
+            }
         }
     }
 }
@@ -184,8 +192,12 @@ fn an_identification_code_is_read_back() {
     begin(&mut write);
     assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
     begin(&mut write);
-    let end = write.receive(id(EA, Command::IdRead1, 0, 0x12_3457), 9);
-    assert_eq!(end, Step::Failed { error: Error::NotDone, ready_ns: 9 });
+    let mut told = |held| write.receive(id(EA, Command::IdRead1, 0, held), 9);
+    assert_eq!([told(0x12_3457), told(0x12_3458), told(0x12_3457)], [ask(9 + MS); 3]);
+    assert_eq!(told(0x12_3457), Step::Failed { error: Error::NotDone, ready_ns: 9 });
+    // What was read back after another write says nothing of this one.
+    begin(&mut write);
+    assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3457), 9), ask(9 + MS));
     // What is no answer is asked again, forty times at the most.
     for nothing in [
         LOST,
@@ -257,7 +269,11 @@ fn an_old_memory_fault_says_nothing_of_a_write() {
         let answered = id(zero, Command::SetAddress2, 0, 0x12_3456);
         assert_eq!(address.receive(answered, 0), send(EA, Operation::Status, 30 * MS));
         assert_eq!(address.receive(fault(), 0), send(EA, Operation::IdRead1, 0));
-        let end = address.receive(id(EA, Command::IdRead1, 0, held), 9);
+        let mut end = address.receive(id(EA, Command::IdRead1, 0, held), 9);
+        if error == Error::NotDone {
+            assert_eq!(end, send(EA, Operation::IdRead1, 9 + MS));
+            end = address.receive(id(EA, Command::IdRead1, 0, held), 9);
+        }
         assert_eq!(end, Step::Failed { error, ready_ns: 9 });
     }
 }

@@ -4,18 +4,13 @@
 use std::cell::Cell;
 use std::convert::Infallible;
 use std::fmt::Debug;
-use std::num::NonZeroU16;
 
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::Cycle;
 use nikon_aformat::{EncoderAddress, Operation, RequestFrame};
-use rtex_block::master::{ActiveCode, Asic, Axis, AxisConfig, Limits, Master, MasterConfig, Slave};
-use rtex_block::timing::{Periods, TimerSystem};
-use rtex_block::{BlockSize, MacId};
 use servowire_drivers::nikon::Frame;
 use servowire_drivers::nikon::blocking::{Driver as Encoders, FramePort};
-use servowire_drivers::rtex::{Driver, FrameCount, Port};
 use servowire_drivers::tformat::blocking::Driver as Encoder;
 use servowire_drivers::{Automatic, Clock, ClockError, CounterClock, Direction, Error, TickRate, Worst};
 
@@ -26,7 +21,7 @@ const STEP_NS: u64 = 2_000;
 
 /// What is wrong with the clock, from one of its looks on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Wrong {
+pub enum Wrong {
     Nothing,
     Stands,
     /// It begins at 0 again.
@@ -38,7 +33,7 @@ enum Wrong {
 }
 
 /// A clock that goes on with every look, until something is wrong.
-struct Bad {
+pub struct Bad {
     looks: Cell<u32>,
     wrong: Wrong,
     at: u32,
@@ -59,7 +54,7 @@ impl Bad {
         call()
     }
 
-    fn look(&self) -> u64 {
+    pub fn look(&self) -> u64 {
         let look = self.looks.get();
         self.looks.set(look + 1);
         assert!(look < self.at.saturating_add(PATIENCE), "{:?} from look {} on: for ever", self.wrong, self.at);
@@ -84,7 +79,7 @@ fn holds<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
     holds_against(&[Wrong::Stands, Wrong::Reset, Wrong::Wraps, Wrong::Jumps], name, calls);
 }
 
-fn holds_against<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
+pub fn holds_against<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
     wrongs: &[Wrong],
     name: &str,
     calls: impl Fn(&Bad) -> [Option<Error<IO, PIN, P, D>>; 3],
@@ -322,65 +317,6 @@ mod asynch {
         holds!("read_bus", async |m: &mut Master<_>| m.read_bus(Operation::Abs40Mt, Addresses::first(8)).await);
         holds!("clear_status", async |m: &mut Master<_>| m.clear_status(ea).await);
     }
-}
-
-/// An ASIC that never gets ready, and the blocks that were written to it.
-struct Stuck<'a>(&'a Cell<u32>);
-
-impl Port for Stuck<'_> {
-    type Word = u16;
-    type Error = Infallible;
-
-    fn state(&mut self) -> Result<Asic, Infallible> {
-        Ok(Asic::RingConfig)
-    }
-
-    fn slaves(&mut self, _: &mut [Slave]) -> Result<Option<usize>, Infallible> {
-        Ok(None)
-    }
-
-    fn read(&mut self, _: usize, _: &mut [u16]) -> Result<(), Infallible> {
-        Ok(())
-    }
-
-    fn write(&mut self, _: usize, _: &[u16]) -> Result<(), Infallible> {
-        self.0.set(self.0.get() + 1);
-        Ok(())
-    }
-}
-
-static RECEIVED: FrameCount = FrameCount::new();
-
-fn host() -> Master<1> {
-    let periods = Periods::from_a6n(-1, 1, Some(500_000)).unwrap();
-    let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal);
-    let mac_id = MacId::truncate(1);
-    let limits = Limits::new(NonZeroU16::new(6).unwrap(), 60);
-    let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, periods.update_ns, limits));
-    Master::new(config, [Slave { mac_id, kind: 1 }], [axis]).unwrap()
-}
-
-#[test]
-fn rtex() {
-    // What a phase of an RTEX master lasts nobody can tell from a jump.
-    holds_against(&[Wrong::Stands, Wrong::Reset, Wrong::Wraps], "start", |clock| {
-        let writes = Cell::new(0);
-        let mut driver = Driver::new(Stuck(&writes), || clock.look(), host(), &RECEIVED);
-        std::array::from_fn(|_| driver.start(1_000_000).err())
-    });
-}
-
-/// Drives stop without commands.
-#[test]
-fn rtex_commands_go_out_whatever_the_clock_says() {
-    let (writes, now_ns) = (Cell::new(0), Cell::new(5_000_000));
-    let mut driver = Driver::new(Stuck(&writes), || now_ns.get(), host(), &RECEIVED);
-    assert_eq!(driver.exchange(5_000_000).map(|exchanged| exchanged.frames_late), Ok(0));
-    now_ns.set(4_000_000);
-    let error = driver.exchange(5_500_000).unwrap_err();
-    assert_eq!(error, Error::Clock(ClockError::Backwards { by_ns: 1_000_000 }));
-    assert_eq!(writes.get(), 2);
-    assert!(driver.exchange(4_000_000).is_ok());
 }
 
 /// A pin that says when it went off, by the true time.

@@ -3,6 +3,7 @@
 #[cfg(feature = "async")]
 mod asynch;
 mod bank;
+mod clock;
 mod exchange;
 mod faults;
 

@@ -476,27 +476,5 @@ const fn is_sound(outcome: &Result<Response, Error>) -> bool {
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
-/// Decodes everything that a UART received since the request began, with the receiver always on: the master's own request, then
-/// the response. It is for buffers without times; bytes after the response are ignored.
-///
-/// # Errors
-/// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;
-/// [`Error::Truncated`] in the middle of the echo; [`Error::NoResponse`] with `echo` set if nothing follows it: no encoder is
-/// there, or the wires A and B are swapped; then as [`Response::parse`].
-pub fn parse_echoed(request: Request, bytes: &[u8]) -> Result<Response, Error> {
-    let sent = request.emit();
-    for (at, (&want, &got)) in (0..).zip(sent.as_bytes().iter().zip(bytes)) {
-        if got != want {
-            return Err(Error::EchoMismatch { at, got, want });
-        }
-    }
-    match (bytes, bytes.get(usize::from(sent.fields())..)) {
-        ([], _) => Err(Error::NoResponse { echo: false }),
-        (_, None) => Err(Error::Truncated { got: 0, want: request.data_id().response_fields().into() }),
-        (_, Some([])) => Err(Error::NoResponse { echo: true }),
-        (_, Some(response)) => Response::parse(request, response),
-    }
-}
-
 #[cfg(test)]
 mod tests;

@@ -437,26 +437,6 @@ fn a_long_block_with_an_echo_ends_with_the_response() {
     assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }
 
-/// A buffer without times: the request of four bytes as it came back, and after it a response or nothing.
-#[test]
-fn what_a_uart_received_since_the_request_began() {
-    let request = Request::write_eeprom(Address::truncate(1), 0x5a);
-    let echo = [0x32, 0x01, 0x5a, 0x69];
-    // The response to a write repeats it, so it looks the same.
-    let both = [&echo[..], &echo[..], &[0xff]].concat();
-    assert_eq!(parse_echoed(request, &both), Response::parse(request, &echo));
-    assert!(parse_echoed(request, &both).is_ok());
-    assert_eq!(parse_echoed(request, &[]), Err(Error::NoResponse { echo: false }));
-    assert_eq!(parse_echoed(request, &echo), Err(Error::NoResponse { echo: true }));
-    for got in 1..4 {
-        assert_eq!(parse_echoed(request, &echo[..got]), Err(Error::Truncated { got: 0, want: 4 }));
-        let mut wrong = both.clone();
-        wrong[got] ^= 4;
-        let want = echo[got];
-        assert_eq!(parse_echoed(request, &wrong), Err(Error::EchoMismatch { at: got as u8, got: want ^ 4, want }));
-    }
-}
-
 /// The evidence is as old as the instant of sampling: 125 us where 125 us are allowed.
 #[test]
 fn evidence_of_an_exchange() {
