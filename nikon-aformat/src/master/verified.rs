@@ -21,7 +21,7 @@ use crate::status::Alm;
 /// | it ends with | the encoder |
 /// |---|---|
 /// | `Done` | has stored it |
-/// | [`Error::NotDone`] | has something else stored |
+/// | [`Error::NotDone`] | has something else stored: what was there before, or what the damaged request asked for |
 /// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::BankError`] | was not asked to write, or reports that it failed |
 /// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back, or MEMERR is set and may have been before (command 20) |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -193,9 +193,16 @@ def script(machine):
 
 def judge(name, result, lines):
     j = Judge(name, result)
-    first = min(edges[0][0] for edges in j.edges.found)
+    judge_corner(j, lines)
+    judge_hold(j, lines["held"])
+    judge_override(j, lines["override"])
+    judge_stop(j, lines["stopped"])
+    return j
 
-    # Two lines in one direction are one; a corner is a rest.
+
+def judge_corner(j, lines):
+    """Two lines in one direction are one; a corner is a rest."""
+    first = min(edges[0][0] for edges in j.edges.found)
     pairs = joined(j.edges, lines["out"])
     begin = j.fits("two lines", lambda at: straight(at, lines["out"]), pairs, first - 0.02, first)
     j.at("hold")
@@ -207,25 +214,12 @@ def judge(name, result, lines):
     pause = corner - end
     assert -2 * j.machine.allowed <= pause <= PAUSE + 2 * j.machine.allowed, f"{pause} s behind the line before"
 
-    # A hold, and from there on.
-    line = lines["held"]
+
+def judge_hold(j, line):
+    """A hold, and from there on."""
     hold, resume = j.at("hold"), j.at("resume")
     pairs = j.edges.take(line)
-
-    def held(begin, at=None, again=None):
-        course = Course(begin, line)
-        course.change(line.speed)
-        if at is None:
-            course.until(begin + 1)
-            return course
-        course.until(at)
-        course.change(0.0)
-        if again is not None:
-            course.until(again)
-            course.time = again
-            course.finish(line.length, line.speed)
-        return course
-
+    held = changed(line, 0.0)
     before, during, _ = split(pairs, hold, resume)
     begin = j.fits("until the hold", held, before, pairs[0][1] - 0.02, pairs[0][1])
     at = j.fits("hold", lambda at: held(begin, at), during, hold, hold + 0.06)
@@ -237,24 +231,12 @@ def judge(name, result, lines):
     again = j.fits("resume", lambda again: held(begin, at, again), after, resume, after[0][1])
     j.reacts("resume", resume, again)
 
-    # Half the speed, and the whole again.
-    line = lines["override"]
+
+def judge_override(j, line):
+    """Half the speed, and the whole again."""
     half, whole = j.at("override"), j.at("override")
     pairs = j.edges.take(line)
-
-    def slowed(begin, at=None, again=None):
-        course = Course(begin, line)
-        course.change(line.speed)
-        if at is not None:
-            course.until(at)
-            course.change(line.speed / 2)
-        if again is not None:
-            course.until(again)
-            course.finish(line.length, line.speed)
-        else:
-            course.until(begin + 1)
-        return course
-
+    slowed = changed(line, line.speed / 2)
     before, during, after = split(pairs, half, whole)
     begin = j.fits("until the override", slowed, before, pairs[0][1] - 0.02, pairs[0][1])
     at = j.fits("override 50", lambda at: slowed(begin, at), during, half, half + 0.06)
@@ -262,28 +244,39 @@ def judge(name, result, lines):
     again = j.fits("override 100", lambda again: slowed(begin, at, again), after, whole, whole + 0.06)
     j.reacts("override 100", whole, again)
 
-    # A stop ends it; nothing comes behind that.
-    line, stop = lines["stopped"], j.at("stop")
+
+def judge_stop(j, line):
+    """A stop ends it; nothing comes behind that."""
+    stop = j.at("stop")
     pairs = j.edges.take(line, most=float("inf"))
+    stopped = changed(line, 0.0)
     before, during, _ = split(pairs, stop, float("inf"))
-    begin = j.fits("until the stop", held_at(line), before, pairs[0][1] - 0.02, pairs[0][1])
-    at = j.fits("stop", lambda at: held_at(line)(begin, at), during, stop, stop + 0.06)
+    begin = j.fits("until the stop", stopped, before, pairs[0][1] - 0.02, pairs[0][1])
+    at = j.fits("stop", lambda at: stopped(begin, at), during, stop, stop + 0.06)
     j.reacts("stop", stop, at)
-    course = held_at(line)(begin, at)
+    course = stopped(begin, at)
     assert off(course, pairs) <= j.machine.allowed, "the end of the stop"
     due = sum(place < course.place - 1e-3 for place, *_ in line.places())
     assert due <= len(pairs) < sum(map(abs, line.steps)), f"{len(pairs)} steps until the stop, {due} are due"
     assert all(taken == len(made) for taken, made in zip(j.edges.taken, j.edges.found)), "steps that nobody asked for"
-    return j
 
 
-def held_at(line):
-    def course_of(begin, at=None):
+def changed(line, speed):
+    """Courses along a line that begin at its own speed; from `at` on it is another one, and from `again` on its own, to the end."""
+
+    def course_of(begin, at=None, again=None):
         course = Course(begin, line)
         course.change(line.speed)
-        course.until(begin + 1 if at is None else at)
         if at is not None:
-            course.change(0.0)
+            course.until(at)
+            course.change(speed)
+        if again is not None:
+            course.until(again)
+            if speed == 0:
+                course.time = again
+            course.finish(line.length, line.speed)
+        elif at is None or speed > 0:
+            course.until(begin + 1)
         return course
 
     return course_of

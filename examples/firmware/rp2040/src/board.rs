@@ -8,15 +8,14 @@ use usb_device::bus::UsbBusAllocator;
 
 use crate::chip::{self, CRYSTAL_HZ};
 use crate::clock::{self, Clock};
-use crate::console::Uart;
-use crate::hal::clocks::{Clock as _, ClockSource, ClocksManager};
+use crate::console::{self, Uart};
+use crate::hal::clocks::{ClockSource, ClocksManager};
 use crate::hal::dma::{CH0, Channel, DMAExt};
 use crate::hal::fugit::{ExtU32, RateExtU32};
 use crate::hal::gpio::{FunctionPio0, Pin, Pins, PullUp};
 use crate::hal::pac::{CLOCKS, PLL_SYS, PLL_USB, Peripherals, RESETS, XOSC};
 use crate::hal::pio::PIOExt;
 use crate::hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
-use crate::hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use crate::hal::usb::UsbBus;
 use crate::hal::xosc::setup_xosc_blocking;
 use crate::hal::{Sio, Watchdog};
@@ -46,7 +45,6 @@ pub struct Board {
     pub watchdog: Watchdog,
 }
 
-pub(crate) const CONSOLE_BAUD: u32 = 1_000_000;
 /// Longer than any wait here.
 const WATCHDOG_MS: u32 = 1_000;
 
@@ -67,13 +65,8 @@ impl Board {
         let clocks = clocks(&mut watchdog, p.XOSC, p.CLOCKS, (p.PLL_SYS, p.PLL_USB), &mut p.RESETS);
 
         let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
-        let mut uart =
-            UartPeripheral::new(p.UART0, (pins.gpio0.into_function(), pins.gpio1.into_function()), &mut p.RESETS)
-                .enable(
-                    UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
-                    clocks.peripheral_clock.freq(),
-                )
-                .expect("7.5 clocks a sample");
+        let uart_pins = (pins.gpio0.into_function(), pins.gpio1.into_function());
+        let mut uart = console::uart(p.UART0, uart_pins, &mut p.RESETS, &clocks);
         let _: Pin<_, FunctionPio0, _> = pins.gpio2.into_function();
         let _: Pin<_, FunctionPio0, _> = pins.gpio3.into_function();
         // The receiver is off while the driver is on: its output floats then.

@@ -9,16 +9,29 @@ use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
 
+use crate::hal::clocks::{Clock as _, ClocksManager};
+use crate::hal::fugit::RateExtU32;
 use crate::hal::gpio::bank0::{Gpio0, Gpio1};
 use crate::hal::gpio::{FunctionUart, Pin, PullDown};
-use crate::hal::pac::UART0;
-use crate::hal::uart::{Enabled, UartPeripheral};
+use crate::hal::pac::{RESETS, UART0};
+use crate::hal::uart::{DataBits, Enabled, StopBits, UartConfig, UartPeripheral};
 use crate::hal::usb::UsbBus;
 use crate::last_words::Before;
 
 /// The console at the pins.
-pub type Uart =
-    UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
+pub type Uart = UartPeripheral<Enabled, UART0, UartPins>;
+type UartPins = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
+
+/// 1,000,000 baud, 8N1.
+///
+/// # Panics
+/// If the peripheral clock is too slow for it.
+pub fn uart(uart: UART0, pins: UartPins, resets: &mut RESETS, clocks: &ClocksManager) -> Uart {
+    let config = UartConfig::new(BAUD.Hz(), DataBits::Eight, None, StopBits::One);
+    UartPeripheral::new(uart, pins, resets).enable(config, clocks.peripheral_clock.freq()).expect("7.5 clocks a sample")
+}
+
+const BAUD: u32 = 1_000_000;
 
 /// For private tests; a product needs its own number.
 const TEST: UsbVidPid = UsbVidPid(0x1209, 0x0001);

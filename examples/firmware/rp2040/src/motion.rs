@@ -5,13 +5,12 @@ use core::fmt::Write;
 use servowire_boards::Machine;
 use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path};
 
-use crate::board::{CONSOLE_BAUD, clocks};
-use crate::hal::clocks::Clock as _;
-use crate::hal::fugit::{ExtU32, RateExtU32};
+use crate::board::clocks;
+use crate::console;
+use crate::hal::fugit::ExtU32;
 use crate::hal::gpio::{FunctionPio0, Pin, Pins};
 use crate::hal::pac::Peripherals;
 use crate::hal::pio::PIOExt;
-use crate::hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use crate::hal::{Sio, Watchdog};
 use crate::steps::{self, AXES, SLOTS, TICK_HZ};
 
@@ -24,7 +23,7 @@ const SPEED: u32 = 5_000;
 const ACCELERATION: u32 = 200_000;
 /// Ticks between steps in different directions: 20 us.
 const REVERSAL_PAUSE: u32 = TICK_HZ / 50_000;
-/// Half of the time within which a request takes effect: 4 ms.
+/// Half of the time within which a request takes effect: 20 ms.
 const REACH: u32 = TICK_HZ / 50;
 /// Longer than any wait here.
 const WATCHDOG_MS: u32 = 1_000;
@@ -40,13 +39,8 @@ pub fn run(image: &str) -> ! {
     let mut watchdog = Watchdog::new(p.WATCHDOG);
     let clocks = clocks(&mut watchdog, p.XOSC, p.CLOCKS, (p.PLL_SYS, p.PLL_USB), &mut p.RESETS);
     let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
-    let mut console =
-        UartPeripheral::new(p.UART0, (pins.gpio0.into_function(), pins.gpio1.into_function()), &mut p.RESETS)
-            .enable(
-                UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
-                clocks.peripheral_clock.freq(),
-            )
-            .expect("7.5 clocks a sample");
+    let uart_pins = (pins.gpio0.into_function(), pins.gpio1.into_function());
+    let mut console = console::uart(p.UART0, uart_pins, &mut p.RESETS, &clocks);
     let _: Pin<_, FunctionPio0, _> = pins.gpio2.into_function();
     let _: Pin<_, FunctionPio0, _> = pins.gpio3.into_function();
     let _: Pin<_, FunctionPio0, _> = pins.gpio4.into_function();

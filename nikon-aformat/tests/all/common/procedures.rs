@@ -360,6 +360,8 @@ pub fn writes(setup: &Setup, turns: u16, shown: &mut Shown) {
         let right = match end {
             Ok(()) => word == Some(data) && acts == 1,
             Err(Error::EffectUnknown) => acts <= 1,
+            // The CRC-3 of a damaged request may be right by chance: the encoder has stored what nobody asked for.
+            Err(Error::NotDone) if acts == 1 => word != Some(data) && word != before,
             Err(_) => word == before && acts == 0,
         };
         assert!(right, "seed {seed} turn {turn}: {end:?}, {acts} writes, {word:x?}");
@@ -376,6 +378,7 @@ pub fn writes(setup: &Setup, turns: u16, shown: &mut Shown) {
     let right = match end {
         Ok(()) => after == id.get() && acts == 1,
         Err(Error::EffectUnknown) => acts <= 1,
+        Err(Error::NotDone) if acts == 1 => after != id.get() && after != before,
         Err(_) => after == before && acts == 0,
     };
     assert!(right, "seed {seed}: {end:?}, {acts} changes of the identification code, {after:x}");
