@@ -236,19 +236,9 @@ fn one(
         return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
     let mut picture = arguments.svg.as_ref().map(|_| Picture::new(name));
-    let mut vcd = match &arguments.vcd {
-        None => None,
-        Some(path) => match File::create(path) {
-            Ok(file) => Some(match (VcdOut::new(BufWriter::new(file)), arguments.cut, arguments.around) {
-                (vcd, Some((from, to)), _) => vcd.within(from, to),
-                (vcd, None, Some(around)) => vcd.around(around),
-                (vcd, None, None) => vcd,
-            }),
-            Err(e) => {
-                let file = path.display().to_string();
-                return Ok(complain(&Fault::new(&file, At::File, format!("cannot be created: {e}")), bar));
-            }
-        },
+    let mut vcd = match vcd_out(arguments) {
+        Ok(vcd) => vcd,
+        Err(fault) => return Ok(complain(&fault, bar)),
     };
     let progress = || bar.set(meter.get());
     let notes = |note: &Note| bar.say(&note.to_string());
@@ -291,6 +281,19 @@ fn one(
         Err(Stop::Output(error)) => return Err(error),
     };
     Ok(complain(&Fault::new(name, At::File, nothing), bar))
+}
+
+/// Creates the file for the decoded line, if one is asked for.
+fn vcd_out(arguments: &Decode) -> Result<Option<VcdOut>, Fault> {
+    let Some(path) = &arguments.vcd else { return Ok(None) };
+    let file = File::create(path)
+        .map_err(|e| Fault::new(&path.display().to_string(), At::File, format!("cannot be created: {e}")))?;
+    let vcd = VcdOut::new(BufWriter::new(file));
+    Ok(Some(match (arguments.cut, arguments.around) {
+        (Some((from, to)), _) => vcd.within(from, to),
+        (None, Some(around)) => vcd.around(around),
+        (None, None) => vcd,
+    }))
 }
 
 /// Returns why the request is impossible for a capture of this kind.

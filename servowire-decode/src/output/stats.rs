@@ -52,8 +52,8 @@ struct Figures {
     delay: Spread,
     /// Keyed by the names of the positions.
     positions: BTreeMap<&'static str, Followed>,
-    /// Positions in frames without a time.
-    untimed: u64,
+    /// The newest positions in frames without a time: how far they moved is not known.
+    untimed: BTreeMap<&'static str, Position>,
     jumps: u64,
     listed: Vec<Jump>,
     /// Times are counted, not measured, and say nothing about the cycle.
@@ -160,7 +160,7 @@ impl Figures {
             self.delay.add(delay);
         }
         let Place::Time { start, .. } = event.place else {
-            self.untimed += u64::from(event.position.is_some());
+            self.untimed.extend(event.position.map(|position| (position.name, position)));
             return;
         };
         if event.verdict.is_silence() {
@@ -174,10 +174,10 @@ impl Figures {
 
     /// Returns what is missing to detect jumps.
     fn missing(&self) -> Option<&'static str> {
-        match (self.positions.is_empty(), self.untimed) {
+        match (self.positions.is_empty(), self.untimed.is_empty()) {
             (false, _) => None,
-            (true, 0) => Some("no position is seen"),
-            (true, _) => Some("the positions have no times (a log of RTEX blocks needs times, or --period)"),
+            (true, true) => Some("no position is seen"),
+            (true, false) => Some("the positions have no times (a log of RTEX blocks needs times, or --period)"),
         }
     }
 
@@ -268,7 +268,7 @@ impl Figures {
                 said.push(format!("{what} {:.3} us +- {:.3}", us(spread.mean), us(spread.deviation())));
             }
         }
-        said.extend(self.positions.iter().map(|(name, Followed { last, .. })| match last.turns() {
+        said.extend(self.newest().map(|(name, last)| match last.turns() {
             Some(turns) => format!("{name} {} ({turns:.6} turns)", last.counts),
             None => format!("{name} {}", last.counts),
         }));
@@ -276,6 +276,12 @@ impl Figures {
             return format!("{missing} requests without an answer");
         }
         said.join("  ")
+    }
+
+    /// The newest positions by their names.
+    fn newest(&self) -> impl Iterator<Item = (&'static str, &Position)> {
+        let timed = self.positions.iter().map(|(name, followed)| (*name, &followed.last));
+        timed.chain(self.untimed.iter().map(|(name, last)| (*name, last)))
     }
 
     fn cycle_text(&self) -> String {
@@ -382,7 +388,7 @@ impl Gathered {
                 "address": speaker.address, "requests": f.requests, "answers": f.answers, "others": f.others,
                 "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
                 "cycle": if f.counted { Json::Null } else { f.cycle.json() }, "answer_delay": f.delay.json(),
-                "last_positions": f.positions.iter().map(|(name, followed)| (*name, followed.last.counts)).collect::<BTreeMap<_, _>>(),
+                "last_positions": f.newest().map(|(name, last)| (name, last.counts)).collect::<BTreeMap<_, _>>(),
                 "largest_move": f.positions.values().map(|followed| followed.largest).max(),
                 "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
                 "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),

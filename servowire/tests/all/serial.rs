@@ -121,6 +121,8 @@ fn figures_are_shown_while_one_listens_and_at_the_end() {
         thread::sleep(Duration::from_millis(20));
     }
     heard.shows(" frames  no errors");
+    // Without times a position is still the newest one.
+    assert!(heard.shows("ABS 39 (").contains(" frames  no errors"));
     let (code, rest, said) = heard.end();
     assert_eq!(code, Some(0), "{said}");
     assert!(rest.iter().any(|line| line.contains("verdicts") && line.ends_with(" 0 refused")), "{rest:?}");
