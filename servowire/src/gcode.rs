@@ -29,7 +29,7 @@ pub(crate) const AXES: usize = 3;
 /// A part program, and the machine that it is for.
 #[derive(Debug, Args)]
 pub(crate) struct Part {
-    /// Follow a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), rests (G4), references (G28, G30), G53 to
+    /// Run a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), dwells (G4), references (G28, G30), G53 to
     /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min; arcs are chords
     /// within 2 um. Anything else is refused with its line.
     #[arg(long, value_name = "FILE")]

@@ -81,7 +81,7 @@ for (const [image, encoder, typed, answer] of [
     assert.ok(waited > 900 && waited <= 1_000, `the watchdog came after ${waited} ms`);
     const again = new Bench(image, encoder, master);
     again.until(40, () => again.usb.length > 3);
-    const before = `the watchdog has begun this image again: ${uart[at]} called once`;
+    const before = `the watchdog has restarted this image: ${uart[at]} called once`;
     for (const [first, second, third] of [again.uart, again.usb]) {
       assert.equal(first, uart[0]);
       assert.equal(second, before);

@@ -70,19 +70,19 @@ impl Chain {
     /// The first word that determines the disparity, 0..=5. If the answer does not begin with the disparity with which the one
     /// before ended, and the fault is in this answer, it is in this word or in an earlier one. If no word determines the
     /// disparity, this is the last word.
-    pub const fn first_told(self) -> u8 {
+    pub const fn first_decisive(self) -> u8 {
         self.first
     }
 
     /// The last word that determines the disparity, 0..=5. If the next answer does not begin with the disparity with which this
     /// one ends, and the fault is in this answer, it is in this word or in a later one. If no word determines the disparity,
     /// this is the first word.
-    pub const fn last_told(self) -> u8 {
+    pub const fn last_decisive(self) -> u8 {
         self.last
     }
 
     /// Returns whether `next` begins with the disparity with which this one ends; `None` if either is unknown.
-    pub fn goes_on_in(self, next: Self) -> Option<bool> {
+    pub fn continues_into(self, next: Self) -> Option<bool> {
         Some(self.after? == next.before?)
     }
 }
@@ -118,11 +118,11 @@ mod tests {
         assert_eq!((up.before(), up.after(), up.holds()), (Some(Minus), Some(Plus), true));
         let next = chain([NEUTRAL, IDLE_PLUS, DOWN, NEUTRAL, NEUTRAL, NEUTRAL]);
         assert_eq!((next.before(), next.after(), next.holds()), (Some(Plus), Some(Minus), true));
-        assert_eq!((neutral.first_told(), neutral.last_told()), (5, 0));
-        assert_eq!((idle.first_told(), idle.last_told()), (1, 1));
-        assert_eq!((up.first_told(), up.last_told()), (1, 3));
-        assert_eq!((up.goes_on_in(next), next.goes_on_in(next)), (Some(true), Some(false)));
-        assert_eq!((up.goes_on_in(neutral), neutral.goes_on_in(up)), (None, None));
+        assert_eq!((neutral.first_decisive(), neutral.last_decisive()), (5, 0));
+        assert_eq!((idle.first_decisive(), idle.last_decisive()), (1, 1));
+        assert_eq!((up.first_decisive(), up.last_decisive()), (1, 3));
+        assert_eq!((up.continues_into(next), next.continues_into(next)), (Some(true), Some(false)));
+        assert_eq!((up.continues_into(neutral), neutral.continues_into(up)), (None, None));
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub struct EchoWatch {
     /// A different lag that was seen, and how many times in a row.
     other: u8,
     seen: u8,
-    /// Number of blocks that have had the lag.
+    /// Number of blocks that confirmed the lag.
     sure: u8,
 }
 

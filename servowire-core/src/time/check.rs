@@ -23,15 +23,15 @@ pub struct ClockCheck {
     last_ns: u64,
     /// The reading that was last repeated, and how many times.
     stood_ns: u64,
-    looks: u32,
-    max_looks: u32,
+    repeats: u32,
+    max_repeats: u32,
 }
 
 impl ClockCheck {
-    /// Creates the check. A clock counts as stopped when a reading is repeated more than `max_looks` times; choose more than
+    /// Creates the check. A clock counts as stopped when a reading is repeated more than `max_repeats` times; choose more than
     /// a fast processor can make within one tick.
-    pub const fn new(max_looks: u32) -> Self {
-        Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
+    pub const fn new(max_repeats: u32) -> Self {
+        Self { last_ns: 0, stood_ns: 0, repeats: 0, max_repeats }
     }
 
     /// The last reading, whether it was good or not; 0 before the first one.
@@ -89,17 +89,17 @@ impl ClockCheck {
         let by_ns = self.last_ns.saturating_sub(now_ns);
         self.last_ns = now_ns;
         if by_ns > 0 {
-            self.looks = 0;
+            self.repeats = 0;
             return Some(ClockError::Backwards { by_ns });
         }
         if self.stood_ns != now_ns {
             self.stood_ns = now_ns;
-            self.looks = 0;
+            self.repeats = 0;
         }
-        if self.looks >= self.max_looks {
+        if self.repeats >= self.max_repeats {
             return Some(ClockError::Stopped);
         }
-        self.looks = self.looks.saturating_add(1);
+        self.repeats = self.repeats.saturating_add(1);
         None
     }
 }

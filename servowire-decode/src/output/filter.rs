@@ -61,7 +61,7 @@ impl Filter {
         self.choice.to.is_some_and(|to| time > to + REST)
     }
 
-    /// Returns whether an event was requested; of these, it may be that only the refused ones are shown.
+    /// Returns whether an event passes the user's choice, apart from [`wants_errors_only`](Self::wants_errors_only).
     pub(super) fn takes(&mut self, origin: &Origin, event: &Event) -> bool {
         let is_meant = |encoder: &String| origin.is_meant(origin.speaker(event), encoder);
         self.choice.encoder.as_ref().is_none_or(is_meant) && self.passes(origin.speaks, event)

@@ -152,7 +152,7 @@ impl Port {
         seen
     }
 
-    /// Learns from the first DISCOVERY in which direction the master is. The last device handles even this first one.
+    /// Learns from the first DISCOVERY in which direction the master is. The last device modifies even this frame.
     fn first(&mut self, status: Status) -> Seen {
         if !status.contains(Status::LAST) {
             self.flags |= PortFlags::MASTER_PORT;

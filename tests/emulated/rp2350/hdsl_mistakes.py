@@ -113,7 +113,7 @@ def main():
     again = Chip(image, line.inputs, line.changed)
     again.registers[SCRATCH2], again.registers[REASON] = chip.registers[SCRATCH2], 1
     again.run(1_000_000, lambda: told(None, said(again)))
-    assert said(again)[1] == "the watchdog has begun this image again: it stood still", f"a restart: {said(again)}"
+    assert said(again)[1] == "the watchdog has restarted this image: it stood still", f"a restart: {said(again)}"
     print(f"a restart: {said(again)[1]}")
 
 

@@ -50,8 +50,8 @@ impl fmt::Display for Before {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let text = self.text.get(..self.len).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or_default();
         match text.trim() {
-            "" => f.write_str("the watchdog has begun this image again: it stood still"),
-            text => write!(f, "the watchdog has begun this image again: {text}"),
+            "" => f.write_str("the watchdog has restarted this image: it stood still"),
+            text => write!(f, "the watchdog has restarted this image: {text}"),
         }
     }
 }

@@ -117,7 +117,7 @@ impl Decoder {
             self.said.refuse(next.number, ("disparity", ANEW.to_owned()));
         }
         let Some(before) = self.chain.replace(next) else { return };
-        let Some(goes_on) = before.chain.goes_on_in(next.chain) else { return };
+        let Some(goes_on) = before.chain.continues_into(next.chain) else { return };
         let (ends, begins) = (before.number, next.number);
         if !before.sound || !next.sound {
             // A damaged answer whose words do not show the place may be damaged just here.
@@ -131,7 +131,7 @@ impl Decoder {
         if !goes_on && self.beginnings.are_carried() {
             let first_failed = if self.at == Some(0) { self.failed.map(|[_, second]| second) } else { None };
             let (tail_is_checked, front_is_checked) =
-                (before.chain.last_told() >= ACCELERATION, next.chain.first_told() == 0);
+                (before.chain.last_decisive() >= ACCELERATION, next.chain.first_decisive() == 0);
             self.breaks.push(Break { ends, begins, tail_is_checked, front_is_checked, first_failed });
             let told = match self.at {
                 Some(0) => first_failed.is_some(),

@@ -120,8 +120,8 @@ impl Decoder {
         }
     }
 
-    /// Returns whether something like a head at `at`, which breaks a rule, lies where none is due: it is then part of an
-    /// answer or of a damaged head.
+    /// Returns whether the bits at `at`, which resemble a head but break a rule, lie where no head is due: they are then
+    /// part of an answer or of a damaged head.
     pub(super) fn is_stray(&self, bits: &Bits, at: u64) -> bool {
         let (Some(last), Some(usual)) = (self.head.filter(|_| self.is_running()), self.apart) else { return false };
         let apart = at - last;
