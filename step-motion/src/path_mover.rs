@@ -226,8 +226,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Slows down to rest along the path and forgets the remaining path. Lines pushed from now on begin where it comes to
     /// rest.
     pub fn stop(&mut self, now: u64) {
-        match self.end_of_stop(now) {
-            Some(end) => self.leave_at(end, now),
+        match self.stop_from(now) {
+            Some(stop) => self.leave_at(&stop),
             None => self.leave(self.tick(now)),
         }
     }
@@ -242,11 +242,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let before = if self.stopping { self.path.end_of_cut() } else { None };
         (self.stopping, self.quick) = (false, true);
         self.path.hurry(&limits);
-        match (self.end_of_stop(now), before) {
-            (Some((end, _)), Some(before)) if before < end => {
-                self.leave_at((before, self.leaving()), now);
+        match (self.stop_from(now), before) {
+            (Some(stop), Some(before)) if before < stop.end => {
+                self.path.cut(before, self.begun(), self.made, self.leaving());
+                self.stopping = true;
+                self.plan(now);
+                self.settle();
             }
-            (Some(end), _) => self.leave_at(end, now),
+            (Some(stop), _) => self.leave_at(&stop),
             (None, _) => self.leave(self.tick(now)),
         }
     }
@@ -262,13 +265,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready()?;
         self.path.check(&target)?;
-        let end = self.end_of_stop(now);
-        let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun(), self.made));
+        let stop = self.stop_from(now);
+        let from = stop.map_or(self.commanded, |stop| self.path.place(stop.end, self.begun(), self.made));
         Path::<N, M>::steps(from, target)?;
-        if end.is_some_and(|((at, _), _)| at.saturating_add(1) >= M) || M == 0 {
+        if stop.is_some_and(|stop| stop.end.0.saturating_add(1) >= M) || M == 0 {
             return Err(Error::QueueFull);
         }
-        self.stop(now);
+        match stop {
+            Some(stop) => self.leave_at(&stop),
+            None => self.leave(self.tick(now)),
+        }
         self.push(target, feed, now)
     }
 

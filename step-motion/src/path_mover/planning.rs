@@ -8,6 +8,17 @@ use crate::real::Real;
 
 use super::PathMover;
 
+/// How a stop runs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stop<const N: usize> {
+    /// The line where it ends, and the place on it.
+    pub(super) end: (usize, Real),
+    /// How it leaves the lines of its first curve.
+    pub(super) left: Leaving,
+    /// Its first curve, if it is not the present one.
+    pub(super) first: Option<(Course, Start<N>, Bounds)>,
+}
+
 impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns the motion from which a new plan starts; `None` if the present plan ends before that, at the end of the line.
     pub(super) fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
@@ -33,12 +44,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Leaving { more: self.more, exit: self.exit, bounds: None }
     }
 
-    /// Returns the line and the place on it where a stop ends, and how the stop leaves the lines of its first curve; `None`
-    /// at rest.
-    pub(super) fn end_of_stop(&self, now: u64) -> Option<((usize, Real), Leaving)> {
+    /// Returns how a stop runs; `None` at rest.
+    pub(super) fn stop_from(&self, now: u64) -> Option<Stop<N>> {
         self.line.as_ref()?;
+        let present = |end| Stop { end, left: self.leaving(), first: None };
         if self.stopping {
-            return self.path.end_of_cut().map(|end| (end, self.leaving()));
+            return self.path.end_of_cut().map(present);
         }
         let here = self.here(now);
         // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
@@ -46,26 +57,35 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return None;
         }
         let course = here.and_then(|(motion, start)| {
-            let Start { place, before, .. } = start;
-            Some((place, before, self.path.course(0, motion, (place, before), (None, self.bounds, self.braking))?))
+            let from = (start.place, start.before);
+            let (course, bounds) = self.path.course(0, motion, from, (None, self.bounds, self.braking))?;
+            Some((course, start, bounds))
         });
-        let (end, left) = match course {
-            Some((place, before, (Course { curve, exit, more, .. }, bounds))) => {
-                let end = self.path.locate(0, (place + curve.way()) - before);
-                (end, Leaving { more, exit, bounds: Some(bounds) })
+        let stop = match course {
+            Some((course, start, bounds)) => {
+                let end = self.path.locate(0, (start.place + course.curve.way()) - start.before);
+                let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
+                // It is whole once the path has been cut off where it ends.
+                Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
             }
-            None => ((self.more, self.path.line(self.more)?.length), self.leaving()),
+            None => present((self.more, self.path.line(self.more)?.length)),
         };
-        let rest = |exit| self.path.end_of_stop(left.more.saturating_add(1), exit);
-        Some((if left.exit.is_zero() { end } else { rest(left.exit) }, left))
+        let Leaving { more, exit, .. } = stop.left;
+        if exit.is_zero() {
+            return Some(stop);
+        }
+        Some(Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop })
     }
 
-    /// Ends the path at a place, and records how the lines before it are left.
-    pub(super) fn leave_at(&mut self, (end, left): ((usize, Real), Leaving), now: u64) {
-        self.path.cut(end, self.begun(), self.made, left);
+    /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along
+    /// the shorter path may differ by its rounding, and leave a line at a speed that it had not.
+    pub(super) fn leave_at(&mut self, stop: &Stop<N>) {
+        self.path.cut(stop.end, self.begun(), self.made, stop.left);
         if !self.stopping {
             self.stopping = true;
-            self.plan(now);
+            if let Some((course, start, bounds)) = &stop.first {
+                self.adopt(course, *start, *bounds);
+            }
         }
         self.settle();
     }

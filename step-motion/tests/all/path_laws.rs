@@ -442,3 +442,31 @@ fn a_quick_stop_is_no_later_for_a_line_that_it_does_not_reach() {
     };
     assert!(rest(true) <= rest(false) + 18, "{} {}", rest(true), rest(false));
 }
+
+/// A stop on the way to another target, six lines of which are short.
+#[test]
+fn a_stop_on_the_way_takes_no_more_steps_than_a_hold() {
+    let limits = |v, a| Limits::new(v, a).unwrap();
+    let axes = [
+        AxisSetup::new(limits(140, 1_235_741).with_jerk(586_848).unwrap(), 93_704),
+        AxisSetup::new(limits(1047, 5_637_619), 367_017),
+    ];
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::new(25_000).unwrap(), axes, 2).unwrap());
+    machine.move_to([-3, 0], 8106, 0).unwrap();
+    machine.push([89, -57], 96_641, 0).unwrap();
+    machine.resume(0);
+    machine.set_override(19, 431);
+    let steps = |mut machine: Machine| {
+        let mut steps = [0; 2];
+        while let Some(pulse) = machine.pulse() {
+            steps[usize::from(pulse.axis)] += 1;
+        }
+        steps
+    };
+    let mut held = machine.clone();
+    held.hold(0);
+    machine.move_to([-10, 0], 10, 0).unwrap();
+    machine.hold(0);
+    let (stop, hold) = (steps(machine), steps(held));
+    assert!(stop[0] <= hold[0] + 1, "{stop:?} {hold:?}");
+}
