@@ -53,10 +53,10 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         }
         let sample = reader.at(now_ns, policy)?;
         let field = reader.angle(now_ns, policy, commutation, acceleration)?;
-        // What is not known of the missing word comes to what is not known of the time in between.
+        // What the missing word leaves open in the position is part of the bound.
         let missing = commutation.bound(sample.angle_bound());
         println!(
-            "frame {:3}: field at {:7.3} degrees, within {:.3}, and {:.3} for missing words",
+            "frame {:3}: field at {:7.3} degrees, within {:.3}, of which {:.3} for missing words",
             sample.frame(),
             f64::from(field.angle.millidegrees()) / 1e3,
             f64::from(field.bound.millidegrees()) / 1e3,

@@ -93,12 +93,17 @@ impl Sample {
         }
     }
 
-    /// How far that angle may be off in either direction; half a turn at most.
+    /// How far that angle may be off in either direction, rounded up; half a turn at most. The bounds of an [`EvidenceShaftCell`]
+    /// include it.
     pub const fn angle_bound(&self) -> Angle {
         if self.bound >= self.steps_per_turn / 2 {
             return Angle::HALF;
         }
-        Angle::from_counts(self.bound, self.steps_per_turn)
+        let rounded_down = Angle::from_counts(self.bound, self.steps_per_turn);
+        if self.bound == 0 || self.steps_per_turn.is_power_of_two() {
+            return rounded_down;
+        }
+        rounded_down.wrapping_add(Angle::from_bits(1))
     }
 
     /// When the shaft was at this position, on the clock used for the ends of the frames: the time at which the sampling edge of
@@ -176,6 +181,10 @@ impl Evidence {
 impl Shaft for Evidence {
     fn shaft(sample: &Sample) -> (Angle, u64) {
         (sample.angle(), sample.sampled_ns())
+    }
+
+    fn bound(sample: &Sample) -> Angle {
+        sample.angle_bound()
     }
 }
 

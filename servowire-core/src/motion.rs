@@ -50,7 +50,7 @@ pub struct Motion {
     speed: i32,
     /// How far the mean speed over the span may be off, in the same unit.
     speed_error: u32,
-    /// The width of a count in units of 2^-32 turn.
+    /// How far the angle may be off in units of 2^-32 turn: the width of a count, and the bound of an estimate.
     count: u32,
 }
 
@@ -78,7 +78,8 @@ impl Motion {
     /// last two samples and t the time since the last one. In the last sample the shaft is off by up to one count; the mean
     /// speed is off by up to a count per s; at the last sample the speed differs from the mean speed by up to a·s/2; from
     /// there the shaft deviates by up to a·t²/2. In total: one count · (1 + t/s) + a·t·(s + t)/2. If the speed is not known,
-    /// or either time exceeds 2.1 s, the bound is half a turn.
+    /// or either time exceeds 2.1 s, the bound is half a turn. If samples are [estimates](crate::Shaft::bound), the bound of the
+    /// last one is added to its count, and those of both to the count per s.
     ///
     /// The instants of both samples are taken as exact: an error in them is multiplied by the speed.
     pub fn at(&self, now_ns: u64, max_acceleration: Acceleration) -> Estimate {
@@ -164,10 +165,16 @@ impl Tracker {
     /// Takes the next sample. The same sample again changes nothing. A sample that contradicts the last one (another angle at
     /// the same instant, or an earlier instant because the clock was set back) counts as a first one.
     pub fn sample(&mut self, angle: Angle, sampled_ns: u64) -> Motion {
+        self.sample_within(angle, sampled_ns, Angle::ZERO)
+    }
+
+    /// Does the same with an angle that may be off by up to `bound`, in addition to the count.
+    pub(crate) fn sample_within(&mut self, angle: Angle, sampled_ns: u64, bound: Angle) -> Motion {
+        let standing = Motion::standing(angle, sampled_ns, self.count.saturating_add(bound.to_bits()));
         let motion = match self.last {
             Some(last) if last.sampled_ns == sampled_ns && last.angle == angle => last,
-            Some(last) => self.moved(last, angle, sampled_ns),
-            None => Motion::standing(angle, sampled_ns, self.count),
+            Some(last) => self.moved(last, standing),
+            None => standing,
         };
         self.last = Some(motion);
         motion
@@ -179,17 +186,31 @@ impl Tracker {
         Motion::UNKNOWN
     }
 
-    /// Computes the motion from one sample to the next.
-    fn moved(&self, last: Motion, angle: Angle, sampled_ns: u64) -> Motion {
-        let standing = Motion::standing(angle, sampled_ns, self.count);
-        let span = sampled_ns.checked_sub(last.sampled_ns).and_then(|span| u32::try_from(span).ok());
-        let Some(span_ns) = span.filter(|span| *span <= self.longest_span_ns) else { return standing };
-        let step = i64::from(angle.difference(last.angle));
+    /// Computes the motion from one sample to the next, which is `standing` so far.
+    fn moved(&self, last: Motion, standing: Motion) -> Motion {
+        // How far the way from one to the other may be off beyond a count.
+        let bounds = last.count.wrapping_sub(self.count).saturating_add(standing.count.wrapping_sub(self.count));
+        let span = standing.sampled_ns.checked_sub(last.sampled_ns).and_then(|span| u32::try_from(span).ok());
+        let Some(span_ns) = span.filter(|span| *span <= self.longest_span_ns(bounds)) else { return standing };
+        let step = i64::from(standing.angle.difference(last.angle));
         let speed = (step << 16).checked_div(span_ns.into()).map(i32::try_from);
-        let error = (u64::from(self.count) << 16).checked_div(span_ns.into()).map(u32::try_from);
+        let error = u64::from(self.count).wrapping_add(bounds.into()) << 16;
+        let error = error.checked_div(span_ns.into()).map(u32::try_from);
         let (Some(Ok(speed)), Some(Ok(error))) = (speed, error) else { return standing };
         // Both divisions are rounded towards zero.
         Motion { span_ns, speed, speed_error: error.saturating_add(2), ..standing }
+    }
+
+    /// Returns the longest time in which the shaft moves less than half a turn, less a count and the `bounds` of both samples.
+    fn longest_span_ns(&self, bounds: u32) -> u32 {
+        if bounds == 0 { self.longest_span_ns } else { self.shorter_span_ns(bounds) }
+    }
+
+    #[cold]
+    fn shorter_span_ns(&self, bounds: u32) -> u32 {
+        let half = Angle::HALF.to_bits().saturating_sub(self.count);
+        let left = times(self.longest_span_ns, half.saturating_sub(bounds));
+        left.checked_div(half.into()).map_or(0, low)
     }
 }
 

@@ -10,6 +10,11 @@ use crate::motion::{Acceleration, Estimate, Motion, Tracker};
 pub trait Shaft: Feedback {
     /// The angle within the turn, and the instant of sampling in ns.
     fn shaft(sample: &Self::Sample) -> (Angle, u64);
+
+    /// How far the angle may be off in either direction beyond the width of a count, if it is an estimate.
+    fn bound(_sample: &Self::Sample) -> Angle {
+        Angle::ZERO
+    }
 }
 
 /// A [`Cell`](crate::Cell) that carries the motion of the shaft in addition to the evidence, for a control loop that runs more
@@ -108,7 +113,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
     pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
         let motion = if let Ok(sample) = evidence.at(now_ns, policy) {
             let (angle, sampled_ns) = F::shaft(&sample);
-            self.tracker.sample(angle, sampled_ns)
+            self.tracker.sample_within(angle, sampled_ns, F::bound(&sample))
         } else {
             self.tracker.interrupt()
         };

@@ -7,6 +7,7 @@ mod ahead;
 mod bench;
 mod both_ends;
 mod cable;
+mod commutation;
 mod complaints;
 mod dialects;
 mod encoder;

@@ -111,6 +111,36 @@ fn a_count_is_as_wide_as_its_angles_are_apart() {
     }
 }
 
+/// An estimate within 2^20, and after it a sample that is exact: the speed between them is as uncertain as the estimate was.
+#[test]
+fn a_bound_goes_into_the_speed() {
+    let mut tracker = Tracker::new(1 << 23, 100).unwrap();
+    let wide = Angle::from_bits(1 << 20);
+    let none = Acceleration(0);
+    tracker.sample_within(Angle::ZERO, 0, wide);
+    let estimated = tracker.sample_within(Angle::ZERO, 50_000, wide);
+    let exact = tracker.sample_within(Angle::ZERO, 100_000, Angle::ZERO);
+    let after = tracker.sample_within(Angle::ZERO, 150_000, Angle::ZERO);
+    for (motion, [now, later]) in [(estimated, [1 << 20, 3 << 20]), (exact, [0, 1 << 20]), (after, [0, 0])] {
+        let bounds = [0, 50_000].map(|ns| motion.at(motion.sampled_ns + ns, none).bound.to_bits());
+        assert!(
+            (now + 512..now + 520).contains(&bounds[0]) && (later + 1024..later + 1040).contains(&bounds[1]),
+            "{bounds:?}"
+        );
+    }
+    // At 100 turns a second half a turn less a count takes 4,999,998 ns; with a quarter of a turn of doubt, half of that.
+    for (bounds, longest) in
+        [([0, 0], 4_999_998), ([1 << 30, 0], 2_499_998), ([1 << 29, 1 << 29], 2_499_998), ([1 << 31, 0], 0)]
+    {
+        let known = [longest, longest + 2].map(|span| {
+            let mut tracker = Tracker::new(1 << 23, 100).unwrap();
+            tracker.sample_within(Angle::ZERO, 7, Angle::from_bits(bounds[0]));
+            tracker.sample_within(Angle::ZERO, 7 + span, Angle::from_bits(bounds[1])).speed().is_some()
+        });
+        assert_eq!(known, [longest != 0, false], "{bounds:?}");
+    }
+}
+
 #[test]
 fn a_steady_shaft_is_where_it_was_going() {
     // A sixteenth of a turn in 2^20 ns, forward and backward; looked at after, at and before the last sample.
@@ -208,6 +238,34 @@ proptest! {
         let motion = tracker.sample(truth.shown(counts), sampled_ns);
         truth.run_halves(limit, after, later);
         let estimate = motion.at(sampled_ns + unsigned(later), limit);
+        prop_assert!(truth.off(estimate.angle) <= i128::from(estimate.bound.to_bits()) << 41);
+    }
+
+    /// Also if the samples are estimates, off by as much as was said; with the largest speed that the tracker was told.
+    #[test]
+    fn the_shaft_is_within_the_bound_of_estimates(
+        counts in prop_oneof![Just(1 << 23), Just(10_000), 3_u32..=u32::MAX],
+        (share_of_it, fastest) in (-980_i128..980, 1_000_u32..7_000),
+        (span, later) in (prop_oneof![1_000_i128..300_000, 1_i128..700_000], 0_i128..300_000),
+        bounds in prop::array::uniform2(prop_oneof![Just(0_u32), 0_u32..1 << 20, 0_u32..1 << 31]),
+        (off, start) in (prop::array::uniform2(-1_000_i64..=1_000), 0_i128..1 << 73),
+        (before, after) in ((share(), share()), (share(), share())),
+    ) {
+        let mut truth = Truth { position: start, speed: i128::from(fastest) * share_of_it * TURN_PER_S / 1_000, fastest: 0 };
+        let mut tracker = Tracker::new(counts, fastest).unwrap();
+        let shown = |truth: &Truth, k: usize| {
+            let off = i64::from(bounds[k]) * off[k] / 1_000;
+            (Angle::from_bits(truth.shown(counts).to_bits().wrapping_add_signed(off as i32)), Angle::from_bits(bounds[k]))
+        };
+        let (angle, bound) = shown(&truth, 0);
+        tracker.sample_within(angle, 1_000, bound);
+        truth.run_halves(A_10_000, before, span);
+        prop_assume!(truth.fastest < i128::from(fastest) * TURN_PER_S);
+        let sampled_ns = 1_000 + unsigned(span);
+        let (angle, bound) = shown(&truth, 1);
+        let motion = tracker.sample_within(angle, sampled_ns, bound);
+        truth.run_halves(A_10_000, after, later);
+        let estimate = motion.at(sampled_ns + unsigned(later), A_10_000);
         prop_assert!(truth.off(estimate.angle) <= i128::from(estimate.bound.to_bits()) << 41);
     }
 
