@@ -104,7 +104,7 @@ def check():
     faults = [fault for name in names for fault in lacking(name)]
     for fault in faults:
         print(fault, file=sys.stderr)
-    print(f"protocols: {', '.join(names)}; {len(faults)} parts missing")
+    print(f"protocols: {', '.join(names)}; parts missing: {len(faults)}")
     return faults
 
 

@@ -22,7 +22,7 @@ servowire_core::errors! {
             want: u16,
         },
         /// A 10-bit word is in neither column of the 8b/10b tables.
-        #[error("{word:#05x} (a in bit 0) is no 8b/10b word")]
+        #[error("{word:#05x} (a in bit 0) is not an 8b/10b word")]
         InvalidWord = 2 {
             /// The word, first line bit in bit 0.
             word: u16,
@@ -59,7 +59,7 @@ servowire_core::errors! {
             mark: u8,
         },
         /// The five symbol bits of a parameter byte have no meaning in this direction.
-        #[error("{symbol:#04x} is no symbol of the parameters channel in this direction")]
+        #[error("{symbol:#04x} is not a symbol of the parameters channel in this direction")]
         UndefinedSymbol = 8 {
             /// Bits 4:0 of the byte.
             symbol: u8,
@@ -153,7 +153,7 @@ servowire_core::errors! {
             missing: u32,
         },
         /// The name of a user file is invalid: it has 1 to 8 characters 20h..=7Eh, then 00h.
-        #[error("this is no name of a user file")]
+        #[error("this is not the name of a user file")]
         FileName = 26,
         /// No pulse period is known with which the frames could be synchronised.
         #[error("no pulse period was given")]
@@ -181,6 +181,6 @@ mod tests {
     #[test]
     fn messages_are_sentences_for_a_person() {
         assert_eq!(Error::Crc { got: 0x1234, want: 0x5678 }.to_string(), "the CRC is 0x1234, computed 0x5678");
-        assert_eq!(Error::InvalidWord { word: 0x3ff }.to_string(), "0x3ff (a in bit 0) is no 8b/10b word");
+        assert_eq!(Error::InvalidWord { word: 0x3ff }.to_string(), "0x3ff (a in bit 0) is not an 8b/10b word");
     }
 }

@@ -73,7 +73,7 @@ pub struct HFrame {
 }
 
 servowire_core::one_line!(HFrame {
-    Self { restarted: Some(reason), was, .. } => "{}, the link starts anew: {}", was, reason;
+    Self { restarted: Some(reason), was, .. } => "{}, the link restarts: {}", was, reason;
     Self { was: State::Running, quality, acceleration: None, .. } => "RUNNING, quality {}, no acceleration", quality;
     Self { was, quality, .. } => "{}, quality {}", was, quality;
 });

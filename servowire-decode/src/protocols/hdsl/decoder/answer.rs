@@ -14,8 +14,7 @@ const TAIL: &str =
     "the next answer does not begin at the running disparity that this one leaves: a bit was flipped at its end";
 const FRONT: &str =
     "it does not begin at the running disparity that the answer before leaves: a bit was flipped at its front";
-const ANEW: &str =
-    "it begins with running disparity +, and all others begin anew with -: a bit was flipped at its front";
+const ANEW: &str = "it begins with running disparity +, and all others begin with -: a bit was flipped at its front";
 const BETWEEN: &str =
     "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
 const STRAY: &str = "VSYNC is expected in every eighth answer, and only there";
