@@ -447,7 +447,9 @@ mod tests {
     fn angles() {
         let at = |position| Sample { steps_per_turn: 1000, bound: 2, ..sample(position, 0) };
         assert_eq!([250, -750, 7250].map(|position| at(position).angle().millidegrees()), [90_000; 3]);
-        assert_eq!(at(0).angle_bound().millidegrees(), 720);
+        // 2/1000 of 2^32 are 8,589,934.6, rounded up; what is exact is not.
+        let bound = |steps_per_turn, bound| Sample { bound, steps_per_turn, ..at(0) }.angle_bound().to_bits();
+        assert_eq!([bound(1000, 2), bound(1000, 0), bound(1024, 2)], [8_589_935, 0, 8_388_608]);
         for bound in [500, 700, 1999, 5000] {
             assert_eq!(Sample { bound, ..at(0) }.angle_bound(), Angle::HALF);
         }

@@ -368,6 +368,18 @@ mod tests {
         );
     }
 
+    /// Up to ten ones between SAMPLE and its edge, one more than the longest window has.
+    #[test]
+    fn the_longest_window() {
+        for (ones, found) in [(4_u32, true), (9, true), (10, true), (11, false)] {
+            let good = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO).bits().bits();
+            let line = good & 0xff | ((1 << ones) - 1) << 8 | good >> 8 << (ones + 8);
+            let head = Head::parse(Window::from_bits(line, 26 + ones).unwrap());
+            let want = ParsedHead { byte: ParameterByte::new(0xd0), extra_bits: ones, len: 26 + ones };
+            assert_eq!(head, if found { Ok(want) } else { Err(Error::Framing) }, "{ones}");
+        }
+    }
+
     #[test]
     fn the_edge_register() {
         let all: [u8; 8] = core::array::from_fn(|t| edge_register(t as u8));

@@ -188,6 +188,23 @@ mod tests {
         }
     }
 
+    /// An unbalanced block has more zeros on a line with d >= 0 and more ones otherwise; the 4-bit block goes by d after the other.
+    /// Ones minus zeros of the 6-bit block are added to d, as the rule counts them: 2 for an unbalanced one.
+    #[test]
+    fn each_block_pulls_the_line_back() {
+        for raw in 0..=255 {
+            for d in [-9_i8, -2, -1, 0, 1, 2, 9] {
+                let coded = LineDisparity::new(d).encode(ParameterByte::new(raw));
+                let ones = |bits: u16, all: i32| 2 * bits.count_ones().cast_signed() - all;
+                let (six, four) = (ones(coded.word.get() & 0x3f, 6), ones(coded.word.get() >> 6, 4));
+                assert!(six == 0 || (six < 0) == (d >= 0), "{raw:02x} {d}");
+                assert!(four == 0 || (four < 0) == (coded.disparity.get() >= 0), "{raw:02x} {d}");
+                assert_eq!(i32::from(coded.disparity.get() - d), six.signum() * 2, "{raw:02x} {d}");
+            }
+        }
+        assert_eq!([-5, 0, 7].map(|d| LineDisparity::new(d).get()), [-5, 0, 7]);
+    }
+
     #[test]
     fn the_documented_words() {
         let bits = |text: &str| text.bytes().rev().fold(0, |b, c| b << 1 | u16::from(c == b'1'));

@@ -115,7 +115,7 @@ pub struct Master {
     ahead: Option<Transmission>,
     /// Why the link was lost, if the frame after the loss is already on the line.
     lost: Option<RestartReason>,
-    /// The frame does not end in the usual way: because of sync mode, a requested restart, frames lost before it, or one of the
+    /// The frame does not end in the usual way: because of another mode, a requested restart, frames lost before it, or one of the
     /// two fields above.
     detour: bool,
 }
@@ -162,7 +162,7 @@ impl Master {
             late: None,
             ahead: None,
             lost: None,
-            detour: sync.is_some(),
+            detour: false,
         }
     }
 
@@ -222,19 +222,26 @@ impl Master {
     /// # Errors
     /// [`Error::Truncated`] for fewer than [`WINDOW`] bytes of samples of an answer; then nothing has changed.
     pub fn hear(&mut self, samples: &[u8], end_ns: u64) -> Result<&HFrame, Error> {
-        if self.present.answered && samples.len() < WINDOW {
-            let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
-            return Err(Error::Truncated { got, want: 72 });
-        }
+        let Some(window) = samples.first_chunk() else { return self.hear_less(samples.len(), end_ns) };
         self.frame_ends(end_ns);
-        Ok(match (self.state, self.alignment, samples.first_chunk()) {
-            (State::Start | State::Learn | State::Check, _, Some(window)) => self.hear_window(window),
-            (_, Some(alignment), Some(window)) if self.present.answered => {
+        Ok(match (self.state, self.alignment) {
+            (State::Start | State::Learn | State::Check, _) => self.hear_window(window),
+            (_, Some(alignment)) if self.present.answered => {
                 let (bits, rssi) = alignment.read_quarter(window, self.link.at() & 3);
                 self.end_measured(alignment, bits, rssi)
             }
             _ => self.end(u64::MAX, None),
         })
+    }
+
+    /// Handles a frame with fewer samples than an answer has.
+    #[cold]
+    fn hear_less(&mut self, samples: usize, end_ns: u64) -> Result<&HFrame, Error> {
+        if self.present.answered {
+            return Err(Error::Truncated { got: u16::try_from(samples).unwrap_or(u16::MAX), want: 72 });
+        }
+        self.frame_ends(end_ns);
+        Ok(self.end(u64::MAX, None))
     }
 
     /// Does the same with four bytes of samples per word, the first one in the low bits, as DMA leaves them in the memory of a
@@ -359,12 +366,17 @@ impl Master {
         if self.h_frame.was != State::Running || outcome.is_err() || self.detour {
             return self.end_with(outcome);
         }
-        self.edge_ns = 0;
-        self.present = self.following();
+        if let Some(sync) = &mut self.sync {
+            let next = sync.next(self.late.take());
+            self.follow_pulse(next);
+        } else {
+            self.edge_ns = 0;
+            self.present = self.following();
+        }
         self.go_on()
     }
 
-    /// Ends a frame in the usual way: does what [`end_with`](Self::end_with) amounts to on a free-running link that is up.
+    /// Ends a frame in the usual way: does what [`end_with`](Self::end_with) amounts to on a link that is up.
     fn go_on(&mut self) -> &HFrame {
         self.count_frame();
         self.h_frame.restarted = None;
@@ -387,7 +399,7 @@ impl Master {
         let restarted = self.lost.take().or(asked).or(outcome.err());
         self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
         // Once more, to say that there is none.
-        self.detour = self.sync.is_some() || self.h_frame.gap;
+        self.detour = self.h_frame.gap;
         if let Some(next) = self.ahead.take() {
             // The next head is out: a restart comes after its frame.
             self.present = next;

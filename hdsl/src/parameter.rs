@@ -253,6 +253,31 @@ mod tests {
         );
     }
 
+    /// What is no symbol is told by its five bits.
+    #[test]
+    fn undefined_symbols() {
+        assert_eq!(ParameterByte::new(0xf2).symbol(), Err(Error::UndefinedSymbol { symbol: 0x12 }));
+        assert_eq!(EncoderByte::new(0xf2).symbol(), Err(Error::UndefinedSymbol { symbol: 0x12 }));
+    }
+
+    /// A bit that is set stays so.
+    #[test]
+    fn bits_that_are_set_twice() {
+        assert_eq!(ParameterByte::new(0x90).with_first().with_msync().with_msync().raw(), 0xd0);
+        assert_eq!(EncoderByte::new(0x10).with_vsync().with_vsync().raw(), 0x90);
+    }
+
+    /// RESET and SYNC are not answered; from START to IDREQ an encoder answers with the pattern or its identifier.
+    #[test]
+    fn what_is_answered_with_what() {
+        for symbol in (0..32).filter_map(MasterSymbol::from_code) {
+            let start_up = [MasterSymbol::Start, MasterSymbol::Learn, MasterSymbol::Check, MasterSymbol::IdReq];
+            assert_eq!(symbol.is_start_up(), start_up.contains(&symbol), "{symbol:?}");
+            let silent = [MasterSymbol::Reset, MasterSymbol::Sync].contains(&symbol);
+            assert_eq!(symbol.is_answered(), !silent, "{symbol:?}");
+        }
+    }
+
     #[test]
     fn every_byte_of_both_directions() {
         let (mut master, mut encoder) = (0, 0);

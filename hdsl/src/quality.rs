@@ -272,6 +272,35 @@ mod tests {
         }
     }
 
+    /// An answer with two bad words, VSYNC in its place and out of it; a V-frame that is sound, or empty.
+    #[test]
+    fn whole_answers_and_v_frames() {
+        use crate::parameter::{EncoderByte, EncoderSymbol};
+        let idle = EncoderByte::of(EncoderSymbol::Idle).with_vsync();
+        let content = crate::answer::Content {
+            vertical: crate::symbol::Character::data(0),
+            parameter: idle,
+            pipe: crate::symbol::Character::control(crate::symbol::Control::K30_7),
+            acceleration: Some(crate::DeltaDelta::ZERO),
+            secondary: crate::symbol::Character::data(0),
+        };
+        let bits = content.emit(crate::symbol::RunningDisparity::Minus).bits;
+        let count = |at, bits| {
+            let mut monitor = QualityMonitor::new(QualityRule::Sick);
+            (monitor.count_answer(at, &Answer::from_bits(crate::Rule::Strict, bits)), monitor.value())
+        };
+        assert_eq!((count(7, bits), count(3, bits)), ((0, 9), (0, 2)));
+        // Ten zeros in the vertical and in the secondary channel.
+        assert_eq!(count(0, bits & !0x3ff & !(0x3ff << 51)).0, 2);
+        let counted = |frame: &VFrame| {
+            let mut monitor = QualityMonitor::new(QualityRule::Sick);
+            monitor.count_v_frame(frame);
+            monitor.value()
+        };
+        let silent = VFrame::of(crate::Rule::Strict, &[Answer::from_bits(crate::Rule::Strict, u64::MAX); 8]);
+        assert!(counted(&silent) < QualityMonitor::START);
+    }
+
     #[test]
     fn where_the_link_is_lost() {
         let eight_off = |rule| {

@@ -238,5 +238,9 @@ mod tests {
         assert_eq!(ResourceError::new(0x44, 1).to_string(), "undocumented (class 44h, detail 01h)");
         assert_eq!(ResourceError::FILE_EXISTS.class(), ResourceErrorClass::Files);
         assert_eq!(ResourceError::new(0x99, 0).class(), ResourceErrorClass::Unknown(0x99));
+        assert_eq!(
+            [0x40, 0x41, 0x42].map(|class| ResourceError::new(class, 0).class()),
+            [ResourceErrorClass::Address, ResourceErrorClass::Access, ResourceErrorClass::Processing]
+        );
     }
 }

@@ -27,7 +27,7 @@ impl Rssi {
     /// Half the RSSI in unary, as that many ones in a row, so that the smaller of two is their bitwise AND.
     #[expect(clippy::cast_possible_truncation, reason = "at most six ones")]
     pub(crate) const fn of_ones(ones: u8) -> Self {
-        Self(2_u8.wrapping_mul(ones.count_ones() as u8))
+        Self(2_u8.wrapping_mul(ones.trailing_ones() as u8))
     }
 }
 

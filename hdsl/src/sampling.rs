@@ -346,6 +346,13 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 24) as u8
         };
+        // Any number of bytes, of which the first 128 count.
+        let long: std::vec::Vec<u8> = (0..140).map(|_| noise()).collect();
+        for (len, index) in (0..=140).zip((0..8).cycle()) {
+            let index = SampleIndex::truncate(index);
+            let slow = (0..len.min(128)).fold(0_u128, |bits, at| bits | u128::from(index.bit(long[at])) << at);
+            assert_eq!(index.bits(&long[..len]), slow);
+        }
         for round in (0..200).step_by(crate::thin(150)) {
             let mut samples = line(0x0f0f_3355_1234_5678, 3 + round % 40);
             for byte in &mut samples {

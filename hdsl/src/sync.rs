@@ -142,6 +142,8 @@ pub struct Synchroniser {
 impl Synchroniser {
     /// Largest correction in one frame, in eighths, as in the vendor's receiver.
     const MAX_CORRECTION: i16 = 6;
+    /// How much earlier or later an edge may come than the one before it; later by one more, for the eighths to spread.
+    const STEP: [i16; 2] = [-6, 7];
 
     /// The largest deviation that later frames make up for.
     const MAX_OWED: i16 = 64;
@@ -237,15 +239,26 @@ impl Synchroniser {
             adjust = self.correction(late).saturating_add(adjust);
         }
         let wanted = adjust.saturating_add(self.owed);
-        adjust = wanted.clamp(Self::MAX_CORRECTION.saturating_neg(), Self::MAX_CORRECTION.saturating_add(1));
-        // At the shortest and longest frames there is no block to give or take: the window stays within its range, and the rest
-        // comes with the next frames.
+        let [least, most] = Self::STEP;
+        if (least..=most).contains(&wanted) && self.state.step(wanted).is_ok() {
+            self.owed = 0;
+        } else {
+            self.step_as_far_as_possible(wanted);
+        }
+        self.frame = if self.frame.saturating_add(1) >= self.es.get() { 0 } else { self.frame.saturating_add(1) };
+        Next { stuffing: self.state.stuffing, extra: self.state.edge }
+    }
+
+    /// At the shortest and longest frames there is no block to give or take: the window stays within its range, and the rest
+    /// comes with the next frames.
+    #[cold]
+    fn step_as_far_as_possible(&mut self, wanted: i16) {
+        let [least, most] = Self::STEP;
+        let mut adjust = wanted.clamp(least, most);
         while self.state.step(adjust).is_err() && adjust != 0 {
             adjust = adjust.saturating_sub(adjust.signum());
         }
         self.owed = wanted.saturating_sub(adjust).clamp(Self::MAX_OWED.saturating_neg(), Self::MAX_OWED);
-        self.frame = if self.frame.saturating_add(1) >= self.es.get() { 0 } else { self.frame.saturating_add(1) };
-        Next { stuffing: self.state.stuffing, extra: self.state.edge }
     }
 
     /// Returns how many eighths later the next edge on a pulse has to come: as measured, or as learned if nothing was measured.

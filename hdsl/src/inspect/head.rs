@@ -183,6 +183,12 @@ mod tests {
     }
 
     #[test]
+    fn classes_of_damage() {
+        let all = [HeadDamage::Parameter, HeadDamage::OneBit, HeadDamage::TwoBits, HeadDamage::Missing];
+        assert_eq!(all.map(HeadDamage::name), ["invalid_word", "head", "head", "missing"]);
+    }
+
+    #[test]
     fn a_parameter_byte_by_itself() {
         let fault = |raw| head_fault(ParsedHead { byte: ParameterByte::new(raw), extra_bits: 0, len: 26 });
         assert_eq!((fault(0xd0), fault(0xf0)), (None, Some(HeadFault::Reserved)));
@@ -206,7 +212,9 @@ mod tests {
     #[test]
     fn trailers_in_front_of_a_head() {
         assert!(ends_with_stuffing(line("000011 001011")) && !ends_with_stuffing(line("001011 000011")));
-        assert!(!ends_with_stuffing(line("01011")));
+        assert!(ends_with_stuffing(line("001011")) && !ends_with_stuffing(line("01011")));
+        // What is left over in front of whole blocks says nothing.
+        assert!(ends_with_trailer(line("01 001011 001011 001011")));
         assert!(ends_with_trailer(line("010101 000011")));
         assert!(ends_with_trailer(line("010101 000011 001011 001011")));
         assert!(ends_with_trailer(line("001011 001011")));

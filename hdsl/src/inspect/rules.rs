@@ -287,6 +287,63 @@ mod tests {
         }
     }
 
+    /// FIRST is 0 during the start-up, whatever the frames after it do.
+    #[test]
+    fn first_in_the_start_up() {
+        for symbol in (0..32).filter_map(MasterSymbol::from_code) {
+            let mut rules = HeadRules::default();
+            let mut check = |first| {
+                let (head, line) = head(symbol, first, false);
+                rules.check(head, line, None)
+            };
+            let running = may_be_first(symbol);
+            assert_eq!((check(true), check(false)), ((!running).then_some(BrokenRule::First), None), "{symbol:?}");
+        }
+        // And heads of the start-up teach nothing about FIRST.
+        let mut rules = HeadRules::default();
+        rules.learn(&[head(MasterSymbol::Check, true, false); 12]);
+        let (head, line) = head(MasterSymbol::Idle, false, false);
+        assert_eq!(rules.check(head, line, None), None);
+    }
+
+    /// In sync mode the line is not balanced before EQUALISATION, and each head is coded for its own window.
+    #[test]
+    fn heads_with_a_window_are_not_judged_by_their_code() {
+        let mut rules = HeadRules::default();
+        for _ in 0..40 {
+            let (head, line) = head(MasterSymbol::Idle, true, false);
+            assert_eq!(rules.check(head, line, None), None);
+        }
+        let byte = ParameterByte::of(MasterSymbol::Idle).with_first();
+        let line = Head::new(byte, crate::frame::Extra::new(48), LineDisparity::new(6)).bits();
+        let head = Head::parse(line).unwrap();
+        assert!(head.extra_bits == 6 && !is_coded_for_balance(head, line));
+        assert_eq!(rules.check(head, line, None), None);
+    }
+
+    #[test]
+    fn classes_of_rules() {
+        let fault = [HeadFault::UndefinedSymbol { symbol: 0x12 }, HeadFault::Reserved].map(BrokenRule::Fault);
+        assert_eq!(fault.map(BrokenRule::name), ["undefined_symbol", "reserved"]);
+        let rules = [BrokenRule::Balance, BrokenRule::First, BrokenRule::Msync];
+        assert_eq!(rules.map(BrokenRule::name), ["disparity", "first", "msync"]);
+    }
+
+    /// What was seen long ago weighs less: after 10,000 answers that were carried on, some 6,500 that begin anew are the rule, not
+    /// 80,000.
+    #[test]
+    fn an_encoder_that_changes_its_mind() {
+        let [carried, anew] = ['+', '-'].map(|begins| answer(begins, if begins == '+' { '-' } else { '+' }));
+        let mut beginnings = Beginnings::default();
+        (0..10_000).for_each(|_| beginnings.note(answer('-', '+'), carried));
+        assert!(beginnings.are_carried());
+        let until = (1..80_000).find(|_| {
+            beginnings.note(answer('-', '+'), anew);
+            beginnings.are_anew()
+        });
+        assert!(until.is_some_and(|until| (6_000..7_000).contains(&until)), "{until:?}");
+    }
+
     /// A head with FIRST 0 among others is damage at once if the first heads had it.
     #[test]
     fn what_the_first_heads_do_is_learned() {

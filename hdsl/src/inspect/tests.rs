@@ -59,6 +59,19 @@ fn mistakes_and_their_causes() {
     assert_eq!(report.cause(), Some(Cause::TestPattern));
 }
 
+/// What is shown as the answer behind a mistake is sound, switch bit and disparity included; noise has no cause.
+#[test]
+fn no_cause_is_made_up() {
+    let good = line(content());
+    let report = inspect(NORMAL, window((good ^ 1 << 50) << 4 | 15, 80));
+    assert_eq!((report.cause(), report.answer()), (Some(LineCause::Disturbed.into()), None));
+    // No word of the code, between short runs of either level.
+    let noise = (0..61).fold(0_u128, |bits, at| bits | u128::from(at / 5 % 2 == 0 || at % 7 == 0) << at);
+    let report = inspect(NORMAL, window(noise, 61));
+    assert!(report.error().is_some() && score(window(noise, 61)) < PERFECT / 2);
+    assert_eq!(report.cause(), None);
+}
+
 /// One flipped bit of the acceleration: its word is bad, or the check bits are wrong.
 #[test]
 fn one_flipped_bit_is_a_disturbance() {

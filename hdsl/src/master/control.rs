@@ -154,7 +154,7 @@ impl Master {
             Some(es) => Some(Synchroniser::new(self.pulse.ok_or(Error::NoPulse)?, es)?),
             None => None,
         };
-        self.detour |= self.sync.is_some();
+        self.detour = true;
         Ok(())
     }
 }

@@ -194,11 +194,15 @@ impl Master {
     fn end_v_frame(&mut self) {
         let link = &mut self.link;
         let VFrame { safe1, safe2 } = &link.vframe;
-        let position = safe1.vpos();
-        let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
+        let (sound1, heard, safe) = match safe1.vpos() {
+            Ok(raw) => (true, true, Ok((raw, safe1.status()))),
+            Err(Error::PositionInvalid { .. }) => (true, true, Err(Doubt::Withheld)),
+            // What the host has not heard says nothing about the line.
+            Err(Error::Truncated { .. }) => (false, false, Err(Doubt::Stale)),
+            Err(_) => (false, true, Err(Doubt::Stale)),
+        };
         let sound2 = safe2.is_sound();
-        // What the host has not heard says nothing about the line.
-        if !matches!(position, Err(Error::Truncated { .. })) {
+        if heard {
             link.quality.count_blocks(sound1, sound2);
         }
         if !sound1 {
@@ -209,12 +213,8 @@ impl Master {
         }
         // The firmware of the SDK looks at channel 2 only with a good channel 1.
         link.test2 = self.dialect.quality == QualityRule::Ti && sound1 && safe2.status() & 0x40 != 0;
-        link.fast.align(position.ok());
-        link.safe = match position {
-            Ok(raw) => Ok((raw, safe1.status())),
-            Err(Error::PositionInvalid { .. }) => Err(Doubt::Withheld),
-            Err(_) => Err(Doubt::Stale),
-        };
+        link.fast.align(safe.ok().map(|(raw, _)| raw));
+        link.safe = safe;
         self.h_frame.v_frame = Some(link.vframe);
         link.msync = !link.msync;
         link.settled = true;

@@ -2,9 +2,10 @@
 //! end of a frame.
 
 use super::{Master, RestartReason, State};
-use crate::frame::{Extra, H_FRAME_BITS, Head, STUFFING_BITS, Stuffing, Trailer};
+use crate::frame::{Extra, H_FRAME_BITS, Head, STUFFING_BITS, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
+use crate::sync::Next;
 
 /// What to send from the start of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -53,7 +54,7 @@ impl Master {
     /// ```
     pub fn ahead(&mut self) -> Option<Transmission> {
         if self.ahead.is_none() {
-            if self.state != State::Running || self.detour && self.waits_for_answer() {
+            if self.state != State::Running || self.sync.is_some() || self.detour && self.waits_for_answer() {
                 return None;
             }
             // What the end of this frame will change: after RX7 another V-frame begins.
@@ -68,13 +69,23 @@ impl Master {
     /// Returns whether the next head depends on the answer of a running link.
     #[cold]
     const fn waits_for_answer(&self) -> bool {
-        self.sync.is_some() || self.restart || self.lost.is_some()
+        self.restart || self.lost.is_some()
     }
 
     /// Returns the head after a frame of a free-running link that is up.
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
         transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
+    }
+
+    /// Prepares the next head and the stuffing before it, for a link that is up in sync mode.
+    #[inline]
+    pub(super) fn follow_pulse(&mut self, next: Next) {
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
+        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: next.stuffing };
+        let (symbol, msync) = (self.requester.transmit(), self.link.msync());
+        (self.present, _) = transmission(State::Running, symbol, msync, Some(next.extra), LineDisparity::ZERO);
+        self.longest_ns = self.present_ns();
     }
 
     /// Returns the time from the end of one window to that of the next, which is that of `present`, plus half a free-running

@@ -154,6 +154,23 @@ fn a_restart_while_the_next_frame_is_out() {
     }
 }
 
+/// Both at once: the frame that is out goes before the restart, and the gap is told.
+#[test]
+fn a_restart_and_lost_frames_while_the_next_frame_is_out() {
+    let mut both = Early::lock(Dialect::SICK);
+    assert!(both.master.ahead().is_some());
+    both.master.skip(1);
+    both.master.request_restart();
+    let mut hear = || {
+        let answer = both.device.set_position(1 << 20).hear(both.master.transmission().head.bits());
+        *both.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, both.sampled_ns)
+    };
+    let first = hear();
+    assert_eq!((first.gap, first.restarted), (true, None));
+    let second = hear();
+    assert_eq!((second.gap, second.restarted), (false, Some(RestartReason::Requested)));
+}
+
 /// In sync mode the window of the next head depends on the pulse: nothing leaves early.
 #[test]
 fn not_in_sync_mode() {

@@ -261,6 +261,27 @@ fn edges_of_the_start_up() {
     assert_eq!((alignment.index.get(), alignment.delay.get()), (7, 1));
 }
 
+/// A glitch in one bit of every answer of the start-up is seen in one frame of four, whichever bit it is: each frame examines another
+/// quarter.
+#[test]
+fn the_signal_of_the_start_up() {
+    for bit in [2, 20, 40, 55] {
+        let mut pair = Pair::new(Dialect::SICK);
+        let mut low = 0;
+        for frame in 0..52 {
+            let answer = pair.device.set_position(1000).hear(pair.master.transmission().head.bits());
+            let mut samples = answer.map_or([0xff; 72], |answer| line(answer.bits, 0));
+            // From CHECK on, away from the sample that is taken.
+            if frame >= 36 {
+                samples[bit] ^= 0x42;
+            }
+            let report = pair.master.hear(&samples, 0).unwrap();
+            low += u32::from(report.signal.is_some_and(|signal| signal.rssi < Rssi::MAX));
+        }
+        assert_eq!((pair.master.state(), low), (State::IdReq, 4), "{bit}");
+    }
+}
+
 /// Samples of a frame without an answer are not looked at, also when a link was there before.
 #[test]
 fn frames_without_an_answer() {

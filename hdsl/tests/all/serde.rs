@@ -74,4 +74,5 @@ fn what_is_written_comes_back() {
     back(&Error::Crc { got: 1, want: 2 });
     back(&LongRequest::parse(&[0xe4, 0x81, 0x80, 0x03, 0x14, 0x13]).unwrap());
     back(&Event::from_bits_retain(0xffff));
+    assert_eq!(serde_json::to_string(&Data::new(&[1, 2]).unwrap()).unwrap(), r#"["Two",[1,2,0,0,0,0,0,0]]"#);
 }

@@ -2,13 +2,22 @@
 
 use crate::bench::Bench;
 use crate::cable::{Cable, Disturbance};
-use hdsl::device::{Behaviour, Fault, Transmission};
+use hdsl::device::{Behaviour, Fault, Resources, Transmission};
 use hdsl::message::{
-    Access, Data, Length, LongAnswer, LongRequest, RemoteRegister, Requester, ResourceAddress, ShortAnswer,
-    ShortRequest,
+    Access, Data, Length, Limits, LongAnswer, LongRequest, RemoteRegister, Requester, ResourceAddress, Responder,
+    ShortAnswer, ShortRequest,
 };
 use hdsl::registers::{Event, OnlineD, Register};
 use hdsl::{Dialect, EncoderSymbol, Error, MasterSymbol, crc16};
+
+/// What one gets without asking.
+#[test]
+fn defaults() {
+    assert_eq!(Dialect::default(), Dialect::SICK);
+    assert_eq!(Limits::default(), Limits::DEFAULT);
+    assert_eq!(Responder::default(), Responder::new());
+    assert_eq!((Behaviour::default(), Resources::default()), (Behaviour::new(), Resources::new()));
+}
 
 /// The offset of a long message comes from PC_OFF, if PC_ADD_H asks for one.
 #[test]
