@@ -228,6 +228,12 @@ impl Clock {
         }
     }
 
+    /// Returns the picoseconds of a sample if they are whole and the time of sample `last` fits into 64 bits: the time of each
+    /// sample before it is then its number times this.
+    pub(crate) fn whole(self, last: u64) -> Option<u64> {
+        (self.samples == 1 && last.checked_mul(self.picoseconds).is_some()).then_some(self.picoseconds)
+    }
+
     /// Returns the number of samples that take at least this many picoseconds.
     pub(crate) fn fewest(self, picoseconds: i64) -> u64 {
         let samples = u128::from(picoseconds.max(0).unsigned_abs()) * u128::from(self.samples);

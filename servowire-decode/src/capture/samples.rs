@@ -1,7 +1,5 @@
 //! A block of packed samples, for a decoder that does not need individual edges.
 
-use std::ops::RangeInclusive;
-
 use crate::time::{Clock, Time};
 
 /// Samples of one channel, eight per byte, the oldest in bit 0.
@@ -95,14 +93,14 @@ impl<'a> Samples<'a> {
 
     /// Returns all changes, by time.
     pub fn changes(self) -> impl Iterator<Item = (Time, bool)> + 'a {
-        let mut numbers = Vec::new();
-        self.numbers(&mut numbers);
         let Self { before, clock, .. } = self;
-        numbers.into_iter().zip([!before, before].into_iter().cycle()).map(move |(at, level)| (clock.time(at), level))
+        let mut room = Vec::new();
+        let numbers = self.pieces().flat_map(move |piece| piece.numbers(&mut room).to_vec());
+        numbers.zip([!before, before].into_iter().cycle()).map(move |(at, level)| (clock.time(at), level))
     }
 
     /// Returns the same samples in pieces so small that the numbers of their changes fit into the cache.
-    pub(crate) fn pieces(self) -> impl Iterator<Item = Self> {
+    pub(crate) fn pieces(self) -> impl Iterator<Item = Self> + 'a {
         let mut before = self.before;
         let mut first = self.first;
         self.bytes.chunks(PIECE).map(move |bytes| {
@@ -112,32 +110,48 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// Returns all changes by time; `room` holds their numbers. A run is even if it lasts between `least` and `most`
-    /// picoseconds.
+    /// Returns all changes of a [piece](Self::pieces) by time; `room` holds their numbers. A run is even if it lasts between
+    /// `least` and `most` picoseconds.
     pub(crate) fn turns(self, room: &mut Vec<u64>, least: i64, most: i64) -> Turns<'_> {
-        room.clear();
-        self.numbers(room);
+        let (level, clock) = (self.before, self.clock);
+        let numbers = self.numbers(room);
         // The times of samples are rounded.
-        let even = self.clock.fewest(least.saturating_add(1))..=self.clock.most(most.saturating_sub(1));
-        Turns { numbers: room, told: 0, level: self.before, clock: self.clock, even }
+        let fewest = clock.fewest(least.saturating_add(1));
+        let even = clock.most(most.saturating_sub(1)).checked_sub(fewest).map(|range| (fewest, range));
+        let whole = numbers.last().and_then(|last| clock.whole(*last));
+        Turns { numbers, told: 0, level, clock, whole, even }
     }
 
-    /// Appends the number of each sample before which the level changes.
-    fn numbers(self, out: &mut Vec<u64>) {
+    /// Returns the number of each sample before which the level changes, in `room`, of at most [`PIECE`] bytes.
+    fn numbers(self, room: &mut Vec<u64>) -> &[u64] {
         let flip = if self.inverted { u64::MAX } else { 0 };
         let mut before = u64::from(self.before);
-        for (at, bytes) in (self.first..).step_by(64).zip(self.bytes.chunks(8)) {
-            let word = little_endian(bytes) ^ flip;
-            let mut edges = word ^ (word << 1 | before);
-            before = word >> 63;
-            if bytes.len() < 8 {
-                edges &= (1 << (8 * bytes.len())) - 1;
-            }
+        // There are at most as many changes as samples.
+        room.resize(8 * PIECE, 0);
+        let Some(found) = room.first_chunk_mut::<{ 8 * PIECE }>() else { return &[] };
+        let mut count = 0;
+        let mut see = |at: u64, mut edges: u64| {
             while edges != 0 {
-                out.push(at + u64::from(edges.trailing_zeros()));
+                if let Some(place) = found.get_mut(count % (8 * PIECE)) {
+                    *place = at + u64::from(edges.trailing_zeros());
+                }
+                count += 1;
                 edges &= edges - 1;
             }
+        };
+        let words = self.bytes.chunks_exact(8);
+        let (mut at, rest) = (self.first, words.remainder());
+        for eight in words {
+            let word = little_endian(eight) ^ flip;
+            see(at, word ^ (word << 1 | before));
+            before = word >> 63;
+            at += 64;
         }
+        if !rest.is_empty() {
+            let word = little_endian(rest) ^ flip;
+            see(at, (word ^ (word << 1 | before)) & ((1 << (8 * rest.len())) - 1));
+        }
+        room.get(..count).unwrap_or_default()
     }
 }
 
@@ -154,34 +168,41 @@ pub(crate) struct Turns<'a> {
     /// The level after the last of these.
     level: bool,
     clock: Clock,
-    even: RangeInclusive<u64>,
+    /// Picoseconds from each sample to the next, if they are whole.
+    whole: Option<u64>,
+    /// The fewest samples of an even run, and how many more it may have.
+    even: Option<(u64, u64)>,
 }
 
-impl<'a> Turns<'a> {
+impl Turns<'_> {
     /// Returns the time of the change reported last.
     pub(crate) fn told_at(&self) -> Option<Time> {
         Some(self.clock.time(*self.numbers.get(self.told.checked_sub(1)?)?))
     }
 
-    /// Returns at most this many changes, starting with the one reported last, each followed by an even run. All of them
-    /// then count as reported, and so does the change after them.
-    pub(crate) fn even(
-        &mut self,
-        most: usize,
-    ) -> impl DoubleEndedIterator<Item = (Time, bool)> + ExactSizeIterator + use<'a> {
+    /// Appends at most this many changes, starting with the one reported last, each followed by an even run, and returns how
+    /// many. All of them then count as reported, and so does the change after them.
+    pub(crate) fn even<T>(&mut self, most: usize, out: &mut Vec<T>, make: impl Fn(Time, bool) -> T) -> usize {
         let from = self.numbers.get(self.told.wrapping_sub(1)..).unwrap_or_default();
-        let mut before = from.first().copied().unwrap_or(0);
-        let is_even = |number: &&u64| {
-            let run = **number - before;
-            before = **number;
-            self.even.contains(&run)
-        };
-        let count = from.iter().skip(1).take(most).take_while(is_even).count();
-        let (clock, level) = (self.clock, self.level);
-        self.told += count;
-        self.level ^= count % 2 == 1;
-        let even = from.get(..count).unwrap_or_default();
-        even.iter().enumerate().map(move |(at, number)| (clock.time(*number), level ^ (at % 2 == 1)))
+        let (Some((first, rest)), Some((fewest, range))) = (from.split_first(), self.even) else { return 0 };
+        let (mut before, mut count) = (*first, 0);
+        for next in rest.get(..most.min(rest.len())).unwrap_or_default() {
+            if (next - before).wrapping_sub(fewest) > range {
+                break;
+            }
+            (before, count) = (*next, count + 1);
+        }
+        let (clock, begun) = (self.clock, self.level);
+        let level = |at: usize| begun ^ (at % 2 == 1);
+        let even = from.get(..count).unwrap_or_default().iter().enumerate();
+        match self.whole {
+            Some(picoseconds) => {
+                out.extend(even.map(|(at, number)| make(Time::from_ps((number * picoseconds).into()), level(at))));
+            }
+            None => out.extend(even.map(|(at, number)| make(clock.time(*number), level(at)))),
+        }
+        (self.told, self.level) = (self.told + count, level(count));
+        count
     }
 }
 

@@ -146,9 +146,10 @@ impl<P: StartStop + Clone> StartStopLine<P> {
     fn give(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let Told { passed, failed, .. } = &mut self.told;
         let mut watch = Watch { out, passed, failed };
-        for field in self.receiver.take() {
-            self.protocol.field(&field, &mut watch)?;
+        for field in self.receiver.fields() {
+            self.protocol.field(field, &mut watch)?;
         }
+        self.receiver.take();
         if self.receiver.is_between() { self.settle(self.receiver.begun(), out) } else { Ok(()) }
     }
 

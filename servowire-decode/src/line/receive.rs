@@ -19,9 +19,10 @@ use crate::time::Time;
 
 /// A speaker that begins after at most this many bits of pause is answering another one.
 const ANSWERS_WITHIN: f64 = 22.0;
-/// Number of speeches over which the spread of edges is averaged, and the minimum for a result.
-const LATELY: u32 = 32;
-const FEWEST: u32 = 4;
+/// Number of speeches by which the spread of edges is judged, and the minimum for a result. One of the latter, or a third of
+/// the former, may be far worse than the others: with another driver at the same time.
+const LATELY: usize = 16;
+const FEWEST: usize = 4;
 /// Maximum number of edges kept of an open burst; beyond that, whole fields are read.
 const MOST_EDGES: usize = 512;
 /// A line that is low for longer ends a burst too, in picoseconds: 13 days. The times within a burst therefore fit into 64
@@ -54,8 +55,9 @@ pub(crate) struct EdgeReceiver {
     heard_before: Vec<f64>,
     /// When the last field ended.
     until: Option<Time>,
-    /// Mean square distance of edges from the grid of the first speaker, in bits, and the number of speeches in it.
-    spread: (f64, u32),
+    /// Mean square distance of edges from the grid, in bits, in the last speeches of those who speak first, and the number of
+    /// such speeches.
+    spread: ([f64; LATELY], usize),
     tried: grid::Tried,
 }
 
@@ -77,7 +79,7 @@ impl EdgeReceiver {
             past: Vec::new(),
             heard_before: Vec::new(),
             until: None,
-            spread: (0.0, 0),
+            spread: ([0.0; LATELY], 0),
             tried: grid::Tried::default(),
         }
     }
@@ -108,9 +110,12 @@ impl EdgeReceiver {
     }
 
     /// Returns the mean square distance of edges from their grid, in bits, for those who speak first: no other driver is on
-    /// then.
+    /// then, as a rule.
     pub(super) fn spread(&self) -> Option<f64> {
-        (self.spread.1 >= FEWEST).then_some(self.spread.0)
+        let (mut spread, count) = self.spread;
+        let spread = spread.get_mut(..count.min(LATELY)).filter(|spread| spread.len() >= FEWEST)?;
+        spread.sort_by(f64::total_cmp);
+        spread.get(spread.len() * 2 / 3).copied()
     }
 
     /// Returns the bit length of the last speaker before edges were forgotten, in picoseconds.
@@ -194,9 +199,8 @@ impl EdgeReceiver {
         if turns.told_at() != Some(since) || since - last.time > self.rest {
             return;
         }
-        let even = turns.even(room);
-        self.rates.edges += even.len() as u64;
-        self.burst.extend(even.map(|(time, level)| Edge { time, level, spikes: 0 }));
+        let even = turns.even(room, &mut self.burst, |time, level| Edge { time, level, spikes: 0 });
+        self.rates.edges += even as u64;
         if let (Some(last), Some(since)) = (self.burst.last(), turns.told_at()) {
             self.spikes.go_on(last, since);
         }
@@ -228,9 +232,14 @@ impl EdgeReceiver {
         !self.fields.is_empty()
     }
 
-    /// Returns the complete fields.
-    pub(crate) fn take(&mut self) -> std::vec::Drain<'_, LineField> {
-        self.fields.drain(..)
+    /// Returns the complete fields, until they are [taken](Self::take).
+    pub(crate) fn fields(&self) -> &[LineField] {
+        &self.fields
+    }
+
+    /// Removes the complete fields.
+    pub(crate) fn take(&mut self) {
+        self.fields.clear();
     }
 
     fn field_bits(&self) -> u32 {
@@ -286,20 +295,27 @@ impl EdgeReceiver {
             rest = fields;
         }
         while !rest.is_empty() {
-            let bit = self.heard.first().copied();
-            let exact = bit.and_then(|bit| even::exact(rest, self.field_bits(), bit, &mut self.tried.best));
+            let (bit, first) = (self.heard.first().copied(), self.fields.len());
+            let exact = bit.and_then(|bit| even::exact(rest, self.field_bits(), bit, &mut self.fields));
             let speech = exact.unwrap_or_else(|| self.speech(rest));
             let (now, after) = rest.split_at(speech.min(rest.len()));
             if after.is_empty() && !whole && now.len() < MOST_EDGES / 2 {
+                self.fields.truncate(first);
                 break;
             }
-            self.speak(now, bit.filter(|_| exact.is_some()));
+            match bit.filter(|_| exact.is_some()) {
+                Some(bit) => self.spoke_exactly(now, first, bit),
+                None => self.speak(now),
+            }
             rest = after;
         }
         let kept = burst.len() - rest.len();
-        self.past.extend_from_slice(burst.get(..kept).unwrap_or_default());
         self.burst = burst;
-        self.burst.drain(..kept);
+        if kept == self.burst.len() && self.past.is_empty() {
+            std::mem::swap(&mut self.past, &mut self.burst);
+        } else {
+            self.past.extend(self.burst.drain(..kept));
+        }
     }
 
     /// Returns the number of edges up to the first pause in which another speaker may have begun.
@@ -322,17 +338,19 @@ impl EdgeReceiver {
         edges.len()
     }
 
-    /// Reads the fields of one speaker; `exact`: the bit length by which they have already been read, if all edges were in
-    /// their places.
-    fn speak(&mut self, edges: &[Edge], exact: Option<f64>) {
-        let field_bits = self.field_bits();
-        let grid::Found { bit, is_sure, alone, misfit, read_by } = match exact {
-            Some(bit) => grid::Found { bit, is_sure: true, alone: exact, misfit: 0.0, read_by: exact },
-            None => grid::fit(edges, field_bits, self.bit, &mut self.heard, &mut self.tried),
-        };
-        if is_sure {
-            self.rates.measured(self.bit / bit);
+    /// The fields from number `first` onwards were read from the edges of one speaker, which were all in their places.
+    fn spoke_exactly(&mut self, edges: &[Edge], first: usize, bit: f64) {
+        if let Some(field) = self.fields.get_mut(first) {
+            field.spikes = std::mem::take(&mut self.dropped);
         }
+        self.spoke(edges, first, &grid::Found { bit, is_sure: true, alone: Some(bit), misfit: 0.0, read_by: None });
+    }
+
+    /// Reads the fields of one speaker.
+    fn speak(&mut self, edges: &[Edge]) {
+        let field_bits = self.field_bits();
+        let found = grid::fit(edges, field_bits, self.bit, &mut self.heard, &mut self.tried);
+        let grid::Found { bit, read_by, .. } = found;
         let speaker = field::Speaker::new(field_bits, bit);
         let first = self.fields.len();
         let mut line = field::Line::IDLE;
@@ -352,20 +370,32 @@ impl EdgeReceiver {
                 rest = next;
             }
         }
+        self.spoke(edges, first, &found);
+        if let Some(field) = self.fields.get_mut(first) {
+            field.bits = line.bits(edges, field.start, speaker);
+        }
+    }
+
+    /// Keeps the measurements of a speaker whose fields begin with number `first`.
+    fn spoke(&mut self, edges: &[Edge], first: usize, found: &grid::Found) {
+        let grid::Found { bit, is_sure, alone, misfit, .. } = *found;
+        if is_sure {
+            self.rates.measured(self.bit / bit);
+        }
         let pause = edges.first().zip(self.until).map(|(edge, until)| (edge.time - until) as f64 / bit);
         let answers = pause.is_some_and(|pause| pause < ANSWERS_WITHIN);
         if let Some(alone) = alone.filter(|_| is_sure) {
             self.rates.spoke(answers, self.bit / alone);
         }
         if is_sure && !answers {
-            self.spread.1 = (self.spread.1 + 1).min(LATELY);
-            self.spread.0 += (misfit - self.spread.0) / f64::from(self.spread.1);
+            let (spread, count) = &mut self.spread;
+            if let Some(place) = spread.get_mut(*count % LATELY) {
+                *place = misfit;
+            }
+            *count += 1;
         }
         self.until = self.fields.last().map(|field| field.end);
         self.time_fields(first, bit);
-        if let Some(field) = self.fields.get_mut(first) {
-            field.bits = line.bits(edges, field.start, speaker);
-        }
     }
 
     /// Fields that follow each other without a pause tell the bit length better than the edges inside them.

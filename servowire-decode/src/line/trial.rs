@@ -79,10 +79,11 @@ impl<P: StartStop + Clone> Trial<P> {
     pub(super) fn of(receiver: &EdgeReceiver, protocol: &P, weights: Weights, edges: &[Edge], now: Time) -> Self {
         let mut trial = Self { receiver: receiver.emptied(), protocol: protocol.clone(), heard: Heard::new(weights) };
         trial.receiver.feed(edges);
-        for field in trial.receiver.take() {
+        for field in trial.receiver.fields() {
             // Nothing is written, so nothing fails.
-            let _ = trial.protocol.field(&field, &mut trial.heard);
+            let _ = trial.protocol.field(field, &mut trial.heard);
         }
+        trial.receiver.take();
         let _ = trial.protocol.rest(now, &mut trial.heard);
         trial
     }

@@ -284,6 +284,47 @@ impl Decoder {
         }
     }
 
+    /// Returns whether a field is one in the middle of a sound answer, as most are.
+    #[inline]
+    fn is_inside(&self, field: &LineField) -> bool {
+        let Some(pending) = &self.pending else { return false };
+        !self.open.is_empty()
+            && self.open.broken.is_none()
+            && self.skip.is_none()
+            && self.open.len() + 1 < pending.answer_fields(self.open.first())
+            && field.start - self.open.end < TURN_ROUND_BITS * self.bit
+            && field.delimiter
+    }
+
+    /// Takes the next field of the line, whatever it is.
+    #[inline(never)]
+    fn next(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.open.is_empty()
+            && (self.is_over(field.start) || field.content & IDLE == IDLE && self.is_long_request())
+        {
+            self.close(out)?;
+        }
+        if let Some(until) = self.skip {
+            let pause = field.start - self.skipped;
+            self.skipped = field.end;
+            if field.start < until && pause <= TURN_ROUND_BITS * self.bit {
+                return Ok(());
+            }
+            self.skip = None;
+        }
+        if self.open.is_empty() {
+            let due = self.pending.and_then(|pending| pending.place.end()).map(|end| end + ANSWER_TIMEOUT);
+            if due.is_some_and(|due| field.start > due) {
+                self.give_up(field.start, true, out)?;
+            }
+        }
+        self.open.push((field.content & 0xff) as u8, field, self.bit);
+        let whole = self.pending.is_some_and(|pending| {
+            self.open.broken.is_none() && self.open.len() == pending.answer_fields(self.open.first())
+        });
+        if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
+    }
+
     /// Takes a frame of a log.
     fn take(&mut self, line: u64, bytes: &[u8], out: &mut dyn Sink) -> io::Result<()> {
         let frame = Frame::of_log(line, bytes);
@@ -316,30 +357,11 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if !self.open.is_empty()
-            && (self.is_over(field.start) || field.content & IDLE == IDLE && self.is_long_request())
-        {
-            self.close(out)?;
+        if self.is_inside(field) {
+            self.open.push((field.content & 0xff) as u8, field, self.bit);
+            return Ok(());
         }
-        if let Some(until) = self.skip {
-            let pause = field.start - self.skipped;
-            self.skipped = field.end;
-            if field.start < until && pause <= TURN_ROUND_BITS * self.bit {
-                return Ok(());
-            }
-            self.skip = None;
-        }
-        if self.open.is_empty() {
-            let due = self.pending.and_then(|pending| pending.place.end()).map(|end| end + ANSWER_TIMEOUT);
-            if due.is_some_and(|due| field.start > due) {
-                self.give_up(field.start, true, out)?;
-            }
-        }
-        self.open.push((field.content & 0xff) as u8, field, self.bit);
-        let whole = self.pending.is_some_and(|pending| {
-            self.open.broken.is_none() && self.open.len() == pending.answer_fields(self.open.first())
-        });
-        if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
+        self.next(field, out)
     }
 
     fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()> {

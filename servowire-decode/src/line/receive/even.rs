@@ -1,6 +1,7 @@
 //! Reads fields whose edges are all near the grid of their speaker: bits and fit in one pass, in integers.
 
 use super::super::spikes::Edge;
+use super::super::start_stop::LineField;
 use super::reading::{Fit, Read};
 use crate::time::Time;
 
@@ -12,13 +13,18 @@ const ONE: i64 = 1 << PART;
 /// different bit length after this speech, the edge then belongs to the same bit.
 const NEAR: i64 = ONE * 15 / 100;
 /// An edge nearer than this counts as exactly in its place.
-const EXACT: i64 = ONE >> 12;
+const EXACT: i64 = 1 << (EXACT_BIT - 1);
+/// In a place to which this distance was added, the bits of a fraction are 0 from this one onwards.
+const EXACT_BIT: u32 = PART - 11;
 /// Bits without a field after which another speaker may follow.
 pub(super) const OTHER_SPEAKER: u32 = 3;
 /// Fields longer than this, in bits, are not read here, nor are bits of which a picosecond is a smaller fraction: these
 /// would be counted too coarsely.
 const LONGEST: u32 = 30;
 const FEWEST: i64 = 1 << 20;
+/// No bits of a line are kept beyond this many.
+const LONGEST_LINE: f64 = 200.0;
+
 /// A field on the grid by which it was read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Even {
@@ -126,39 +132,77 @@ pub(super) fn read(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<E
     (spikes == 0).then_some(fit)
 }
 
-/// Reads the fields of the next speaker if all edges are exactly in their places, so that nothing has to be measured;
-/// returns the number of edges.
-pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<Even>) -> Option<usize> {
-    let grid = Grid::new(field_bits, bit)?;
-    fields.clear();
-    let (first, rest) = edges.split_first()?;
-    let (mut first, mut spikes, mut bits, mut count) = (first.time, first.spikes, 0_u32, edges.len());
-    let all = (1 << field_bits) - 1;
-    let mut close = |first: Time, bits: u32| {
-        fields.push(Even { first, bits: bits & all, places: 0.0, off: 0.0, share: 1.0 });
-        (bits >> (field_bits - 1) & 1 == 1).then_some(())
-    };
-    for (at, edge) in rest.iter().enumerate() {
-        let place = grid.place(edge, first) + EXACT;
-        if place > grid.last {
-            if edge.level {
-                return None;
-            }
-            if place > grid.other {
-                count = at + 1;
+/// Reads the fields of the next speaker if all edges are exactly in their places, so that nothing has to be measured, and
+/// appends them; returns the number of edges. The first field holds the bits of the line.
+pub(super) fn exact(edges: &[Edge], field_bits: u32, bit: f64, fields: &mut Vec<LineField>) -> Option<usize> {
+    let begun = fields.len();
+    let read = exact_fields(edges, Grid::new(field_bits, bit)?, field_bits, bit, fields);
+    match (read, fields.get_mut(begun)) {
+        (Some((_, line)), Some(first)) => first.bits = line,
+        _ => fields.truncate(begun),
+    }
+    read.map(|(count, _)| count)
+}
+
+/// Does the same, and returns the bits of the line too.
+#[inline]
+fn exact_fields(
+    edges: &[Edge],
+    grid: Grid,
+    field_bits: u32,
+    bit: f64,
+    fields: &mut Vec<LineField>,
+) -> Option<(usize, u128)> {
+    let is_exact = |place: i64| place >> EXACT_BIT & ((1 << (PART - EXACT_BIT)) - 1) == 0;
+    // From here onwards an edge belongs to the next field, from here onwards to another speaker, in picoseconds.
+    let [last, other] = [grid.last, grid.other].map(|place| (place - EXACT) / grid.per);
+    let (length, longest) = ((f64::from(field_bits) * bit) as i64, (LONGEST_LINE * bit) as i64);
+    let (content, all) = ((1 << (field_bits - 2)) - 1, (1 << field_bits) - 1);
+    let start = edges.first()?;
+    let (mut first, mut spikes, mut line) = (start.time, start.spikes, u128::MAX);
+    let mut at = 1;
+    loop {
+        let (mut bits, mut next) = (0_u32, None);
+        for edge in edges.get(at..)? {
+            let time = edge.time.after(first);
+            if time > last {
+                next = Some(edge);
                 break;
             }
-            close(first, bits)?;
-            (first, bits) = (edge.time, 0);
-        } else if place & (ONE - 1) > 2 * EXACT {
-            return None;
-        } else {
+            let place = time * grid.per + EXACT;
+            if !is_exact(place) {
+                return None;
+            }
             bits ^= u32::MAX << (place >> PART & 31);
+            spikes |= edge.spikes;
+            at += 1;
         }
+        let place = first.after(start.time).min(longest) * grid.per + EXACT;
+        line &= !u128::from(!bits & all).checked_shl((place >> PART) as u32).unwrap_or(0);
+        // A field begins low and ends high, and the line keeps its grid from field to field.
+        if bits & 1 != 0 || bits >> (field_bits - 1) & 1 == 0 || !is_exact(place) {
+            return None;
+        }
+        fields.push(LineField {
+            content: (bits >> 1 & content) as u16,
+            delimiter: true,
+            start: first,
+            end: first + length,
+            spikes: 0,
+            bits: 0,
+        });
+        let Some(edge) = next else { break };
+        if edge.level {
+            return None;
+        }
+        if edge.time.after(first) > other {
+            break;
+        }
+        at += 1;
+        first = edge.time;
         spikes |= edge.spikes;
     }
-    close(first, bits)?;
-    (spikes == 0).then_some(count)
+    (spikes == 0).then_some((at, line))
 }
 
 /// Ends a field that has no more edges. It ends high.

@@ -29,8 +29,9 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
     }
     fields.extend(frame.spikes());
     let names = id.map_or(&["CF"][..], |id| id.layout().request);
-    let event = event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()));
-    located(event, frame, parts(id, Direction::Request))
+    let mut event = event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()));
+    locate(&mut event.fields, frame, parts(id, Direction::Request));
+    event
 }
 
 /// What is known about the encoder.
@@ -84,8 +85,8 @@ impl Encoder {
         fields.extend(frame.spikes());
         let said = frame.data_id().ok().or(id);
         let names = said.map_or(&["CF"][..], |id| id.layout().response);
-        let event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
-        let mut event = located(event, frame, parts(said, Direction::Answer));
+        let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
+        locate(&mut event.fields, frame, parts(said, Direction::Answer));
         event.position = position;
         event.delay = delay;
         event
@@ -212,12 +213,12 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
     Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
 }
 
-/// Adds the places of its fields, of which these are on the line.
-fn located(mut event: Event, frame: &Frame, parts: &[Part]) -> Event {
-    let Some(spans) = frame.spans() else { return event };
+/// Adds the places of the fields of a frame, of which these are on the line.
+fn locate(fields: &mut [Field], frame: &Frame, parts: &[Part]) {
+    let Some(spans) = frame.spans() else { return };
     // The fields come in the order of the line, except those without a place.
     let mut rest = parts.iter();
-    for field in &mut event.fields {
+    for field in fields {
         let mut behind = rest.clone();
         let found = behind.find(|part| part.name == field.name);
         if found.is_some() {
@@ -227,7 +228,6 @@ fn located(mut event: Event, frame: &Frame, parts: &[Part]) -> Event {
             field.span = spans.of(*first, *last);
         }
     }
-    event
 }
 
 /// A value of a frame on the line, and its bits: ABS is in the fields ABS0 to ABS2.

@@ -135,8 +135,21 @@ impl Pending {
 
     /// Returns the number of fields in the answer that begins with `cf`: as `cf` says or, if it is damaged, as requested.
     pub(super) fn answer_fields(&self, cf: u8) -> usize {
-        let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
-        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::ReadAll);
-        usize::from(id.response_fields())
+        match ANSWER_FIELDS.get(usize::from(cf)) {
+            Some(said @ 1..) => usize::from(*said),
+            _ => usize::from(self.request.map_or(DataId::ReadAll, Request::data_id).response_fields()),
+        }
     }
 }
+
+/// Fields of the answer that begins with each byte; 0: none does.
+const ANSWER_FIELDS: [u8; 256] = {
+    let mut fields = [0; 256];
+    let mut ids = DataId::ALL.as_slice();
+    while let [id, rest @ ..] = ids {
+        let [.., place] = fields.split_at_mut(id.control_field().get() as usize + 1).0 else { break };
+        *place = id.response_fields();
+        ids = rest;
+    }
+    fields
+};

@@ -148,7 +148,7 @@ fn two_drivers_at_once_are_named() {
         }
     }
     // Where both say the same, they look like one that is slow.
-    assert!(4 * named >= wanted, "{named} of {wanted} are named");
+    assert!(2 * named >= wanted, "{named} of {wanted} are named");
 }
 
 #[test]
