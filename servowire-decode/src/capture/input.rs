@@ -15,6 +15,9 @@ const BUFFER: usize = 1 << 18;
 /// Bytes from which a file is recognised.
 pub(super) const HEAD: usize = 1 << 12;
 
+/// If events were due this often, the first lines have to be enough. The first time may count from before they arrived.
+const SLOW: u32 = 2;
+
 /// Maximum depth to which packed files inside packed files are unpacked.
 const DEEPEST: u8 = 4;
 /// Input that must be read backwards but cannot be is held in memory, up to this many bytes.
@@ -65,6 +68,8 @@ pub struct Input {
     /// The beginning, read ahead to recognise the file, and how much of it has been taken.
     head: Vec<u8>,
     head_taken: usize,
+    /// How often events were due while the beginning of a slow input was awaited.
+    overdue: u32,
     taken: Rc<Cell<u64>>,
     /// A reader whose bytes are counted elsewhere.
     quiet: bool,
@@ -94,6 +99,7 @@ impl Input {
             reader: BufReader::with_capacity(BUFFER, source),
             head: Vec::new(),
             head_taken: 0,
+            overdue: 0,
             taken: Rc::default(),
         }
     }
@@ -163,12 +169,13 @@ impl Input {
         Ok(Box::new(Cursor::new(bytes)))
     }
 
-    /// Returns the beginning of the file without consuming it: 4 KiB, or the whole file if it is shorter.
+    /// Returns the beginning of the file without consuming it: 4 KiB, or the whole file if it is shorter; of input that
+    /// arrives slowly, the first lines.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
         // What was taken of the beginning is no longer it.
         self.head.drain(..self.head_taken);
         self.head_taken = 0;
-        while self.head.len() < HEAD && (self.head.is_empty() || !self.waits()) {
+        while self.head.len() < HEAD && (self.head.is_empty() || self.overdue < SLOW && !self.waits()) {
             let name = &self.name;
             let more = self.reader.fill_buf();
             let more = more.map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))?;
@@ -177,6 +184,9 @@ impl Input {
             self.reader.consume(count);
             if count == 0 {
                 break;
+            }
+            if self.head.contains(&b'\n') && self.reader.get_mut().live().is_some_and(Live::is_overdue) {
+                self.overdue += 1;
             }
         }
         Ok(&self.head)

@@ -114,6 +114,18 @@ fn a_log_and_a_table_from_a_pipe() {
     assert_eq!(live.end().len(), 1);
 }
 
+/// Lines that keep coming, each before the program takes the input for paused, are shown long before they fill 4 KiB.
+#[test]
+fn a_log_that_comes_line_by_line() {
+    let mut live = Live::start(&["decode", "--json", "-"]);
+    let mut lines = ["1A\n", "1A 20 29 C0 3B 17 00 00 00 C8 37\n"].into_iter().cycle();
+    let shown = (0..150).find_map(|_| {
+        live.write(lines.next()?.as_bytes());
+        live.lines.recv_timeout(Duration::from_millis(20)).ok()
+    });
+    assert!(shown.expect("nothing was shown").contains("\"line\":1"));
+}
+
 #[test]
 fn a_file_that_grows() {
     let bench = Bench::new();
