@@ -16,7 +16,7 @@ use servowire::talk::backup::Backup;
 use servowire::talk::fault::Fault;
 use servowire::talk::link::Link;
 use servowire::talk::simulate;
-use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
+use servowire_world::{Cable, Scenario, Tally};
 use tformat::device::Device;
 use tformat::{Abm, Abs, Address, Almc, BitRate, Request, Response};
 
@@ -264,35 +264,6 @@ fn an_echo_alone_is_no_answer() {
     let fault = Link::open(Box::new(port), Duration::from_millis(20)).unwrap_err();
     assert!(matches!(fault, Fault::OnlyEcho), "{fault}");
     bench.end();
-}
-
-/// Whatever the line does, a value that is accepted was sent, and the next exchange on a good line is good.
-#[test]
-fn faults_are_refused_and_over_with_the_next_exchange() {
-    let rates = Rates { longest_ns: 2_000_000, ..Rates::QUIET }
-        .with(Kind::Drop, 50_000)
-        .with(Kind::Flip, 100_000)
-        .with(Kind::Cut, 100_000)
-        .with(Kind::Delay, 100_000)
-        .with(Kind::Repeat, 50_000)
-        .with(Kind::Noise, 50_000);
-    for echo in [false, true] {
-        let (bench, port) = hurt(Scenario::random(7, rates), echo);
-        let mut link = (0..5)
-            .find_map(|_| Link::open(Box::new(port.try_clone_native().unwrap()), Duration::from_millis(15)).ok())
-            .unwrap();
-        let (mut good, mut last) = (0, 0);
-        for _ in 0..150 {
-            if let Ok(Response::ReadAll(all)) = link.exchange(Request::ReadAll) {
-                assert!(all.abs.get() > last, "{} after {last}: an old answer", all.abs);
-                assert_eq!((all.abm.get(), all.enid), (2, 0x17));
-                (good, last) = (good + 1, all.abs.get());
-            }
-        }
-        let tally = bench.end();
-        println!("{good} of 150 good; {tally}");
-        assert!(good > 75);
-    }
 }
 
 /// An output that cannot be written is not the fault of the port; who reads no further has read enough.

@@ -1,6 +1,7 @@
 //! `talk` at ports of which the time is known: adapters that hold answers back, and ports that go away.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::rc::Rc;
 use std::thread;
@@ -8,8 +9,9 @@ use std::time::Duration;
 
 use servowire::talk::link::Link;
 use servowire::talk::port::Port;
+use servowire_world::{Cable, Kind, Rates, Scenario};
 use tformat::device::Device;
-use tformat::{Abm, Abs, BitRate, Request, Response};
+use tformat::{Abm, Abs, Almc, BitRate, Request, Response};
 
 /// An adapter that holds each answer back for some time, and may hear itself. Its time runs while somebody waits.
 struct Holding {
@@ -106,6 +108,123 @@ fn an_answer_that_is_there_is_not_late() {
     let holding = Holding { device, echo: false, held: Duration::ZERO, asked: 0, coming: Vec::new(), longest };
     let port = Adapter(Rc::new(RefCell::new(holding)));
     assert!(Link::open(port, Duration::ZERO).is_ok());
+}
+
+/// An encoder at the end of a line with faults. Its time runs while somebody waits, so nothing comes later than the faults
+/// make it, however busy the machine is.
+struct Faulty {
+    device: Device<6>,
+    echo: bool,
+    line: Cable,
+    now_ns: u64,
+    shaft: u32,
+    coming: VecDeque<(u64, Vec<u8>)>,
+    longest: Duration,
+}
+
+impl Faulty {
+    fn hear(&mut self, byte: u8) {
+        if self.echo {
+            self.coming.push_back((self.now_ns, vec![byte]));
+        }
+        self.shaft += 1;
+        self.device.set_position(Abs::truncate(self.shaft), Abm::truncate(2));
+        let Some(answer) = self.device.hear(&[byte], self.now_ns) else { return };
+        let mut at_ns = self.now_ns;
+        for arrival in self.line.carry(answer.frame.as_bytes(), self.now_ns) {
+            // In two pieces, as USB likes it.
+            let (first, second) = arrival.bytes.split_at(arrival.bytes.len() / 3);
+            at_ns = at_ns.max(arrival.at_ns);
+            self.coming.extend([(at_ns, first.to_vec()), (at_ns + 200_000, second.to_vec())]);
+            at_ns += 200_000;
+        }
+    }
+
+    /// What comes until then; otherwise it is then.
+    fn until(&mut self, then_ns: u64) -> Option<Vec<u8>> {
+        let (at_ns, _) = self.coming.front().filter(|(at_ns, _)| *at_ns <= then_ns)?;
+        self.now_ns = self.now_ns.max(*at_ns);
+        self.coming.pop_front().map(|(_, piece)| piece)
+    }
+}
+
+#[derive(Clone)]
+struct Line(Rc<RefCell<Faulty>>);
+
+impl Read for Line {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        let mut line = self.0.borrow_mut();
+        let then_ns = line.now_ns + u64::try_from(line.longest.as_nanos()).unwrap();
+        if let Some(piece) = line.until(then_ns) {
+            bytes[..piece.len()].copy_from_slice(&piece);
+            return Ok(piece.len());
+        }
+        line.now_ns = then_ns;
+        thread::sleep(line.longest);
+        Err(std::io::ErrorKind::TimedOut.into())
+    }
+}
+
+impl Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut line = self.0.borrow_mut();
+        for byte in bytes {
+            line.hear(*byte);
+        }
+        line.coming.retain(|(_, piece)| !piece.is_empty());
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Port for Line {
+    fn wait(&mut self, longest: Duration) -> std::io::Result<()> {
+        self.0.borrow_mut().longest = longest;
+        Ok(())
+    }
+
+    fn forget(&mut self) -> std::io::Result<()> {
+        let mut line = self.0.borrow_mut();
+        let now_ns = line.now_ns;
+        line.coming.retain(|(at_ns, _)| *at_ns > now_ns);
+        Ok(())
+    }
+}
+
+/// Whatever the line does, a value that is accepted was sent, and the next exchange on a good line is good.
+#[test]
+fn faults_are_refused_and_over_with_the_next_exchange() {
+    let rates = Rates { longest_ns: 2_000_000, ..Rates::QUIET }
+        .with(Kind::Drop, 50_000)
+        .with(Kind::Flip, 100_000)
+        .with(Kind::Cut, 100_000)
+        .with(Kind::Delay, 100_000)
+        .with(Kind::Repeat, 50_000)
+        .with(Kind::Noise, 50_000);
+    for echo in [false, true] {
+        let mut device = Device::new(0x17, BitRate::Mbit2_5);
+        device.raise_alarms(Almc::OS);
+        device.end_alarms(Almc::OS);
+        let line = Cable::new(0, Scenario::random(7, rates));
+        let (coming, longest) = (VecDeque::new(), Duration::ZERO);
+        let faulty = Faulty { device, echo, line, now_ns: 0, shaft: 0, coming, longest };
+        let port = Line(Rc::new(RefCell::new(faulty)));
+        let mut link = (0..5).find_map(|_| Link::open(port.clone(), Duration::from_millis(15)).ok()).unwrap();
+        assert_eq!(link.echo(), echo);
+        let (mut good, mut last) = (0, 0);
+        for _ in 0..150 {
+            if let Ok(Response::ReadAll(all)) = link.exchange(Request::ReadAll) {
+                assert!(all.abs.get() > last, "{} after {last}: an old answer", all.abs);
+                assert_eq!((all.abm.get(), all.enid), (2, 0x17));
+                (good, last) = (good + 1, all.abs.get());
+            }
+        }
+        println!("{good} of 150 good; {}", port.0.borrow().line.tally);
+        assert!(good > 75);
+    }
 }
 
 /// A port that is gone, as its reads say by giving nothing.
