@@ -43,6 +43,7 @@ mod rtex;
 mod samples;
 mod scopes;
 mod serial;
+mod surfer;
 mod talk;
 mod talk_memory;
 mod talk_ports;
