@@ -216,12 +216,21 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
-        self.path.append(target, feed, self.end)?;
+        let line = self.path.line_to(target, feed)?;
+        // In the copies it is mostly the same one.
+        let like = [&self.work, &self.stops[0], &self.stops[1]].map(|other| other.ends_as(&self.path));
+        self.path.append(line, target, self.end);
+        let add = |other: &mut PathMover<N, M>, like: bool, end| {
+            let line = if like { line } else { other.line_to(target, feed)? };
+            other.append(line, target, end);
+            Ok(())
+        };
         if self.stage != Stage::Idle {
             // The same lines, or some of them: there is room for this one.
-            let _: Result<_, _> = self.work.append(target, feed, self.end);
+            let _: Result<(), Error> = add(&mut self.work, like[0], self.end);
         }
-        self.tell_stops(|stop, end| stop.append(target, feed, end));
+        let [_, stops @ ..] = like;
+        self.tell_stops(|at, stop, end| add(stop, stops.get(at).copied().unwrap_or(false), end));
         Ok(())
     }
 
@@ -233,7 +242,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.ready()?;
         self.begin_anew();
         self.path.move_to(target, feed, self.end)?;
-        self.tell_stops(|stop, end| stop.move_to(target, feed, end));
+        self.tell_stops(|_, stop, end| stop.move_to(target, feed, end));
         Ok(())
     }
 
@@ -268,7 +277,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     pub fn stop(&mut self) {
         self.begin_anew();
         self.path.stop(self.end);
-        self.tell_stops(|stop, end| {
+        self.tell_stops(|_, stop, end| {
             stop.stop(end);
             Ok(())
         });
@@ -278,7 +287,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     pub fn quick_stop(&mut self, limits: [Limits; N]) {
         self.begin_anew();
         self.path.quick_stop(limits, self.end);
-        self.tell_stops(|stop, end| {
+        self.tell_stops(|_, stop, end| {
             stop.quick_stop(limits, end);
             Ok(())
         });
@@ -360,13 +369,13 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Passes requests to the stops too, so that the machine would carry them out after a stop as well.
-    fn tell_stops(&mut self, ask: impl Fn(&mut PathMover<N, M>, u64) -> Result<(), Error>) {
+    fn tell_stops(&mut self, ask: impl Fn(usize, &mut PathMover<N, M>, u64) -> Result<(), Error>) {
         for at in 0..2 {
             if !self.may_come_to(at) {
                 continue;
             }
             if let (Some(stop), Some(out)) = (self.stops.get_mut(at), self.outs.get(at)) {
-                if ask(stop, out.end).is_err() {
+                if ask(at, stop, out.end).is_err() {
                     stop.stop(out.end);
                 }
             }

@@ -52,6 +52,15 @@ impl<const N: usize> Line<N> {
         self.steps.map(|steps| phases::steps(self.place(steps, place)).min(steps.unsigned_abs()))
     }
 
+    /// Returns the steps that each axis makes on it before the path leaves it; none that is 0 there.
+    pub(super) fn made(&self) -> [i32; N] {
+        let mut made = self.steps;
+        for (made, _) in made.iter_mut().zip(self.ends).filter(|(_, end)| *end == 0) {
+            *made = 0;
+        }
+        made
+    }
+
     /// Returns the position of an axis at a place on the line, in 2^-32 steps.
     fn place(&self, steps: i32, at: Real) -> i64 {
         let place = Real::new(steps.unsigned_abs().into()) * at / self.whole;

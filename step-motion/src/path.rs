@@ -108,7 +108,7 @@ pub struct Path<const N: usize, const M: usize> {
     len: usize,
     /// Direction and length of the line before the next one pushed, in units.
     before: Option<([i32; N], Real)>,
-    /// Where the last line ends, and the last direction of each axis up to there.
+    /// Where the last line ends, and the last direction of each axis up to there, if it is known.
     target: [i64; N],
     ways: [Option<Direction>; N],
     /// The last direction of each axis on lines that have ended, and when they ended.
@@ -149,7 +149,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             len: 0,
             before: None,
             target: [0; N],
-            ways: [None; N],
+            ways: [Some(Direction::Forward); N],
             gone: [Some(Direction::Forward); N],
             over: 0,
             speed: Real::ZERO,
@@ -193,6 +193,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more
     /// than 2^31 - 1 steps.
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        if let Some(line) = self.line_to(target, feed)? {
+            self.add(line, target);
+        }
+        Ok(())
+    }
+
+    /// Returns the line that a push would add; `None` for one of zero length.
+    pub(super) fn line_to(&self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
@@ -200,7 +208,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let steps = Self::steps(self.target, target)?;
         let length = self.length(&steps);
         if length.is_zero() {
-            return Ok(());
+            return Ok(None);
         }
         let (bounds, feed) = self.bounds(&steps, length, feed.max(1));
         let corner = match self.before {
@@ -209,16 +217,25 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
             None => Real::ZERO,
         };
+        Ok(Some(Line::new(steps, length, bounds, (feed, corner))))
+    }
+
+    /// Adds a line that leads from the present target to another one.
+    pub(super) fn add(&mut self, line: Line<N>, target: [i64; N]) {
         let place = self.first.wrapping_add(self.len).checked_rem(M).and_then(|at| self.lines.get_mut(at));
         if let Some(place) = place {
-            *place = Some(Line::new(steps, length, bounds, (feed, corner)));
+            *place = Some(line);
             self.len = self.len.saturating_add(1);
-            self.before = Some((steps, length));
+            self.before = Some((line.steps, line.whole));
             self.target = target;
             self.knows_all = false;
-            gone_along(&mut self.ways, &steps);
+            gone_along(&mut self.ways, &line.steps);
         }
-        Ok(())
+    }
+
+    /// Returns whether another path of the same axes ends in the same way, so that the same line would be added to it.
+    pub(super) fn ends_as(&self, other: &Self) -> bool {
+        self.target == other.target && self.before == other.before && self.ways == other.ways && !self.is_full()
     }
 
     /// Plans the first line of the queue and takes it out. It begins where and when the previous one ends; after a rest no
@@ -351,7 +368,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     pub(super) fn pass(&mut self) {
         if let Some(place) = self.lines.get_mut(self.first) {
             if let Some(line) = place.take() {
-                gone_along(&mut self.gone, &line.steps);
+                gone_along(&mut self.gone, &line.made());
             }
         }
         self.first = self.first.wrapping_add(1).checked_rem(M).unwrap_or(0);
@@ -415,13 +432,19 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
         }
         (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
+        // Lines that were cut off turn no axis.
+        let mut ways = self.gone;
+        for line in (0..self.len).filter_map(|at| self.line(at)) {
+            gone_along(&mut ways, &line.made());
+        }
+        self.ways = ways;
     }
 
     /// Empties the queue, at rest at a position from a moment onwards.
     pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
         (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
         (self.speed, self.moment, self.offset, self.on) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO, None);
-        (self.over, self.gone) = (self.moment, [None; N]);
+        (self.over, self.gone, self.ways) = (self.moment, [None; N], [None; N]);
     }
 
     /// Makes the next line begin no earlier than this tick, after a rest.

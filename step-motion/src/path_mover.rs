@@ -5,7 +5,7 @@ mod planning;
 use crate::cutter::{Demand, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::line::{AxisPulse, LinePulses, Steps};
+use crate::line::{AxisPulse, Line, LinePulses, Steps};
 use crate::path::Path;
 use crate::plan::Setpoint;
 use crate::real::Real;
@@ -335,16 +335,27 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         over.div_ceil(self.clock().moment(1))
     }
 
-    /// Does the same as [`push`](Self::push), but the present motion ignores the line until
-    /// [`look_ahead`](Self::look_ahead) is called.
-    pub(super) fn append(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+    /// Returns the line that a push would add.
+    pub(super) fn line_to(&mut self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
         self.ready()?;
-        self.path.push(target, feed)?;
+        self.path.line_to(target, feed)
+    }
+
+    /// Does the same as [`push`](Self::push) with a line that [`line_to`](Self::line_to) has returned, but the present motion
+    /// ignores the line until [`look_ahead`](Self::look_ahead) is called.
+    pub(super) fn append(&mut self, line: Option<Line<N>>, target: [i64; N], now: u64) {
+        if let Some(line) = line {
+            self.path.add(line, target);
+        }
         self.halted = false;
         if self.line.is_none() {
             self.replan(now);
         }
-        Ok(())
+    }
+
+    /// Returns whether a line of another mover would be the same here.
+    pub(super) fn ends_as(&self, other: &Self) -> bool {
+        !self.quick && self.path.ends_as(&other.path)
     }
 
     /// Sets the deviation at corners, for lines appended from now on.

@@ -43,7 +43,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     pub(super) fn turning(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real)) -> Real {
         let mut most = Real::HUGE;
         for (((axis, way), &before), &after) in self.axes.iter().zip(self.ways).zip(from).zip(to) {
-            let turns = way.is_some_and(|way| way != Direction::of(after.into()));
+            let turns = way != Some(Direction::of(after.into()));
             if after == 0 || axis.reversal_pause == 0 || !turns {
                 continue;
             }

@@ -33,8 +33,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Returns the run that begins at line `at`, with a speed of at most `speed` and of what its lines allow, and with an
     /// acceleration and jerk under way: limits below these would make them jump. It has at most `most` lines after the
-    /// first one.
-    fn run(&self, at: usize, part: Option<Real>, speed: Real, held: [Real; 2], most: usize) -> Option<Run> {
+    /// first one; with `any`, also such as allow other accelerations.
+    fn run(
+        &self,
+        at: usize,
+        part: Option<Real>,
+        (speed, held): (Real, [Real; 2]),
+        (most, any): (usize, bool),
+    ) -> Option<Run> {
         let mut last = self.line(at)?;
         let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
         while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
@@ -48,7 +54,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
             let fits = line.corner >= fastest && own.v >= speed;
             let v = part.is_none() || alike(own.v, run.bounds.v, EQUAL);
-            if !fits || !v || !alike(own.a, run.bounds.a, ALIKE) || !alike(other.j, jerk.j, ALIKE) {
+            let same = any || alike(own.a, run.bounds.a, ALIKE) && alike(other.j, jerk.j, ALIKE);
+            if !fits || !v || !same {
                 break;
             }
             let (a, j) = (run.bounds.a.min(own.a), jerk.j.min(other.j));
@@ -75,6 +82,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         (part, present, brakes): (Option<Real>, Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
+        let Some(part) = part else { return self.brake(at, start, (place, before), (present, brakes)) };
+        let run = self.run(at, Some(part), self.under_way(at, start, present)?, (M, false))?;
+        let left = (run.length + before) - place;
+        let most = self.exit(at.saturating_add(run.more), part);
+        let wish = most.min(fastest_exit(start, left, &run.bounds));
+        self.leave(at, start, left, (&run, run.bounds, run.bounds), (wish, most))
+    }
+
+    /// Returns the speed that a motion on line `at` reaches if it goes on as it is, and the acceleration and jerk under way.
+    fn under_way(&self, at: usize, start: Motion, present: Option<Bounds>) -> Option<(Real, [Real; 2])> {
         let first = self.line(at)?;
         let (mut fastest, mut held) = (start.v, [Real::ZERO; 2]);
         if let Some(jerk) = first.bounds.jerk.filter(|_| !start.a.is_zero()) {
@@ -85,55 +102,103 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 fastest = start.v + (start.a.squared() / j).half();
             }
         }
-        let mut run = self.run(at, part, fastest, held, if part.is_some() { M } else { 0 })?;
-        let mut own = run.bounds;
-        let mut left = (run.length + before) - place;
-        if part.is_none() {
-            // With the limits of no more lines than the stop takes.
-            for _ in 0..M {
-                own = present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least));
-                let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
-                let (end, rest) = self.locate(at, (place + curve.way()) - before);
-                if curve.way() <= left + SLACK {
-                    let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
-                    let more = end.saturating_sub(at);
-                    return Some((Course { curve, exit: Real::ZERO, wish: Real::ZERO, whole, more }, own));
-                }
-                let most = end.saturating_sub(at).max(run.more.saturating_add(1));
-                let more = self.run(at, None, fastest, held, most)?;
-                if more.more == run.more {
-                    break;
-                }
-                run = more;
-                left = (run.length + before) - place;
+        Some((fastest, held))
+    }
+
+    /// Plans a stop on the lines of a run; if it does not fit, brakes as far as it can to their end.
+    fn brake(
+        &self,
+        at: usize,
+        start: Motion,
+        from: (Real, Real),
+        how: (Option<Bounds>, bool),
+    ) -> Option<(Course, Bounds)> {
+        match self.stop_within(at, start, from, how, false)? {
+            Ok(stop) => Some(stop),
+            Err((run, own)) => {
+                let left = (run.length + from.1) - from.0;
+                self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
             }
         }
-        let more = run.more;
-        let last = at.saturating_add(more);
-        let line = self.line(last)?;
-        let most = part.map_or(Real::ZERO, |part| self.exit(last, part));
-        let (bounds, wish) = if part.is_some() {
-            (own, most.min(fastest_exit(start, left, &own)))
-        } else {
-            (own.slower(start.v), Real::ZERO)
-        };
+    }
+
+    /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same, or any lines. If it does not fit, returns
+    /// the longest run that there is, with the limits on it.
+    fn stop_within(
+        &self,
+        at: usize,
+        start: Motion,
+        (place, before): (Real, Real),
+        (present, brakes): (Option<Bounds>, bool),
+        any: bool,
+    ) -> Option<Result<(Course, Bounds), (Run, Bounds)>> {
+        let under_way = self.under_way(at, start, present)?;
+        // With the limits of no more lines than the stop takes.
+        let mut run = self.run(at, None, under_way, (0, any))?;
+        let mut own = run.bounds;
+        for _ in 0..M {
+            own = present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least));
+            let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
+            let way = (place + curve.way()) - before;
+            if curve.way() <= ((run.length + before) - place) + SLACK {
+                // Rounding must not let it begin a line behind the run.
+                let (end, rest) = self.locate(at, way, at.saturating_add(run.more));
+                let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
+                let more = end.saturating_sub(at);
+                return Some(Ok((Course { curve, exit: Real::ZERO, wish: Real::ZERO, whole, more }, own)));
+            }
+            let (end, _) = self.locate(at, way, self.len);
+            let most = end.saturating_sub(at).max(run.more.saturating_add(1));
+            let more = self.run(at, None, under_way, (most, any))?;
+            if more.more == run.more {
+                break;
+            }
+            run = more;
+        }
+        Some(Err((run, own)))
+    }
+
+    /// Plans a stop on one curve over lines that may allow other accelerations, within the least of all of them; `None` if
+    /// it does not fit.
+    pub(crate) fn stop_on_any(
+        &self,
+        at: usize,
+        start: Motion,
+        from: (Real, Real),
+        how: (Option<Bounds>, bool),
+    ) -> Option<(Course, Bounds)> {
+        self.stop_within(at, start, from, how, true)?.ok()
+    }
+
+    /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is. `own` and
+    /// `wish` go into the course.
+    fn leave(
+        &self,
+        at: usize,
+        start: Motion,
+        left: Real,
+        (run, own, bounds): (&Run, Bounds, Bounds),
+        (speed, wish): (Real, Real),
+    ) -> Option<(Course, Bounds)> {
+        let last = at.saturating_add(run.more);
+        let leave = self.line(last)?.leave;
         let to = |exit| {
             let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
-            Some((Course { curve, exit, wish: most, whole: true, more }, own))
+            Some((Course { curve, exit, wish, whole: true, more: run.more }, own))
         };
-        if line.leave.is_some() {
-            return line.leave.and_then(to);
+        if leave.is_some() {
+            return leave.and_then(to);
         }
-        to(wish).or_else(|| {
+        to(speed).or_else(|| {
             let most = self.most(last);
-            let slowest = slowest_exit(start, left, wish, &bounds).min(most);
+            let slowest = slowest_exit(start, left, speed, &bounds).min(most);
             [slowest, most, Real::ZERO].into_iter().find_map(to)
         })
     }
 
-    /// Returns the line that lies a distance beyond the start of line `at`, and the place on it.
-    pub(crate) fn locate(&self, at: usize, mut way: Real) -> (usize, Real) {
-        let last = self.len.saturating_sub(1);
+    /// Returns the line that lies a distance beyond the start of line `at`, at most line `last`, and the place on it.
+    pub(crate) fn locate(&self, at: usize, mut way: Real, last: usize) -> (usize, Real) {
+        let last = last.min(self.len.saturating_sub(1));
         for i in at..last {
             let Some(line) = self.line(i) else { break };
             if way <= line.length {
@@ -160,7 +225,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> (usize, Real) {
         while let Some((Course { curve, exit, more, .. }, _)) = self.begin(at, speed, None) {
             if exit.is_zero() {
-                return self.locate(at, curve.way());
+                return self.locate(at, curve.way(), at.saturating_add(more));
             }
             (at, speed) = (at.saturating_add(more).saturating_add(1), exit);
         }
@@ -186,7 +251,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let mut runs = [None; M];
         let mut next = at.saturating_add(1);
         for place in &mut runs {
-            let Some(run) = self.run(next, Some(part), Real::ZERO, [Real::ZERO; 2], M) else { break };
+            let Some(run) = self.run(next, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false)) else { break };
             *place = Some((next, run));
             next = next.saturating_add(run.more).saturating_add(1);
         }

@@ -56,25 +56,29 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
             return None;
         }
-        let course = here.and_then(|(motion, start)| {
-            let from = (start.place, start.before);
-            let (course, bounds) = self.path.course(0, motion, from, (None, self.bounds, self.braking))?;
-            Some((course, start, bounds))
-        });
-        let stop = match course {
-            Some((course, start, bounds)) => {
-                let end = self.path.locate(0, (start.place + course.curve.way()) - start.before);
-                let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
-                // It is whole once the path has been cut off where it ends.
-                Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
-            }
+        let Some((motion, start)) = here else {
+            return Some(present((self.more, self.path.line(self.more)?.length)));
+        };
+        let from = (start.place, start.before);
+        let how = (self.bounds, self.braking);
+        let planned = |(course, bounds): (Course, Bounds)| {
+            let end = self.path.locate(0, (start.place + course.curve.way()) - start.before, course.more);
+            let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
+            // It is whole once the path has been cut off where it ends.
+            Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
+        };
+        let stop = match self.path.course(0, motion, from, (None, how.0, how.1)) {
+            Some(course) => planned(course),
             None => present((self.more, self.path.line(self.more)?.length)),
         };
         let Leaving { more, exit, .. } = stop.left;
         if exit.is_zero() {
             return Some(stop);
         }
-        Some(Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop })
+        let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop };
+        // At each joint it would have acceleration 0; on one curve it may be shorter.
+        let once = self.path.stop_on_any(0, motion, from, how).map(planned);
+        once.filter(|once| once.end < stop.end).or(Some(stop))
     }
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along

@@ -7,11 +7,13 @@ mod bounds;
 mod changes;
 mod laws;
 mod lines;
+mod machine;
 mod path_laws;
 mod path_queue;
 mod paths;
 mod plans;
 mod queue;
+mod replans;
 #[cfg(feature = "serde")]
 mod serde;
 mod stops;

@@ -470,3 +470,62 @@ fn a_stop_on_the_way_takes_no_more_steps_than_a_hold() {
     let (stop, hold) = (steps(machine), steps(held));
     assert!(stop[0] <= hold[0] + 1, "{stop:?} {hold:?}");
 }
+
+/// Stopped just before the end of a line, and sent back: the axis that turns has its pause.
+#[test]
+fn a_line_behind_a_stop_has_the_pause_of_an_axis_that_turns() {
+    let axes = [
+        AxisSetup::new(Limits::new(35_951, 11_103).unwrap(), 453_393).with_reversal_pause(20_778),
+        AxisSetup::new(Limits::new(13_234, 39_387).unwrap().with_jerk(18_677_251).unwrap(), 137_084),
+    ];
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::MICROSECONDS, axes, 0).unwrap());
+    machine.set_override(176, 0);
+    machine.move_to([168, 73], 5617, 1).unwrap();
+    let (mut last, mut turned) = ([None::<(u64, Direction)>; 2], 0);
+    let mut take = |machine: &mut Machine, until: u64| {
+        while machine.due().is_some_and(|due| due <= until) {
+            let pulse = machine.pulse().unwrap();
+            let before = last[usize::from(pulse.axis)].replace((pulse.tick, pulse.direction));
+            if let Some((tick, _)) = before.filter(|(_, way)| pulse.axis == 0 && *way != pulse.direction) {
+                assert!(pulse.tick - tick + 2 >= 20_778, "{tick} {}", pulse.tick - tick);
+                turned += 1;
+            }
+        }
+    };
+    take(&mut machine, 249_518);
+    machine.push([0, 0], 10, 249_518).unwrap();
+    take(&mut machine, 249_519);
+    machine.stop(249_519);
+    take(&mut machine, 249_520);
+    machine.push([0, 0], 970, 249_520).unwrap();
+    take(&mut machine, u64::MAX);
+    assert_eq!((machine.commanded(), turned), ([0, 0], 1));
+}
+
+/// A quick stop ends on the step before the place where a hold ends.
+#[test]
+fn a_quick_stop_of_a_short_line_takes_no_more_steps_than_a_hold() {
+    let axes = [
+        AxisSetup::new(Limits::new(125, 17_614).unwrap().with_jerk(83_599).unwrap(), 6473).with_reversal_pause(11_904),
+        AxisSetup::new(Limits::new(1349, 948_950).unwrap(), 55_765),
+    ];
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::MICROSECONDS, axes, 1).unwrap());
+    machine.push([-3, 0], 41_268, 0).unwrap();
+    machine.push([-51, 3], 40_102, 1).unwrap();
+    while machine.due().is_some_and(|due| due <= 38_923) {
+        machine.pulse();
+    }
+    let steps = |mut machine: Machine| {
+        let mut steps = [0; 2];
+        while let Some(pulse) = machine.pulse() {
+            steps[usize::from(pulse.axis)] += 1;
+        }
+        (steps, (38_923..1_000_000).find(|now| machine.is_at_rest(*now)).unwrap())
+    };
+    let mut held = machine.clone();
+    held.hold(38_923);
+    let quick = Limits::new(1, 54_426_867).unwrap().with_jerk(10_000).unwrap();
+    machine.quick_stop([quick, Limits::new(1, 999).unwrap()], 38_923);
+    let (quick, hold) = (steps(machine), steps(held));
+    assert!(quick.0[0] <= hold.0[0] && quick.1 <= hold.1 + 2, "{quick:?} {hold:?}");
+}

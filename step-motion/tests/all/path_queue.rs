@@ -3,107 +3,25 @@
 use proptest::prelude::*;
 use step_motion::{Axes, AxesQueue, AxesTimer, AxisSetup, Clock, Limits, Path, PathMover, Work};
 
+use crate::laws::limits;
+use crate::machine;
+
 const N: usize = 3;
 const LINES: usize = 8;
 const SLOTS: usize = 257;
 
 type Background = Axes<'static, N, LINES, SLOTS>;
 
-fn limits(speed: u32, acceleration: u32, jerk: u64) -> Limits {
-    let limits = Limits::new(speed, acceleration).unwrap();
-    if jerk == 0 { limits } else { limits.with_jerk(jerk).unwrap() }
-}
-
 fn queue() -> &'static AxesQueue<N, SLOTS> {
     Box::leak(Box::default())
 }
 
-/// A timer, and what its handler does.
-struct Machine {
-    timer: AxesTimer<'static, N, SLOTS>,
-    now: u64,
-    /// When the compare register is reached.
-    compare: Option<u64>,
-    reverse: u16,
-    /// When DIR changed, and the last step, of each axis.
-    turned: [Option<u64>; N],
-    last: [Option<(u64, bool)>; N],
-    /// The steps: when, which axis, and which way.
-    steps: Vec<(u64, usize, i64)>,
-    position: [i64; N],
-}
+type Machine = machine::Machine<AxesTimer<'static, N, SLOTS>, N>;
 
-impl Machine {
-    fn new(timer: AxesTimer<'static, N, SLOTS>) -> Self {
-        Self {
-            timer,
-            now: 0,
-            compare: None,
-            reverse: 0,
-            turned: [None; N],
-            last: [None; N],
-            steps: Vec::new(),
-            position: [0; N],
-        }
-    }
-
-    fn fire(&mut self) {
-        let fired = self.timer.fire();
-        for axis in 0..N {
-            let (step, back) = (fired.steps() >> axis & 1 != 0, fired.reverse() >> axis & 1 != 0);
-            if back != (self.reverse >> axis & 1 != 0) {
-                assert!(!step, "DIR changes with a step");
-                assert!(self.last[axis].is_none_or(|(last, _)| last < self.now));
-                self.turned[axis] = Some(self.now);
-            }
-            if step {
-                assert!(self.last[axis].is_none_or(|(last, _)| last < self.now), "two steps in a tick");
-                assert!(self.turned[axis].is_none_or(|turned| turned < self.now), "a step in the tick of DIR");
-                self.last[axis] = Some((self.now, back));
-                let by = if back { -1 } else { 1 };
-                self.steps.push((self.now, axis, by));
-                self.position[axis] += by;
-            }
-        }
-        self.reverse = fired.reverse();
-        self.compare = Some(fired.wait()).filter(|wait| *wait > 0).map(|wait| self.now + u64::from(wait));
-    }
-
-    /// Time goes on.
-    fn until(&mut self, time: u64) {
-        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
-            self.now = compare;
-            self.fire();
-        }
-        self.now = self.now.max(time);
-    }
-
-    /// All that is out.
-    fn drain(&mut self) {
-        while let Some(compare) = self.compare {
-            self.until(compare);
-        }
-    }
-}
-
-/// The background in time: called every so many ticks, until the machine is at rest or a time comes.
 fn run(axes: &mut Background, machine: &mut Machine, every: u64, until: u64) -> Work {
-    loop {
-        let mut calls = 0;
-        let work = loop {
-            match axes.poll() {
-                Work::More => calls += 1,
-                Work::Start if machine.compare.is_none() => machine.fire(),
-                other => break other,
-            }
-            assert!(calls < 20_000, "the background does not end");
-        };
-        assert_ne!(work, Work::TooFewSlots);
-        if machine.now >= until || work == Work::Rest {
-            return work;
-        }
-        machine.until((machine.now + every).min(until));
-    }
+    let work = machine.run(axes, every, until);
+    assert_ne!(work, Work::TooFewSlots);
+    work
 }
 
 fn path(hz: u32, axes: [AxisSetup; N], deviation: u32) -> Path<N, LINES> {
@@ -249,10 +167,7 @@ proptest! {
             ask(&mut axes, request);
             // A background that is cut off after some slices.
             for _ in 0..polls {
-                match axes.poll() {
-                    Work::Start if machine.compare.is_none() => machine.fire(),
-                    work => prop_assert_ne!(work, Work::TooFewSlots),
-                }
+                prop_assert_ne!(machine.slice(&mut axes), Work::TooFewSlots);
             }
             let until = machine.now + wait_us * u64::from(hz) / 1_000_000;
             if wait_us % 3 == 0 {
@@ -318,10 +233,7 @@ proptest! {
                 _ => {}
             }
             for _ in 0..polls {
-                match axes.poll() {
-                    Work::Start if machine.compare.is_none() => machine.fire(),
-                    work => prop_assert_ne!(work, Work::TooFewSlots),
-                }
+                prop_assert_ne!(machine.slice(&mut axes), Work::TooFewSlots);
             }
             machine.until(machine.now + wait_us * u64::from(hz) / 1_000_000);
         }
@@ -348,4 +260,54 @@ proptest! {
             prop_assert!(off <= 1.1, "{at:?} at {tick} is {off} steps off the line to {:?}", lines[line].0);
         }
     }
+}
+
+/// Three axes of 20,000 steps/s and 2,000,000 steps/s² at 1 MHz, with a reach of 5 ms.
+fn quick_axes() -> (Background, Machine) {
+    let setup = AxisSetup::new(limits(20_000, 2_000_000, 0), 80_000);
+    let (axes, timer) = Axes::new(queue(), path(1_000_000, [setup; N], 20));
+    (axes.with_reach(5000), Machine::new(timer))
+}
+
+/// With a background that is called as seldom as it may be, and at any instant.
+#[test]
+fn a_hold_and_an_override_act_within_twice_the_reach() {
+    for at in 0..160 {
+        let (mut axes, mut machine) = quick_axes();
+        axes.push([9000, 0, 0], 250_000).unwrap();
+        run(&mut axes, &mut machine, 2500, 100_000 + at * 619);
+        let before = machine.position[0];
+        // A tenth of 20,000 steps/s, in 10 ms and 9 ms of brake.
+        axes.set_override(10);
+        run(&mut axes, &mut machine, 2500, 130_000 + at * 619);
+        assert!(machine.position[0] - before <= 200 + 99 + 24, "{at}: {}", machine.position[0] - before);
+        axes.set_override(100);
+        run(&mut axes, &mut machine, 2500, 180_000 + at * 619);
+        axes.hold();
+        let made = machine.position[0];
+        run(&mut axes, &mut machine, 2500, u64::MAX);
+        // 10 ms, and the 100 steps from 20,000 steps/s to rest.
+        assert!((100..=302).contains(&(machine.position[0] - made)), "{at}: {}", machine.position[0] - made);
+    }
+}
+
+/// A line that comes after any slice of the background, and a background that is not there afterwards: it is not lost.
+#[test]
+fn a_line_is_not_lost_whenever_it_comes() {
+    let mut stops = 0;
+    for slices in 0..300 {
+        let (mut axes, mut machine) = quick_axes();
+        axes.push([300, 40, 0], 250_000).unwrap();
+        for _ in 0..slices {
+            if machine.slice(&mut axes) == Work::Later {
+                machine.until(machine.now + 1000);
+            }
+        }
+        axes.push([600, 0, 30], 250_000).unwrap();
+        machine.drain();
+        stops += u32::from(machine.position != [300, 40, 0] && machine.position != [0; N]);
+        run(&mut axes, &mut machine, 1000, u64::MAX);
+        assert_eq!((machine.position, axes.commanded()), ([600, 0, 30], [600, 0, 30]), "{slices}");
+    }
+    assert!(stops > 50, "{stops}");
 }

@@ -268,3 +268,21 @@ fn the_last_that_is_allowed() {
     let refused = Plan::new(clock, limits(500_000, 1_000_000, 0), most + 1);
     assert!(matches!(refused, Err(Error::TooManySteps { steps: 0x8000_0000, limit: 0x7fff_ffff })));
 }
+
+/// 315 ordinary S-curves, to the finest scale and the hardest jerk that machines have: none is refused, all are as fast as possible.
+#[test]
+fn ordinary_curves_of_machines() {
+    let clock = Clock::new(168_000_000).unwrap();
+    for per_mm in [5, 25, 80, 160, 400, 1600, 10_000_u32] {
+        for acceleration in [50, 200, 1000, 5000, 20_000_u32] {
+            for jerk in [200, 1000, 5000, 20_000, 50_000, 100_000, 250_000, 1_000_000, 2_000_000_u64] {
+                // 100 mm/s, over 10 mm.
+                let [v, a] = [100 * per_mm, acceleration * per_mm];
+                let plan = Plan::new(clock, limits(v, a, jerk * u64::from(per_mm)), 10 * per_mm).unwrap();
+                let best = optimum(10.0, [100.0, acceleration.into(), jerk as f64], [0.0; 2]).unwrap();
+                let off = plan.duration() as f64 - best * 168e6;
+                assert!(off.abs() <= 1.0, "{per_mm} steps/mm, {acceleration} mm/s², {jerk} mm/s³: {off} ticks");
+            }
+        }
+    }
+}

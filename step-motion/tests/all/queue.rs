@@ -3,86 +3,19 @@
 use proptest::prelude::*;
 use step_motion::{Axis, Clock, Direction, Limits, Mover, Queue, StepTimer, Work};
 
-const SLOTS: usize = 129;
+use crate::laws::limits;
+use crate::machine;
 
-fn limits(speed: u32, acceleration: u32, jerk: u64) -> Limits {
-    let limits = Limits::new(speed, acceleration).unwrap();
-    if jerk == 0 { limits } else { limits.with_jerk(jerk).unwrap() }
-}
+const SLOTS: usize = 129;
 
 fn queue() -> &'static Queue<SLOTS> {
     Box::leak(Box::default())
 }
 
-/// A timer, and what its handler does.
-struct Machine {
-    timer: StepTimer<'static, SLOTS>,
-    now: u64,
-    /// When the compare register is reached.
-    compare: Option<u64>,
-    dir: Direction,
-    /// When DIR changed, and the steps: when and which way.
-    turned: u64,
-    steps: Vec<(u64, Direction)>,
-    position: i64,
-}
+type Machine = machine::Machine<StepTimer<'static, SLOTS>, 1>;
 
-impl Machine {
-    fn new(timer: StepTimer<'static, SLOTS>) -> Self {
-        let steps = Vec::new();
-        Self { timer, now: 0, compare: None, dir: Direction::Forward, turned: 0, steps, position: 0 }
-    }
-
-    fn fire(&mut self) {
-        let fired = self.timer.fire();
-        if fired.direction() != self.dir {
-            assert!(!fired.is_step(), "DIR changes with a step");
-            assert!(self.steps.last().is_none_or(|(last, _)| *last < self.now));
-            (self.dir, self.turned) = (fired.direction(), self.now);
-        }
-        if fired.is_step() {
-            assert!(self.steps.last().is_none_or(|(last, _)| *last < self.now), "two steps in a tick");
-            assert!(self.turned < self.now || self.now == 0, "a step in the tick of DIR");
-            self.steps.push((self.now, self.dir));
-            self.position += if self.dir.dir() { -1 } else { 1 };
-        }
-        self.compare = Some(fired.wait()).filter(|wait| *wait > 0).map(|wait| self.now + u64::from(wait));
-    }
-
-    /// Time goes on.
-    fn until(&mut self, time: u64) {
-        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
-            self.now = compare;
-            self.fire();
-        }
-        self.now = self.now.max(time);
-    }
-
-    /// All that is out.
-    fn drain(&mut self) {
-        while let Some(compare) = self.compare {
-            self.until(compare);
-        }
-    }
-}
-
-/// The background in time: called every so many ticks, until the axis is at rest or a time comes.
 fn run(axis: &mut Axis<'static, SLOTS>, machine: &mut Machine, every: u64, until: u64) -> Work {
-    loop {
-        let mut calls = 0;
-        let work = loop {
-            match axis.poll() {
-                Work::More => calls += 1,
-                Work::Start if machine.compare.is_none() => machine.fire(),
-                other => break other,
-            }
-            assert!(calls < 1000, "the background does not end");
-        };
-        if machine.now >= until || work == Work::Rest {
-            return work;
-        }
-        machine.until((machine.now + every).min(until));
-    }
+    machine.run(axis, every, until)
 }
 
 /// The steps of one move beside the exact times, which an axis with a finer clock has.
@@ -95,10 +28,10 @@ fn compare(hz: u32, limits: Limits, target: i64, reach: u32) -> Result<(), TestC
     let mut machine = Machine::new(timer);
     axis.move_to(target).unwrap();
     prop_assert_eq!(run(&mut axis, &mut machine, u64::from(reach) / 16 + 1, u64::MAX), Work::Rest);
-    prop_assert_eq!((machine.position, axis.commanded()), (target, target));
+    prop_assert_eq!((machine.position[0], axis.commanded()), (target, target));
     prop_assert!(axis.is_at_rest());
     let most = (0.75 + 1.5 / f64::from(finer)).max(25e-9 * f64::from(hz));
-    for (step, (tick, _)) in machine.steps.iter().enumerate() {
+    for (step, (tick, ..)) in machine.steps.iter().enumerate() {
         let want = exact.pulse().unwrap().tick as f64 / f64::from(finer);
         prop_assert!((*tick as f64 - want).abs() <= most, "step {step} at {tick}, {want} is right");
     }
@@ -203,14 +136,12 @@ proptest! {
                 Request::Quick(acceleration) => axis.quick_stop(Limits::new(1, acceleration).unwrap()),
                 Request::Halt => {
                     axis.halt();
-                    halted = Some(machine.position);
+                    halted = Some(machine.position[0]);
                 }
             }
             // A background that is cut off after some slices.
             for _ in 0..polls {
-                if axis.poll() == Work::Start && machine.compare.is_none() {
-                    machine.fire();
-                }
+                machine.slice(&mut axis);
             }
             let until = machine.now + wait_us * u64::from(hz) / 1_000_000;
             if wait_us % 3 == 0 {
@@ -219,10 +150,10 @@ proptest! {
                 run(&mut axis, &mut machine, reach / 2, until);
             }
             if let Some(position) = halted {
-                prop_assert_eq!(machine.position, position, "a step after a halt");
+                prop_assert_eq!(machine.position[0], position, "a step after a halt");
             }
-            prop_assert_eq!(axis.commanded(), machine.position);
-            prop_assert!((-3000..=3000).contains(&machine.position));
+            prop_assert_eq!(axis.commanded(), machine.position[0]);
+            prop_assert!((-3000..=3000).contains(&machine.position[0]));
         }
         axis.stop();
         machine.drain();
@@ -232,10 +163,10 @@ proptest! {
         axis.resume();
         axis.move_to(target).unwrap();
         prop_assert_eq!(run(&mut axis, &mut machine, reach / 2, u64::MAX), Work::Rest);
-        prop_assert_eq!((machine.position, axis.commanded()), (target, target));
+        prop_assert_eq!((machine.position[0], axis.commanded()), (target, target));
         let least = u64::from(hz) / u64::from(limits.speed());
         for pair in machine.steps.windows(2) {
-            if pair[0].1 == pair[1].1 {
+            if pair[0].2 == pair[1].2 {
                 // A stop that nobody asked for is as exact as there are slots for it.
                 prop_assert!(pair[1].0 - pair[0].0 + 2 + least / 32 >= least, "{pair:?}, {least} ticks are the fastest");
             }
@@ -260,7 +191,7 @@ fn a_background_that_starves_ends_in_a_stop_at_every_segment() {
             }
         }
         machine.drain();
-        stalls += u32::from(machine.position < 6000 && machine.position > 0);
+        stalls += u32::from(machine.position[0] < 6000 && machine.position[0] > 0);
         // From 20,000 steps/s rest takes 1500 steps; the last interval of a stop is longer than that at 1000 steps/s.
         if let [.., before, last] = machine.steps[..] {
             assert!(last.0 - before.0 > 1000, "{slices}: {} ticks before rest", last.0 - before.0);
@@ -273,7 +204,7 @@ fn a_background_that_starves_ends_in_a_stop_at_every_segment() {
             assert!((second - first).abs() <= 210_000.0 * time + noise, "{slices}: {first} to {second} steps/s");
         }
         assert_eq!(run(&mut axis, &mut machine, 2000, u64::MAX), Work::Rest);
-        assert_eq!((machine.position, axis.commanded()), (6000, 6000));
+        assert_eq!((machine.position[0], axis.commanded()), (6000, 6000));
     }
     assert!(stalls > 200, "{stalls}");
 }
@@ -324,18 +255,18 @@ fn a_halt_acts_in_the_interrupt() {
         let mut machine = Machine::new(timer);
         axis.move_to(5000).unwrap();
         run(&mut axis, &mut machine, 1000, at);
-        let position = machine.position;
+        let position = machine.position[0];
         axis.halt();
         assert!(axis.move_to(0).is_err(), "not before the interrupt has seen it");
         machine.drain();
-        assert_eq!((machine.position, axis.commanded()), (position, position));
+        assert_eq!((machine.position[0], axis.commanded()), (position, position));
         let until = machine.now + 10_000;
         run(&mut axis, &mut machine, 1000, until);
-        assert_eq!((machine.position, axis.is_at_rest()), (position, true));
+        assert_eq!((machine.position[0], axis.is_at_rest()), (position, true));
         assert_eq!(axis.is_halted(), position < 5000, "{at}");
         axis.move_to(-20).unwrap();
         run(&mut axis, &mut machine, 1000, u64::MAX);
-        assert_eq!((machine.position, axis.commanded(), axis.is_halted()), (-20, -20, false));
+        assert_eq!((machine.position[0], axis.commanded(), axis.is_halted()), (-20, -20, false));
     }
 }
 
@@ -346,16 +277,16 @@ fn a_request_acts_within_twice_the_reach() {
     let (mut axis, mut machine) = (axis.with_reach(5000), Machine::new(timer));
     axis.run(Direction::Forward, 1).unwrap();
     run(&mut axis, &mut machine, 1000, 3_200_000);
-    assert_eq!(machine.position, 3);
+    assert_eq!(machine.position[0], 3);
     axis.run(Direction::Forward, 20_000).unwrap();
     run(&mut axis, &mut machine, 1000, 3_300_000);
     // 10 ms of reaction at most, 10 ms of ramp with 100 steps, and 80 ms; 90 ms without a reaction.
-    assert!((1700..=1903).contains(&machine.position), "{}", machine.position);
+    assert!((1700..=1903).contains(&machine.position[0]), "{}", machine.position[0]);
     axis.stop();
-    let before = machine.position;
+    let before = machine.position[0];
     run(&mut axis, &mut machine, 1000, u64::MAX);
     // 200 steps in 10 ms, twice 5 ms, and the 100 of the stop.
-    assert!(machine.position - before <= 310, "{}", machine.position - before);
+    assert!(machine.position[0] - before <= 310, "{}", machine.position[0] - before);
 }
 
 /// At any instant of a long motion, with a background that is called as seldom as it may be, alone or soon after another request: a
@@ -373,9 +304,9 @@ fn a_hold_acts_within_twice_the_reach_at_any_instant() {
             run(&mut axis, &mut machine, 2500, time);
         }
         axis.hold();
-        let made = machine.position;
+        let made = machine.position[0];
         run(&mut axis, &mut machine, 2500, u64::MAX);
         // 10 ms, and the 100 steps from 20,000 steps/s to rest.
-        assert!(machine.position - made <= 302, "{at} {before:?}: {}", machine.position - made);
+        assert!(machine.position[0] - made <= 302, "{at} {before:?}: {}", machine.position[0] - made);
     }
 }

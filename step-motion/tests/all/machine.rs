@@ -1,0 +1,129 @@
+//! The interrupt of an axis, or of the axes of a path, and what its handler does. The fuzz targets have it from here.
+
+use step_motion::{Axes, AxesTimer, Axis, StepTimer, Work};
+
+/// An interrupt half.
+pub(crate) trait Timer {
+    /// Steps and DIR, with a bit for each axis, and the ticks to the next event.
+    fn fired(&mut self) -> (u16, u16, u32);
+}
+
+impl<const S: usize> Timer for StepTimer<'_, S> {
+    fn fired(&mut self) -> (u16, u16, u32) {
+        let fired = self.fire();
+        (fired.is_step().into(), fired.direction().dir().into(), fired.wait())
+    }
+}
+
+impl<const N: usize, const S: usize> Timer for AxesTimer<'_, N, S> {
+    fn fired(&mut self) -> (u16, u16, u32) {
+        let fired = self.fire();
+        (fired.steps(), fired.reverse(), fired.wait())
+    }
+}
+
+/// A background half.
+pub(crate) trait Background {
+    /// Does a slice of its work.
+    fn slice(&mut self) -> Work;
+}
+
+impl<const S: usize> Background for Axis<'_, S> {
+    fn slice(&mut self) -> Work {
+        self.poll()
+    }
+}
+
+impl<const N: usize, const M: usize, const S: usize> Background for Axes<'_, N, M, S> {
+    fn slice(&mut self) -> Work {
+        self.poll()
+    }
+}
+
+/// A timer, and what its handler does.
+pub(crate) struct Machine<T, const N: usize> {
+    timer: T,
+    pub(crate) now: u64,
+    /// When the compare register is reached.
+    pub(crate) compare: Option<u64>,
+    reverse: u16,
+    /// When DIR changed, and the last step, of each axis.
+    turned: [Option<u64>; N],
+    last: [Option<u64>; N],
+    /// The steps: when, which axis, and which way.
+    pub(crate) steps: Vec<(u64, usize, i64)>,
+    pub(crate) position: [i64; N],
+}
+
+impl<T: Timer, const N: usize> Machine<T, N> {
+    pub(crate) fn new(timer: T) -> Self {
+        let (turned, last, steps) = ([None; N], [None; N], Vec::new());
+        Self { timer, now: 0, compare: None, reverse: 0, turned, last, steps, position: [0; N] }
+    }
+
+    pub(crate) fn fire(&mut self) {
+        let (steps, reverse, wait) = self.timer.fired();
+        for axis in 0..N {
+            let (step, back) = (steps >> axis & 1 != 0, reverse >> axis & 1 != 0);
+            if back != (self.reverse >> axis & 1 != 0) {
+                assert!(!step, "DIR changes with a step");
+                assert!(self.last[axis].is_none_or(|last| last < self.now), "DIR changes in the tick of a step");
+                self.turned[axis] = Some(self.now);
+            }
+            if step {
+                assert!(self.last[axis].is_none_or(|last| last < self.now), "two steps in a tick");
+                assert!(self.turned[axis].is_none_or(|turned| turned < self.now), "a step in the tick of DIR");
+                let by = if back { -1 } else { 1 };
+                self.last[axis] = Some(self.now);
+                self.steps.push((self.now, axis, by));
+                self.position[axis] += by;
+            }
+        }
+        self.reverse = reverse;
+        self.compare = (wait > 0).then(|| self.now + u64::from(wait));
+    }
+
+    /// Time goes on.
+    pub(crate) fn until(&mut self, time: u64) {
+        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
+            self.now = compare;
+            self.fire();
+        }
+        self.now = self.now.max(time);
+    }
+
+    /// All that is out.
+    pub(crate) fn drain(&mut self) {
+        while let Some(compare) = self.compare {
+            self.until(compare);
+        }
+    }
+
+    /// A slice of the background; the timer starts if it asks for that.
+    pub(crate) fn slice(&mut self, background: &mut impl Background) -> Work {
+        let work = background.slice();
+        if work == Work::Start && self.compare.is_none() {
+            self.fire();
+            return Work::More;
+        }
+        work
+    }
+
+    /// The background in time: called every so many ticks, until it is at rest or a time comes.
+    pub(crate) fn run(&mut self, background: &mut impl Background, every: u64, until: u64) -> Work {
+        loop {
+            let mut calls = 0;
+            let work = loop {
+                match self.slice(background) {
+                    Work::More => calls += 1,
+                    other => break other,
+                }
+                assert!(calls < 20_000, "the background does not end");
+            };
+            if self.now >= until || work == Work::Rest {
+                return work;
+            }
+            self.until((self.now + every).min(until));
+        }
+    }
+}
