@@ -1,11 +1,15 @@
 //! step-motion: plans, paths and an axis in two halves against their laws.
 
 use step_motion::{
-    Axes, AxesQueue, AxesTimer, Axis, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Queue,
-    StepTimer, Work,
+    Axes, AxesQueue, Axis, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Queue, Work,
 };
 
 use crate::{byte, word};
+
+#[path = "../../step-motion/tests/all/machine.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
+mod machine;
+use machine::{Background, Machine, Timer};
 
 /// Steps of a plan that are looked at.
 const LOOKED_AT: u32 = 4000;
@@ -129,13 +133,17 @@ pub fn axis(mut data: &[u8]) {
     let queue = Queue::new();
     let (axis, timer) = Axis::new(&queue, Clock::MICROSECONDS, limits).expect("a speed below the clock's");
     let axis = axis.with_reach(500 + reach * 40).with_soft_limits(LOW, HIGH);
-    let mut halves =
-        Halves { axis, timer, now: 0, compare: None, position: 0, last: None, fastest: 1_000_000 / u64::from(speed) };
+    let mut halves = Halves::new(axis, timer, speed, 250);
     while let [command, a, b, rest @ ..] = data {
         data = rest;
-        let (value, axis) = (i64::from(i16::from_le_bytes([*a, *b])), &mut halves.axis);
+        let (value, axis) = (i64::from(i16::from_le_bytes([*a, *b])), &mut halves.background);
         match command & 15 {
-            0 | 1 => assert_eq!(axis.move_to(value).is_ok(), (LOW..=HIGH).contains(&value) && !halves.refuses()),
+            0 | 1 => {
+                let taken = axis.move_to(value).is_ok();
+                // Refused in a quick stop, and before a halt has been seen.
+                let refuses = axis.move_to(axis.commanded()) == Err(Error::Moving);
+                assert_eq!(taken, (LOW..=HIGH).contains(&value) && !refuses);
+            }
             2 => {
                 let direction = if value < 0 { Direction::Reverse } else { Direction::Forward };
                 let _: Result<_, _> = axis.run(direction, u32::from(*a) * 100);
@@ -151,93 +159,69 @@ pub fn axis(mut data: &[u8]) {
                     halves.slice();
                 }
             }
-            11 => halves.until(halves.now + u64::from(*a) * 64),
-            _ => halves.run(halves.now + (u64::from(*a) << (b & 7))),
+            11 => halves.until(u64::from(*a) * 64),
+            _ => halves.run(u64::from(*a) << (b & 7)),
         }
     }
     // Afterwards it can be started again.
-    halves.axis.stop();
-    halves.run(halves.now + 100_000_000);
-    halves.axis.set_override(100);
-    halves.axis.resume();
-    halves.axis.move_to(77).expect("it is at rest");
-    halves.run(halves.now + 100_000_000);
-    assert_eq!((halves.position, halves.axis.is_at_rest()), (77, true));
+    halves.background.stop();
+    halves.run(100_000_000);
+    halves.background.set_override(100);
+    halves.background.resume();
+    halves.background.move_to(77).expect("it is at rest");
+    halves.run(100_000_000);
+    assert_eq!((halves.machine.position, halves.background.is_at_rest()), ([77], true));
 }
 
-/// A background and a timer.
-struct Halves<'q> {
-    axis: Axis<'q, SLOTS>,
-    timer: StepTimer<'q, SLOTS>,
-    now: u64,
-    compare: Option<u64>,
-    position: i64,
-    /// The last step: when and which way.
-    last: Option<(u64, Direction)>,
-    /// Ticks of a step at the greatest speed.
+/// A background and a timer, with what their steps have to keep.
+struct Halves<B, T, const N: usize> {
+    background: B,
+    machine: Machine<T, N>,
+    /// Where the steps have led, and the last one of each axis: when and which way.
+    position: [i64; N],
+    last: [Option<(u64, i64)>; N],
+    /// Ticks of a step at the greatest speed, and how often the background is called.
     fastest: u64,
+    every: u64,
 }
 
-impl Halves<'_> {
-    /// Moves are refused in a quick stop, and before a halt has been seen.
-    fn refuses(&mut self) -> bool {
-        let at = self.axis.commanded();
-        self.axis.move_to(at) == Err(Error::Moving)
+impl<B: Background<N>, T: Timer, const N: usize> Halves<B, T, N> {
+    fn new(background: B, timer: T, speed: u32, every: u64) -> Self {
+        let fastest = 1_000_000 / u64::from(speed);
+        let machine = Machine::new(timer);
+        Self { background, machine, position: [0; N], last: [None; N], fastest, every }
     }
 
     fn slice(&mut self) -> Work {
-        let work = self.axis.poll();
-        if work == Work::Start {
-            self.fire();
-        }
+        let work = self.machine.slice(&mut self.background);
+        self.look();
         work
     }
 
-    fn fire(&mut self) {
-        let fired = self.timer.fire();
-        let direction = fired.direction();
-        if fired.is_step() {
-            self.position = direction.advance(self.position);
-            assert!((LOW..=HIGH).contains(&self.position), "{} is beyond the soft limits", self.position);
-            if let Some((last, before)) = self.last {
-                let ticks = self.now - last;
-                // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
-                assert!(
-                    ticks > 0 && (before != direction || ticks + 2 + self.fastest / 8 >= self.fastest),
-                    "{ticks} ticks"
-                );
-            }
-            self.last = Some((self.now, direction));
-        }
-        self.compare = (fired.wait() > 0).then(|| self.now + u64::from(fired.wait()));
-        assert_eq!(self.axis.commanded(), self.position);
-    }
-
     /// Time goes on, without a background.
-    fn until(&mut self, time: u64) {
-        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
-            self.now = compare;
-            self.fire();
-        }
-        self.now = self.now.max(time);
+    fn until(&mut self, ticks: u64) {
+        self.machine.until(self.machine.now + ticks);
+        self.look();
     }
 
-    /// With one, every 250 us; until it is at rest, or until a time.
-    fn run(&mut self, time: u64) {
-        loop {
-            let mut slices = 0;
-            let work = loop {
-                match self.slice() {
-                    Work::More | Work::Start => slices += 1,
-                    other => break other,
-                }
-                assert!(slices < 2000, "the background does not end");
-            };
-            if self.now >= time || work == Work::Rest {
-                return;
+    /// With one; until it is at rest, or for a time.
+    fn run(&mut self, ticks: u64) {
+        self.machine.run(&mut self.background, self.every, self.machine.now + ticks);
+        self.look();
+    }
+
+    fn look(&mut self) {
+        for (tick, axis, by) in self.machine.steps.drain(..) {
+            self.position[axis] += by;
+            assert!((LOW..=HIGH).contains(&self.position[axis]), "{:?} is beyond the soft limits", self.position);
+            if let Some((last, before)) = self.last[axis].replace((tick, by)) {
+                let ticks = tick - last;
+                // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
+                let fast = before == by && ticks + 3 + self.fastest / 8 < self.fastest;
+                assert!(!fast, "{ticks} ticks of axis {axis}");
             }
-            self.until((self.now + 250).min(time));
         }
+        assert_eq!(self.background.made(), self.position);
     }
 }
 
@@ -263,112 +247,38 @@ pub fn axes(mut data: &[u8]) {
     let path = Path::<2, 4>::new(Clock::MICROSECONDS, axes, deviation).expect("a speed below the clock's");
     let queue = AxesQueue::new();
     let (axes, timer) = Axes::new(&queue, path);
-    let fastest = 1_000_000 / u64::from(speed);
-    let mut both = Both { axes, timer, now: 0, compare: None, position: [0; 2], last: [None; 2], fastest };
+    let mut both = Halves::new(axes, timer, speed, 2000);
     while let [command, a, b, rest @ ..] = data {
         data = rest;
         let to = [a, b].map(|value| i64::from(i8::from_le_bytes([*value])) * 20);
         match command & 15 {
             0..=2 => {
                 let inside = to.iter().all(|to| (LOW..=HIGH).contains(to));
-                let added = both.axes.push(to, 200_000).is_ok();
+                let added = both.background.push(to, 200_000).is_ok();
                 assert!(inside || !added, "{to:?} is beyond the soft limits");
             }
-            3 => drop(both.axes.move_to(to, 50_000)),
-            4 => both.axes.set_override(u16::from(*a)),
-            5 => both.axes.hold(),
-            6 => both.axes.resume(),
-            7 => both.axes.stop(),
-            8 => both.axes.quick_stop([Limits::new(1, u32::from(*b) * 10_000 + 1).expect("in range"); 2]),
-            9 => both.axes.halt(),
+            3 => drop(both.background.move_to(to, 50_000)),
+            4 => both.background.set_override(u16::from(*a)),
+            5 => both.background.hold(),
+            6 => both.background.resume(),
+            7 => both.background.stop(),
+            8 => both.background.quick_stop([Limits::new(1, u32::from(*b) * 10_000 + 1).expect("in range"); 2]),
+            9 => both.background.halt(),
             10 | 11 => {
                 for _ in 0..*a {
                     both.slice();
                 }
             }
-            12 => both.until(both.now + u64::from(*a) * 64),
-            _ => both.run(both.now + (u64::from(*a) << (b & 7))),
+            12 => both.until(u64::from(*a) * 64),
+            _ => both.run(u64::from(*a) << (b & 7)),
         }
     }
     // Afterwards it can be started again.
-    both.axes.stop();
-    both.run(both.now + 100_000_000);
-    both.axes.set_override(100);
-    both.axes.resume();
-    both.axes.push([77, -5], 200_000).expect("it is at rest");
-    both.run(both.now + 100_000_000);
-    assert_eq!((both.position, both.axes.is_at_rest()), ([77, -5], true));
-}
-
-/// A background and a timer of two axes.
-struct Both<'q> {
-    axes: Axes<'q, 2, 4, SLOTS_OF_AN_AXIS>,
-    timer: AxesTimer<'q, 2, SLOTS_OF_AN_AXIS>,
-    now: u64,
-    compare: Option<u64>,
-    position: [i64; 2],
-    /// The last step of each: when and whether backwards.
-    last: [Option<(u64, bool)>; 2],
-    /// Ticks of a step at the greatest speed.
-    fastest: u64,
-}
-
-impl Both<'_> {
-    fn slice(&mut self) -> Work {
-        let work = self.axes.poll();
-        if work == Work::Start && self.compare.is_none() {
-            self.fire();
-        }
-        work
-    }
-
-    fn fire(&mut self) {
-        let fired = self.timer.fire();
-        for axis in 0..2 {
-            let back = fired.reverse() >> axis & 1 != 0;
-            if fired.steps() >> axis & 1 == 0 {
-                continue;
-            }
-            self.position[axis] += if back { -1 } else { 1 };
-            assert!((LOW..=HIGH).contains(&self.position[axis]), "{:?} is beyond the soft limits", self.position);
-            if let Some((last, before)) = self.last[axis].replace((self.now, back)) {
-                let ticks = self.now - last;
-                // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
-                let fast = before == back && ticks + 3 + self.fastest / 8 < self.fastest;
-                assert!(ticks > 0 && !fast, "{ticks} ticks of axis {axis}");
-            }
-        }
-        self.compare = (fired.wait() > 0).then(|| self.now + u64::from(fired.wait()));
-        assert_eq!(self.axes.commanded(), self.position);
-    }
-
-    /// Time goes on, without a background.
-    fn until(&mut self, time: u64) {
-        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
-            self.now = compare;
-            self.fire();
-        }
-        self.now = self.now.max(time);
-    }
-
-    /// With one, every 2 ms; until it is at rest, or until a time.
-    fn run(&mut self, time: u64) {
-        loop {
-            let mut slices = 0;
-            let work = loop {
-                let stands = self.compare.is_none();
-                match self.slice() {
-                    Work::More => slices += 1,
-                    // After a halt the timer may still be running.
-                    Work::Start if stands => slices += 1,
-                    other => break other,
-                }
-                assert!(slices < 20_000, "the background does not end");
-            };
-            if self.now >= time || work == Work::Rest {
-                return;
-            }
-            self.until((self.now + 2000).min(time));
-        }
-    }
+    both.background.stop();
+    both.run(100_000_000);
+    both.background.set_override(100);
+    both.background.resume();
+    both.background.push([77, -5], 200_000).expect("it is at rest");
+    both.run(100_000_000);
+    assert_eq!((both.machine.position, both.background.is_at_rest()), ([77, -5], true));
 }

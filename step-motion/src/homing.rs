@@ -215,10 +215,16 @@ mod tests {
         for direction in DIRECTIONS {
             let (state, real, _, mover) = home(direction, 6000);
             assert_eq!((state, mover.commanded()), (HomingState::Failed, real));
-            assert!(real.abs() < 6000);
+            // One step beyond the range, and 260 to rest: (v / 2)(v / a + a / j).
+            assert_eq!(real.abs(), 5001 + 260);
             let (state, ..) = home(direction, -5000);
             assert_eq!(state, HomingState::Failed);
         }
+        let (config, mut mover) = parts(Direction::Forward);
+        // It is closed: away from it at once.
+        let homing = Homing::start(config, &mut mover, Switch::Closed, 0).unwrap();
+        assert_eq!((homing.state(), mover.direction()), (HomingState::BackingOff, Direction::Reverse));
+        assert_eq!(HomingConfig::new(Direction::Forward, 4000, 300, 5000, config.stop).back_off, 500);
         let (config, mut mover) = parts(Direction::Forward);
         mover.move_to(50, 0).unwrap();
         assert_eq!(Homing::start(config, &mut mover, Switch::Open, 0).unwrap_err(), Error::Moving);

@@ -151,7 +151,13 @@ fn a_halt_is_confirmed_by_the_interrupt() {
     assert!(!bench.axes.is_halted());
     bench.until(3_000_000, true);
     assert_eq!(bench.axes.commanded(), [0, 0]);
-    // A second one, at rest.
+    // The interrupt has stopped for one halt: the next one still waits for it.
+    bench.axes.halt();
+    bench.machine.fire();
+    bench.axes.halt();
+    assert_eq!(bench.axes.poll(), Work::Start);
+    bench.until(3_050_000, true);
+    // One more, at rest.
     bench.axes.halt();
     bench.until(3_100_000, true);
     bench.machine.fire();

@@ -22,21 +22,31 @@ impl<const N: usize, const S: usize> Timer for AxesTimer<'_, N, S> {
     }
 }
 
-/// A background half.
-pub(crate) trait Background {
+/// A background half of `N` axes.
+pub(crate) trait Background<const N: usize> {
     /// Does a slice of its work.
     fn slice(&mut self) -> Work;
+    /// The steps that it knows of.
+    fn made(&self) -> [i64; N];
 }
 
-impl<const S: usize> Background for Axis<'_, S> {
+impl<const S: usize> Background<1> for Axis<'_, S> {
     fn slice(&mut self) -> Work {
         self.poll()
     }
+
+    fn made(&self) -> [i64; 1] {
+        [self.commanded()]
+    }
 }
 
-impl<const N: usize, const M: usize, const S: usize> Background for Axes<'_, N, M, S> {
+impl<const N: usize, const M: usize, const S: usize> Background<N> for Axes<'_, N, M, S> {
     fn slice(&mut self) -> Work {
         self.poll()
+    }
+
+    fn made(&self) -> [i64; N] {
+        self.commanded()
     }
 }
 
@@ -100,17 +110,18 @@ impl<T: Timer, const N: usize> Machine<T, N> {
     }
 
     /// A slice of the background; the timer starts if it asks for that.
-    pub(crate) fn slice(&mut self, background: &mut impl Background) -> Work {
-        let work = background.slice();
+    pub(crate) fn slice(&mut self, background: &mut impl Background<N>) -> Work {
+        let mut work = background.slice();
         if work == Work::Start && self.compare.is_none() {
             self.fire();
-            return Work::More;
+            work = Work::More;
         }
+        assert_eq!(background.made(), self.position);
         work
     }
 
     /// The background in time: called every so many ticks, until it is at rest or a time comes.
-    pub(crate) fn run(&mut self, background: &mut impl Background, every: u64, until: u64) -> Work {
+    pub(crate) fn run(&mut self, background: &mut impl Background<N>, every: u64, until: u64) -> Work {
         loop {
             let mut calls = 0;
             let work = loop {
