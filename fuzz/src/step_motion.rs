@@ -130,7 +130,7 @@ pub fn axis(mut data: &[u8]) {
     let speed = speed * 100 + 100;
     let limits = Limits::new(speed, acceleration * 1000 + 5000).expect("in range");
     let limits = if jerk == 0 { limits } else { limits.with_jerk(u64::from(jerk) * 100_000).expect("in range") };
-    let queue = Queue::new();
+    let queue = Queue::<SLOTS>::new();
     let (axis, timer) = Axis::new(&queue, Clock::MICROSECONDS, limits).expect("a speed below the clock's");
     let axis = axis.with_reach(500 + reach * 40).with_soft_limits(LOW, HIGH);
     let mut halves = Halves::new(axis, timer, speed, 250);
@@ -245,7 +245,7 @@ pub fn axes(mut data: &[u8]) {
     let axis = AxisSetup::new(limits, 80_000).with_soft_limits(LOW, HIGH);
     let axes = [axis.with_reversal_pause(pause * 40), axis];
     let path = Path::<2, 4>::new(Clock::MICROSECONDS, axes, deviation).expect("a speed below the clock's");
-    let queue = AxesQueue::new();
+    let queue = AxesQueue::<2, SLOTS_OF_AN_AXIS>::new();
     let (axes, timer) = Axes::new(&queue, path);
     let mut both = Halves::new(axes, timer, speed, 2000);
     while let [command, a, b, rest @ ..] = data {
