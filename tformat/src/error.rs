@@ -84,7 +84,7 @@ servowire_core::errors! {
             /// Address in the request.
             want: u8,
         },
-        /// The response to an EEPROM write repeats another data byte, or a byte that was written reads back as another.
+        /// The response to an EEPROM write repeats another data byte, or the page register does not take the page.
         #[error("the EEPROM data is {got:#04x}, {want:#04x} was written")]
         DataMismatch = 11 {
             /// Data in the response.
@@ -114,7 +114,7 @@ servowire_core::errors! {
             /// Number of requests sent.
             tries: u16,
         },
-        /// The operation was not done, as reading back shows.
+        /// The operation was not done: reading back twice shows it, or nothing was sent because no two readings before agreed.
         #[error("not done, after {sent} requests: {because}")]
         NotDone = 15 {
             /// Number of requests sent.

@@ -15,14 +15,18 @@ use crate::status::Alm;
 ///    clear, so that afterwards it refers to this write. The only encoder on a line (command 19) is first asked for its address with command 17.
 ///    If an encoder is chosen by its identification code (command 20), its address is not known, and MEMERR says nothing.
 /// 2. The write is sent **once**; after 30 ms STATUS is read. MEMERR must still be clear.
-/// 3. What was written is read back, even if the response to the write is missing. A value that differs must be read twice: its
-///    CRC-8 may be right by chance.
+/// 3. What was written is read back, even if the response to the write is missing.
+///
+/// **One response is no evidence**: its CRC-8 may be right by chance. What was written counts as stored if the encoder has answered
+/// the write and its status and the value is read back once, and otherwise if it is read back twice. Something else counts as stored
+/// if it is read back twice in a row. MEMERR has to be reported twice, and a wrong bank by the write and by the read.
 ///
 /// | it ends with | the encoder |
 /// |---|---|
 /// | `Done` | has stored it |
 /// | [`Error::NotDone`] | has something else stored: what was there before, or what the damaged request asked for |
-/// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::BankError`] | was not asked to write, or reports that it failed |
+/// | [`Error::MemoryFault`], [`Error::BankError`] | was not asked to write, or reports that it failed |
+/// | [`Error::Busy`] and faults of the first response | was not asked to write |
 /// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back, or MEMERR is set and may have been before (command 20) |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -32,10 +36,10 @@ pub struct VerifiedWrite {
     /// The encoder to ask for the status.
     ea: EncoderAddress,
     phase: Phase,
-    /// MEMERR is set; it may have been set before.
-    doubtful: bool,
-    /// The value last read back that is not the one written.
-    other: Option<u32>,
+    /// How the write itself ended.
+    written: Written,
+    /// The value last read back.
+    seen: Option<u32>,
     tries: u16,
     end: Option<Step<()>>,
 }
@@ -47,6 +51,20 @@ enum Phase {
     Ready,
     Writing,
     ReadingBack,
+}
+
+/// How the write itself ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Written {
+    /// Its response or the status afterwards is missing.
+    Unanswered,
+    /// The encoder has answered it, and its status reports no fault.
+    Answered,
+    /// MEMERR is set; it may have been set before.
+    Doubtful,
+    /// The response to it reports that there is no such bank.
+    NoBank,
 }
 
 /// How the written value is read back.
@@ -70,14 +88,14 @@ impl VerifiedWrite {
             Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),
             _ => Back::Id(Request::new(ea, Operation::IdRead1)),
         };
-        Self { write, back, ea, phase: Phase::Ready, doubtful: false, other: None, tries: 0, end: None }
+        Self { write, back, ea, phase: Phase::Ready, written: Written::Unanswered, seen: None, tries: 0, end: None }
     }
 
     /// Returns the first request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<()> {
         self.tries = 0;
-        self.doubtful = false;
-        self.other = None;
+        self.written = Written::Unanswered;
+        self.seen = None;
         self.end = None;
         let Request { ea, operation } = self.write.request();
         self.ea = ea;
@@ -101,17 +119,25 @@ impl VerifiedWrite {
         match self.phase {
             Phase::Address => self.address(outcome, ready_ns),
             Phase::Ready => self.ready(outcome, ready_ns),
-            Phase::Writing => match self.write.receive(outcome, ready_ns) {
-                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                Step::Failed { error: Error::MemoryFault, ready_ns } if self.is_chosen_by_id() => {
-                    self.doubtful = true;
-                    self.read_back(ready_ns)
-                }
-                Step::Failed { error: error @ (Error::MemoryFault | Error::BankError), ready_ns } => {
-                    Step::Failed { error, ready_ns }
-                }
-                Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => self.read_back(ready_ns),
-            },
+            Phase::Writing => {
+                let (written, ready_ns) = match self.write.receive(outcome, ready_ns) {
+                    Step::Send { request, not_before_ns } => return Step::Send { request, not_before_ns },
+                    Step::Failed { error: Error::MemoryFault, ready_ns } if self.is_chosen_by_id() => {
+                        (Written::Doubtful, ready_ns)
+                    }
+                    Step::Failed { error: error @ Error::MemoryFault, ready_ns } => {
+                        return Step::Failed { error, ready_ns };
+                    }
+                    // The memory may have been written to all the same, and be busy.
+                    Step::Failed { error: Error::BankError, ready_ns } => {
+                        (Written::NoBank, ready_ns.saturating_add(crate::timing::WRITE_BUSY_NS.into()))
+                    }
+                    Step::Failed { ready_ns, .. } => (Written::Unanswered, ready_ns),
+                    Step::Done { ready_ns, .. } => (Written::Answered, ready_ns),
+                };
+                self.written = written;
+                self.read_back(ready_ns)
+            }
             Phase::ReadingBack => self.compare(outcome, ready_ns),
         }
     }
@@ -180,32 +206,38 @@ impl VerifiedWrite {
         let written = self.write.request();
         match &mut self.back {
             Back::Word { read, data } => match read.receive(outcome, ready_ns) {
-                Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
-                Step::Done { value, ready_ns } if value != *data => {
-                    let request = read.begin();
-                    self.differs(value.into(), request, ready_ns)
+                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+                Step::Failed { error: error @ Error::BankError, ready_ns } if self.written == Written::NoBank => {
+                    Step::Failed { error, ready_ns }
                 }
-                step => step.and_then(|_, ready_ns| Step::Done { value: (), ready_ns }),
+                Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
+                Step::Done { value, ready_ns } => {
+                    let shown = Read { got: value.into(), want: (*data).into() };
+                    let request = read.begin();
+                    self.shown(shown, request, ready_ns)
+                }
             },
             Back::Id(request) => {
                 let request = *request;
                 match outcome.ok().and_then(|response| read_back(written, request, response)) {
-                    Some(Read { got, want }) if got != want => self.differs(got, request, ready_ns),
-                    // Whether it was stored is what MEMERR would say.
-                    Some(_) if self.doubtful => Step::Failed { error: Error::EffectUnknown, ready_ns },
-                    Some(_) => Step::Done { value: (), ready_ns },
+                    Some(shown) => self.shown(shown, request, ready_ns),
                     None => self.again(request, Error::EffectUnknown, ready_ns),
                 }
             }
         }
     }
 
-    /// Something else is stored if it is read twice in a row.
-    fn differs(&mut self, got: u32, request: Request, ready_ns: u64) -> Step<()> {
-        if self.other.replace(got) == Some(got) {
-            return Step::Failed { error: Error::NotDone, ready_ns };
+    /// Judges what was read back, or reads it once more.
+    fn shown(&mut self, Read { got, want }: Read, request: Request, ready_ns: u64) -> Step<()> {
+        let twice = self.seen.replace(got) == Some(got);
+        match (got == want, self.written) {
+            (true, Written::Answered) => Step::Done { value: (), ready_ns },
+            // Whether it was stored is what MEMERR would say.
+            (true, Written::Doubtful) => Step::Failed { error: Error::EffectUnknown, ready_ns },
+            (true, _) if twice => Step::Done { value: (), ready_ns },
+            (false, _) if twice => Step::Failed { error: Error::NotDone, ready_ns },
+            _ => self.again(request, Error::EffectUnknown, ready_ns),
         }
-        self.again(request, Error::EffectUnknown, ready_ns)
     }
 }
 

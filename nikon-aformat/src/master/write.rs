@@ -23,6 +23,8 @@ pub struct Write {
     request: Request,
     /// The encoder to ask for the status, once the write has been answered.
     written: Option<EncoderAddress>,
+    /// The last status had MEMERR set: two in a row are evidence.
+    faulty: bool,
     tries: u16,
     end: Option<Step<Response>>,
 }
@@ -59,12 +61,13 @@ impl Write {
     }
 
     const fn of(ea: EncoderAddress, operation: Operation) -> Self {
-        Self { request: Request::new(ea, operation), written: None, tries: 0, end: None }
+        Self { request: Request::new(ea, operation), written: None, faulty: false, tries: 0, end: None }
     }
 
     /// Returns the request, to be sent at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.written = None;
+        self.faulty = false;
         self.tries = 0;
         self.end = None;
         Step::Send { request: self.request, not_before_ns: now_ns }
@@ -80,7 +83,7 @@ impl Write {
         ///
         /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with
         /// [`Error::EffectUnknown`] if no response to this write or no status comes, and with [`Error::MemoryFault`] if
-        /// MEMERR is set, by this write or earlier.
+        /// MEMERR is set in two statuses, by this write or earlier.
         Response
     }
 
@@ -103,10 +106,13 @@ impl Write {
         let not_before_ns = ready_ns.saturating_add(WRITE_POLLING.interval_ns.into());
         match status_of(ea, outcome) {
             Ok((_, alm)) if alm.contains(Alm::MEMERR) => {
-                return Step::Failed { error: Error::MemoryFault, ready_ns };
+                if core::mem::replace(&mut self.faulty, true) {
+                    return Step::Failed { error: Error::MemoryFault, ready_ns };
+                }
             }
             Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns },
-            _ => {}
+            Ok(_) => self.faulty = false,
+            Err(_) => {}
         }
         if self.tries >= WRITE_POLLING.max_tries {
             return Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns };
@@ -182,6 +188,8 @@ mod tests {
         assert_eq!(other, Step::Failed { error: Error::EffectUnknown, ready_ns: 30_000_007 });
         let _ = write.start(0);
         let _ = write.receive(Ok(echo(Command::EepromWrite)), 0);
+        let again = Step::Send { request: Request::new(ea, Operation::Status), not_before_ns: 1_000_005 };
+        assert_eq!(write.receive(Ok(status(ea, 0, Alm::MEMERR)), 5), again);
         let fault = write.receive(Ok(status(ea, 0, Alm::MEMERR)), 5);
         assert_eq!(fault, Step::Failed { error: Error::MemoryFault, ready_ns: 5 });
         let _ = write.start(0);

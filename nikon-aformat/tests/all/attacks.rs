@@ -107,9 +107,11 @@ fn a_wrong_bank_is_known_not_to_be_written() {
     let mut write = Write::eeprom_of_bank(THREE, 9, 0x10, 1);
     let _ = write.start(0);
     assert!(matches!(write.receive(Err(Error::BankError), 0), Step::Failed { error: Error::BankError, .. }));
+    // Verified: the read says so too.
     let mut write = VerifiedWrite::new(Write::eeprom_of_bank(THREE, 9, 0x10, 1));
     let _ = write.start(0);
     let _ = write.receive(status(THREE, Command::Status, Alm::empty()), 0);
+    assert!(matches!(write.receive(Err(Error::BankError), 0), Step::Send { .. }));
     assert!(matches!(write.receive(Err(Error::BankError), 0), Step::Failed { error: Error::BankError, .. }));
 }
 

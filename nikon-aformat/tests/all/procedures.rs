@@ -102,16 +102,17 @@ const WRITE: Operation = match UserAddress::new(0x42) {
 
 #[test]
 fn a_word_is_written_once_and_read_back() {
-    // The CRC-8 of a value that differs may be right by chance: it counts once it has been read twice in a row.
+    // The CRC-8 of a value may be right by chance: one that differs counts once it has been read twice in a row, and so does the one
+    // that was written, unless the encoder has answered the write.
     let again = send(EA, Operation::EepromRead { address: 0x43 }, 99 + MS);
     let ends = [Step::Done { value: (), ready_ns: 99 }, Step::Failed { error: Error::NotDone, ready_ns: 99 }];
-    for (values, end) in [
-        (&[0x1234_u16] as &[_], ends[0]),
-        (&[0x1235, 0x1234], ends[0]),
-        (&[0x1235, 0x1235], ends[1]),
-        (&[0x1235, 0x1236, 0x1235, 0x1235], ends[1]),
+    for (answered, unanswered, end) in [
+        (&[0x1234_u16] as &[_], &[0x1234_u16, 0x1234] as &[_], ends[0]),
+        (&[0x1235, 0x1234], &[0x1235, 0x1234, 0x1235, 0x1234, 0x1234], ends[0]),
+        (&[0x1235, 0x1235], &[0x1235, 0x1235], ends[1]),
+        (&[0x1235, 0x1236, 0x1235, 0x1235], &[0x1234, 0x1235, 0x1235], ends[1]),
     ] {
-        for lost in [false, true] {
+        for (lost, values) in [(false, answered), (true, unanswered)] {
             let mut write = eeprom_write();
             assert_eq!(write.start(7), send(EA, Operation::Status, 7));
             assert_eq!(write.receive(idle(), 50), send(EA, WRITE, 10_050));
@@ -167,8 +168,21 @@ fn how_a_write_fails() {
     let _ = write.start(0);
     let _ = write.receive(idle(), 0);
     let _ = write.receive(word(Command::EepromWrite, 0, 0x42, 0x1234), 0);
+    // Once is no evidence, nor once more after it was clear.
+    let ask = |ready_ns| send(EA, Operation::Status, ready_ns + MS);
+    assert_eq!(write.receive(status(EA, 4, Alm::MEMERR), 7), ask(7));
+    assert_eq!(write.receive(status(EA, 1, Alm::empty()), 7), ask(7));
+    assert_eq!(write.receive(status(EA, 4, Alm::MEMERR), 8), ask(8));
+    assert_eq!(write.receive(LOST, 8), ask(8));
     let end = write.receive(status(EA, 4, Alm::MEMERR), 9);
     assert_eq!(end, Step::Failed { error: Error::MemoryFault, ready_ns: 9 });
+    // A new start knows nothing of it.
+    let _ = write.start(0);
+    let _ = write.receive(idle(), 0);
+    let _ = write.receive(word(Command::EepromWrite, 0, 0x42, 0x1234), 0);
+    assert_eq!(write.receive(status(EA, 4, Alm::MEMERR), 7), ask(7));
+    let other = send(EA, Operation::EepromRead { address: 0x43 }, 9);
+    assert_eq!(write.receive(idle(), 9), other);
 
     let _ = write.start(0);
     let _ = write.receive(idle(), 0);
@@ -190,14 +204,23 @@ fn an_identification_code_is_read_back() {
         assert_eq!(write.receive(LOST, 0), ask(30 * MS));
     };
     begin(&mut write);
+    assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), ask(9 + MS));
     assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
     begin(&mut write);
     let mut told = |held| write.receive(id(EA, Command::IdRead1, 0, held), 9);
     assert_eq!([told(0x12_3457), told(0x12_3458), told(0x12_3457)], [ask(9 + MS); 3]);
     assert_eq!(told(0x12_3457), Step::Failed { error: Error::NotDone, ready_ns: 9 });
-    // What was read back after another write says nothing of this one.
+    // What was read back after another write says nothing of this one, nor how that one was answered.
     begin(&mut write);
     assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3457), 9), ask(9 + MS));
+    let _ = write.start(7);
+    let _ = write.receive(idle(), 0);
+    let answered = id(EA, Command::IdWrite1, 0, 0x12_3456);
+    assert_eq!(write.receive(answered, 0), send(EA, Operation::Status, 30 * MS));
+    assert_eq!(write.receive(idle(), 5), ask(5));
+    assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
+    begin(&mut write);
+    assert_eq!(write.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), ask(9 + MS));
     // What is no answer is asked again, forty times at the most.
     for nothing in [
         LOST,
@@ -226,6 +249,7 @@ fn other_writes_and_how_they_are_read_back() {
     assert_eq!(only.receive(id(EA, Command::IdRead2, 0, 1), 0), send(EA, Operation::Status, 10_000));
     assert_eq!(only.receive(idle(), 0), send(zero, Operation::IdWrite2 { id: new }, 10_000));
     assert_eq!(only.receive(LOST, 0), send(zero, Operation::IdRead2, 30 * MS));
+    assert_eq!(only.receive(id(EA, Command::IdRead2, 0, 0x12_3456), 9), send(zero, Operation::IdRead2, 9 + MS));
     assert_eq!(only.receive(id(EA, Command::IdRead2, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
 
     // At the new address there is an encoder with this code.
@@ -233,6 +257,7 @@ fn other_writes_and_how_they_are_read_back() {
     assert_eq!(address.start(7), send(EA, Operation::SetAddress2 { id: new }, 7));
     assert_eq!(address.receive(LOST, 0), send(EA, Operation::IdRead1, 30 * MS));
     assert_eq!(address.receive(id(ea(2), Command::IdRead1, 0, 0x12_3456), 0), send(EA, Operation::IdRead1, MS));
+    assert_eq!(address.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), send(EA, Operation::IdRead1, 9 + MS));
     assert_eq!(address.receive(id(EA, Command::IdRead1, 0, 0x12_3456), 9), Step::Done { value: (), ready_ns: 9 });
 
     let coefficient = U19::truncate(0x4_0001);
@@ -242,8 +267,14 @@ fn other_writes_and_how_they_are_read_back() {
         assert_eq!(write.start(7), send(EA, Operation::Status, 7));
         assert_eq!(write.receive(idle(), 0), send(EA, Operation::CoefficientWrite { coefficient }, 10_000));
         assert_eq!(write.receive(LOST, 0), send(EA, Operation::CoefficientRead, 30 * MS));
+        assert_eq!(write.receive(carried(held), 9), send(EA, Operation::CoefficientRead, 9 + MS));
         let end = write.receive(carried(held), 9);
-        assert_eq!(matches!(end, Step::Done { ready_ns: 9, .. }), done, "{end:?}");
+        let want = if done {
+            Step::Done { value: (), ready_ns: 9 }
+        } else {
+            Step::Failed { error: Error::NotDone, ready_ns: 9 }
+        };
+        assert_eq!(end, want);
     }
 
     let bank = Operation::EepromWriteBank { bank: 3, address: 0x10, data: 5 };
@@ -251,6 +282,34 @@ fn other_writes_and_how_they_are_read_back() {
     let _ = word.start(0);
     assert_eq!(word.receive(idle(), 0), send(EA, bank, 10_000));
     assert_eq!(word.receive(LOST, 0), send(EA, Operation::EepromReadBank { bank: 3, address: 0x11 }, 30 * MS));
+}
+
+/// That there is no such bank is believed if the write and the read say so; one of them may be right by chance.
+#[test]
+fn a_wrong_bank_is_believed_if_the_read_says_so_too() {
+    let read = |address, not_before_ns| send(EA, Operation::EepromReadBank { bank: 3, address }, not_before_ns);
+    let no_bank = Err(Error::BankError);
+    let begin = |write: &mut VerifiedWrite, outcome| {
+        let _ = write.start(0);
+        let _ = write.receive(idle(), 0);
+        assert_eq!(write.receive(outcome, 5), read(0x11, 5 + 30 * MS));
+    };
+    let mut write = VerifiedWrite::new(Write::eeprom_of_bank(EA, 3, 0x10, 5));
+    for (of_write, of_read, error) in [(no_bank, no_bank, Error::BankError), (LOST, no_bank, Error::EffectUnknown)] {
+        begin(&mut write, of_write);
+        assert_eq!(write.receive(of_read, 9), Step::Failed { error, ready_ns: 9 + 300_000 });
+    }
+    // The write said so, and yet the word is there: twice.
+    begin(&mut write, no_bank);
+    let of = |address, data| {
+        said(EA, Command::EepromRead, 0, Data::EepromBank { data, bank: 3, address, bank_error: false })
+    };
+    let mut back = || {
+        let _ = write.receive(of(0x11, 1), 0);
+        let _ = write.receive(of(0x10, 2), 0);
+        write.receive(of(0x10, 5), 9)
+    };
+    assert_eq!([back(), back()], [read(0x11, 9 + MS), Step::Done { value: (), ready_ns: 9 }]);
 }
 
 /// MEMERR that was set long ago: command 19 does not begin, command 20 cannot know, and neither says that it failed.
@@ -268,6 +327,7 @@ fn an_old_memory_fault_says_nothing_of_a_write() {
         assert_eq!(address.start(7), send(EA, Operation::SetAddress2 { id: new }, 7));
         let answered = id(zero, Command::SetAddress2, 0, 0x12_3456);
         assert_eq!(address.receive(answered, 0), send(EA, Operation::Status, 30 * MS));
+        assert_eq!(address.receive(fault(), 0), send(EA, Operation::Status, MS));
         assert_eq!(address.receive(fault(), 0), send(EA, Operation::IdRead1, 0));
         let mut end = address.receive(id(EA, Command::IdRead1, 0, held), 9);
         if error == Error::NotDone {

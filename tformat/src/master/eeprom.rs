@@ -27,7 +27,7 @@ enum Phase {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Sent {
-    /// The write was not sent, or reading has shown that it was not done.
+    /// The write was not sent, or the same other value was read twice instead.
     Not,
     /// The write may have been done, and nothing that was read shows whether it was.
     Unknown,
@@ -43,10 +43,21 @@ enum Sent {
 ///
 /// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, including
 /// one to the page register, the cell is read. It is written again only if the cell of the requested page holds another
-/// value. A memory that reports busy is polled by reading. It ends with [`Error::EffectUnknown`] if nothing can be read
-/// after a write has been sent, or if the register then holds another page: the write may have gone there. A response for
-/// another address is refused, like a response of another kind. Once it is done or has failed, it stays in that state until
-/// it is restarted.
+/// value. A memory that reports busy is polled by reading.
+///
+/// **One response is no evidence**, because the check field misses two wrong bits in one column. Before a write the register
+/// has to show the page twice, or once after a selection that was answered. A byte whose write was answered has to be read
+/// back once, and any other twice; another value has to be read twice.
+///
+/// | it ends with | the cell of the page |
+/// |---|---|
+/// | `Done` | holds the byte |
+/// | [`Error::NotDone`] | holds another byte, as reading back has shown |
+/// | [`Error::EffectUnknown`] | may hold the byte: it cannot be read back, or the register then holds another page, to which the write may have gone |
+/// | any other error | was not written to; that of an access whose page the encoder does not select is [`Error::DataMismatch`] |
+///
+/// A response for another address is refused, like a response of another kind. Once it is done or has failed, it stays in that
+/// state until it is restarted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
@@ -61,8 +72,12 @@ pub struct EepromAccess {
     on_page: bool,
     selection: Sent,
     written: Sent,
+    /// Number of times that the byte was written.
+    writes: u8,
     /// The value that the cell held.
     value: u8,
+    /// What was read last of the register or of the cell since it may have changed, to be read once more.
+    seen: Option<u8>,
     end: Option<Step<u8>>,
 }
 
@@ -90,7 +105,9 @@ impl EepromAccess {
             on_page: false,
             selection: Sent::Not,
             written: Sent::Not,
+            writes: 0,
             value: 0,
+            seen: None,
             end: None,
         }
     }
@@ -106,15 +123,7 @@ impl EepromAccess {
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
         let error = match self.memory(outcome) {
             Ok(memory) if !memory.adf.busy() => return self.answered(memory.edf, ready_ns),
-            Ok(_) => {
-                // What is busy did not take a write.
-                match self.phase {
-                    Phase::Select => self.selection = Sent::Not,
-                    Phase::Write => self.written = Sent::Not,
-                    Phase::CheckBefore | Phase::Read | Phase::CheckAfter => {}
-                }
-                Error::Busy { tries: self.tries.saturating_add(1) }
-            }
+            Ok(_) => Error::Busy { tries: self.tries.saturating_add(1) },
             Err(error) => error,
         };
         let not_before_ns = ready_ns.saturating_add(self.polling.interval_ns.into());
@@ -159,43 +168,82 @@ impl EepromAccess {
                 self.value = edf;
                 self.enter(Phase::CheckAfter, ready_ns)
             }
-            Phase::CheckBefore if on_page => {
-                self.selection = Sent::Not;
-                if !self.on_page {
-                    self.on_page = true;
-                    self.tries = 0;
-                }
-                self.enter(if self.write.is_some() { Phase::Write } else { Phase::Read }, ready_ns)
-            }
+            Phase::CheckBefore => self.before(edf, ready_ns),
             Phase::CheckAfter if on_page => self.judge(ready_ns),
             // The write may have gone to the other page.
             Phase::CheckAfter if self.written != Sent::Not => {
                 Step::Failed { error: Error::EffectUnknown { because: ErrorClass::DataMismatch }, ready_ns }
             }
-            // Another page is not selected in vain yet.
-            Phase::CheckBefore if self.selection == Sent::Not => self.enter(Phase::Select, ready_ns),
-            Phase::CheckBefore | Phase::CheckAfter => {
-                let confirmed = core::mem::replace(&mut self.selection, Sent::Not) == Sent::Confirmed;
-                self.differs(
-                    Error::DataMismatch { got: edf, want: self.page.get() },
-                    confirmed,
-                    Phase::Select,
-                    ready_ns,
-                )
+            Phase::CheckAfter => self.other_page(edf, ready_ns),
+        }
+    }
+
+    /// Takes what the register holds before an access.
+    fn before(&mut self, edf: u8, ready_ns: u64) -> Step<u8> {
+        let on_page = edf == self.page.get();
+        // A read looks again afterwards, and a page is not selected in vain yet.
+        let once = match self.selection {
+            Sent::Not => !on_page || self.write.is_none(),
+            Sent::Unknown => on_page && self.write.is_none(),
+            Sent::Confirmed => on_page,
+        };
+        if !once {
+            if let Some(again) = self.unless_seen_twice(edf, ready_ns) {
+                return again;
             }
         }
+        if !on_page {
+            return match self.selection {
+                Sent::Not => self.enter(Phase::Select, ready_ns),
+                Sent::Unknown | Sent::Confirmed => self.other_page(edf, ready_ns),
+            };
+        }
+        self.selection = Sent::Not;
+        if !self.on_page {
+            self.on_page = true;
+            self.tries = 0;
+        }
+        self.enter(if self.write.is_some() { Phase::Write } else { Phase::Read }, ready_ns)
+    }
+
+    /// Selects the page, unless the encoder had confirmed that.
+    fn other_page(&mut self, edf: u8, ready_ns: u64) -> Step<u8> {
+        let confirmed = core::mem::replace(&mut self.selection, Sent::Not) == Sent::Confirmed;
+        let error = Error::DataMismatch { got: edf, want: self.page.get() };
+        self.differs(error, confirmed, Phase::Select, ready_ns)
     }
 
     /// Judges the value that was read from the cell of the page.
     fn judge(&mut self, ready_ns: u64) -> Step<u8> {
-        let Self { value, .. } = *self;
-        match self.write {
-            Some(want) if value != want => {
-                let confirmed = core::mem::replace(&mut self.written, Sent::Not) == Sent::Confirmed;
-                self.differs(Error::DataMismatch { got: value, want }, confirmed, Phase::Write, ready_ns)
-            }
-            _ => Step::Done { value, ready_ns },
+        let Self { value, written, .. } = *self;
+        let done = Step::Done { value, ready_ns };
+        let Some(want) = self.write else { return done };
+        let confirmed = written == Sent::Confirmed;
+        if confirmed && value == want {
+            return done;
         }
+        if let Some(again) = self.unless_seen_twice(value, ready_ns) {
+            return again;
+        }
+        if value == want {
+            return done;
+        }
+        self.written = Sent::Not;
+        let error = Error::NotDone { sent: self.writes, because: ErrorClass::DataMismatch };
+        self.differs(error, confirmed, Phase::Write, ready_ns)
+    }
+
+    /// Reads again unless the last reading gave the same value. The first reading costs no try, one that contradicts it does.
+    fn unless_seen_twice(&mut self, value: u8, ready_ns: u64) -> Option<Step<u8>> {
+        let seen = self.seen.replace(value);
+        if seen == Some(value) {
+            return None;
+        }
+        let read = if self.phase == Phase::CheckAfter { Phase::Read } else { self.phase };
+        Some(match seen {
+            Some(want) if self.is_given_up() => self.failed(Error::DataMismatch { got: value, want }, ready_ns),
+            _ => self.enter(read, ready_ns),
+        })
     }
 
     /// Handles a write that evidently was not done. The write is sent again, unless the encoder had confirmed it.
@@ -221,8 +269,15 @@ impl EepromAccess {
     const fn enter(&mut self, phase: Phase, not_before_ns: u64) -> Step<u8> {
         self.phase = phase;
         match phase {
-            Phase::Select => self.selection = Sent::Unknown,
-            Phase::Write => self.written = Sent::Unknown,
+            Phase::Select => {
+                self.selection = Sent::Unknown;
+                self.seen = None;
+            }
+            Phase::Write => {
+                self.written = Sent::Unknown;
+                self.writes = self.writes.saturating_add(1);
+                self.seen = None;
+            }
             Phase::CheckBefore | Phase::Read | Phase::CheckAfter => {}
         }
         Step::Send { request: self.request(), not_before_ns }

@@ -14,10 +14,10 @@ use crate::response::Response;
 /// storage time that any of them states, so that a count that is updated late is not mistaken for one that was not reset.
 ///
 /// A shaft at rest on the boundary of a turn may count a turn more or less if it vibrates. `tolerance` says how many turns
-/// are allowed: 1 in general, 0 if the shaft is known to rest elsewhere. The result is the count read afterwards, within the
-/// tolerance of 0. Otherwise it ends with
+/// are allowed: 1 in general, 0 if the shaft is known to rest elsewhere. A count is believed if it is read twice in a row within
+/// the tolerance. The result is the count read afterwards, within the tolerance of 0. Otherwise it ends with
 ///
-/// * [`Error::NotDone`]: the count is what it was before;
+/// * [`Error::NotDone`]: the count is what it was before, or no two readings before agreed and nothing was sent;
 /// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it is inconclusive: it was at or near 0 before, or is
 ///   now neither at 0 nor what it was;
 /// * the error of the exchange, if the count could not be read before: nothing was sent.
@@ -100,10 +100,10 @@ mod tests {
         (step, sent)
     }
 
-    /// 31 us, 40 us of idle line, ten times 71 us but for the last pause, 18 ms, 31 us.
+    /// Twice 31 us, 40 us of idle line, ten times 71 us but for the last pause, 18 ms, twice 31 us.
     #[test]
     fn turns_that_read_zero_are_done() {
-        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 31_000;
+        let ready_ns = 62_000 + 40_000 + 670_000 + 18_000_000 + 62_000;
         assert_eq!(run(700, 0, Some(0)), (Step::Done { value: multi(0), ready_ns }, 10));
         // The last response was lost, but the count shows it.
         assert!(matches!(run(700, 10, Some(0)).0, Step::Done { .. }));
@@ -152,7 +152,7 @@ mod tests {
     /// Three times 31 us after the rest of the idle line: nobody is storing then, so there is nothing to wait for.
     #[test]
     fn turns_that_cannot_be_read_are_read_again_at_once() {
-        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 3 * 31_000;
+        let ready_ns = 62_000 + 40_000 + 670_000 + 18_000_000 + 3 * 31_000;
         let error = Error::EffectUnknown { because: ErrorClass::NoResponse };
         assert_eq!(run(700, 0, None), (Step::Failed { error, ready_ns }, 10));
     }

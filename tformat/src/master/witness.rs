@@ -19,6 +19,8 @@ enum Phase {
 
 /// A reset that sets a value to 0, between two readings of the value that show its effect. The number of requests sent and
 /// answered proves nothing: the encoder may have counted earlier ones, or may have restarted.
+///
+/// Nor does one reading: the check field misses two wrong bits in one column. A reading counts once the next one agrees with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Witness {
@@ -27,16 +29,18 @@ pub(super) struct Witness {
     request: Request,
     phase: Phase,
     before: u32,
+    /// What was read last in this phase.
+    seen: Option<u32>,
     sent: u8,
     tries: u8,
 }
 
 impl Witness {
-    /// How many times the value is read before giving up.
+    /// How many readings may fail, or contradict the one before, until it is given up.
     pub(super) const MAX_READS: u8 = 3;
 
     pub(super) const fn new(reset: Reset, request: Request) -> Self {
-        Self { reset, request, phase: Phase::Before, before: 0, sent: 0, tries: 0 }
+        Self { reset, request, phase: Phase::Before, before: 0, seen: None, sent: 0, tries: 0 }
     }
 
     /// Returns the first request, to be sent at once.
@@ -62,13 +66,25 @@ impl Witness {
             Some(sf) if sf.intersects(StatusField::REQUEST_DAMAGED) => Err(Error::Rejected { sf }),
             _ => value(response).unwrap_or(Err(mismatch(response, self.request))),
         });
-        match (read_out, self.phase) {
-            (Err(error), _) => self.unread(error, ready_ns),
-            (Ok((message, now)), Phase::After(act)) => match self.judge(act, now, near) {
+        let (message, now) = match read_out {
+            Ok(read_out) => read_out,
+            Err(error) => return self.unread(error, ready_ns),
+        };
+        match self.seen.replace(now) {
+            None => return self.read(ready_ns),
+            // Nothing is sent while the shaft turns.
+            Some(seen) if !near(seen, now) => {
+                let error = Error::NotDone { sent: self.sent, because: ErrorClass::DataMismatch };
+                return self.unread(error, ready_ns);
+            }
+            Some(_) => {}
+        }
+        match self.phase {
+            Phase::After(act) => match self.judge(act, now, near) {
                 Ok(()) => Step::Done { value: message, ready_ns },
                 Err(error) => Step::Failed { error, ready_ns },
             },
-            (Ok((_, now)), _) => {
+            Phase::Before | Phase::Act => {
                 self.before = now;
                 self.phase = Phase::Act;
                 let step = self.reset.start(ready_ns.saturating_add(Reset::SPACING_NS.into()));
@@ -94,6 +110,7 @@ impl Witness {
 
     const fn enter<T>(&mut self, phase: Phase, not_before_ns: u64) -> Step<T> {
         self.phase = phase;
+        self.seen = None;
         self.tries = 0;
         self.read(not_before_ns)
     }
@@ -109,7 +126,11 @@ impl Witness {
         if self.tries < Self::MAX_READS {
             return self.read(if before { ready_ns.saturating_add(Reset::ZERO_WAIT_NS.into()) } else { ready_ns });
         }
-        let error = if before { error } else { Error::EffectUnknown { because: error.class() } };
+        let error = match error {
+            error if before => error,
+            Error::NotDone { because, .. } => Error::EffectUnknown { because },
+            error => Error::EffectUnknown { because: error.class() },
+        };
         Step::Failed { error, ready_ns }
     }
 

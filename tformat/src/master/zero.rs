@@ -10,10 +10,10 @@ use crate::response::Response;
 /// the position again. **This shifts the commutation angle of the motor**, see
 /// [`Reset::set_single_turn_zero_and_shift_commutation_angle`].
 ///
-/// The shaft must stand still. The result is the position read afterwards, within the tolerance of 0. Otherwise it
-/// ends with
+/// The shaft must stand still. A position counts if it is read twice in a row within the tolerance. The result is the position
+/// read afterwards, within the tolerance of 0. Otherwise it ends with
 ///
-/// * [`Error::NotDone`]: the position is what it was before;
+/// * [`Error::NotDone`]: the position is what it was before, or no two readings before agreed and nothing was sent;
 /// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it is inconclusive: it was at zero before, or is
 ///   now neither at zero nor where it was;
 /// * the error of the exchange, if the position could not be read before: nothing was sent.
@@ -95,8 +95,8 @@ mod tests {
 
     #[test]
     fn a_zero_that_shows_is_done() {
-        // 31 us, 40 us of idle line, ten times 71 us, 18 ms, 31 us.
-        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 31_000;
+        // Twice 31 us, 40 us of idle line, ten times 71 us, 18 ms, twice 31 us.
+        let ready_ns = 62_000 + 40_000 + 670_000 + 18_000_000 + 62_000;
         assert_eq!(run(5_000, 0, Some(2)), (Step::Done { value: single(2), ready_ns }, 10));
         // The other side of zero, and a shaft that was at zero already.
         assert!(matches!(run(5_000, 0, Some(131_069)).0, Step::Done { .. }));
@@ -134,6 +134,69 @@ mod tests {
             assert_eq!(requests, 10);
         }
         assert!(matches!(run(5_000, 0, None).0, Step::Failed { error: Error::EffectUnknown { .. }, .. }));
+    }
+
+    /// The check field misses two wrong bits in one column: one reading proves neither that the zero was set nor that it was not.
+    #[test]
+    fn a_position_is_read_twice() {
+        let run = |before: &[u32], after: &[u32]| {
+            let mut readings = [before, after].map(|all| all.iter().copied());
+            let resolution = Resolution::new(17, 16).unwrap();
+            let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
+            let (mut step, mut sent) = (zero.start(0), 0);
+            while let Step::Send { request, not_before_ns } = step {
+                let outcome = match request {
+                    Request::SetSingleTurnZero => {
+                        sent += 1;
+                        Ok(Response::SetSingleTurnZero(single(0)))
+                    }
+                    _ => {
+                        let Some(abs) = readings[usize::from(sent > 0)].next() else { return (Some(request), sent) };
+                        Ok(Response::ReadSingleTurn(single(abs)))
+                    }
+                };
+                step = zero.receive(outcome, not_before_ns + 31_000);
+            }
+            let left: usize = readings.into_iter().map(|all| all.count()).sum();
+            assert_eq!(left, 0, "{step:?}");
+            (None, if matches!(step, Step::Done { .. }) { 100 } else { sent })
+        };
+        let open = Some(Request::ReadSingleTurn);
+        assert_eq!(
+            [run(&[5_000], &[]), run(&[5_000, 5_003], &[0]), run(&[5_000, 5_000], &[5_000])],
+            [(open, 0), (open, 10), (open, 10)]
+        );
+        assert_eq!(run(&[5_000, 5_000], &[5_000, 3, 2]), (None, 100));
+        assert_eq!(run(&[5_000, 5_000], &[0, 5_000, 5_004]), (None, 10));
+        assert_eq!(run(&[9_000, 5_000, 5_000], &[0, 0]), (None, 100));
+        // A shaft that turns: nothing is sent.
+        assert_eq!(run(&[1_000, 2_000, 3_000, 4_000], &[]), (None, 0));
+    }
+
+    /// Readings that contradict each other: before nothing was sent, and afterwards nobody knows.
+    #[test]
+    fn readings_that_contradict_each_other_end_it() {
+        let turning = |sent_before: bool| {
+            let resolution = Resolution::new(17, 16).unwrap();
+            let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
+            let (mut step, mut abs, mut sent) = (zero.start(0), 50_000, 0);
+            while let Step::Send { request, not_before_ns } = step {
+                let outcome = if request == Request::SetSingleTurnZero {
+                    sent += 1;
+                    Response::SetSingleTurnZero(single(0))
+                } else {
+                    abs += if sent > 0 || !sent_before { 1_000 } else { 0 };
+                    Response::ReadSingleTurn(single(abs))
+                };
+                step = zero.receive(Ok(outcome), not_before_ns);
+            }
+            step
+        };
+        let because = ErrorClass::DataMismatch;
+        let Step::Failed { error, .. } = turning(false) else { panic!("it turns") };
+        assert_eq!(error, Error::NotDone { sent: 0, because });
+        let Step::Failed { error, .. } = turning(true) else { panic!("it turns") };
+        assert_eq!(error, Error::EffectUnknown { because });
     }
 
     #[test]
