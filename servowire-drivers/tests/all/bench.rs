@@ -16,7 +16,7 @@ use tformat::device::Device;
 use tformat::master::Line;
 use tformat::{Abm, Abs, BitRate};
 
-use crate::hostile::{Calls, rates};
+use crate::hostile::{Calls, Excuse, rates};
 use crate::second::tformat::Encoder;
 
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
@@ -130,9 +130,9 @@ impl Bench {
             left && alone && !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
         // Nothing in the window of an SPI is older than the request, not even if the host was busy elsewhere.
         let coincidence = matches!(outcome, Some(Ok(shaft)) if truth.is_coincidence(request, shaft.into()));
-        let excused = if self.sampled { !left } else { preempted || coincidence };
+        let excuse = Excuse::of(!self.sampled && preempted, if self.sampled { !left } else { coincidence });
         let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
-        calls.count(outcome, whole, excused, seed, call);
+        calls.count(outcome, whole, excuse, seed, call);
         let past_ns = self.now_ns().saturating_sub(1_000_000);
         self.world.truth_mut().forget_before(past_ns);
     }

@@ -22,7 +22,7 @@ use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Verdict, Wire, World,
 };
 
-use crate::hostile::{Calls, rates};
+use crate::hostile::{Calls, Excuse, rates};
 #[cfg(feature = "async")]
 use crate::polls::pause;
 use crate::second::nikon::Encoder;
@@ -119,17 +119,43 @@ impl Bench {
     /// others.
     pub fn judge_one<E: Debug>(&self, calls: &mut Calls, ea: u8, outcome: Result<u32, E>, seed: u64, call: usize) {
         let Some(request) = self.request else { return };
-        let truth = self.world.truth();
-        let Some(sent) = truth.transmission(request) else { return };
+        if self.world.truth().transmission(request).is_some() {
+            self.verdict(calls, Some(outcome), self.came_whole_of(ea), request, seed, call);
+        }
+    }
+
+    /// Whether the answer of this encoder of several came through whole and in time.
+    fn came_whole_of(&self, ea: u8) -> bool {
+        let (truth, now_ns) = (self.world.truth(), self.world.now_ns());
+        let Some(sent) = self.request.and_then(|request| truth.transmission(request)) else { return false };
         // A request that comes twice is answered twice.
         let sent_once = sent.start_ns == sent.asked_ns && sent.end_ns == sent.sent_ns;
-        let now_ns = self.world.now_ns();
         let on_time = |answer: &Transmission| {
             let own = answer.speaker == Speaker::Device(ea) && answer.delivered_ns < now_ns;
             own && answer.start_ns == answer.asked_ns && answer.end_ns - answer.start_ns == ANSWER_NS
         };
-        let whole = !self.was_preempted() && sent_once && truth.intact_answers(request).any(on_time);
-        self.verdict(calls, Some(outcome), whole, request, seed, call);
+        !self.was_preempted() && sent_once && truth.intact_answers(sent.id).any(on_time)
+    }
+
+    /// Judges what a bus said of one of its encoders, unless nobody can say what it should be.
+    pub fn judge_of_bus(
+        &self,
+        calls: &mut Calls,
+        bus: &Bus,
+        ea: EncoderAddress,
+        value: Result<u32, &str>,
+        seed: u64,
+        call: usize,
+    ) {
+        // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
+        if value.is_err() && bus.duplicates().contains(ea) {
+            return;
+        }
+        if value.is_err() && self.has_chance(bus) {
+            calls.chances += u64::from(self.came_whole_of(ea.get()));
+            return;
+        }
+        self.judge_one(calls, ea.get(), value, seed, call);
     }
 
     /// Whether the CRC-8 of one of these responses is right by chance: of two that overlap nobody can tell which one was sent.
@@ -155,7 +181,7 @@ impl Bench {
         let truth = self.world.truth();
         let coincidence = matches!(outcome, Some(Ok(shaft)) if truth.is_coincidence(request, shaft.into()));
         let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
-        calls.count(outcome, whole, self.was_preempted() || coincidence, seed, call);
+        calls.count(outcome, whole, Excuse::of(self.was_preempted(), coincidence), seed, call);
     }
 
     pub fn pass(&mut self, until_ns: u64) {

@@ -7,7 +7,7 @@ use servowire_world::{Draw, Kind, Scenario, Verdict};
 use tformat::{Address, Request, Response, StatusField};
 
 use crate::bench::{Bench, Heard, Misframed, Uart, Watch, line, scenario};
-use crate::hostile::{Calls, live_through};
+use crate::hostile::{Calls, Excuse, live_through};
 use crate::second::tformat::Encoder;
 
 /// Cells that the test may write.
@@ -102,7 +102,11 @@ fn position(response: &Response) -> Option<u32> {
 
 fn judge<E>(calls: &mut Calls, outcome: &Result<Response, E>, heard: &Heard, alone: bool, what: &str) {
     let old = matches!(heard.verdict, Some(Verdict::Old { .. }));
-    assert!(!old || heard.preempted || heard.coincidence, "{what}: {:?}", heard.verdict);
+    if old {
+        let excuse = Excuse::of(heard.preempted, heard.coincidence);
+        assert!(excuse.is_some(), "{what}: {:?}", heard.verdict);
+        calls.excuse(excuse);
+    }
     let whole = heard.whole && alone && !heard.preempted;
     assert!(!whole || outcome.is_ok(), "{what}");
     match outcome {

@@ -182,12 +182,12 @@ impl Truth {
     }
 
     /// Whether a master can have taken the old value `tag` for an answer to `request` without a fault of its own: the line held the
-    /// request up, and somebody else than the host gave that value meanwhile; or it never came whole, and what came in place of
+    /// request up, and somebody else than the host began to give that value meanwhile; or it never came whole, and what came in place of
     /// the rest happened to fit.
     pub fn is_coincidence(&self, request: Id, tag: u64) -> bool {
         let carriers = || self.log.iter().filter(|t| t.tag == Some(tag) && t.speaker != Speaker::Host);
         let held_up = |sent: &Transmission| {
-            sent.start_ns > sent.asked_ns && carriers().any(|carrier| carrier.end_ns > sent.asked_ns)
+            sent.start_ns > sent.asked_ns && carriers().any(|carrier| carrier.again_ns >= sent.asked_ns)
         };
         self.transmission(request).is_some_and(held_up) || carriers().all(|carrier| carrier.delivered < carrier.units)
     }

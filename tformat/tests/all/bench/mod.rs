@@ -54,11 +54,13 @@ pub struct Bench {
     pub line: Line,
     pub ready_ns: u64,
     pub seen: Seen,
-    /// Requests that the encoder believed and nobody sent like that: damage that it cannot see, or another speaker.
+    /// Resets that the encoder heard, and writes that it answered, which the host did not send like that: damage that it cannot
+    /// see, or another speaker.
     pub forged_requests: u32,
-    /// The three fields that the encoder heard last: of which transmission, and where in it; and whether they were damaged.
-    fields: [Option<(Id, u16)>; 3],
-    damaged: [bool; 3],
+    /// Reads of the memory like that.
+    pub forged_reads: u32,
+    /// The four fields that the encoder heard last: of which request of the host, and where in it; `None` for any other.
+    fields: [Option<(Id, u16)>; 4],
     /// Bytes that the encoder heard and that the host did not send like that or not then: its count of resets may have begun
     /// again.
     pub misheard: u32,
@@ -106,8 +108,8 @@ impl Bench {
             ready_ns: 100_000,
             seen: Seen::default(),
             forged_requests: 0,
-            fields: [None; 3],
-            damaged: [false; 3],
+            forged_reads: 0,
+            fields: [None; 4],
             misheard: 0,
             misread: 0,
             moves: true,
@@ -314,21 +316,17 @@ impl Bench {
                 // Its own answers are not heard by itself.
                 let foreign = !matches!(unit.origin.speaker, Speaker::Host | Speaker::Device(_));
                 self.misheard += u32::from(unit.damaged || foreign);
-                if framed && (unit.damaged || unit.origin.speaker != Speaker::Host) {
-                    self.forged_requests += u32::from([0xba, 0xc2, 0x62, 0x32].contains(&byte));
-                    self.forged_requests += u32::from(sent.is_some() && byte & 7 != 2);
-                }
-                // Fields that came twice make other requests to the memory: 32 32 7F 7F of 32 7F.
-                let place = (unit.origin.transmission, unit.origin.index);
-                let to_memory =
-                    |sent: &tformat::device::Transmission| matches!(sent.frame.as_bytes(), [0x32 | 0xea, ..]);
-                self.forged_requests += u32::from(sent.as_ref().is_some_and(to_memory) && twice(&self.fields, place));
-                // Two wrong bits in one column, which the XOR does not see, make a request for another cell or of another byte.
-                let damaged = unit.damaged || self.damaged.contains(&true);
-                self.forged_requests += u32::from(sent.as_ref().is_some_and(to_memory) && damaged);
-                self.damaged = [self.damaged[1], self.damaged[2], unit.damaged];
+                let own = !unit.damaged && unit.origin.speaker == Speaker::Host;
+                self.forged_requests += u32::from(framed && !own && [0xba, 0xc2, 0x62].contains(&byte));
                 self.fields.rotate_left(1);
-                self.fields[2] = Some(place);
+                self.fields[3] = own.then_some((unit.origin.transmission, unit.origin.index));
+                // Two wrong bits in one column make a request for another cell or of another byte, and fields that came twice one of
+                // other fields: 32 32 7F 7F of 32 7F.
+                match sent.as_ref().map(|sent| sent.frame.as_bytes()) {
+                    Some([0x32, ..]) => self.forged_requests += u32::from(!is_one_request(&self.fields)),
+                    Some([0xea, ..]) => self.forged_reads += u32::from(!is_one_request(&self.fields[1..])),
+                    _ => {}
+                }
                 if let Some(sent) = sent {
                     let message = Message::bytes(sent.frame.as_bytes()).tagged(tag(sent.frame.as_bytes()));
                     let _ = self.world.answer(0, unit.origin.transmission, &message, sent.start_ns);
@@ -485,12 +483,10 @@ fn tag(frame: &[u8]) -> u64 {
     frame.iter().take(2).rev().fold(sum, |tag, byte| tag << 8 | u64::from(*byte))
 }
 
-/// Whether one of the fields was heard twice, with this one behind them.
-fn twice(before: &[Option<(Id, u16)>; 3], last: (Id, u16)) -> bool {
-    let [one, two, three] = *before;
-    [one, two, three].contains(&Some(last))
-        || three.is_some() && (three == one || three == two)
-        || two.is_some() && two == one
+/// Whether these fields are a request of the host, whole and in order.
+fn is_one_request(fields: &[Option<(Id, u16)>]) -> bool {
+    let first = fields[0].map(|(id, _)| id);
+    (0..).zip(fields).all(|(at, field)| *field == first.map(|id| (id, at)))
 }
 
 /// Whether the host was given every field of a transmission since this request.
