@@ -121,8 +121,8 @@ impl<'a> Simulated<'a> {
 
     /// The byte that was read or written.
     fn access(&mut self, mut access: EepromAccess, polling: Polling) -> Result<u8, Error> {
-        // Page, write and read-back with tries of their own, and a look at the page after each lost response.
-        self.run(&mut access, 6 * u32::from(polling.max_tries.max(1)) + 6)
+        // Page, write and read-back with tries of their own, and for each try a write, the cell twice, and the page after each.
+        self.run(&mut access, 18 * u32::from(polling.max_tries.max(1)) + 18)
     }
 
     /// A procedure that takes no more requests than `limit`.
