@@ -169,7 +169,10 @@ mod tests {
             same(good)?;
             let other = Abs40 { ea: EncoderAddress::truncate(ea + 1), ..raw };
             same(other.emit_line(order, &expected))?;
-            same(raw.emit_line(order, &Expected::new(Layout::Abs40, Command::Abs40Mt)))?;
+            let several = Expected::new(Layout::Abs40, Command::Abs40Mt);
+            let line = raw.emit_line(order, &several);
+            prop_assert_eq!(Abs40::parse_line(&several, &line, order), Ok(raw));
+            same(line)?;
         }
     }
 }

@@ -303,6 +303,8 @@ mod tests {
                     let bad = Window::from_bits(line.bits() ^ 1 << at, 108).unwrap();
                     prop_assert_eq!(framed(6, &bad), None);
                     prop_assert_eq!(framing(bad, 6), want);
+                    // Bits after it are ignored.
+                    prop_assert_eq!(framing(bad.padded(120).unwrap(), 6), want);
                 }
             }
         }

@@ -322,6 +322,19 @@ mod tests {
         assert!(findings(&[0x8a, 0, 1, 2, 3, 0x8a]).iter().eq([ErrorClass::CfMismatch]));
         assert!(findings(&[0x0a, 0, 1, 2, 3, 0x0a]).iter().eq([ErrorClass::Parity]));
         assert!(findings(&[0x02, 0, 1, 2, 3]).iter().eq([ErrorClass::Truncated]));
+        // And beside the start bit of field 2, which is the error.
+        let also = |bytes: &[u8]| {
+            let line = Frame::new(bytes).unwrap().line();
+            inspect(Request::ReadSingleTurn, window(line.bits() ^ 1 << 20, line.len())).findings()
+        };
+        for (bytes, class) in [
+            (&[0x8a, 0, 1, 2, 3, 0x8a][..], ErrorClass::CfMismatch),
+            (&[0x0a, 0, 1, 2, 3, 0x0a], ErrorClass::Parity),
+            (&[0x02, 0, 1, 2, 3], ErrorClass::Truncated),
+        ] {
+            assert!([ErrorClass::StartBit, class].iter().all(|class| also(bytes).contains(*class)), "{class:?}");
+            assert_eq!(also(bytes).iter().count(), 2, "{class:?}");
+        }
     }
 
     #[test]

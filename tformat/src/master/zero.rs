@@ -145,19 +145,16 @@ mod tests {
             let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
             let (mut step, mut sent) = (zero.start(0), 0);
             while let Step::Send { request, not_before_ns } = step {
-                let outcome = match request {
-                    Request::SetSingleTurnZero => {
-                        sent += 1;
-                        Ok(Response::SetSingleTurnZero(single(0)))
-                    }
-                    _ => {
-                        let Some(abs) = readings[usize::from(sent > 0)].next() else { return (Some(request), sent) };
-                        Ok(Response::ReadSingleTurn(single(abs)))
-                    }
+                let response = if request == Request::SetSingleTurnZero {
+                    sent += 1;
+                    Response::SetSingleTurnZero(single(0))
+                } else {
+                    let Some(abs) = readings[usize::from(sent > 0)].next() else { return (Some(request), sent) };
+                    Response::ReadSingleTurn(single(abs))
                 };
-                step = zero.receive(outcome, not_before_ns + 31_000);
+                step = zero.receive(Ok(response), not_before_ns + 31_000);
             }
-            let left: usize = readings.into_iter().map(|all| all.count()).sum();
+            let left: usize = readings.into_iter().map(Iterator::count).sum();
             assert_eq!(left, 0, "{step:?}");
             (None, if matches!(step, Step::Done { .. }) { 100 } else { sent })
         };
