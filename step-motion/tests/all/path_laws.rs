@@ -529,3 +529,29 @@ fn a_quick_stop_of_a_short_line_takes_no_more_steps_than_a_hold() {
     let (quick, hold) = (steps(machine), steps(held));
     assert!(quick.0[0] <= hold.0[0] && quick.1 <= hold.1 + 2, "{quick:?} {hold:?}");
 }
+
+/// A stop that crosses a corner is not later than a hold that does.
+#[test]
+fn a_stop_over_a_corner_is_not_later_than_a_hold() {
+    let axes = [
+        AxisSetup::new(Limits::new(49, 999).unwrap(), 999),
+        AxisSetup::new(Limits::new(49, 999).unwrap().with_jerk(13_369).unwrap(), 58_577),
+    ];
+    let mut machine = PathMover::new(Path::<2, 5>::new(Clock::new(1000).unwrap(), axes, 5).unwrap());
+    machine.push([1, -3], 50_188, 0).unwrap();
+    machine.push([156, 0], 3745, 0).unwrap();
+    machine.set_override(172, 0);
+    while machine.due().is_some_and(|due| due <= 58) {
+        machine.pulse();
+    }
+    let rest = |mut machine: Machine| {
+        while machine.pulse().is_some() {}
+        (machine.commanded(), (58..10_000).find(|now| machine.is_at_rest(*now)).unwrap())
+    };
+    let mut held = machine.clone();
+    held.hold(58);
+    machine.stop(58);
+    let hold = rest(held);
+    let stop = rest(machine);
+    assert!(stop.0 == hold.0 && stop.1 <= hold.1 + 7, "{stop:?} {hold:?}");
+}
