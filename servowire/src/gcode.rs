@@ -37,8 +37,8 @@ pub(crate) struct Part {
     /// Steps per millimetre of each axis of a part program.
     #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     steps_per_mm: u32,
-    /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000, in mm/min, mm/s² and mm/s³; repeat it for
-    /// each axis.
+    /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000,low=0,high=300,pause=0.5, in mm/min, mm/s²,
+    /// mm/s³, soft limits in mm, and ms of rest before each change of direction; repeat it for each axis.
     #[arg(long, value_name = "AXIS", requires = "gcode")]
     axis: Vec<setup::Setup>,
     /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P override it.
@@ -54,15 +54,21 @@ impl Part {
     pub(crate) const SPEED: u32 = 100_000;
     pub(crate) const ACCELERATION: u32 = 400_000;
 
-    /// Reads all of a part program for faults; how many straight lines it has.
-    pub(crate) fn check(&self, path: &Path) -> Result<usize, Fault> {
-        let mut lines = 0;
-        for item in self.open(path)? {
-            lines += usize::from(matches!(item?, Item::Line(_)));
+    /// Reads all of a part program for faults, and for lines beyond the soft limits of an axis; how many straight lines it has.
+    pub(crate) fn check(&self, path: &Path) -> Result<usize, Box<dyn std::error::Error>> {
+        let (mut lines, mut program) = (0, self.open(path)?);
+        // Their speeds play no part.
+        let axes = self.axes(Limits::new(Self::SPEED, Self::ACCELERATION)?)?;
+        while let Some(item) = program.next() {
+            let Item::Line(line) = item? else { continue };
+            if let Some(what) = setup::outside(line.to, &axes) {
+                return Err(program.refuse(what).into());
+            }
+            lines += 1;
         }
         if lines == 0 {
             let what = "no motion in it: a line with G0 or G1 and X, Y or Z begins one";
-            return Err(Fault::new(&path.display().to_string(), At::File, what));
+            return Err(Fault::new(&path.display().to_string(), At::File, what).into());
         }
         Ok(lines)
     }

@@ -27,6 +27,13 @@ impl<R: BufRead> Program<R> {
         Self { name: name.to_owned(), text, number: 0, block_delete, over: false, state, items }
     }
 
+    /// A fault of the line that was read last, which ends the program.
+    pub(super) fn refuse(&mut self, what: String) -> Fault {
+        self.over = true;
+        self.items.clear();
+        Fault::new(&self.name, At::Line(self.number), what)
+    }
+
     /// Items read but not yet taken.
     #[cfg(test)]
     pub(super) fn waiting(&self) -> usize {

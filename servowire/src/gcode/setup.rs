@@ -4,16 +4,55 @@ use std::str::FromStr;
 
 use step_motion::{AxisSetup, Limits};
 
-/// `X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000`: the settings of one axis, in mm, with minutes for the speed
-/// and seconds for the rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
+use super::AXES;
+
+/// `X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000,low=0,high=300,pause=0.5`: the settings of one axis, in mm, with
+/// minutes for the speed, milliseconds for the pause and seconds for the rest.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Setup {
     pub(super) axis: usize,
     steps_per_mm: Option<f64>,
     speed: Option<f64>,
     acceleration: Option<f64>,
     jerk: Option<f64>,
+    /// The soft limits, and the pause before each change of direction.
+    low: Option<f64>,
+    high: Option<f64>,
+    pause: Option<f64>,
 }
+
+/// A setting: its place, and the least value.
+type Place<'a> = (&'a mut Option<f64>, Least);
+
+/// What a value has to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Least {
+    Above0,
+    From0,
+    Any,
+}
+
+impl Least {
+    fn allows(self, value: f64) -> bool {
+        match self {
+            Self::Above0 => value > 0.0,
+            Self::From0 => value >= 0.0,
+            Self::Any => true,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Above0 => "a number above 0",
+            Self::From0 => "a number from 0 on",
+            Self::Any => "a number",
+        }
+    }
+}
+
+/// The farthest soft limit, in mm, and the longest pause, in ms.
+const FARTHEST: f64 = 100_000.0;
+const LONGEST: f64 = 1000.0;
 
 impl FromStr for Setup {
     type Err = String;
@@ -23,33 +62,55 @@ impl FromStr for Setup {
             text.split_once(':').ok_or("X, Y or Z, a colon, and settings: X:steps-per-mm=80,speed=6000")?;
         let axis = ["X", "Y", "Z"].iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()));
         let axis = axis.ok_or_else(|| format!("\"{name}\" is not an axis: X, Y or Z"))?;
-        let mut new = Self { axis, steps_per_mm: None, speed: None, acceleration: None, jerk: None };
+        let mut new = Self { axis, ..Self::default() };
         for setting in settings.split(',') {
             let (key, value) =
                 setting.split_once('=').ok_or_else(|| format!("\"{setting}\" is not a setting, such as speed=6000"))?;
-            let place = match key.trim() {
-                "steps-per-mm" => &mut new.steps_per_mm,
-                "speed" => &mut new.speed,
-                "acceleration" => &mut new.acceleration,
-                "jerk" => &mut new.jerk,
-                other => {
-                    return Err(format!(
-                        "\"{other}\": steps-per-mm, speed (mm/min), acceleration (mm/s²) or jerk (mm/s³)"
-                    ));
-                }
-            };
-            let value = value.trim().parse().ok().filter(|value: &f64| *value > 0.0 && value.is_finite());
-            *place = Some(value.ok_or_else(|| format!("\"{setting}\": a number above 0"))?);
+            let (place, least) = new.place(key.trim())?;
+            let value = value.trim().parse().ok().filter(|value: &f64| least.allows(*value) && value.is_finite());
+            *place = Some(value.ok_or_else(|| format!("\"{setting}\": {}", least.name()))?);
         }
-        if new.steps_per_mm.is_some_and(|n| !(0.001..=10_000.0).contains(&n)) {
-            return Err("steps-per-mm: 0.001 to 10000".to_owned());
-        }
+        new.check()?;
         Ok(new)
     }
 }
 
 impl Setup {
-    /// Returns an axis that takes what is not given here from `other`.
+    fn place(&mut self, key: &str) -> Result<Place<'_>, String> {
+        Ok(match key {
+            "steps-per-mm" => (&mut self.steps_per_mm, Least::Above0),
+            "speed" => (&mut self.speed, Least::Above0),
+            "acceleration" => (&mut self.acceleration, Least::Above0),
+            "jerk" => (&mut self.jerk, Least::Above0),
+            "low" => (&mut self.low, Least::Any),
+            "high" => (&mut self.high, Least::Any),
+            "pause" => (&mut self.pause, Least::From0),
+            other => {
+                return Err(format!(
+                    "\"{other}\": steps-per-mm, speed (mm/min), acceleration (mm/s²), jerk (mm/s³), low or high (mm), or pause (ms)"
+                ));
+            }
+        })
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.steps_per_mm.is_some_and(|n| !(0.001..=10_000.0).contains(&n)) {
+            return Err("steps-per-mm: 0.001 to 10000".to_owned());
+        }
+        if self.low.into_iter().chain(self.high).any(|limit| limit.abs() > FARTHEST) {
+            return Err(format!("low, high: -{FARTHEST} to {FARTHEST} mm"));
+        }
+        // Every program begins at 0.
+        if self.low.is_some_and(|low| low > 0.0) || self.high.is_some_and(|high| high < 0.0) {
+            return Err("low is at most 0, and high at least 0: the program begins there".to_owned());
+        }
+        if self.pause.is_some_and(|pause| pause > LONGEST) {
+            return Err(format!("pause: 0 to {LONGEST} ms"));
+        }
+        Ok(())
+    }
+
+    /// Returns an axis that takes what is not given here from `other`; ticks are ns.
     pub(super) fn over(&self, other: AxisSetup) -> Result<AxisSetup, String> {
         let steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
         let per_mm = f64::from(steps_per_m) / 1000.0;
@@ -59,8 +120,39 @@ impl Setup {
         let limits = Limits::new(speed, acceleration).map_err(|e| e.to_string())?;
         let jerk = self.jerk.map(|jerk| steps(jerk) as u64).or(other.limits.jerk());
         let limits = jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk)).map_err(|e| e.to_string())?;
-        Ok(AxisSetup::new(limits, steps_per_m))
+        let mut axis = other;
+        (axis.limits, axis.steps_per_m) = (limits, steps_per_m);
+        if self.low.is_some() || self.high.is_some() {
+            // A limit is the last step that is within it.
+            let low = self.low.map_or(i64::MIN, |mm| (mm * per_mm).ceil() as i64);
+            let high = self.high.map_or(i64::MAX, |mm| (mm * per_mm).floor() as i64);
+            axis = axis.with_soft_limits(low, high);
+        }
+        if let Some(ms) = self.pause {
+            axis = axis.with_reversal_pause((ms * 1e6).round() as u32);
+        }
+        Ok(axis)
     }
+}
+
+/// The position of an axis in steps.
+pub(super) fn in_steps(mm: f64, axis: &AxisSetup) -> i64 {
+    (mm * f64::from(axis.steps_per_m) / 1000.0).round() as i64
+}
+
+/// The first axis of a place in mm that is beyond its soft limits.
+pub(super) fn outside(to: [f64; AXES], axes: &[AxisSetup; AXES]) -> Option<String> {
+    for ((name, mm), axis) in ["X", "Y", "Z"].into_iter().zip(to).zip(axes) {
+        let Some((low, high)) = axis.soft_limits else { continue };
+        let (at, per_mm) = (in_steps(mm, axis), f64::from(axis.steps_per_m) / 1000.0);
+        let (side, limit) = match at {
+            at if at < low => ("below the low", low),
+            at if at > high => ("above the high", high),
+            _ => continue,
+        };
+        return Some(format!("{name}{mm:.3} is {side} soft limit, {:.3} mm", limit as f64 / per_mm));
+    }
+    None
 }
 
 #[cfg(test)]
@@ -75,6 +167,11 @@ mod tests {
         assert_eq!((setup.axis, setup.over(machine)), (2, Ok(AxisSetup::new(limits, 400_000))));
         let setup: Setup = "X:speed=6000".parse().unwrap();
         assert_eq!(setup.over(machine), Ok(AxisSetup::new(Limits::new(8000, 400_000).unwrap(), 80_000)));
+        let setup: Setup = "Y:low=-2.51,high=300,pause=0.5".parse().unwrap();
+        let axis = machine.with_soft_limits(-200, 24_000).with_reversal_pause(500_000);
+        assert_eq!(setup.over(machine), Ok(axis));
+        let setup: Setup = "Y:high=1,pause=0".parse().unwrap();
+        assert_eq!(setup.over(machine), Ok(machine.with_soft_limits(i64::MIN, 80)));
         for (text, want) in [
             ("X", "a colon"),
             ("A:speed=1", "\"A\" is not an axis"),
@@ -82,6 +179,12 @@ mod tests {
             ("X:speed", "is not a setting"),
             ("X:speed=0", "above 0"),
             ("X:steps-per-mm=20000", "0.001 to 10000"),
+            ("X:low=NaN", "a number"),
+            ("X:low=1", "at most 0"),
+            ("X:high=-1", "at least 0"),
+            ("X:high=200000", "-100000 to 100000 mm"),
+            ("X:pause=-1", "from 0 on"),
+            ("X:pause=2000", "0 to 1000 ms"),
         ] {
             let error = text.parse::<Setup>().unwrap_err();
             assert!(error.contains(want), "{text}: {error}");

@@ -10,6 +10,7 @@ use step_motion::{Axes, AxesQueue, AxesTimer, AxisPulse, AxisSetup, Clock, Direc
 use super::AXES;
 use super::item::{Item, Line};
 use super::program::Program;
+use super::setup;
 
 /// Number of lines in the look-ahead.
 const AHEAD: usize = 64;
@@ -24,7 +25,7 @@ pub(crate) struct Steps {
     name: String,
     axes: Box<Axes<'static, AXES, AHEAD, SLOTS>>,
     timer: AxesTimer<'static, AXES, SLOTS>,
-    per_mm: [f64; AXES],
+    setups: [AxisSetup; AXES],
     deviation: u32,
     /// Nothing moves before a rest of this many ns has ended.
     rest: Option<u64>,
@@ -47,7 +48,7 @@ impl Steps {
         axes: [AxisSetup; AXES],
         deviation: u32,
     ) -> Result<Self, step_motion::Error> {
-        let per_mm = axes.map(|axis| f64::from(axis.steps_per_m) / 1000.0);
+        let setups = axes;
         // As long-lived as a machine; a run has one.
         let queue: &'static AxesQueue<AXES, SLOTS> = Box::leak(Box::new(AxesQueue::new()));
         let (axes, timer) = Axes::new(queue, Path::new(Clock::NANOSECONDS, axes, deviation)?);
@@ -57,7 +58,7 @@ impl Steps {
             name,
             axes,
             timer,
-            per_mm,
+            setups,
             deviation,
             rest: None,
             over: false,
@@ -99,12 +100,15 @@ impl Steps {
 
     fn push(&mut self, Line { to, feed }: Line) {
         let mut target = [0; AXES];
-        for ((target, mm), per_mm) in target.iter_mut().zip(to).zip(self.per_mm) {
-            *target = (mm * per_mm).round() as i64;
+        for ((target, mm), axis) in target.iter_mut().zip(to).zip(&self.setups) {
+            *target = setup::in_steps(mm, axis);
         }
         self.lines += 1;
         // It is not full, and 100 m of 10000 steps/mm are fewer than 2^31.
-        let _: Result<_, _> = self.axes.push(target, feed.unwrap_or(u32::MAX));
+        if self.axes.push(target, feed.unwrap_or(u32::MAX)).is_err() {
+            let what = setup::outside(to, &self.setups).unwrap_or_default();
+            (self.fault, self.over) = (Some(self.program.refuse(what)), true);
+        }
     }
 
     /// Does all work of the background until it has to wait; returns `false` if it is at rest and nothing is to come.
@@ -239,6 +243,21 @@ mod tests {
         assert!(still("G1 X1 F6000\nX2\n") < 2_000_000);
         assert!(still("G1 X1 F6000\nM0\nX2\n") > 3_000_000);
         assert!(still("G61 G1 X1 F6000\nX1 Y1\n") > still("G64 P0.5 G1 X1 F6000\nX1 Y1\n"));
+    }
+
+    /// A line beyond a soft limit ends the program before it, at rest; an axis that turns has its pause.
+    #[test]
+    fn soft_limits_and_pauses_of_an_axis() {
+        let mut axes = axes();
+        axes[1] = axes[1].with_soft_limits(-80, 160).with_reversal_pause(5_000_000);
+        let run = |text: &str| Steps::new(program(text), "part.nc".to_owned(), axes, 2000).unwrap();
+        let mut steps = run("G1 Y2 F6000\nX1 Y1.5\nX2 Y2.1\nX0 Y0\n");
+        assert_eq!(steps.by_ref().count(), 160 + 80 + 40);
+        let fault = steps.fault().unwrap().to_string();
+        assert!(fault.contains("line 3") && fault.contains("Y2.100 is above the high soft limit, 2.000 mm"), "{fault}");
+        let turns: Vec<u64> =
+            run("G1 Y1 F6000\nX1 Y0.5\n").filter(|pulse| pulse.axis == 1).map(|pulse| pulse.tick).collect();
+        assert!(turns[80] - turns[79] >= 5_000_000, "{}", turns[80] - turns[79]);
     }
 
     /// What is wrong in the middle of a program ends it there, at rest.
