@@ -16,3 +16,14 @@ fn the_bounds_that_are_said_are_those_that_are_checked() {
     assert!(quarter(1_073_741_824).is_ok());
     assert!(quarter(1_073_741_825).is_err());
 }
+
+#[test]
+fn clocks_and_limits_as_numbers() {
+    assert_eq!(u32::from(Clock::new(72_000_000).unwrap()), 72_000_000);
+    let limits = Limits::new(20_000, 200_000).unwrap();
+    assert_eq!(<(u32, u32, Option<u64>)>::from(limits), (20_000, 200_000, None));
+    assert_eq!(
+        <(u32, u32, Option<u64>)>::from(limits.with_jerk(4_000_000).unwrap()),
+        (20_000, 200_000, Some(4_000_000))
+    );
+}

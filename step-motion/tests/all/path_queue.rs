@@ -311,3 +311,34 @@ fn a_line_is_not_lost_whenever_it_comes() {
     }
     assert!(stops > 50, "{stops}");
 }
+
+/// Whether two lines are refused with `S` slots an axis. Refused or not, every step that the background knows of has been made.
+fn refused_with_slots<const S: usize>() -> bool {
+    let queue: &'static AxesQueue<N, S> = Box::leak(Box::default());
+    let setup = AxisSetup::new(limits(20_000, 200_000, 4_000_000), 80_000);
+    let (mut axes, timer) = Axes::new(queue, path(1_000_000, [setup; N], 20));
+    let mut machine = machine::Machine::<_, N>::new(timer);
+    axes.push([3000, 211, 7], 250_000).unwrap();
+    axes.push([3000, 900, 7], 250_000).unwrap();
+    let mut refused = false;
+    loop {
+        match machine.slice(&mut axes) {
+            Work::More | Work::Start => {}
+            Work::Later => machine.until(machine.compare.unwrap()),
+            Work::TooFewSlots => refused = true,
+            Work::Rest => break,
+        }
+    }
+    assert_eq!(axes.commanded(), machine.position, "{S} slots");
+    assert!(refused || machine.position == [3000, 900, 7], "{S} slots: {:?}", machine.position);
+    refused
+}
+
+#[test]
+fn few_slots_cost_exactness_and_never_a_step() {
+    assert!(refused_with_slots::<9>());
+    for refused in [refused_with_slots::<15>(), refused_with_slots::<61>(), refused_with_slots::<129>()] {
+        println!("{refused}");
+    }
+    assert!(!refused_with_slots::<257>());
+}
