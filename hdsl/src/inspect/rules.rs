@@ -334,11 +334,11 @@ mod tests {
     #[test]
     fn an_encoder_that_changes_its_mind() {
         let [carried, anew] = ['+', '-'].map(|begins| answer(begins, if begins == '+' { '-' } else { '+' }));
-        let mut beginnings = Beginnings::default();
-        (0..10_000).for_each(|_| beginnings.note(answer('-', '+'), carried));
+        let (before, mut beginnings) = (answer('-', '+'), Beginnings::default());
+        (0..10_000).for_each(|_| beginnings.note(before, carried));
         assert!(beginnings.are_carried());
         let until = (1..80_000).find(|_| {
-            beginnings.note(answer('-', '+'), anew);
+            beginnings.note(before, anew);
             beginnings.are_anew()
         });
         assert!(until.is_some_and(|until| (6_000..7_000).contains(&until)), "{until:?}");

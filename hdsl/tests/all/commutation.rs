@@ -1,5 +1,5 @@
 //! From the line to the field of a motor, as README and `examples/commutation.rs` put it together, against a shaft in whole numbers:
-//! at every instant of use the true field is within the bound.
+//! at every instant of use the true field is within the bound. `DRIVES=20000` runs as many drives.
 
 use hdsl::device::Device;
 use hdsl::master::{Master, State};
@@ -159,7 +159,7 @@ impl Drive {
 #[test]
 fn the_field_is_within_its_bound() {
     let mut tally = Tally::default();
-    for seed in 0..crate::commutation::drives() {
+    for seed in 0..drives() {
         let mut draw = Draw(seed ^ 0x5eed);
         let mut pick = |values: &[u32]| values[draw.below(values.len() as u64) as usize];
         let drive = Drive {
