@@ -193,8 +193,10 @@ impl Figures {
     }
 
     fn follow(&mut self, time: Time, position: Position, limit: Option<u64>) {
-        let new = Followed { last: position, largest: 0 };
-        let known = self.positions.entry(position.name).or_insert(new);
+        let Some(known) = self.positions.get_mut(position.name) else {
+            self.positions.insert(position.name, Followed { last: position, largest: 0 });
+            return;
+        };
         let before = std::mem::replace(&mut known.last, position);
         // Single-turn and multi-turn positions are not compared with each other.
         if before.span != position.span {
@@ -310,8 +312,13 @@ impl Gathered {
 
     /// Takes the next event of a file.
     pub fn add(&mut self, origin: &Origin, event: &Event) {
-        if !event.remark {
-            self.by.entry(origin.speaker(event)).or_default().add(event, self.limit);
+        if event.remark {
+            return;
+        }
+        let (speaker, limit) = (origin.speaker(event), self.limit);
+        match self.by.get_mut(&speaker) {
+            Some(figures) => figures.add(event, limit),
+            None => self.by.entry(speaker).or_default().add(event, limit),
         }
     }
 

@@ -58,6 +58,14 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         self.len = k + 1;
     }
 
+    /// Returns the fields and begins without any.
+    pub(super) fn take(&mut self) -> Self {
+        let whole = *self;
+        // What is beyond the length means nothing, and stays as it is.
+        (self.len, self.end, self.broken, self.spikes, self.raw, self.line) = (0, Time::ZERO, None, 0, 0, None);
+        whole
+    }
+
     /// The contents of the fields.
     pub(super) fn contents(&self) -> &[T] {
         self.contents.get(..self.len).unwrap_or_default()

@@ -152,7 +152,7 @@ impl Decoder {
 
     /// Ends the open group.
     fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        let group = std::mem::take(&mut self.open);
+        let group = self.open.take();
         let begin = self.begin.take();
         let event = match group.kind() {
             Kind::Request => self.request(&group, out)?,
@@ -328,7 +328,7 @@ impl StartStop for Decoder {
                     .is_ok_and(|expected| self.open.len() < usize::from(expected.layout().frames())),
             };
             if recent && short {
-                let piece = std::mem::take(&mut self.open);
+                let piece = self.open.take();
                 self.pending = None;
                 return out.event(&Event::cut_off(piece.place()));
             }

@@ -155,7 +155,7 @@ impl Decoder {
 
     /// Ends the open frame.
     fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        let frame = std::mem::take(&mut self.open);
+        let frame = self.open.take();
         let begin = self.begin.take();
         if self.pending.is_some_and(|pending| pending.is_asked_again(&frame)) {
             self.give_up(frame.start(), true, out)?;
@@ -370,7 +370,7 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.len() == usize::from(id.request_fields()));
             if recent && !request {
-                let piece = std::mem::take(&mut self.open);
+                let piece = self.open.take();
                 self.pending = None;
                 self.clear(out)?;
                 return out.event(&Event::cut_off(piece.place()));

@@ -220,7 +220,11 @@ fn locate(fields: &mut [Field], frame: &Frame, parts: &[Part]) {
     let mut rest = parts.iter();
     for field in fields {
         let mut behind = rest.clone();
-        let found = behind.find(|part| part.name == field.name);
+        // Mostly it is the next one, whose name is the same text in the same place.
+        let found = behind.next().filter(|part| std::ptr::eq(part.name, field.name)).or_else(|| {
+            behind = rest.clone();
+            behind.find(|part| part.name == field.name)
+        });
         if found.is_some() {
             rest = behind;
         }
@@ -248,11 +252,12 @@ fn parts(id: Option<DataId>, direction: Direction) -> &'static [Part] {
     if direction == Direction::Request { request } else { answer }
 }
 
-/// The values in fields of these names.
+/// The values in fields of these names, as far as events have them.
 fn gathered(names: &[&'static str]) -> Vec<Part> {
     let mut parts: Vec<Part> = Vec::new();
     for (first, name) in (0..).step_by(8).zip(names) {
         let name = name.strip_suffix(['0', '1', '2']).unwrap_or(name);
+        let Some(name) = FIELDS.iter().copied().find(|own| *own == name) else { continue };
         match parts.last_mut() {
             Some(part) if part.name == name => part.last += 8,
             _ => parts.push(Part { name, first, last: first + 7 }),
