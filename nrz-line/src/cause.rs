@@ -206,6 +206,7 @@ mod tests {
         assert_eq!(find(Search::new(), window(doubled, 2 * LEN)), Some((Cause::HalfRate, whole)));
         assert_eq!(find(Search::new(), window(doubled ^ 1, 2 * LEN)), None);
         assert_eq!(find(Search::new(), Window::EMPTY), None);
+        assert_eq!(find(Search::default(), line.inverted()), Some((Cause::LineInverted, whole)));
     }
 
     #[test]

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn evidence_is_judged_when_it_is_read() {
-        let mut cell = Cell::<Number, 5>::new();
+        let mut cell = Cell::<Number, 5>::default();
         let (mut writer, mut reader) = cell.split();
         let policy = Policy::new(100);
         assert_eq!((reader.latest(), reader.at(1_000, policy)), (Number(0), Err(1_000)));

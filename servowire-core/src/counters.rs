@@ -132,6 +132,7 @@ mod tests {
     #[test]
     fn every_class_has_its_counter() {
         let mut counters = Counters::<4>::new();
+        assert_eq!(counters, Counters::default());
         assert_eq!(counters.errors_per_million(), 0);
         for _ in 0..3 {
             counters.record::<_, Kind>(&Ok(()));

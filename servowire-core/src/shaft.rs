@@ -382,7 +382,7 @@ mod tests {
 
     #[test]
     fn the_field_goes_on_between_samples_until_they_are_old() {
-        let mut cell = ShaftCell::<Count, 3>::new();
+        let mut cell = ShaftCell::<Count, 3>::default();
         let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
         assert_eq!((field(&mut reader, 1_000), reader.latest()), (Err(Doubt::Never), Count::NEVER));
         // 1/64 of a turn in 100 µs: 5.6 degrees of the shaft, 11.25 of the field, backward from 90.

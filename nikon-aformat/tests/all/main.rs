@@ -17,3 +17,4 @@ mod remains;
 #[cfg(feature = "serde")]
 mod serde;
 mod transactions;
+mod values;

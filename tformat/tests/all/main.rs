@@ -15,3 +15,4 @@ mod both_ends;
 mod laws;
 #[cfg(feature = "serde")]
 mod serde;
+mod values;
