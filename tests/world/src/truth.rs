@@ -183,13 +183,17 @@ impl Truth {
 
     /// Whether a master can have taken the old value `tag` for an answer to `request` without a fault of its own: the line held the
     /// request up, and somebody else than the host began to give that value meanwhile; or it never came whole, and what came in place of
-    /// the rest happened to fit.
+    /// the rest happened to fit; or its first unit came once more, after the request had left, so that all that was taken began
+    /// after it.
     pub fn is_coincidence(&self, request: Id, tag: u64) -> bool {
         let carriers = || self.log.iter().filter(|t| t.tag == Some(tag) && t.speaker != Speaker::Host);
         let held_up = |sent: &Transmission| {
             sent.start_ns > sent.asked_ns && carriers().any(|carrier| carrier.again_ns >= sent.asked_ns)
         };
-        self.transmission(request).is_some_and(held_up) || carriers().all(|carrier| carrier.delivered < carrier.units)
+        let again = |sent: &Transmission| carriers().any(|carrier| carrier.again_ns >= sent.sent_ns);
+        let sent = self.transmission(request);
+        sent.is_some_and(|sent| held_up(sent) || again(sent))
+            || carriers().all(|carrier| carrier.delivered < carrier.units)
     }
 
     /// Laws 2 and 3: the answers to `request` that came to the host whole, which a master may therefore not lose.

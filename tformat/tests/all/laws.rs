@@ -306,7 +306,8 @@ fn hostile_eeprom_writes() {
         bench.restarts = (seed % 5 == 0).then_some(Draw::seeded(seed));
         let access = EepromAccess::write(Page::truncate(page as u8), address, data, EEPROM_POLLING);
         let end = bench.run(&mut Watched::new(access, seed));
-        if bench.forged_requests > 0 {
+        // Two wrong readings that agree are beyond it: an echo of EA 00 EA whose 00 comes twice, handed over beyond the budget.
+        if bench.forged_requests > 0 || bench.misread > 1 {
             ends.excused += 1;
             return bench;
         }
