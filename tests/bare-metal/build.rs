@@ -16,8 +16,13 @@ mod rtex;
 mod sorte;
 #[path = "build/step_profile.rs"]
 mod step_profile;
+#[path = "../../step-motion/tests/all/toolpaths/ten.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
+mod ten;
 #[path = "build/tformat.rs"]
 mod tformat;
+#[path = "build/toolpaths.rs"]
+mod toolpaths;
 
 /// A protocol's folder under `tests/vectors` and what makes its tables, from a reader of topics.
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
@@ -39,6 +44,8 @@ fn main() -> io::Result<()> {
         println!("cargo:rerun-if-changed={}", folder.display());
         fs::write(out.join(format!("{name}.rs")), tables(&|topic| rows(&folder, topic)))?;
     }
+    fs::write(out.join("toolpaths.rs"), toolpaths::tables())?;
+    println!("cargo:rerun-if-changed=../../step-motion/tests/all/toolpaths/ten.rs");
     fs::copy(here.join("memory.x"), out.join("memory.x"))?;
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rustc-link-search={}", out.display());

@@ -20,6 +20,13 @@ static LONG: Queue<129> = Queue::new();
 static SHORT: Queue<129> = Queue::new();
 static ASKED: Queue<9> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
+static MOVES: [Queue<129>; 3] = [const { Queue::new() }; 3];
+static PATHS: [AxesQueue<3, 257>; 3] = [const { AxesQueue::new() }; 3];
+
+mod toolpaths {
+    include!(concat!(env!("OUT_DIR"), "/toolpaths.rs"));
+}
+use toolpaths::{AHEAD, AXES, DEVIATION, TOOLPATHS};
 
 /// An axis that goes back and forth, with its interrupt, and how far.
 struct Shuttle {
@@ -49,6 +56,16 @@ impl Shuttle {
     fn event(&mut self) -> Fired {
         while matches!(self.slice(), Work::More | Work::Rest) {}
         self.timer.fire()
+    }
+
+    /// A step, and all that the background has to do up to it.
+    fn step(&mut self) -> Fired {
+        loop {
+            let fired = self.event();
+            if fired.is_step() {
+                return fired;
+            }
+        }
     }
 
     /// At one end of its way, from which it goes all of it.
@@ -87,6 +104,81 @@ impl Square {
         }
         while self.axes.poll() == Work::More {}
         self.timer.fire()
+    }
+}
+
+/// On a Cortex-M0+ only an eighth of each toolpath is followed, or it would take a minute.
+const PART: usize = if cfg!(target_has_atomic = "ptr") { 1 } else { 8 };
+
+/// The ten toolpaths of step-motion's tests one after another, each from where the last one ended, with their interrupt.
+struct Job {
+    axes: Axes<'static, 3, AHEAD, 257>,
+    timer: AxesTimer<'static, 3, 257>,
+    /// The path, and the line of it that is pushed next.
+    path: usize,
+    line: usize,
+    /// Steps that have been made and not counted yet.
+    ahead: u32,
+}
+
+impl Job {
+    fn new(queue: &'static AxesQueue<3, 257>) -> Option<Self> {
+        let [x, y, z] = AXES.map(|[per_m, v, a, j]| {
+            let limits = Limits::new(v, a).ok()?.with_jerk(j.into()).ok()?;
+            Some(AxisSetup::new(limits, per_m))
+        });
+        let path = Path::new(Clock::new(168_000_000)?, [x?, y?, z?], DEVIATION).ok()?;
+        let (axes, timer) = Axes::new(queue, path);
+        Some(Self { axes, timer, path: 0, line: 0, ahead: 0 })
+    }
+
+    fn path(at: usize) -> Option<impl Iterator<Item = &'static ([i32; 3], u32)>> {
+        let path = TOOLPATHS.get(at)?;
+        Some(path.iter().take((path.len() / PART).max(4)))
+    }
+
+    /// The next line; none behind the last one.
+    fn next(&mut self) -> Option<([i64; 3], u32)> {
+        loop {
+            if let Some((to, feed)) = Self::path(self.path)?.nth(self.line) {
+                self.line += 1;
+                return Some((to.map(i64::from), *feed));
+            }
+            (self.path, self.line) = (self.path + 1, 0);
+        }
+    }
+
+    /// An event, and all that the background has to do then; steps in it.
+    fn event(&mut self) -> u32 {
+        while !self.axes.is_full() {
+            let Some((to, feed)) = self.next() else { break };
+            let _: Result<_, _> = self.axes.push(to, feed);
+        }
+        while self.axes.poll() == Work::More {}
+        self.timer.fire().steps().count_ones()
+    }
+
+    /// A step of any axis.
+    fn step(&mut self) -> bool {
+        for _ in 0..1000 {
+            if self.ahead > 0 {
+                break;
+            }
+            self.ahead = self.event();
+        }
+        let made = self.ahead > 0;
+        self.ahead = self.ahead.saturating_sub(1);
+        made
+    }
+
+    /// Steps of all axes on all paths.
+    fn steps() -> usize {
+        let (mut steps, mut at) = (0, [0; 3]);
+        for (to, _) in (0..).map_while(Self::path).flatten() {
+            steps += to.iter().zip(at).map(|(to, at)| to.abs_diff(at) as usize).sum::<usize>();
+            at = *to;
+        }
+        steps
     }
 }
 
@@ -163,6 +255,69 @@ kernels_on_states! {
     } as {
         let Some(own) = Shuttle::new(&SHORT, 100, 5_000_000) else { return 0 };
         tenths_of(10 * 200, &mut own.at_its_end(), step_motion_axis_short, &[0])
+    }
+
+    /// A step with all of its background, in moves of 250, 2500 and 25000 steps: there and back.
+    fn step_motion_axis_250(shuttle: &mut Shuttle, input: &u64) -> (Fired, u64) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::new(&MOVES[0], 125, 1_000_000) else { return 0 };
+        tenths_of(20 * 250, &mut own.at_its_end(), step_motion_axis_250, &[0])
+    }
+
+    /// The same.
+    fn step_motion_axis_2500(shuttle: &mut Shuttle, input: &u32) -> (Fired, u32) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::new(&MOVES[1], 1250, 1_000_000) else { return 0 };
+        tenths_of(4 * 2500, &mut own.at_its_end(), step_motion_axis_2500, &[0])
+    }
+
+    /// The same.
+    fn step_motion_axis_25000(shuttle: &mut Shuttle, input: &i16) -> (Fired, i16) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::new(&MOVES[2], 12_500, 1_000_000) else { return 0 };
+        tenths_of(2 * 25_000, &mut own.at_its_end(), step_motion_axis_25000, &[0])
+    }
+
+    /// A step of any axis with all of its background, on the ten toolpaths of step-motion's tests.
+    fn step_motion_axes_job(job: &mut Job, _input: &()) -> bool {
+        job.step()
+    } as {
+        Job::new(&PATHS[0]).map_or(0, |mut own| tenths_of(Job::steps(), &mut own, step_motion_axes_job, &[()]))
+    }
+
+    /// The worst slice of the background of these axes, to 40 instructions.
+    fn step_motion_axes_slice(job: &mut Job, _input: &u8) -> Work {
+        job.axes.poll()
+    } as {
+        let Some(mut job) = Job::new(&PATHS[1]) else { return 0 };
+        most_tenths(100_000 / PART, |clock| {
+            while !job.axes.is_full() {
+                let Some((to, feed)) = job.next() else { break };
+                let _: Result<_, _> = job.axes.push(to, feed);
+            }
+            match clock(&mut || step_motion_axes_slice(&mut job, &0)) {
+                Work::More => {}
+                _ => _ = job.timer.fire(),
+            }
+        })
+    }
+
+    /// The worst push of a line to these axes.
+    fn step_motion_axes_push(job: &mut Job, _input: &u16) -> bool {
+        let Some((to, feed)) = job.next() else { return false };
+        job.axes.push(to, feed).is_ok()
+    } as {
+        let Some(mut job) = Job::new(&PATHS[2]) else { return 0 };
+        most_tenths(3000 / PART, |clock| {
+            while job.axes.is_full() && !job.axes.is_at_rest() {
+                while job.axes.poll() == Work::More {}
+                job.timer.fire();
+            }
+            clock(&mut || step_motion_axes_push(&mut job, &0));
+        })
     }
 
     /// The worst slice of the background, to 40 instructions.
