@@ -131,6 +131,9 @@ impl<'a> Samples<'a> {
         let Some(found) = room.first_chunk_mut::<{ 8 * PIECE + AT_ONCE }>() else { return &[] };
         let mut count = 0;
         let mut see = |at: u64, mut edges: u64| {
+            if edges == 0 {
+                return;
+            }
             let mut place = count % (8 * PIECE);
             count += edges.count_ones() as usize;
             // The processor need not guess how many there are: what is written too much is overwritten.
