@@ -21,7 +21,7 @@ mod log;
 use core::fmt;
 
 pub use fields::{Field, Fields, Value};
-pub use log::{DriveTrouble, LogAnalysis, LogFinding, LogShape, Trouble, Unfinished};
+pub use log::{DriveTrouble, LogAnalysis, LogFinding, LogShape, ShapeDoubt, Trouble, Unfinished};
 
 use crate::block::{LEN, LEN32};
 use crate::code::Code;

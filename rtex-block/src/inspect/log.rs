@@ -5,7 +5,7 @@ mod shape;
 mod track;
 
 pub use finding::{DriveTrouble, LogFinding, Trouble, Unfinished};
-pub use shape::LogShape;
+pub use shape::{LogShape, ShapeDoubt};
 
 use crate::block::LEN;
 use crate::code::Code;

@@ -32,5 +32,6 @@ mod runner;
 #[cfg(feature = "serde")]
 mod serde;
 mod setpoints;
+mod shape;
 mod steps;
 mod stops;

@@ -48,8 +48,10 @@ impl Codec for Rtex {
 /// NOPs after power-up.
 const MOST_HELD: usize = 1 << 16;
 
-/// Lines or records after the NOPs that are enough to determine the shape.
-const TELLING: usize = 16;
+/// Numbers of lines or records after the NOPs at which the shape is looked for, and the number that is enough to be told that it
+/// has none.
+const TELLING: [usize; 3] = [16, 64, 256];
+const ENOUGH: usize = 1024;
 
 /// Flags of a response that change with every motion and are therefore not events.
 const MOTION: [&str; 3] = ["IN_POSITION", "IN_PROGRESS", "TORQUE_LIMITED"];
@@ -94,7 +96,10 @@ impl Decoder {
     /// Finds the shape in this piece of the log.
     fn look_at(&mut self, sample: &[Burst]) {
         self.blocks.look_at(sample);
-        self.misread = self.blocks.shape().0.and_then(misread);
+        self.misread = match self.blocks.doubt() {
+            Some((a, b)) => Some(format!("{}; none of it is shown", either(a, b))),
+            None => self.blocks.shape().0.and_then(misread),
+        };
     }
 
     /// Decodes the data held back.
@@ -110,13 +115,23 @@ impl Decoder {
 
     /// Takes a line or record, now that the shape is known as well as possible.
     fn decode(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
-        if let Some(piece) = self.blocks.feed(burst) {
-            self.piece(&piece, out)?;
+        if let Some(line) = self.blocks.feed(burst) {
+            out.event(&self.stray(&line))?;
         }
         while let Some(piece) = self.blocks.next(burst) {
             self.piece(&piece, out)?;
         }
         Ok(())
+    }
+
+    /// Describes a line of another length than the others, in a log whose blocks do not begin with its lines.
+    fn stray(&self, line: &Piece) -> Event {
+        let (len, usual) = (line.bytes.len(), self.blocks.line());
+        let class = if len < usual { "truncated" } else { "too_long" };
+        let place = line.time.map_or(Place::Line(line.line), |time| Place::Time { start: time, end: time });
+        let bytes = Field::digits("bytes", line.bytes.iter().copied(), 2);
+        let reason = format!("{len} bytes among lines of {usual}: it is not known where a block begins in them");
+        Event::new(place, None, "line", vec![bytes], Refusal::new(class, reason).into())
     }
 
     /// Decodes a block, or whatever is in its place.
@@ -157,7 +172,8 @@ impl Decoder {
         let (place, counted) = self.place(piece, header);
         self.place = place;
         let (mut fields, mut happened) = (Vec::new(), Vec::new());
-        if is_block(report) {
+        let doubt = self.blocks.doubt();
+        if doubt.is_none() && is_block(report) {
             let findings: Vec<LogFinding> = self.analysis.block(block).collect();
             let before = self.last.insert(header.emit() & 0x9f, *report);
             match &before {
@@ -173,9 +189,10 @@ impl Decoder {
         }
         let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
         let kind = format!("{word} {}", header.mac_id);
-        let verdict = match piece.direction.filter(|told| *told != direction) {
-            Some(_) => turned_round(header.response),
-            None => verdict(report),
+        let verdict = match (doubt, piece.direction.filter(|told| *told != direction)) {
+            (Some((a, b)), _) => Refusal::new("shape", either(a, b)).into(),
+            (None, Some(_)) => turned_round(header.response),
+            (None, None) => verdict(report),
         };
         if let Verdict::Refused(refusal) = &verdict {
             happened.push(format!("refused: {}", refusal.reason));
@@ -187,7 +204,8 @@ impl Decoder {
             Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
         });
         let address = Some(header.mac_id.get().into());
-        Some(Event { position: position(report), address, happened, counted, ..event })
+        let position = position(report).filter(|_| doubt.is_none());
+        Some(Event { position, address, happened, counted, ..event })
     }
 }
 
@@ -231,6 +249,11 @@ fn said(LogShape { size, word, skip }: LogShape) -> String {
     format!("blocks of {size} bytes{order}{from}")
 }
 
+/// Says that either of two shapes may be the right one.
+fn either(a: LogShape, b: LogShape) -> String {
+    format!("the log is either {} or {}, and nothing in it tells which", said(a), said(b))
+}
+
 /// Says why a log of this shape is not what was intended.
 fn misread(shape: LogShape) -> Option<String> {
     let what = match shape {
@@ -255,6 +278,9 @@ impl LogDecoder for Decoder {
     /// Returns remarks about the log as a whole, before its blocks.
     fn note(&self) -> Option<String> {
         let (Some(shape), taken) = self.blocks.shape() else { return None };
+        if let Some((a, b)) = self.blocks.doubt() {
+            return Some(either(a, b));
+        }
         let size = shape.size.bytes();
         let plain = LogShape { word: 1, skip: 0, ..shape } == shape;
         if plain && size == taken && (size == rtex_block::LEN || self.settings.block_size.is_some()) {
@@ -281,7 +307,9 @@ impl LogDecoder for Decoder {
         let nops = |burst: &Burst| burst.bytes.chunks(rtex_block::LEN).all(is_empty);
         let told = self.held.iter().rev().take_while(|burst| !nops(burst)).count();
         // Nothing but NOPs, or too few blocks behind them to tell by.
-        let waits = self.held.len() > told && told < TELLING && self.held.len() < MOST_HELD;
+        let tells =
+            TELLING.contains(&told) && Blocks::tells(self.held.get(self.held.len() - told..).unwrap_or_default());
+        let waits = !tells && told < ENOUGH && self.held.len() < MOST_HELD;
         if waits { Ok(()) } else { self.let_go(out) }
     }
 

@@ -1,6 +1,8 @@
 //! Block size, byte order and starting offset of a log.
 
 use crate::block::BlockSize;
+use crate::code::CyclicCode;
+use crate::header::Header;
 use crate::inspect::strict;
 
 /// The shape of a whole log.
@@ -16,79 +18,83 @@ pub struct LogShape {
     pub skip: usize,
 }
 
+/// Why the shape of a log is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ShapeDoubt {
+    /// Too few blocks make sense in any shape. NOPs look alike in every shape, so pass more of the log.
+    Unknown,
+    /// Two shapes explain the log equally well.
+    Either(LogShape, LogShape),
+}
+
+/// Points of a sound block whose counter follows the one before it.
+const FOLLOWS: i32 = 64;
+/// Points of one whose counter does not.
+const STANDS: i32 = 16;
+/// Points of a sound sub block.
+const SUB: i32 = 32;
+/// Fewer blocks say nothing.
+const LEAST: usize = 4;
+
 impl LogShape {
-    /// Guesses the block size, byte order and starting offset with which most of the blocks make sense. `None` if nothing
-    /// makes sense, or if fewer than four blocks follow the leading NOPs. NOPs look alike in every shape, so pass more of
-    /// the log in that case.
+    /// Guesses block size, byte order and starting offset: the shape in which blocks make sense, their counters advance, and
+    /// positions change least from block to block.
     ///
-    /// In a log of 32-byte blocks, every second piece of 16 bytes is a sub block. That of a command begins with 80h, 82h or
-    /// 8Ah, which, read as a main block, would be a response of drive 0, 2 or 10.
-    pub fn guess(bytes: &[u8]) -> Option<Self> {
-        let shapes = || {
-            let sizes = [BlockSize::Bytes16, BlockSize::Bytes32];
-            [1, 2, 4].into_iter().flat_map(move |word| sizes.map(|size| Self { size, word, skip: 0 }))
-        };
-        // More than half.
-        let aligned = Self::best(shapes(), bytes, 501);
-        if aligned.is_some() {
-            return aligned;
-        }
-        // NOPs alone do not tell the shape, and their data may look like blocks of another shape. But in their own shape all of
-        // them are sound, and in the other one the counters do not advance.
-        let aligned = shapes().map(|shape| shape.sound(bytes)).max();
-        let explains_more = |shape: &Self| {
-            let sound = Some(shape.sound(bytes));
-            sound > aligned || sound == aligned && shape.counts(bytes)
-        };
-        let shifted = shapes().flat_map(|shape| (1..shape.size.bytes()).map(move |skip| Self { skip, ..shape }));
-        Self::best(shifted.filter(explains_more), bytes, 900)
-    }
-
-    /// Returns the first of the best-scoring shapes with a score of at least `least`; a larger size wins only if it explains
-    /// more.
-    fn best(shapes: impl Iterator<Item = Self>, bytes: &[u8], least: usize) -> Option<Self> {
-        let mut best: Option<(Self, usize)> = None;
-        for shape in shapes {
-            let score = shape.score(bytes).filter(|score| *score >= least);
-            if let Some(score) = score.filter(|score| best.is_none_or(|(_, other)| *score > other)) {
-                best = Some((shape, score));
+    /// More than half of the blocks after the leading NOPs have to make sense, and at least four. In a log that begins in
+    /// the middle of a block, nine of ten have to, and counters have to advance.
+    ///
+    /// A log of exchanged 16-bit words that begins one word inside a block has address, counter and code in the same places as
+    /// one of turned 32-bit words, and the other way round. Commands and responses of [`CyclicCode::CyclicPosition`] tell them
+    /// apart; otherwise a log that begins with a block is taken for one.
+    pub fn guess(bytes: &[u8]) -> Result<Self, ShapeDoubt> {
+        let mut first: Option<(Self, Sum)> = None;
+        let mut second: Option<(Self, Sum)> = None;
+        for shape in Self::all() {
+            let sum = shape.sum(bytes);
+            let is_better = |than: &Option<(Self, Sum)>| than.as_ref().is_none_or(|(_, best)| sum.mean() > best.mean());
+            if !sum.makes_sense(shape.skip > 0) {
+                continue;
+            } else if is_better(&first) {
+                (first, second) = (Some((shape, sum)), first);
+            } else if is_better(&second) {
+                second = Some((shape, sum));
             }
         }
-        best.map(|(shape, _)| shape)
-    }
-
-    /// Share of sound blocks after the leading NOPs, in thousandths.
-    fn score(self, bytes: &[u8]) -> Option<usize> {
-        let (mut good, mut all) = (0_usize, 0_usize);
-        let blocks = bytes.get(self.skip..)?.chunks_exact(self.size.bytes());
-        for block in blocks.skip_while(|block| self.is_nop(block)).take(256) {
-            all = all.saturating_add(1);
-            good = good.saturating_add(usize::from(self.is_sound(block) && !self.is_nop(block)));
+        let (best, sum) = first.ok_or(ShapeDoubt::Unknown)?;
+        match second.filter(|(_, other)| sum.is_close_to(other)) {
+            None => Ok(best),
+            Some(_) if best.skip == 0 => Ok(best),
+            Some((other, _)) if !best.is_twin_of(other) => Err(ShapeDoubt::Unknown),
+            Some((other, _)) if other.skip == 0 => Ok(other),
+            Some((other, _)) => Err(ShapeDoubt::Either(best, other)),
         }
-        good.saturating_mul(1_000).checked_div(all).filter(|_| all >= 4)
     }
 
-    /// Returns the share of sound blocks, including NOPs, in thousandths.
-    fn sound(self, bytes: &[u8]) -> usize {
-        let blocks = || bytes.get(self.skip..).unwrap_or_default().chunks_exact(self.size.bytes());
-        let good = blocks().filter(|block| self.is_sound(block)).count();
-        good.saturating_mul(1_000).checked_div(blocks().len()).unwrap_or(0)
+    /// Whether header and code are in the same places: exchanged 16-bit words, and turned 32-bit words that begin two bytes before.
+    fn is_twin_of(self, other: Self) -> bool {
+        let (narrow, wide) = if self.word < other.word { (self, other) } else { (other, self) };
+        let skip = wide.skip.saturating_add(2).checked_rem(wide.size.bytes());
+        narrow.size == wide.size && (narrow.word, wide.word) == (2, 4) && skip == Some(narrow.skip)
     }
 
-    /// Whether the counters of blocks that follow each other in a direction advance; each may be sent twice.
-    fn counts(self, bytes: &[u8]) -> bool {
-        let mut last = [None; 256];
-        let (mut went_on, mut all) = (0_usize, 0_usize);
+    /// Returns all shapes; first those that begin with a block.
+    fn all() -> impl Iterator<Item = Self> {
+        (0..32).flat_map(|skip| {
+            let sizes = [BlockSize::Bytes16, BlockSize::Bytes32].into_iter().filter(move |size| skip < size.bytes());
+            sizes.flat_map(move |size| [1, 2, 4].map(|word| Self { size, word, skip }))
+        })
+    }
+
+    /// Returns what the bytes say for this shape.
+    fn sum(self, bytes: &[u8]) -> Sum {
+        let mut sum = Sum::NEW;
         for block in bytes.get(self.skip..).unwrap_or_default().chunks_exact(self.size.bytes()) {
-            let [byte0, ..] = self.turned(block);
-            let counter = byte0 >> 5 & 3;
-            let Some(before) = last.get_mut(usize::from(byte0 & 0x9f)) else { continue };
-            if let Some(before) = before.replace(counter) {
-                all = all.saturating_add(1);
-                went_on = went_on.saturating_add(usize::from(counter == before.wrapping_add(1) & 3));
-            }
+            let turned = self.turned(block);
+            let is_sound = turned.get(..self.size.bytes()).is_some_and(|turned| strict(turned).is_ok());
+            sum.take(&turned, is_sound, self.size == BlockSize::Bytes32);
         }
-        went_on >= 4 && went_on.saturating_mul(5) >= all.saturating_mul(2)
+        sum
     }
 
     /// Returns a block with its bytes in order.
@@ -101,14 +107,104 @@ impl LogShape {
         }
         turned
     }
+}
 
-    /// Code 00h: nothing else in the block is certain to have a meaning.
-    fn is_nop(self, block: &[u8]) -> bool {
-        self.turned(block).get(1).is_some_and(|byte1| byte1 & 0x7f == 0)
+/// What the blocks of a log say for a shape.
+struct Sum {
+    /// Number of pieces of 16 bytes.
+    halves: i32,
+    points: i32,
+    /// Blocks since at least half of them were NOPs, and the sound ones of these that are no NOPs.
+    all: usize,
+    good: usize,
+    /// Sound blocks of a drive and direction that had one before them, and those whose counter follows it.
+    again: usize,
+    followed: usize,
+    /// Of a direction and drive: the counter, and whether it was the next one.
+    counters: [Option<(u8, bool)>; 64],
+    /// Of a direction and drive, the last position; with cyclic positions those of both directions are nearly the same.
+    positions: [Option<i32>; 64],
+}
+
+impl Sum {
+    const NEW: Self = Self {
+        halves: 0,
+        points: 0,
+        all: 0,
+        good: 0,
+        again: 0,
+        followed: 0,
+        counters: [None; 64],
+        positions: [None; 64],
+    };
+
+    fn take(&mut self, block: &[u8; 32], is_sound: bool, wide: bool) {
+        let [byte0, code, _, _, l, ml, mh, h, ..] = *block;
+        let (halves, of_sub) = if wide { (2, SUB) } else { (1, 0) };
+        self.halves = self.halves.saturating_add(halves);
+        // In a NOP, nothing else is certain to have a meaning.
+        let is_nop = code & 0x7f == 0;
+        self.all = self.all.saturating_add(1);
+        if is_nop && self.good.saturating_mul(2) <= self.all {
+            *self = Self { counters: self.counters, positions: self.positions, ..Self::NEW };
+            return;
+        }
+        if !is_sound {
+            self.points = self.points.saturating_sub(FOLLOWS.saturating_mul(halves));
+        } else if !is_nop {
+            self.good = self.good.saturating_add(1);
+            let cyclic = code >> 4 & 7 == CyclicCode::CyclicPosition.code();
+            let weight = self.count(byte0);
+            let moved = self.moved(byte0, cyclic, i32::from_le_bytes([l, ml, mh, h]));
+            self.points = self.points.saturating_add(weight).saturating_add(of_sub).saturating_sub(moved);
+        }
     }
 
-    /// Whether an encoder could have written a block of this shape.
-    fn is_sound(self, block: &[u8]) -> bool {
-        self.turned(block).get(..self.size.bytes()).is_some_and(|turned| strict(turned).is_ok())
+    /// Takes the counter, which may be sent twice, and returns the points for it.
+    fn count(&mut self, byte0: u8) -> i32 {
+        let counter = Header::parse(byte0).update_counter.get();
+        let Some(last) = self.counters.get_mut(place(byte0)) else { return STANDS };
+        let Some((before, went_on)) = last.replace((counter, false)) else { return STANDS };
+        let goes_on = counter == before.wrapping_add(1) & 3;
+        *last = Some((counter, goes_on));
+        self.again = self.again.saturating_add(1);
+        let follows = goes_on || went_on && counter == before;
+        self.followed = self.followed.saturating_add(follows.into());
+        if follows { FOLLOWS } else { STANDS }
     }
+
+    /// Returns by how many bits the position has changed.
+    fn moved(&mut self, byte0: u8, cyclic: bool, position: i32) -> i32 {
+        let own = place(byte0);
+        let before = self.positions.get_mut(own).and_then(|last| last.replace(position));
+        if let Some(other) = self.positions.get_mut(own ^ 32).filter(|_| cyclic) {
+            *other = Some(position);
+        }
+        let distance = before.map_or(0, |before| position.wrapping_sub(before).unsigned_abs());
+        distance.checked_ilog2().map_or(0, |bits| i32::try_from(bits).unwrap_or(0).saturating_add(1))
+    }
+
+    /// Whether enough of the blocks make sense, and counters advance, which NOPs in another shape do not seem to.
+    fn makes_sense(&self, shifted: bool) -> bool {
+        let of_ten = if shifted { 9 } else { 5 };
+        let is_sound = self.good >= LEAST && self.good.saturating_mul(10) > self.all.saturating_mul(of_ten);
+        let counts = self.followed.saturating_mul(5) >= self.again.saturating_mul(3);
+        is_sound && counts && self.followed.saturating_mul(2) >= self.good && self.points > 0
+    }
+
+    /// Whether two blocks more or less make the difference, as there may be at the ends of a log.
+    fn is_close_to(&self, other: &Self) -> bool {
+        let two_blocks = FOLLOWS.saturating_mul(2_000).checked_div(self.halves).unwrap_or(0);
+        self.mean().saturating_sub(other.mean()) <= two_blocks
+    }
+
+    /// Returns the points of 16 bytes, in thousandths.
+    fn mean(&self) -> i32 {
+        self.points.saturating_mul(1_000).checked_div(self.halves).unwrap_or(0)
+    }
+}
+
+/// Returns the place of a direction and drive.
+const fn place(byte0: u8) -> usize {
+    (byte0 >> 2 & 0x20 | byte0 & 0x1f) as usize
 }

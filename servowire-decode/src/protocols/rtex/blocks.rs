@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use rtex_block::inspect::LogShape;
+use rtex_block::inspect::{LogShape, ShapeDoubt};
 use rtex_block::{BlockSize, LEN, LEN32};
 
 use crate::capture::hexlog::Burst;
@@ -17,6 +17,8 @@ pub(super) struct Blocks {
     /// The size given by the user.
     said: Option<usize>,
     shape: Option<LogShape>,
+    /// Two shapes of which either may be the right one; blocks are cut in the first.
+    doubt: Option<(LogShape, LogShape)>,
     size: usize,
     /// Bytes of most lines or records.
     line: usize,
@@ -44,6 +46,7 @@ impl Blocks {
         Self {
             said,
             shape: None,
+            doubt: None,
             size: said.unwrap_or(LEN),
             line: 0,
             flow: false,
@@ -63,6 +66,22 @@ impl Blocks {
         (self.shape, self.size)
     }
 
+    /// Returns the two shapes of which nothing tells which is the right one.
+    pub(super) fn doubt(&self) -> Option<(LogShape, LogShape)> {
+        self.doubt
+    }
+
+    /// Returns the length of a line or record, if most have the same.
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// Returns whether the end of these lines says what shape they have.
+    pub(super) fn tells(lines: &[Burst]) -> bool {
+        let bytes: Vec<u8> = lines.iter().flat_map(|burst| &burst.bytes).copied().collect();
+        bytes.rchunks(SAMPLE).next().is_some_and(|bytes| LogShape::guess(bytes).is_ok())
+    }
+
     /// Returns whether the log ends inside a block.
     pub(super) fn is_open(&self) -> bool {
         self.flow && self.rest.len() > self.at && self.skip == 0
@@ -78,9 +97,15 @@ impl Blocks {
         let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
         let bytes: Vec<u8> = lines.flatten().copied().collect();
         // NOPs from before the start say nothing, so the end of the sample counts, which holds more than NOPs.
-        let known = bytes.chunks(SAMPLE).find_map(LogShape::guess);
         let from_last = bytes.len().saturating_sub(SAMPLE) / LEN32 * LEN32;
-        let shape = known.or_else(|| LogShape::guess(bytes.get(from_last..).unwrap_or_default()));
+        let pieces = bytes.chunks(SAMPLE).chain([bytes.get(from_last..).unwrap_or_default()]);
+        let guesses: Vec<_> = pieces.map(LogShape::guess).collect();
+        let known = guesses.iter().find_map(|guess| guess.ok());
+        self.doubt = guesses.iter().find_map(|guess| match guess {
+            Err(ShapeDoubt::Either(a, b)) if known.is_none() => Some((*a, *b)),
+            _ => None,
+        });
+        let shape = known.or(self.doubt.map(|(shape, _)| shape));
         self.take(shape, shape.map_or(0, |shape| shape.skip));
         let halves = self.size == LEN32 && !line.is_empty() && read().all(|it| it.len() == LEN);
         self.flow |= halves;
@@ -169,10 +194,12 @@ impl Blocks {
         let (window, unsound) = (std::mem::take(&mut self.window), std::mem::take(&mut self.unsound));
         self.seen = 0;
         let now = LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) };
-        if self.said.is_some() || unsound * 10 < WINDOW {
+        let doubts = self.doubt.is_some();
+        if self.said.is_some() || unsound * 10 < WINDOW && !doubts {
             return None;
         }
-        let other = LogShape::guess(&window).filter(|other| *other != now)?;
+        let other = LogShape::guess(&window).ok().filter(|other| *other != now || doubts)?;
+        self.doubt = None;
         let size = other.size.bytes();
         // The window begins with a block of the old shape, and ends where the next bytes continue.
         self.take(Some(other), (other.skip + size - window.len() % size) % size);

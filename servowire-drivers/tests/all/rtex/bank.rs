@@ -1,5 +1,11 @@
 //! Two frames are never taken as one, however late the exchange is.
 
+use std::cell::Cell;
+use std::convert::Infallible;
+
+use rtex_block::master::Asic;
+use servowire_drivers::rtex::{FrameCount, Port};
+
 use super::*;
 
 /// The bank is switched in the middle of the exchange, after any access, by the receive interrupt or by XSYNC because the exchange is
@@ -109,4 +115,68 @@ fn a_late_interrupt_mixes_no_frames() {
         assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
     }
     assert!(mixed > 150, "{mixed}");
+}
+
+/// One drive that answers at once, at an ASIC that receives a frame in every reading, while it is `restless`.
+struct Restless<'a> {
+    frames: &'a FrameCount,
+    restless: &'a Cell<bool>,
+    /// How often the state was asked for, and the first words of the last command.
+    asked: u32,
+    command: u16,
+}
+
+impl Port for Restless<'_> {
+    type Word = u16;
+    type Error = Infallible;
+
+    fn state(&mut self) -> Result<Asic, Infallible> {
+        self.asked += 1;
+        Ok(match self.asked {
+            1 => Asic::RingConfig,
+            2 => Asic::Ready,
+            _ => Asic::Running,
+        })
+    }
+
+    fn slaves(&mut self, found: &mut [Slave]) -> Result<Option<usize>, Infallible> {
+        found[0] = Slave { mac_id: MacId::truncate(1), kind: 1 };
+        Ok(Some(1))
+    }
+
+    fn read(&mut self, _: usize, words: &mut [u16]) -> Result<(), Infallible> {
+        if self.restless.get() {
+            self.frames.add();
+        }
+        // C/R, counter, address and code as they came; Servo_Ready and In_Position; position 1000.
+        words.fill(0);
+        words[..3].copy_from_slice(&[self.command | 0x80, 0x41, 1_000]);
+        Ok(())
+    }
+
+    fn write(&mut self, _: usize, words: &[u16]) -> Result<(), Infallible> {
+        self.command = words[0];
+        Ok(())
+    }
+}
+
+/// A frame comes in every reading, and the blocks look like those of one frame: none is taken.
+#[test]
+fn blocks_that_only_look_like_one_frame_are_not_taken() {
+    let (frames, restless, now_ns) = (FrameCount::new(), Cell::new(false), Cell::new(0));
+    let port = Restless { frames: &frames, restless: &restless, asked: 0, command: 0 };
+    let mut driver = Driver::new(port, || now_ns.get(), clock::host(), &frames);
+    assert_eq!(driver.start(1_000_000), Ok(ControlPhase::Running));
+    let mut update = || {
+        now_ns.set(now_ns.get() + 500_000);
+        frames.add();
+        let exchanged = driver.exchange(now_ns.get()).unwrap();
+        (exchanged.torn, driver.master().ring().axes()[0].arrival() == Arrival::OnTime)
+    };
+    let calm: Vec<_> = (0..20).map(|_| update()).collect();
+    assert!(calm[10..].iter().all(|it| *it == (false, true)), "{calm:?}");
+    restless.set(true);
+    for period in 0..3 {
+        assert_eq!(update(), (true, false), "{period}");
+    }
 }

@@ -39,7 +39,7 @@ impl Port for Stuck<'_> {
 
 static RECEIVED: FrameCount = FrameCount::new();
 
-fn host() -> Master<1> {
+pub(super) fn host() -> Master<1> {
     let periods = Periods::from_a6n(-1, 1, Some(500_000)).unwrap();
     let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal);
     let mac_id = MacId::truncate(1);
