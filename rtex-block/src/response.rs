@@ -73,7 +73,7 @@ impl<'a> ResponseBlock<'a> {
     }
 
     /// Bytes 8-15.
-    pub const fn noncyclic_bytes(self) -> [u8; 8] {
+    pub(crate) const fn noncyclic_bytes(self) -> [u8; 8] {
         let [_, _, _, _, _, _, _, _, tail @ ..] = *self.0;
         tail
     }

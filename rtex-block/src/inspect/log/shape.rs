@@ -52,7 +52,7 @@ impl LogShape {
         let mut second: Option<(Self, Sum)> = None;
         for shape in Self::all() {
             let sum = shape.sum(bytes);
-            let is_better = |than: &Option<(Self, Sum)>| than.as_ref().is_none_or(|(_, best)| sum.mean() > best.mean());
+            let is_better = |than: &Option<(Self, Sum)>| than.as_ref().is_none_or(|(_, best)| sum.points > best.points);
             if !sum.makes_sense(shape.skip > 0) {
                 continue;
             } else if is_better(&first) {
@@ -111,8 +111,6 @@ impl LogShape {
 
 /// What the blocks of a log say for a shape.
 struct Sum {
-    /// Number of pieces of 16 bytes.
-    halves: i32,
     points: i32,
     /// Blocks since at least half of them were NOPs, and the sound ones of these that are no NOPs.
     all: usize,
@@ -127,21 +125,12 @@ struct Sum {
 }
 
 impl Sum {
-    const NEW: Self = Self {
-        halves: 0,
-        points: 0,
-        all: 0,
-        good: 0,
-        again: 0,
-        followed: 0,
-        counters: [None; 64],
-        positions: [None; 64],
-    };
+    const NEW: Self =
+        Self { points: 0, all: 0, good: 0, again: 0, followed: 0, counters: [None; 64], positions: [None; 64] };
 
     fn take(&mut self, block: &[u8; 32], is_sound: bool, wide: bool) {
         let [byte0, code, _, _, l, ml, mh, h, ..] = *block;
         let (halves, of_sub) = if wide { (2, SUB) } else { (1, 0) };
-        self.halves = self.halves.saturating_add(halves);
         // In a NOP, nothing else is certain to have a meaning.
         let is_nop = code & 0x7f == 0;
         self.all = self.all.saturating_add(1);
@@ -194,13 +183,8 @@ impl Sum {
 
     /// Whether two blocks more or less make the difference, as there may be at the ends of a log.
     fn is_close_to(&self, other: &Self) -> bool {
-        let two_blocks = FOLLOWS.saturating_mul(2_000).checked_div(self.halves).unwrap_or(0);
-        self.mean().saturating_sub(other.mean()) <= two_blocks
-    }
-
-    /// Returns the points of 16 bytes, in thousandths.
-    fn mean(&self) -> i32 {
-        self.points.saturating_mul(1_000).checked_div(self.halves).unwrap_or(0)
+        let two_blocks = FOLLOWS.saturating_add(SUB).saturating_mul(2);
+        self.points.saturating_sub(other.points) <= two_blocks
     }
 }
 
