@@ -4,11 +4,15 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
+use rtex_block::master::{
+    ActiveCode, Axis, AxisConfig, AxisState, Fellows, Heard, Limits, Ring, StopCategory, StopReason,
+};
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
 use servowire_world::Draw;
+
+use crate::common::{CODES, Pair, limits};
 
 const AXES: usize = 32;
 const LIMIT: u16 = 8;
@@ -225,4 +229,31 @@ fn after_every_fault_every_servo_is_off_in_time() {
         bench.repair();
     }
     assert!(faults.iter().all(|&n| n > 0), "{faults:?}");
+}
+
+/// Two axes that fail in the same update period do not make up for each other: an axis that slows down on request is switched off
+/// as it is configured to be beside a fault.
+#[test]
+fn two_faults_in_one_period_are_faults() {
+    let mac_id = MacId::new(9).unwrap();
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits()).with_deceleration(100);
+    let mut fellow = Pair::with(config, DriveConfig::new(mac_id, CODES));
+    fellow.switch_on();
+    for speed in (0..5_000).step_by(100) {
+        let to = fellow.axis.setpoint().wrapping_add(speed);
+        fellow.axis.set_position(to).unwrap();
+        fellow.update();
+    }
+    fellow.axis.stop(StopCategory::One);
+    fellow.update();
+    assert_eq!(fellow.axis.state(), AxisState::Stopping(StopReason::Requested));
+    let mut faulty = Pair::on(ActiveCode::CyclicPosition, Behaviour::default());
+    faulty.drive.set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
+    faulty.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Alarm));
+    let mut fellows = Fellows::new();
+    fellows.begin();
+    (0..2).for_each(|place| fellows.look(place, &faulty.axis));
+    fellows.tell(&mut fellow.axis);
+    // At once, and the first reason stays.
+    assert_eq!(fellow.axis.state(), AxisState::Stopped(StopReason::Requested));
 }

@@ -143,7 +143,7 @@ fn a_log_from_any_byte_on_is_told() {
 fn no_piece_of_a_log_looks_like_another_shape() {
     let mut draw = Draw::seeded(27);
     let (mut told, mut pieces) = (0, 0);
-    for _ in 0..150 {
+    for _ in 0..300 {
         let traffic =
             [Traffic::Positions, Traffic::Standing, Traffic::Speeds, Traffic::Profile][draw.below(4) as usize];
         let (wide, word) = (draw.below(2) == 1, [1, 2, 4][draw.below(3) as usize]);

@@ -52,10 +52,11 @@ impl LogShape {
         let mut second: Option<(Self, Sum)> = None;
         for shape in Self::all() {
             let sum = shape.sum(bytes);
-            let is_better = |than: &Option<(Self, Sum)>| than.as_ref().is_none_or(|(_, best)| sum.points > best.points);
             if !sum.makes_sense(shape.skip > 0) {
                 continue;
-            } else if is_better(&first) {
+            }
+            let is_better = |than: &Option<(Self, Sum)>| than.as_ref().is_none_or(|(_, best)| sum.points > best.points);
+            if is_better(&first) {
                 (first, second) = (Some((shape, sum)), first);
             } else if is_better(&second) {
                 second = Some((shape, sum));

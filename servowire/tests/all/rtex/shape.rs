@@ -167,6 +167,29 @@ fn a_log_from_power_up() {
     }
 }
 
+/// Eight drives from power-up, in blocks of 32 bytes: the first lines after the NOPs, one update period, do not tell the size, so they
+/// wait for those that do.
+#[test]
+fn a_ring_from_power_up() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    for period in 0..90_u8 {
+        let (counter, code) = if period < 40 { (0, 0) } else { (period % 4 * 32, 0x20) };
+        for drive in 1..=8 {
+            for (byte0, sub) in [(counter + drive, 0x80), (0x80 + counter + drive, 0_u8)] {
+                let status = if byte0 < 0x80 { 0 } else { 0x40 };
+                writeln!(text, "{byte0:02x}{code:02x}{status:02x}{:026x}{sub:02x}{:030x}", 0, 0).unwrap();
+            }
+        }
+    }
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--json"]);
+    assert!(run.code == 0 && !run.err.contains("from here on"), "{} {}", run.code, run.err);
+    let kinds: std::collections::BTreeSet<_> =
+        run.json().iter().map(|event| event["kind"].as_str().unwrap().to_owned()).collect();
+    let want = (1..=8).flat_map(|drive| [format!("cmd {drive}"), format!("rsp {drive}")]).collect();
+    assert_eq!(kinds, want);
+}
+
 /// Blocks of which the first is cut, and blocks of which five bytes are missing in the middle of the log: what is whole is shown, and the
 /// log is said not to be what it was written as.
 #[test]
