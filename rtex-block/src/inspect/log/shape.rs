@@ -62,7 +62,7 @@ impl LogShape {
                 second = Some((shape, sum));
             }
         }
-        let (best, sum) = first.ok_or(ShapeDoubt::Unknown)?;
+        let (best, sum) = first.filter(|(_, sum)| sum.good >= LEAST).ok_or(ShapeDoubt::Unknown)?;
         match second.filter(|(_, other)| sum.is_close_to(other)) {
             None => Ok(best),
             Some(_) if best.skip == 0 => Ok(best),
@@ -177,7 +177,9 @@ impl Sum {
     /// Whether enough of the blocks make sense, and counters advance, which NOPs in another shape do not seem to.
     fn makes_sense(&self, shifted: bool) -> bool {
         let of_ten = if shifted { 9 } else { 5 };
-        let is_sound = self.good >= LEAST && self.good.saturating_mul(10) > self.all.saturating_mul(of_ten);
+        // At the end of a log, another shape may see one block more.
+        let is_sound =
+            self.good.saturating_add(1) >= LEAST && self.good.saturating_mul(10) > self.all.saturating_mul(of_ten);
         let counts = self.followed.saturating_mul(5) >= self.again.saturating_mul(3);
         is_sound && counts && self.followed.saturating_mul(2) >= self.good && self.points > 0
     }

@@ -96,15 +96,16 @@ impl Blocks {
         let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
         let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
         let bytes: Vec<u8> = lines.flatten().copied().collect();
-        // NOPs from before the start say nothing, so the end of the sample counts, which holds more than NOPs.
-        let from_last = bytes.len().saturating_sub(SAMPLE) / LEN32 * LEN32;
-        let pieces = bytes.chunks(SAMPLE).chain([bytes.get(from_last..).unwrap_or_default()]);
-        let guesses: Vec<_> = pieces.map(LogShape::guess).collect();
-        let known = guesses.iter().find_map(|guess| guess.ok());
-        self.doubt = guesses.iter().find_map(|guess| match guess {
-            Err(ShapeDoubt::Either(a, b)) if known.is_none() => Some((*a, *b)),
+        // The first piece that says something counts. NOPs from before the start do not; what comes after them may begin at the end
+        // of a piece, and then it is in the middle of another.
+        let later = bytes.get(SAMPLE / 2..).unwrap_or_default();
+        let guesses = || bytes.chunks(SAMPLE).chain(later.chunks(SAMPLE)).map(LogShape::guess);
+        let known = guesses().find_map(Result::ok);
+        let either = |guess| match guess {
+            Err(ShapeDoubt::Either(a, b)) => Some((a, b)),
             _ => None,
-        });
+        };
+        self.doubt = if known.is_none() { guesses().find_map(either) } else { None };
         let shape = known.or(self.doubt.map(|(shape, _)| shape));
         self.take(shape, shape.map_or(0, |shape| shape.skip));
         let halves = self.size == LEN32 && !line.is_empty() && read().all(|it| it.len() == LEN);

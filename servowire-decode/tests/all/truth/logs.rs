@@ -195,3 +195,69 @@ fn the_shape_of_a_log_is_told_by_sound_blocks() {
     let seeds = [("NOPs before the start", 59), ("blocks are cut short", 43), ("blocks are cut short", 53)];
     hold_these(CONDITIONS, &seeds, run);
 }
+
+/// Blocks that go over the ends of lines, and one line that is not bytes: its blocks are lost, and every other one is shown with its own
+/// values and the line in which it begins.
+#[test]
+fn a_spoilt_line_costs_its_own_blocks() {
+    for (wide, from, len) in
+        [(false, 5, 16), (false, 16, 24), (true, 5, 16), (true, 20, 32), (false, 3, 48), (true, 9, 48)]
+    {
+        let size = if wide { 32 } else { 16 };
+        let mut bytes = Vec::new();
+        for k in 0..90_i32 {
+            let counter = (k % 4 * 32) as u8;
+            for (byte0, status, position) in
+                [(counter + 5, 0x80, 70_000 * k + 40), (0x80 + counter + 5, 0xc1, 70_000 * k)]
+            {
+                let mut block = vec![0; size];
+                block[..3].copy_from_slice(&[byte0, 0x20, status]);
+                block[4..8].copy_from_slice(&position.to_le_bytes());
+                if wide && byte0 < 0x80 {
+                    block[16] = 0x80;
+                }
+                bytes.extend(block);
+            }
+        }
+        let bytes = &bytes[from..];
+        let bytes = &bytes[..bytes.len() / len * len];
+        let first = (size - from % size) % size;
+        for spoilt in (0..bytes.len() / len).step_by(7) {
+            let mut text = String::new();
+            for (k, line) in bytes.chunks(len).enumerate() {
+                // A String takes everything.
+                let _ = match k {
+                    _ if k == spoilt => writeln!(text, "{}", "zz ".repeat(len)),
+                    _ => writeln!(
+                        text,
+                        "{}",
+                        line.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x} "))
+                    ),
+                };
+            }
+            let begins = (first..).step_by(size).take_while(|at| at + size <= bytes.len());
+            let is_whole = |at: &usize| !(at / len..=(at + size - 1) / len).contains(&spoilt);
+            let want: Vec<_> = begins
+                .filter(is_whole)
+                .map(|at| {
+                    let position = i32::from_le_bytes(bytes[at + 4..at + 8].try_into().unwrap());
+                    let response = bytes[at] >= 0x80;
+                    (
+                        (1 + at / len) as f64,
+                        if response { "rsp 5" } else { "cmd 5" },
+                        response.then_some(position.into()),
+                    )
+                })
+                .collect();
+            let capture = capture::open(Input::over("log.txt", Cursor::new(text)), Hints::default()).unwrap();
+            let (events, notes) = read(capture, Some(protocol("rtex")), &Settings::default());
+            let is_good = |event: &&Event| event.verdict.is_ok() && !event.remark;
+            let shown: Vec<_> = events
+                .iter()
+                .filter(is_good)
+                .map(|event| (start(event), event.kind.as_ref(), event.position.map(|position| position.counts)))
+                .collect();
+            assert_eq!(shown, want, "{wide} {from} {len}, line {}: {notes}", spoilt + 1);
+        }
+    }
+}

@@ -117,10 +117,10 @@ fn a_late_interrupt_mixes_no_frames() {
     assert!(mixed > 150, "{mixed}");
 }
 
-/// One drive that answers at once, at an ASIC that receives a frame in every reading, while it is `restless`.
+/// One drive that answers at once, at an ASIC that receives a frame in every reading, while it is `busy`.
 struct Restless<'a> {
     frames: &'a FrameCount,
-    restless: &'a Cell<bool>,
+    busy: &'a Cell<bool>,
     /// How often the state was asked for, and the first words of the last command.
     asked: u32,
     command: u16,
@@ -145,7 +145,7 @@ impl Port for Restless<'_> {
     }
 
     fn read(&mut self, _: usize, words: &mut [u16]) -> Result<(), Infallible> {
-        if self.restless.get() {
+        if self.busy.get() {
             self.frames.add();
         }
         // C/R, counter, address and code as they came; Servo_Ready and In_Position; position 1000.
@@ -164,7 +164,7 @@ impl Port for Restless<'_> {
 #[test]
 fn blocks_that_only_look_like_one_frame_are_not_taken() {
     let (frames, restless, now_ns) = (FrameCount::new(), Cell::new(false), Cell::new(0));
-    let port = Restless { frames: &frames, restless: &restless, asked: 0, command: 0 };
+    let port = Restless { frames: &frames, busy: &restless, asked: 0, command: 0 };
     let mut driver = Driver::new(port, || now_ns.get(), clock::host(), &frames);
     assert_eq!(driver.start(1_000_000), Ok(ControlPhase::Running));
     let mut update = || {
