@@ -62,7 +62,7 @@ impl LogShape {
                 second = Some((shape, sum));
             }
         }
-        let (best, sum) = first.filter(|(_, sum)| sum.good >= LEAST).ok_or(ShapeDoubt::Unknown)?;
+        let (best, sum) = first.filter(|(_, sum)| sum.is_enough()).ok_or(ShapeDoubt::Unknown)?;
         match second.filter(|(_, other)| sum.is_close_to(other)) {
             None => Ok(best),
             Some(_) if best.skip == 0 => Ok(best),
@@ -174,14 +174,23 @@ impl Sum {
         distance.checked_ilog2().map_or(0, |bits| i32::try_from(bits).unwrap_or(0).saturating_add(1))
     }
 
-    /// Whether enough of the blocks make sense, and counters advance, which NOPs in another shape do not seem to.
+    /// Whether most of the blocks make sense, and counters advance, which NOPs in another shape do not seem to. One block fewer than
+    /// are enough will do: at the end of a log another shape may see one more.
     fn makes_sense(&self, shifted: bool) -> bool {
         let of_ten = if shifted { 9 } else { 5 };
-        // At the end of a log, another shape may see one block more.
-        let is_sound =
-            self.good.saturating_add(1) >= LEAST && self.good.saturating_mul(10) > self.all.saturating_mul(of_ten);
+        let is_sound = self.good.saturating_mul(10) > self.all.saturating_mul(of_ten);
         let counts = self.followed.saturating_mul(5) >= self.again.saturating_mul(3);
-        is_sound && counts && self.followed.saturating_mul(2) >= self.good && self.points > 0
+        is_sound && counts && self.points > 0 && self.has(LEAST.saturating_sub(1), self.followed.saturating_add(1))
+    }
+
+    /// Whether these blocks are enough.
+    fn is_enough(&self) -> bool {
+        self.has(LEAST, self.followed)
+    }
+
+    /// Whether there are at least so many sound blocks, and the counters of half of them follow others.
+    fn has(&self, least: usize, followed: usize) -> bool {
+        self.good >= least && followed.saturating_mul(2) >= self.good
     }
 
     /// Whether two blocks more or less make the difference, as there may be at the ends of a log.
