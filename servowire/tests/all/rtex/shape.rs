@@ -94,7 +94,7 @@ fn a_log_that_may_have_either_of_two_shapes() {
     let turning: Vec<u8> = (1..=200_u8)
         .flat_map(|k| {
             let place = i32::from(k) * 70_000;
-            [(k % 4 * 32 + 5, place), (0x80 | k % 4 * 32 + 5, place - 900)].map(|(byte0, place)| {
+            [(k % 4 * 32 + 5, place), (0x80 | (k % 4 * 32 + 5), place - 900)].map(|(byte0, place)| {
                 let [l, ml, mh, h] = place.to_le_bytes();
                 [byte0, 0x20, if byte0 < 0x80 { 0x80 } else { 0xc1 }, 0, l, ml, mh, h, 0, 0, 0, 0, 0, 0, 0, 0]
             })
