@@ -239,12 +239,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if self.line.is_none() {
             return self.stop(now);
         }
-        let plain = self.stop_from(now);
-        let before = plain.filter(|_| self.stopping).map(|stop| stop.end);
+        let before = if self.stopping { self.path.end_of_cut() } else { None };
         (self.stopping, self.quick) = (false, true);
         self.path.hurry(&limits);
-        let stop = plain.and_then(|plain| self.stop_within(now, &plain));
-        match (stop, before) {
+        match (self.stop_from(now), before) {
             (Some(stop), Some(before)) if before < stop.end => {
                 self.path.cut(before, self.begun(), self.made, self.leaving());
                 self.stopping = true;

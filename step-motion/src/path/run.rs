@@ -221,19 +221,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
         ))
     }
 
-    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`, and the time
-    /// from there.
-    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> ((usize, Real), Real) {
-        let mut time = Real::ZERO;
+    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
+    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> (usize, Real) {
         while let Some((Course { curve, exit, more, .. }, _)) = self.begin(at, speed, None) {
-            time = time + curve.time;
             if exit.is_zero() {
-                return (self.locate(at, curve.way(), at.saturating_add(more)), time);
+                return self.locate(at, curve.way(), at.saturating_add(more));
             }
             (at, speed) = (at.saturating_add(more).saturating_add(1), exit);
         }
         let last = self.len.saturating_sub(1);
-        ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
+        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
     }
 
     /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time; worked out from the

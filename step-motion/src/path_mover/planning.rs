@@ -15,16 +15,8 @@ pub(super) struct Stop<const N: usize> {
     pub(super) end: (usize, Real),
     /// How it leaves the lines of its first curve.
     pub(super) left: Leaving,
-    /// Its first curve, if it is not the present one, and the time to rest.
+    /// Its first curve, if it is not the present one.
     pub(super) first: Option<(Course, Start<N>, Bounds)>,
-    pub(super) time: Option<Real>,
-}
-
-impl<const N: usize> Stop<N> {
-    /// Returns whether it ends no farther and no later than another one.
-    pub(super) fn is_within(&self, other: &Self) -> bool {
-        self.end <= other.end && self.time.zip(other.time).is_none_or(|(own, other)| own <= other)
-    }
 }
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
@@ -55,7 +47,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns how a stop runs; `None` at rest.
     pub(super) fn stop_from(&self, now: u64) -> Option<Stop<N>> {
         self.line.as_ref()?;
-        let present = |end| Stop { end, left: self.leaving(), first: None, time: None };
+        let present = |end| Stop { end, left: self.leaving(), first: None };
         if self.stopping {
             return self.path.end_of_cut().map(present);
         }
@@ -68,40 +60,25 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return Some(present((self.more, self.path.line(self.more)?.length)));
         };
         let from = (start.place, start.before);
-        let stop = match self.path.course(0, motion, from, (None, self.bounds, self.braking)) {
-            Some(course) => self.stop_on(course, start),
+        let how = (self.bounds, self.braking);
+        let planned = |(course, bounds): (Course, Bounds)| {
+            let end = self.path.locate(0, (start.place + course.curve.way()) - start.before, course.more);
+            let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
+            // It is whole once the path has been cut off where it ends.
+            Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
+        };
+        let stop = match self.path.course(0, motion, from, (None, how.0, how.1)) {
+            Some(course) => planned(course),
             None => present((self.more, self.path.line(self.more)?.length)),
         };
         let Leaving { more, exit, .. } = stop.left;
         if exit.is_zero() {
             return Some(stop);
         }
-        let (end, rest) = self.path.end_of_stop(more.saturating_add(1), exit);
-        Some(Stop { end, time: stop.time.map(|time| time + rest), ..stop })
-    }
-
-    /// Returns the stop whose first curve is this.
-    fn stop_on(&self, (course, bounds): (Course, Bounds), start: Start<N>) -> Stop<N> {
-        let end = self.path.locate(0, (start.place + course.curve.way()) - start.before, course.more);
-        let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
-        let time = Some(course.curve.time - course.curve.skipped.0);
-        // It is whole once the path has been cut off where it ends.
-        Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)), time }
-    }
-
-    /// Returns a stop that is no longer and no later than another one, if there is one: at each joint of lines that allow other
-    /// accelerations a stop has acceleration 0; on one curve within the least limits it may be shorter.
-    pub(super) fn stop_within(&self, now: u64, than: &Stop<N>) -> Option<Stop<N>> {
-        let stop = self.stop_from(now)?;
-        if stop.is_within(than) {
-            return Some(stop);
-        }
-        let once = self.here(now).and_then(|(motion, start)| {
-            let how = (self.bounds, self.braking);
-            let course = self.path.stop_on_any(0, motion, (start.place, start.before), how)?;
-            Some(self.stop_on(course, start))
-        });
-        once.filter(|once| once.is_within(than)).or(Some(stop))
+        let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop };
+        // At each joint it would have acceleration 0; on one curve it may be shorter.
+        let once = self.path.stop_on_any(0, motion, from, how).map(planned);
+        once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
     }
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along

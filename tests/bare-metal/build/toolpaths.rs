@@ -1,6 +1,6 @@
 //! The ten toolpaths, in steps.
 
-use crate::ten::{AXES, AHEAD, DEVIATION, N, on_steps, toolpaths};
+use crate::ten::{AHEAD, AXES, DEVIATION, N, on_steps, toolpaths};
 
 /// The axes as `[steps/m, steps/s, steps/s², steps/s³]`, and the lines of each path with their feeds in um/s.
 pub(super) fn tables() -> String {
