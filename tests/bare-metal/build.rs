@@ -18,10 +18,12 @@ mod sorte;
 mod step_profile;
 #[path = "../../step-motion/tests/all/toolpaths/ten.rs"]
 #[expect(dead_code, reason = "the tests use more of it")]
+#[expect(clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "small positive numbers of a generator")]
 mod ten;
 #[path = "build/tformat.rs"]
 mod tformat;
 #[path = "build/toolpaths.rs"]
+#[expect(clippy::cast_sign_loss, reason = "limits and feeds are positive")]
 mod toolpaths;
 
 /// A protocol's folder under `tests/vectors` and what makes its tables, from a reader of topics.

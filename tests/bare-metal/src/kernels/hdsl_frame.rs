@@ -65,6 +65,7 @@ impl Link {
         Some(Self::of(Master::synchronised(Dialect::SICK, sync), 14, line))
     }
 
+    #[expect(clippy::large_types_passed_by_value, reason = "it is moved into the link")]
     fn of(master: Master, delay: u32, line: Line) -> Self {
         let mut link = Self {
             master,
