@@ -17,6 +17,8 @@
 // Helpers.
 #[cfg(feature = "rtex")]
 mod asic;
+#[cfg(any(all(feature = "tformat", feature = "nikon"), feature = "rtex"))]
+mod bad_clock;
 #[cfg(feature = "tformat")]
 mod bench;
 #[cfg(feature = "nikon")]
@@ -34,7 +36,7 @@ mod second;
 
 #[cfg(all(feature = "tformat", feature = "nikon"))]
 mod anew;
-#[cfg(all(feature = "tformat", feature = "nikon", feature = "rtex"))]
+#[cfg(all(feature = "tformat", feature = "nikon"))]
 mod clock;
 mod contract;
 #[cfg(feature = "tformat")]

@@ -68,9 +68,16 @@ pub struct Transmission {
     pub(crate) image_ns: u64,
     pub(crate) last_order: u64,
     pub(crate) broken: bool,
+    /// Which of its first 64 units the host was given, the first in bit 0.
+    pub(crate) heard: u64,
 }
 
 impl Transmission {
+    /// Whether the host was given each of its units at least once. Two copies of one and none of another are not the whole.
+    fn came_whole(&self) -> bool {
+        self.heard.count_ones() as usize >= self.units.min(64)
+    }
+
     /// The longest idle time between two units of `len` bits, start and stop bit included, in bits; for a transmission without
     /// damage.
     pub fn longest_idle(&self, len: usize) -> usize {
@@ -192,8 +199,7 @@ impl Truth {
         };
         let again = |sent: &Transmission| carriers().any(|carrier| carrier.again_ns >= sent.sent_ns);
         let sent = self.transmission(request);
-        sent.is_some_and(|sent| held_up(sent) || again(sent))
-            || carriers().all(|carrier| carrier.delivered < carrier.units)
+        sent.is_some_and(|sent| held_up(sent) || again(sent)) || carriers().all(|carrier| !carrier.came_whole())
     }
 
     /// Laws 2 and 3: the answers to `request` that came to the host whole, which a master may therefore not lose.
@@ -265,6 +271,7 @@ impl Truth {
         self.handed.push_back(Handed { at_ns: now_ns, origin, damaged });
         let Some(t) = self.transmission_mut(origin.transmission) else { return };
         let follows = t.delivered == 0 || t.last_order + 1 == order;
+        t.heard |= 1_u64.checked_shl(origin.index.into()).unwrap_or(0);
         t.broken |= damaged || usize::from(origin.index) != t.delivered || !follows;
         t.delivered += 1;
         t.last_order = order;

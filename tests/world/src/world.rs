@@ -234,6 +234,7 @@ impl World {
             sent_ns: times.2,
             units: message.units.len(),
             delivered: 0,
+            heard: 0,
             delivered_ns: 0,
             intact: false,
             image: layout.image,

@@ -10,7 +10,7 @@ use rtex_block::{BlockSize, MacId};
 use servowire_drivers::rtex::{Driver, FrameCount, Port};
 use servowire_drivers::{ClockError, Error};
 
-use crate::clock::{Wrong, holds_against};
+use crate::bad_clock::{Wrong, holds_against};
 
 /// An ASIC that never gets ready, and the blocks that were written to it.
 struct Stuck<'a>(&'a Cell<u32>);
