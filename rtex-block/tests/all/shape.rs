@@ -185,6 +185,39 @@ fn a_few_blocks_do_not_tell_what_they_do_not_show() {
     }
 }
 
+/// Two drives whose servos are off, a few blocks after the NOPs of power-up: words of 16 bits and of 32 bits look nearly alike, and the
+/// order that begins with a block may see one more. The positions decide.
+#[test]
+fn a_few_blocks_behind_nops_are_told_by_their_positions() {
+    for (word, from) in [(2, 30), (4, 2), (2, 0), (4, 0)] {
+        for nops in [0, 8, 60] {
+            for count in 9..24_u8 {
+                let mut blocks = vec![vec![0; 32]; nops];
+                for k in 0..count {
+                    let (period, drive) = (k / 4, [3, 9][usize::from(k / 2 % 2)]);
+                    let place = -90_000 * i32::from(drive) + 130 * i32::from(period);
+                    let mut block = vec![0; 32];
+                    block[..2].copy_from_slice(&[(period + 1) % 4 * 32 + drive, 0x20]);
+                    block[4..8].copy_from_slice(&place.to_le_bytes());
+                    if k % 2 == 0 {
+                        block[16] = 0x80;
+                    } else {
+                        (block[0], block[2]) = (block[0] + 0x80, 0x41);
+                        block[4..8].copy_from_slice(&(place - 40).to_le_bytes());
+                    }
+                    blocks.push(block);
+                }
+                // One more, of which the beginning is cut; and the log is cut at the length of whole blocks.
+                blocks.insert(0, vec![0; 32]);
+                let mut bytes = written(&blocks, word)[from..].to_vec();
+                bytes.truncate(bytes.len() / 32 * 32);
+                let want = LogShape { size: BlockSize::Bytes32, word, skip: (32 - from) % 32 };
+                assert_eq!(LogShape::guess(&bytes), Ok(want), "{nops} NOPs and {count} blocks");
+            }
+        }
+    }
+}
+
 /// One block in ten is damaged, by one byte or all of them.
 #[test]
 fn damaged_blocks_do_not_change_the_shape() {

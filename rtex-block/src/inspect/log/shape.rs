@@ -34,6 +34,10 @@ const FOLLOWS: i32 = 64;
 const STANDS: i32 = 16;
 /// Points of a sound sub block.
 const SUB: i32 = 32;
+/// Points a block by which one of two shapes with header and code in the same places has to be better to be told.
+const TELLS: i32 = 4;
+/// Points that say nothing: those of a single position that moved by more bits.
+const SLIGHT: i32 = 16;
 /// Fewer blocks say nothing.
 const LEAST: usize = 4;
 
@@ -46,7 +50,7 @@ impl LogShape {
     ///
     /// A log of exchanged 16-bit words that begins one word inside a block has address, counter and code in the same places as
     /// one of turned 32-bit words, and the other way round. Commands and responses of [`CyclicCode::CyclicPosition`] tell them
-    /// apart; otherwise a log that begins with a block is taken for one.
+    /// apart; if nothing does, a log that begins with a block is taken for one.
     pub fn guess(bytes: &[u8]) -> Result<Self, ShapeDoubt> {
         let mut first: Option<(Self, Sum)> = None;
         let mut second: Option<(Self, Sum)> = None;
@@ -65,11 +69,36 @@ impl LogShape {
         let (best, sum) = first.filter(|(_, sum)| sum.is_enough()).ok_or(ShapeDoubt::Unknown)?;
         match second.filter(|(_, other)| sum.is_close_to(other)) {
             None => Ok(best),
+            Some((other, _)) if best.is_twin_of(other) => best.or_twin(other, bytes),
             Some(_) if best.skip == 0 => Ok(best),
-            Some((other, _)) if !best.is_twin_of(other) => Err(ShapeDoubt::Unknown),
-            Some((other, _)) if other.skip == 0 => Ok(other),
-            Some((other, _)) => Err(ShapeDoubt::Either(best, other)),
+            Some(_) => Err(ShapeDoubt::Unknown),
         }
+    }
+
+    /// Returns which of two shapes with header and code in the same places explains the blocks better.
+    fn or_twin(self, other: Self, bytes: &[u8]) -> Result<Self, ShapeDoubt> {
+        let (lead, blocks) = self.lead(other, bytes);
+        let (best, other) = if lead < 0 { (other, self) } else { (self, other) };
+        let lead = lead.saturating_abs();
+        if lead >= FOLLOWS && lead >= i32::try_from(blocks).unwrap_or(i32::MAX).saturating_mul(TELLS) {
+            return Ok(best);
+        }
+        match (best.skip, other.skip) {
+            (0, _) => Ok(best),
+            (_, 0) if lead <= SLIGHT => Ok(other),
+            _ => Err(ShapeDoubt::Either(best, other)),
+        }
+    }
+
+    /// Returns by how many points this shape explains the blocks that both see better than its twin, and the number of these blocks.
+    /// What one of them sees more at the ends of a piece says nothing.
+    fn lead(self, other: Self, bytes: &[u8]) -> (i32, usize) {
+        let own_is_narrow = self.word < other.word;
+        let (narrow, wide) = if own_is_narrow { (self, other) } else { (other, self) };
+        let narrow = Self { skip: wide.skip.saturating_add(2), ..narrow }.sum(bytes);
+        let wide = wide.sum(bytes.get(..bytes.len().saturating_sub(2)).unwrap_or_default());
+        let (own, twin) = if own_is_narrow { (&narrow, &wide) } else { (&wide, &narrow) };
+        (own.points.saturating_sub(twin.points), own.good.max(twin.good))
     }
 
     /// Whether header and code are in the same places: exchanged 16-bit words, and turned 32-bit words that begin two bytes before.

@@ -19,6 +19,8 @@ pub(super) struct Blocks {
     shape: Option<LogShape>,
     /// Two shapes of which either may be the right one; blocks are cut in the first.
     doubt: Option<(LogShape, LogShape)>,
+    /// Nothing tells the shape from its twin yet, but that the log begins with a block in it.
+    leaning: bool,
     size: usize,
     /// Bytes of most lines or records.
     line: usize,
@@ -47,6 +49,7 @@ impl Blocks {
             said,
             shape: None,
             doubt: None,
+            leaning: false,
             size: said.unwrap_or(LEN),
             line: 0,
             flow: false,
@@ -79,7 +82,8 @@ impl Blocks {
     /// Returns whether the end of these lines says what shape they have.
     pub(super) fn tells(lines: &[Burst]) -> bool {
         let bytes: Vec<u8> = lines.iter().flat_map(|burst| &burst.bytes).copied().collect();
-        bytes.rchunks(SAMPLE).next().is_some_and(|bytes| LogShape::guess(bytes).is_ok())
+        let end = bytes.rchunks(SAMPLE).next().unwrap_or_default();
+        LogShape::guess(end).is_ok_and(|shape| !leans(shape) || certain(end).is_some())
     }
 
     /// Returns whether the log ends inside a block.
@@ -99,8 +103,13 @@ impl Blocks {
         // The first piece that says something counts. NOPs from before the start do not; what comes after them may begin at the end
         // of a piece, and then it is in the middle of another.
         let later = bytes.get(SAMPLE / 2..).unwrap_or_default();
-        let guesses = || bytes.chunks(SAMPLE).chain(later.chunks(SAMPLE)).map(LogShape::guess);
+        let pieces = || bytes.chunks(SAMPLE).chain(later.chunks(SAMPLE));
+        let guesses = || pieces().map(LogShape::guess);
         let known = guesses().find_map(Result::ok);
+        // A shape that is only preferred gives way to what a later piece is certain of.
+        let sure = known.filter(|known| leans(*known)).and_then(|known| pieces().find_map(|piece| twin(piece, known)));
+        self.leaning = known.is_some_and(leans) && sure.is_none();
+        let known = sure.or(known);
         let either = |guess| match guess {
             Err(ShapeDoubt::Either(a, b)) => Some((a, b)),
             _ => None,
@@ -196,9 +205,10 @@ impl Blocks {
         self.seen = 0;
         let now = LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) };
         let doubts = self.doubt.is_some();
-        if self.said.is_some() || unsound * 10 < WINDOW && !doubts {
+        if self.said.is_some() || unsound * 10 < WINDOW && !doubts && !self.leaning {
             return None;
         }
+        self.leaning &= certain(&window) != Some(now);
         let other = LogShape::guess(&window).ok().filter(|other| *other != now || doubts)?;
         self.doubt = None;
         let size = other.size.bytes();
@@ -206,6 +216,25 @@ impl Blocks {
         self.take(Some(other), (other.skip + size - window.len() % size) % size);
         Some(other)
     }
+}
+
+/// Returns whether a shape may have been preferred to its twin because the log begins with a block in it.
+fn leans(shape: LogShape) -> bool {
+    shape.skip == 0 && shape.word > 1
+}
+
+/// Returns the shape that a piece has even if it is not known to begin with a block. Both twins begin later in what is behind its first
+/// four bytes, so neither is preferred.
+fn certain(piece: &[u8]) -> Option<LogShape> {
+    let shape = LogShape::guess(piece.get(4..)?).ok()?;
+    Some(LogShape { skip: (shape.skip + 4) % shape.size.bytes(), ..shape })
+}
+
+/// Returns the shape that a piece certainly has, if it is this one or its twin.
+fn twin(piece: &[u8], known: LogShape) -> Option<LogShape> {
+    let begins = if known.word == 2 { known.size.bytes() - 2 } else { 2 };
+    let other = LogShape { word: 6 - known.word, skip: begins, ..known };
+    certain(piece).filter(|shape| *shape == known || *shape == other)
 }
 
 /// Returns the length that most lines have; if there are several, the longest.
