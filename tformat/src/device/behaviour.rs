@@ -160,8 +160,10 @@ mod tests {
     #[test]
     fn every_combination_is_there() {
         let shown = |number| std::format!("{:?}", Behaviour::numbered(number));
-        let all: HashSet<_> = (0..Behaviour::NUMBERED).map(shown).collect();
-        assert_eq!(all.len(), 3 * 1024 * 4);
+        // All of them take ten minutes under Miri.
+        let step = if cfg!(miri) { 97 } else { 1 };
+        let all: HashSet<_> = (0..Behaviour::NUMBERED).step_by(step).map(shown).collect();
+        assert_eq!(all.len(), (3 * 1024 * 4_usize).div_ceil(step));
         assert_eq!(Behaviour::numbered(0), Behaviour::new());
         assert_eq!(Behaviour::numbered(Behaviour::NUMBERED), Behaviour::new());
     }
