@@ -133,7 +133,7 @@ pub fn axis(mut data: &[u8]) {
     let queue = Queue::<SLOTS>::new();
     let (axis, timer) = Axis::new(&queue, Clock::MICROSECONDS, limits).expect("a speed below the clock's");
     let axis = axis.with_reach(500 + reach * 40).with_soft_limits(LOW, HIGH);
-    let mut halves = Halves::new(axis, timer, speed, 250);
+    let mut halves = Halves::new(axis, timer, speed, 2, 250);
     while let [command, a, b, rest @ ..] = data {
         data = rest;
         let (value, axis) = (i64::from(i16::from_le_bytes([*a, *b])), &mut halves.background);
@@ -180,16 +180,17 @@ struct Halves<B, T, const N: usize> {
     /// Where the steps have led, and the last one of each axis: when and which way.
     position: [i64; N],
     last: [Option<(u64, i64)>; N],
-    /// Ticks of a step at the greatest speed, and how often the background is called.
+    /// Ticks of a step at the greatest speed, how many fewer rounding may cost, and how often the background is called.
     fastest: u64,
+    rounding: u64,
     every: u64,
 }
 
 impl<B: Background<N>, T: Timer, const N: usize> Halves<B, T, N> {
-    fn new(background: B, timer: T, speed: u32, every: u64) -> Self {
+    fn new(background: B, timer: T, speed: u32, rounding: u64, every: u64) -> Self {
         let fastest = 1_000_000 / u64::from(speed);
         let machine = Machine::new(timer);
-        Self { background, machine, position: [0; N], last: [None; N], fastest, every }
+        Self { background, machine, position: [0; N], last: [None; N], fastest, rounding, every }
     }
 
     fn slice(&mut self) -> Work {
@@ -217,7 +218,7 @@ impl<B: Background<N>, T: Timer, const N: usize> Halves<B, T, N> {
             if let Some((last, before)) = self.last[axis].replace((tick, by)) {
                 let ticks = tick - last;
                 // Each step of a stop that nobody asked for is exact to a sixteenth of an interval.
-                let fast = before == by && ticks + 3 + self.fastest / 8 < self.fastest;
+                let fast = before == by && ticks + self.rounding + self.fastest / 8 < self.fastest;
                 assert!(!fast, "{ticks} ticks of axis {axis}");
             }
         }
@@ -247,7 +248,7 @@ pub fn axes(mut data: &[u8]) {
     let path = Path::<2, 4>::new(Clock::MICROSECONDS, axes, deviation).expect("a speed below the clock's");
     let queue = AxesQueue::<2, SLOTS_OF_AN_AXIS>::new();
     let (axes, timer) = Axes::new(&queue, path);
-    let mut both = Halves::new(axes, timer, speed, 2000);
+    let mut both = Halves::new(axes, timer, speed, 3, 2000);
     while let [command, a, b, rest @ ..] = data {
         data = rest;
         let to = [a, b].map(|value| i64::from(i8::from_le_bytes([*value])) * 20);

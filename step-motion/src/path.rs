@@ -1,6 +1,7 @@
 //! Straight lines in several axes, one after another.
 
 mod corner;
+mod cut;
 mod run;
 
 use crate::curve::{Curve, Piece};
@@ -11,6 +12,8 @@ use crate::plan::{checked, clamp};
 use crate::planner::Motion;
 use crate::real::Real;
 use servowire_core::Direction;
+
+pub(crate) use cut::Leaving;
 
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,16 +61,6 @@ pub(super) struct Course {
     pub(super) whole: bool,
     /// Number of lines that it covers after the first one.
     pub(super) more: usize,
-}
-
-/// How a stop leaves the lines of its first curve.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Leaving {
-    /// Lines after the first one.
-    pub(super) more: usize,
-    pub(super) exit: Real,
-    /// The limits of the run that they belong to, if that run has been planned again.
-    pub(super) bounds: Option<Bounds>,
 }
 
 /// A queue of up to `M` straight lines in `N` axes.
@@ -378,68 +371,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// Returns the line that was cut off, and the place on it.
-    pub(super) fn end_of_cut(&self) -> Option<(usize, Real)> {
-        (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
-    }
-
-    /// Returns the position in whole steps at a place on line `at`, if the first line begins at `from`.
-    /// `made`: the steps made on the first line, which cannot be undone.
-    pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
-        let mut to = from;
-        for i in 0..=at {
-            let Some(line) = self.line(i) else { break };
-            let mut ends = if i == at { line.steps_at(place) } else { line.ends };
-            if i == 0 {
-                ends = at_least(ends, made);
-            }
-            for ((to, end), steps) in to.iter_mut().zip(ends).zip(line.steps) {
-                let way = i64::from(end);
-                *to = to.saturating_add(if steps < 0 { way.wrapping_neg() } else { way });
-            }
-        }
-        to
-    }
-
-    /// Cuts the queue off at a place on line `at`, if the first line begins at `from` and a stop leaves it as `first` says.
-    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], first: Leaving) {
-        self.target = self.place((at, place), from, made);
-        let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
-        for i in 0..self.len {
-            if i > end && i <= at {
-                let course = self.begin(i, speed, None);
-                (end, speed, bounds) = course.map_or((i, speed, None), |(course, bounds)| {
-                    (i.saturating_add(course.more), course.exit, Some(bounds))
-                });
-            }
-            let mut entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
-            if let (Some(Some(line)), Some(bounds)) = (&mut entry, bounds.filter(|_| i <= end)) {
-                // The stop must stay the same when its run gets shorter.
-                line.bounds = bounds;
-            }
-            match entry {
-                Some(Some(line)) if i < at && i == end => line.leave = line.leave.or(Some(speed)),
-                Some(Some(_)) if i < at => {}
-                Some(Some(line)) if i == at => {
-                    line.ends = line.steps_at(place);
-                    if i == 0 {
-                        line.ends = at_least(line.ends, made);
-                    }
-                    (line.length, line.cut) = (place.min(line.length), true);
-                }
-                Some(entry) => *entry = None,
-                None => {}
-            }
-        }
-        (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
-        // Lines that were cut off turn no axis.
-        let mut ways = self.gone;
-        for line in (0..self.len).filter_map(|at| self.line(at)) {
-            gone_along(&mut ways, &line.made());
-        }
-        self.ways = ways;
-    }
-
     /// Empties the queue, at rest at a position from a moment onwards.
     pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
         (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
@@ -497,13 +428,4 @@ fn gone_along<const N: usize>(ways: &mut [Option<Direction>; N], steps: &[i32; N
     for (way, &steps) in ways.iter_mut().zip(steps).filter(|(_, steps)| **steps != 0) {
         *way = Some(Direction::of(steps.into()));
     }
-}
-
-/// Raises the steps to those already made: a step falls into the nearest tick, so it may have been made before its place
-/// was reached.
-fn at_least<const N: usize>(mut ends: [u32; N], made: [u32; N]) -> [u32; N] {
-    for (end, made) in ends.iter_mut().zip(made) {
-        *end = made.max(*end);
-    }
-    ends
 }

@@ -11,7 +11,7 @@ use crate::real::Real;
 
 /// Consecutive lines of the queue.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Run {
+pub(crate) struct Run {
     /// Lines after the first one.
     more: usize,
     length: Real,
@@ -82,7 +82,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         (part, present, brakes): (Option<Real>, Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
-        let Some(part) = part else { return self.brake(at, start, (place, before), (present, brakes)) };
+        let Some(part) = part else {
+            // If it does not fit, as far as it can to the end of the run.
+            return self.stop(at, start, (place, before), (present, brakes), false)?.map_or_else(
+                |(run, own)| {
+                    let left = (run.length + before) - place;
+                    self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
+                },
+                Some,
+            );
+        };
         let run = self.run(at, Some(part), self.under_way(at, start, present)?, (M, false))?;
         let left = (run.length + before) - place;
         let most = self.exit(at.saturating_add(run.more), part);
@@ -105,26 +114,10 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some((fastest, held))
     }
 
-    /// Plans a stop on the lines of a run; if it does not fit, brakes as far as it can to their end.
-    fn brake(
-        &self,
-        at: usize,
-        start: Motion,
-        from: (Real, Real),
-        how: (Option<Bounds>, bool),
-    ) -> Option<(Course, Bounds)> {
-        match self.stop_within(at, start, from, how, false)? {
-            Ok(stop) => Some(stop),
-            Err((run, own)) => {
-                let left = (run.length + from.1) - from.0;
-                self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
-            }
-        }
-    }
-
-    /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same, or any lines. If it does not fit, returns
-    /// the longest run that there is, with the limits on it.
-    fn stop_within(
+    /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with `any`, lines that may
+    /// allow other accelerations, within the least of all of them. If it does not fit, returns the longest run that there is,
+    /// with the limits on it.
+    pub(crate) fn stop(
         &self,
         at: usize,
         start: Motion,
@@ -158,20 +151,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(Err((run, own)))
     }
 
-    /// Plans a stop on one curve over lines that may allow other accelerations, within the least of all of them; `None` if
-    /// it does not fit.
-    pub(crate) fn stop_on_any(
-        &self,
-        at: usize,
-        start: Motion,
-        from: (Real, Real),
-        how: (Option<Bounds>, bool),
-    ) -> Option<(Course, Bounds)> {
-        self.stop_within(at, start, from, how, true)?.ok()
-    }
-
-    /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is. `own` and
-    /// `wish` go into the course.
+    /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is.
+    /// `own` and `wish` go into the course.
     fn leave(
         &self,
         at: usize,

@@ -77,7 +77,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop };
         // At each joint it would have acceleration 0; on one curve it may be shorter.
-        let once = self.path.stop_on_any(0, motion, from, how).map(planned);
+        let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
         once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
     }
 

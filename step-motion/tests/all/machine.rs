@@ -24,6 +24,8 @@ impl<const N: usize, const S: usize> Timer for AxesTimer<'_, N, S> {
 
 /// A background half of `N` axes.
 pub(crate) trait Background<const N: usize> {
+    /// More slices than it needs at once.
+    const SLICES: u32;
     /// Does a slice of its work.
     fn slice(&mut self) -> Work;
     /// The steps that it knows of.
@@ -31,6 +33,8 @@ pub(crate) trait Background<const N: usize> {
 }
 
 impl<const S: usize> Background<1> for Axis<'_, S> {
+    const SLICES: u32 = 1000;
+
     fn slice(&mut self) -> Work {
         self.poll()
     }
@@ -41,6 +45,8 @@ impl<const S: usize> Background<1> for Axis<'_, S> {
 }
 
 impl<const N: usize, const M: usize, const S: usize> Background<N> for Axes<'_, N, M, S> {
+    const SLICES: u32 = 20_000;
+
     fn slice(&mut self) -> Work {
         self.poll()
     }
@@ -121,7 +127,7 @@ impl<T: Timer, const N: usize> Machine<T, N> {
     }
 
     /// The background in time: called every so many ticks, until it is at rest or a time comes.
-    pub(crate) fn run(&mut self, background: &mut impl Background<N>, every: u64, until: u64) -> Work {
+    pub(crate) fn run<B: Background<N>>(&mut self, background: &mut B, every: u64, until: u64) -> Work {
         loop {
             let mut calls = 0;
             let work = loop {
@@ -129,7 +135,7 @@ impl<T: Timer, const N: usize> Machine<T, N> {
                     Work::More => calls += 1,
                     other => break other,
                 }
-                assert!(calls < 20_000, "the background does not end");
+                assert!(calls < B::SLICES, "the background does not end");
             };
             if self.now >= until || work == Work::Rest {
                 return work;

@@ -337,8 +337,7 @@ fn refused_with_slots<const S: usize>() -> bool {
 #[test]
 fn few_slots_cost_exactness_and_never_a_step() {
     assert!(refused_with_slots::<9>());
-    for refused in [refused_with_slots::<15>(), refused_with_slots::<61>(), refused_with_slots::<129>()] {
-        println!("{refused}");
-    }
+    // Either is right between them.
+    let _ = [refused_with_slots::<15>(), refused_with_slots::<61>(), refused_with_slots::<129>()];
     assert!(!refused_with_slots::<257>());
 }
