@@ -128,10 +128,15 @@ impl Decoder {
     fn stray(&self, line: &Piece) -> Event {
         let (len, usual) = (line.bytes.len(), self.blocks.line());
         let class = if len < usual { "truncated" } else { "too_long" };
-        let place = line.time.map_or(Place::Line(line.line), |time| Place::Time { start: time, end: time });
-        let bytes = Field::digits("bytes", line.bytes.iter().copied(), 2);
         let reason = format!("{len} bytes among lines of {usual}: it is not known where a block begins in them");
-        Event::new(place, None, "line", vec![bytes], Refusal::new(class, reason).into())
+        Self::unread(line, "line", (class, reason))
+    }
+
+    /// Describes bytes of which nothing can be told: neither drive nor direction.
+    fn unread(piece: &Piece, kind: &'static str, (class, reason): (&'static str, String)) -> Event {
+        let place = piece.time.map_or(Place::Line(piece.line), |time| Place::Time { start: time, end: time });
+        let bytes = Field::digits("bytes", piece.bytes.iter().copied(), 2);
+        Event::new(place, None, kind, vec![bytes], Refusal::new(class, reason).into())
     }
 
     /// Decodes a block, or whatever is in its place.
@@ -165,6 +170,11 @@ impl Decoder {
     }
 
     fn block(&mut self, piece: &Piece, block: &[u8], report: &Report) -> Option<Event> {
+        if let Some((a, b)) = self.blocks.doubt() {
+            let event = Self::unread(piece, "block", ("shape", either(a, b)));
+            self.place = event.place;
+            return Some(event);
+        }
         let header = Header::parse(block.first().copied()?);
         if self.settings.mac_id.is_some_and(|only| only != header.mac_id.get()) {
             return None;
@@ -172,8 +182,7 @@ impl Decoder {
         let (place, counted) = self.place(piece, header);
         self.place = place;
         let (mut fields, mut happened) = (Vec::new(), Vec::new());
-        let doubt = self.blocks.doubt();
-        if doubt.is_none() && is_block(report) {
+        if is_block(report) {
             let findings: Vec<LogFinding> = self.analysis.block(block).collect();
             let before = self.last.insert(header.emit() & 0x9f, *report);
             match &before {
@@ -189,10 +198,9 @@ impl Decoder {
         }
         let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
         let kind = format!("{word} {}", header.mac_id);
-        let verdict = match (doubt, piece.direction.filter(|told| *told != direction)) {
-            (Some((a, b)), _) => Refusal::new("shape", either(a, b)).into(),
-            (None, Some(_)) => turned_round(header.response),
-            (None, None) => verdict(report),
+        let verdict = match piece.direction.filter(|told| *told != direction) {
+            Some(_) => turned_round(header.response),
+            None => verdict(report),
         };
         if let Verdict::Refused(refusal) = &verdict {
             happened.push(format!("refused: {}", refusal.reason));
@@ -204,8 +212,7 @@ impl Decoder {
             Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
         });
         let address = Some(header.mac_id.get().into());
-        let position = position(report).filter(|_| doubt.is_none());
-        Some(Event { position, address, happened, counted, ..event })
+        Some(Event { position: position(report), address, happened, counted, ..event })
     }
 }
 

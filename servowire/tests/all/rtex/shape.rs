@@ -87,9 +87,12 @@ fn a_log_that_may_have_either_of_two_shapes() {
     let options = ["--protocol", "rtex", "--bytes", "--json"];
     let run = bench.decode("log.txt", lines(&standing(60)), &options);
     assert!(run.code != 0 && run.err.contains("nothing in it tells which"), "{} {}", run.code, run.err);
-    let blocks: Vec<_> = run.json().into_iter().filter(|event| event["kind"] == "cmd 5").collect();
+    let blocks: Vec<_> = run.json().into_iter().filter(|event| event["kind"] == "block").collect();
     assert!(blocks.len() > 50 && blocks.iter().all(|event| event["verdict"] == "shape"), "{:?}", run.verdicts());
-    assert!(run.json().iter().all(|event| event["position"].is_null()));
+    assert!(run.json().iter().all(|event| event["position"].is_null() && event["address"].is_null()));
+    // Nor are there figures of a drive.
+    let figures = bench.decode("log.txt", lines(&standing(60)), &["--protocol", "rtex", "--bytes", "--stats"]);
+    assert!(!figures.out.contains("drive") && !figures.out.contains("address"), "{}", figures.out);
     // What follows is told once the motor turns: from there on it is shown.
     let turning: Vec<u8> = (1..=200_u8)
         .flat_map(|k| {
