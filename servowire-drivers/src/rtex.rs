@@ -16,9 +16,10 @@
 //! internal-timer system the ASIC switches it at XSYNC if the exchange is late. Half of the blocks would then come from another
 //! frame. The counter echoes of one frame are equal, so the exchange compares those of what it has read, reads one block
 //! again, looks at [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails
-//! again, each axis takes its block only if it is on time ([`Arrival`](rtex_block::master::Arrival)); if two frames have the
-//! same counter (two communications per update period) and the bank was switched in between, none is taken. System Design
-//! Guide for Master, chapters 1 and 2.
+//! again, every block is read a third time, and one whose echo has changed is not taken, because it may be the halves of two; of
+//! the others, each axis takes its block only if it is on time ([`Arrival`](rtex_block::master::Arrival)). If the receive
+//! interrupt came meanwhile, none is taken: with two communications per update period, two frames have the same counter. System
+//! Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
 //! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place
@@ -32,7 +33,7 @@ mod port;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
+use rtex_block::master::{Arrival, Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
 use rtex_block::{BlockSize, Command32, Evidence, MacId, pack};
 use servowire_core::{ClockCheck, ClockError};
 
@@ -46,7 +47,7 @@ pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infall
 
 /// Number of words in the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
-/// How many times an exchange reads the blocks if the bank is switched meanwhile.
+/// How many times an exchange reads the blocks if they are not of one frame.
 const READS: u8 = 2;
 
 /// Repeats an access if the port reports a fault, because half a command must not be sent.
@@ -220,11 +221,12 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.clear();
     }
 
-    /// Reads the blocks of one frame, if possible.
+    /// Reads the blocks of one frame, if possible; otherwise those that are surely not halves of two.
     fn read(&mut self) -> Read<P, N> {
         let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None };
+        let mut frames = self.received.get();
         for _ in 0..READS {
-            let frames = self.received.get();
+            frames = self.received.get();
             read.fault = None;
             for (place, heard) in read.heard.iter_mut().enumerate() {
                 *heard = self.block(place).unwrap_or_else(|fault| {
@@ -233,15 +235,19 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
                 });
             }
             let mixed = self.master.ring().is_torn(&read.heard) || self.has_changed(&read.heard);
-            let switched = self.received.get() != frames;
-            read.torn = mixed || switched;
+            read.torn = mixed || self.received.get() != frames;
             if !read.torn {
-                break;
+                return read;
             }
-            if switched && !mixed {
-                // They look like one frame and are not.
-                read.heard = [Heard::Nothing; N];
+        }
+        for (place, heard) in read.heard.iter_mut().enumerate() {
+            if !self.is_still(place, heard) {
+                *heard = Heard::Nothing;
             }
+        }
+        if self.received.get() != frames {
+            // They may look like one frame and are not.
+            read.heard = [Heard::Nothing; N];
         }
         read
     }
@@ -257,12 +263,20 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.check.check(self.clock.now_ns()?)
     }
 
-    /// Returns whether a block that was read now has another echo, which means that the bank was switched in the middle of the
-    /// last block.
+    /// Returns whether a block has another echo now, which means that the bank was switched, perhaps in the middle of the last block.
+    /// The echo of a drive that was not on time before may stand still.
     fn has_changed(&mut self, heard: &[Heard; N]) -> bool {
+        let axes = self.master.ring().axes();
+        let mut good = heard.iter().enumerate().filter(|(_, heard)| heard.response().is_some());
+        let lives = |place: usize| axes.get(place).is_some_and(|axis| axis.arrival() == Arrival::OnTime);
+        let first = good.clone().find(|(place, _)| lives(*place)).or(good.next());
+        first.is_some_and(|(place, before)| !self.is_still(place, before))
+    }
+
+    /// Returns whether a further reading of a block has the same echo. One that fails is no proof of that.
+    fn is_still(&mut self, place: usize, before: &Heard) -> bool {
         let echo = |heard: &Heard| heard.response().map(|response| response.update_counter_echo);
-        let first = heard.iter().enumerate().find_map(|(place, heard)| Some((place, echo(heard)?)));
-        first.is_some_and(|(place, before)| self.block(place).is_ok_and(|now| echo(&now) != Some(before)))
+        self.block(place).is_ok_and(|now| echo(&now) == echo(before))
     }
 
     fn block(&mut self, place: usize) -> Result<Heard, P::Error> {

@@ -1,6 +1,7 @@
 //! A ring with its communication ASIC: banks of memory, frames, interrupts, and time that goes on with every access.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::rc::Rc;
 
@@ -53,8 +54,12 @@ pub struct Ring {
     pub interrupt_waits: bool,
     /// Frames of which the host has read blocks since the exchange began.
     pub read_of: Vec<u32>,
+    /// The positions in the blocks of the last frames.
+    pub positions: VecDeque<[i32; AXES]>,
     /// Faults: calls of the port until one fails, frames that are lost, a stall at an access.
     pub fail_in: Option<u32>,
+    /// The call after the one that fails does so too.
+    pub fail_again: bool,
     /// Places that cannot be written, or read, at all.
     pub dead: Option<usize>,
     pub deaf: Option<usize>,
@@ -92,7 +97,9 @@ impl Ring {
             in_exchange: false,
             interrupt_waits: false,
             read_of: Vec::new(),
+            positions: VecDeque::new(),
             fail_in: None,
+            fail_again: false,
             dead: None,
             deaf: None,
             lose_frames: 0,
@@ -154,6 +161,8 @@ impl Ring {
             }
         }
         self.hidden = Answers { frame: self.frames, blocks };
+        self.positions.truncate(15);
+        self.positions.push_front(blocks.map(|block| i32::from_le_bytes([block[4], block[5], block[6], block[7]])));
         if self.external {
             // The receive interrupt has the highest priority.
             self.reception.add();
@@ -185,7 +194,7 @@ impl Ring {
         self.pass(self.now_ns + stall_ns + ACCESS_NS * words as u64);
         match &mut self.fail_in {
             Some(0) => {
-                self.fail_in = None;
+                self.fail_in = std::mem::take(&mut self.fail_again).then_some(0);
                 Err(())
             }
             Some(left) => {

@@ -180,3 +180,72 @@ fn blocks_that_only_look_like_one_frame_are_not_taken() {
         assert_eq!(update(), (true, false), "{period}");
     }
 }
+
+/// The echo of a drive stands still, so no reading looks like one frame, or one that is of two does, and the bank is switched in the
+/// middle of a block: a position is never put together from the halves of two.
+#[test]
+fn no_position_is_made_of_two_halves() {
+    let mut halves = 0;
+    for (external, still) in
+        [true, false].into_iter().flat_map(|external| (0..AXES).map(move |still| (external, still)))
+    {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        // Both words of a position change in each period.
+        let run = |driver: &mut Rtex<u16>, periods: u16| {
+            for _ in 0..periods {
+                for place in (0..AXES).filter(|place| *place != still) {
+                    let axis = &mut driver.ring_mut().axes_mut()[place];
+                    axis.set_position(axis.setpoint().wrapping_add(0x1_8001)).unwrap();
+                }
+                update(&ring, driver).unwrap();
+                for (place, axis) in driver.master().ring().axes().iter().enumerate() {
+                    let position = axis.evidence().at(0, Policy::new(u64::MAX)).unwrap().position();
+                    let ring = ring.borrow();
+                    let known = ring.positions.iter().map(|frame| frame[place]);
+                    assert!(known.clone().any(|it| it == position), "{position} of {:?}", known.collect::<Vec<_>>());
+                }
+            }
+        };
+        for (at, periods) in (0..100).flat_map(|at| (1..LIMIT - 1).map(move |periods| (at, periods))) {
+            ring.borrow_mut().drives[still].set_fault(Fault::StaleEcho);
+            run(&mut driver, periods);
+            ring.borrow_mut().stall_in = Some((at, if external { 29_000 } else { 499_000 }));
+            run(&mut driver, 1);
+            halves += usize::from(ring.borrow().read_of.windows(2).any(|two| two[0] != two[1]));
+            heal(&ring);
+            ring.borrow_mut().drives[still].set_fault(Fault::None);
+            run(&mut driver, 6);
+            assert_eq!(driver.master().ring().failure(), None, "{external} {still} {at} {periods}");
+        }
+    }
+    assert!(halves > 1_400, "{halves}");
+}
+
+/// The port fails when the first block is read again at the end, which alone tells that the bank was switched in the middle of the
+/// last one.
+#[test]
+fn a_block_that_cannot_be_read_again_is_no_proof() {
+    let ring = Ring::new(false, false);
+    let mut driver = on::<u16>(&ring);
+    let words = AXES as u32 * 8;
+    for at in 1..8 {
+        {
+            let mut ring = ring.borrow_mut();
+            ring.stall_in = Some((words - 8 + at, 499_000));
+            (ring.fail_in, ring.fail_again) = (Some(words), true);
+        }
+        let exchanged = update(&ring, &mut driver);
+        let read = std::mem::take(&mut ring.borrow_mut().read_of);
+        heal(&ring);
+        let last = driver.master().ring().axes()[AXES - 1].arrival();
+        // The first reading, and the second one if there was one.
+        let halves = |reading: &[u32]| reading[2 * 8..].windows(2).any(|two| two[0] != two[1]);
+        let taken = &read[if read.len() > 3 * 8 { read.len() - 4 * 8 } else { 0 }..][..3 * 8];
+        assert!(halves(&read[..3 * 8]), "{at}: {read:?}");
+        assert!(last != Arrival::OnTime || !halves(taken), "{at}: {exchanged:?} {read:?}");
+        for _ in 0..3 {
+            update(&ring, &mut driver).unwrap();
+        }
+    }
+}
