@@ -311,13 +311,14 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         if let Some(ticket) = self.halt {
             return self.confirm(ticket);
         }
-        let (place, idle) = self.place();
         if self.pending && self.is_in(1_usize.wrapping_sub(self.block)) {
             (self.pending, self.standing) = (false, false);
             if let Some(out) = self.outs.get_mut(self.block) {
                 out.valid = false;
             }
         }
+        // Read after that: the interrupt may come at any time, and where it has been before the block is no rest in it.
+        let (place, idle) = self.place();
         if let Some((block, place)) = place.filter(|_| !self.standing) {
             if self.outs.get(block).is_some_and(|out| place >= out.len) {
                 // The interrupt has found nothing but the stop.

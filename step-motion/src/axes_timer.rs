@@ -1,9 +1,10 @@
 //! The interrupt half of a path: the step timers of all its axes on one clock.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{Ordering, fence};
 
 use crate::queue::{JOINT, Queue, REST};
 use crate::step_timer::StepTimer;
+use crate::word::Word;
 
 /// Segments between [`Axes`](crate::Axes) in the background and an [`AxesTimer`] in an interrupt: a [`Queue`] of `S` slots for each of
 /// `N` axes, 1 to 16.
@@ -14,7 +15,7 @@ pub struct AxesQueue<const N: usize, const S: usize> {
     pub(crate) axes: [Queue<S>; N],
     /// The slot at which the next block begins in all axes; [`REST`] if it follows a stop rather than a block; and from bit
     /// [`TURN`] up, a number that changes with each block. One store therefore lets all axes in.
-    pub(crate) gate: AtomicU32,
+    pub(crate) gate: Word,
 }
 
 /// The lowest bit of a gate's number, and how many such numbers there are.
@@ -25,7 +26,7 @@ impl<const N: usize, const S: usize> AxesQueue<N, S> {
     /// Empty.
     pub const fn new() -> Self {
         const { assert!(N >= 1 && N <= 16, "1 to 16 axes") };
-        Self { axes: [const { Queue::new() }; N], gate: AtomicU32::new(0) }
+        Self { axes: [const { Queue::new() }; N], gate: Word::new(0) }
     }
 }
 
@@ -169,6 +170,8 @@ impl<'q, const N: usize, const S: usize> AxesTimer<'q, N, S> {
             axis.halted(ticket);
             *wait = 0;
         }
+        // What was let in before the halt is over with it, also where the background runs on another core.
+        fence(Ordering::Acquire);
         (self.wait, self.taken) = (0, self.queue.gate.load(Ordering::Relaxed));
         FiredAxes { steps: 0, reverse: self.reverse, wait: 0 }
     }

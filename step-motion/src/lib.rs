@@ -29,6 +29,7 @@ mod reloads;
 mod slope;
 mod step_timer;
 mod stepper;
+mod word;
 mod writer;
 
 pub use arc::{Arc, Turning};

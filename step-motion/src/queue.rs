@@ -9,6 +9,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use crate::word::Word;
+
 /// Some steps whose intervals change by the second and third differences of their times. Times are in 2^-32 ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Segment {
@@ -81,7 +83,7 @@ pub(crate) const TICKET: u32 = 16;
 #[derive(Debug)]
 pub(crate) struct Slot {
     pub(crate) head: AtomicU32,
-    pub(crate) next: AtomicU32,
+    pub(crate) next: Word,
     first: [AtomicU32; 2],
     interval: [AtomicU32; 2],
     add: [AtomicU32; 2],
@@ -96,7 +98,7 @@ impl Slot {
         const fn pair() -> [AtomicU32; 2] {
             [word(0), word(0)]
         }
-        Self { head: word(1), next: word(NONE), first: pair(), interval: pair(), add: pair(), bend: pair() }
+        Self { head: word(1), next: Word::new(NONE), first: pair(), interval: pair(), add: pair(), bend: pair() }
     }
 
     #[inline(always)]
@@ -149,11 +151,11 @@ impl Slot {
 pub struct Queue<const N: usize> {
     pub(crate) slots: [Slot; N],
     /// Where the reader is.
-    pub(crate) current: AtomicU32,
+    pub(crate) current: Word,
     /// Steps made, forward minus reverse, modulo 2^32.
-    pub(crate) made: AtomicU32,
+    pub(crate) made: Word,
     /// The ticket of a halt if not 0: no further step.
-    pub(crate) halt: AtomicU32,
+    pub(crate) halt: Word,
 }
 
 impl<const N: usize> Queue<N> {
@@ -163,12 +165,7 @@ impl<const N: usize> Queue<N> {
     /// Creates an empty queue.
     pub const fn new() -> Self {
         const { assert!(N >= 9 && N < 1 << 16, "9 to 65535 slots") };
-        Self {
-            slots: [const { Slot::new() }; N],
-            current: AtomicU32::new(IDLE),
-            made: AtomicU32::new(0),
-            halt: AtomicU32::new(0),
-        }
+        Self { slots: [const { Slot::new() }; N], current: Word::new(IDLE), made: Word::new(0), halt: Word::new(0) }
     }
 
     /// Returns the slot at a place of a block.

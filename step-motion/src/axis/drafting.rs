@@ -53,6 +53,8 @@ impl<const N: usize> Axis<'_, N> {
             if running.is_some() {
                 return Work::Later;
             }
+            // It may have made steps since the first look.
+            self.look();
             self.mover.rest_at(self.position, tick(self.end.end));
             self.lost = false;
         }
