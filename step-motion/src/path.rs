@@ -288,9 +288,10 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(())
     }
 
-    /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again.
-    pub(super) fn hurry(&mut self, limits: &[Limits; N]) {
-        let own = self.axes;
+    /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again. Returns the lines
+    /// as they were.
+    pub(super) fn hurry(&mut self, limits: &[Limits; N]) -> [Option<Line<N>>; M] {
+        let (own, lines) = (self.axes, self.lines);
         for (axis, limits) in self.axes.iter_mut().zip(limits) {
             axis.limits = axis.limits.or_higher(*limits);
         }
@@ -303,6 +304,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
         }
         self.axes = own;
+        lines
+    }
+
+    /// Takes the lines as they were before [`hurry`](Self::hurry).
+    pub(super) const fn calm(&mut self, lines: [Option<Line<N>>; M]) {
+        self.lines = lines;
     }
 
     /// Returns the steps of each axis from one position to another.

@@ -239,18 +239,19 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if self.line.is_none() {
             return self.stop(now);
         }
-        let before = if self.stopping { self.path.end_of_cut() } else { None };
+        let plain = self.stop_from(now).map(|stop| (self.rest_of(&stop), stop));
+        let (stopping, lines) = (self.stopping, self.path.hurry(&limits));
         (self.stopping, self.quick) = (false, true);
-        self.path.hurry(&limits);
-        match (self.stop_from(now), before) {
-            (Some(stop), Some(before)) if before < stop.end => {
-                self.path.cut(before, self.begun(), self.made, self.leaving());
-                self.stopping = true;
-                self.plan(now);
-                self.settle();
+        let Some(stop) = self.stop_from(now) else { return self.leave(self.tick(now)) };
+        // Who brakes harder before a corner comes to the line behind it later, which may allow more.
+        let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
+        match plain.filter(|(rest, plain)| *rest < latest || plain.end < stop.end) {
+            Some((_, plain)) => {
+                self.path.calm(lines);
+                self.stopping = stopping;
+                self.leave_at(&plain);
             }
-            (Some(stop), _) => self.leave_at(&stop),
-            (None, _) => self.leave(self.tick(now)),
+            None => self.leave_at(&stop),
         }
     }
 

@@ -202,16 +202,19 @@ impl<const N: usize, const M: usize> Path<N, M> {
         ))
     }
 
-    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`.
-    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> (usize, Real) {
+    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`; and how long
+    /// it takes from there.
+    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> ((usize, Real), Real) {
+        let mut time = Real::ZERO;
         while let Some((Course { curve, exit, more, .. }, _)) = self.begin(at, speed, None) {
+            time = time + curve.time;
             if exit.is_zero() {
-                return self.locate(at, curve.way(), at.saturating_add(more));
+                return (self.locate(at, curve.way(), at.saturating_add(more)), time);
             }
             (at, speed) = (at.saturating_add(more).saturating_add(1), exit);
         }
         let last = self.len.saturating_sub(1);
-        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
+        ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
     }
 
     /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time; worked out from the

@@ -75,10 +75,26 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if exit.is_zero() {
             return Some(stop);
         }
-        let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit), ..stop };
+        let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit).0, ..stop };
         // At each joint it would have acceleration 0; on one curve it may be shorter.
         let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
         once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
+    }
+
+    /// Returns the moment at which a stop comes to rest.
+    pub(super) fn rest_of(&self, stop: &Stop<N>) -> u64 {
+        let first = match &stop.first {
+            Some((Course { curve, .. }, start, _)) => {
+                let time = start.offset + (curve.time - curve.skipped.0);
+                start.moment.saturating_add(time.to_fixed(0))
+            }
+            None => self.line.as_ref().map_or(0, LinePulses::over),
+        };
+        let Leaving { more, exit, .. } = stop.left;
+        if exit.is_zero() {
+            return first;
+        }
+        first.saturating_add(self.path.end_of_stop(more.saturating_add(1), exit).1.to_fixed(0))
     }
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along

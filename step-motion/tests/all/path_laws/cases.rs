@@ -273,3 +273,32 @@ fn a_stop_over_a_corner_is_not_later_than_a_hold() {
     let stop = rest(machine);
     assert!(stop.0 == hold.0 && stop.1 <= hold.1 + 7, "{stop:?} {hold:?}");
 }
+
+/// Harder brakes before a corner, and a line behind it that allows more: who comes there later is at rest later, so the quick stop is as the hold.
+#[test]
+fn a_quick_stop_before_a_corner_is_not_later_than_a_hold() {
+    let limits = |v, a| Limits::new(v, a).unwrap();
+    let mild = [AxisSetup::new(limits(500, 500_758), 13_490), AxisSetup::new(limits(49, 999), 2809)];
+    let jerk = limits(49, 9_066_448).with_jerk(15_876_333_851).unwrap();
+    let near = [AxisSetup::new(limits(36_054, 25_448), 87_100), AxisSetup::new(jerk, 999)];
+    for (hz, axes, deviation, lines, now, quick) in [
+        (1000, mild, 34, [([-3, 3], 17_833, 0), ([-660, 0], 91_673, 0)], 68, 1593),
+        (1_000_000, near, 1, [([-614, 1], 137_570, 0), ([-2, 180], 36_018, 214_656)], 214_657, 999),
+    ] {
+        let mut machine = Machine::new(Path::new(Clock::new(hz).unwrap(), axes, deviation).unwrap());
+        for (to, feed, at) in lines {
+            while machine.due().is_some_and(|due| due <= at) {
+                machine.pulse();
+            }
+            machine.push(to, feed, at).unwrap();
+        }
+        while machine.due().is_some_and(|due| due <= now) {
+            machine.pulse();
+        }
+        let mut held = machine.clone();
+        held.hold(now);
+        machine.quick_stop([limits(1, 999), limits(1, quick)], now);
+        let [quick, held] = [ending(&machine, now), ending(&held, now)];
+        assert!(quick.is_within(held, 0, 2), "{quick:?}, {held:?} of a hold");
+    }
+}
