@@ -3,8 +3,11 @@
 
 use std::boxed::Box;
 use std::rc::Rc;
+use std::vec;
 
 use core::cell::RefCell;
+
+use proptest::prelude::*;
 
 use super::watched::interrupt;
 use crate::{Axes, AxesQueue, Axis, AxisSetup, Clock, Limits, Path, Queue, Work};
@@ -15,7 +18,10 @@ const SLOTS: usize = 41;
 /// What happens to the machine.
 #[derive(Debug, Clone, Copy)]
 enum Event {
+    /// A line, which may be refused; a new target.
     To([i64; N]),
+    Away([i64; N]),
+    Quick,
     Hold,
     Resume,
     Stop,
@@ -46,7 +52,8 @@ impl Background for Axis<'static, SLOTS> {
 
     fn ask(&mut self, event: Event) {
         match event {
-            Event::To([to, _]) => self.move_to(to).unwrap(),
+            Event::To([to, _]) | Event::Away([to, _]) => _ = self.move_to(to),
+            Event::Quick => self.quick_stop(Limits::new(1, 9_000_000).unwrap()),
             Event::Hold => self.hold(),
             Event::Resume => self.resume(),
             Event::Stop => self.stop(),
@@ -72,7 +79,9 @@ impl Background for Axes<'static, N, 4, SLOTS> {
 
     fn ask(&mut self, event: Event) {
         match event {
-            Event::To(to) => self.push(to, 250_000).unwrap(),
+            Event::To(to) => _ = self.push(to, 250_000),
+            Event::Away(to) => _ = self.move_to(to, 250_000),
+            Event::Quick => self.quick_stop([Limits::new(1, 9_000_000).unwrap(); N]),
             Event::Hold => self.hold(),
             Event::Resume => self.resume(),
             Event::Stop => self.stop(),
@@ -92,6 +101,7 @@ impl Background for Axes<'static, N, 4, SLOTS> {
 }
 
 type Fire = Box<dyn FnMut() -> (u16, u16, u32)>;
+type Halves = (Box<dyn Background>, Fire);
 
 /// The interrupt, and when it comes.
 struct Interrupt {
@@ -102,12 +112,9 @@ struct Interrupt {
     steps: u64,
     last: [Option<(u64, bool)>; N],
     reverse: u16,
-    /// Accesses of the background so far; that before which events come, and how many.
+    /// Accesses of the background so far.
     accesses: u32,
-    at: u32,
-    events: u32,
-    /// One event in so many accesses; 0 for none.
-    pace: u32,
+    times: Times,
 }
 
 impl Interrupt {
@@ -138,9 +145,11 @@ impl Interrupt {
     }
 
     fn access(&mut self) {
-        if self.accesses == self.at {
-            self.events(self.events);
-        } else if self.pace > 0 && self.accesses % self.pace == 0 {
+        let Times { at, events, pace, .. } = self.times;
+        if self.accesses == at {
+            self.events(events);
+            self.times.at = at.saturating_add(self.times.every);
+        } else if pace > 0 && self.accesses % pace == 0 {
             self.events(1);
         }
         self.accesses += 1;
@@ -152,32 +161,43 @@ struct Bench {
     interrupt: Rc<RefCell<Interrupt>>,
 }
 
-/// When the interrupt comes: before which access of the background and how many times, and how often beside that.
+/// When the interrupt comes: before which accesses of the background and how many times, and how often beside that.
 #[derive(Debug, Clone, Copy)]
 struct Times {
     at: u32,
+    every: u32,
     events: u32,
+    /// One event in so many accesses; 0 for none.
     pace: u32,
 }
 
+impl Times {
+    const fn once(at: u32, events: u32, pace: u32) -> Self {
+        Self { at, every: u32::MAX, events, pace }
+    }
+}
+
 impl Bench {
-    fn new((background, fire): (Box<dyn Background>, Fire), Times { at, events, pace }: Times) -> Self {
+    fn new((background, fire): Halves, times: Times) -> Self {
         let (position, last) = ([0; N], [None; N]);
-        let (running, now, steps, reverse, accesses) = (false, 0, 0, 0, 0);
-        let new = Interrupt { fire, running, now, position, steps, last, reverse, accesses, at, events, pace };
+        let new = Interrupt { fire, running: false, now: 0, position, steps: 0, last, reverse: 0, accesses: 0, times };
         Self { background, interrupt: Rc::new(RefCell::new(new)) }
     }
 
-    /// A slice of the background, in which the interrupt may come.
-    fn slice(&mut self) -> Work {
+    /// The background does something, in which the interrupt may come.
+    fn does<T>(&mut self, what: impl FnOnce(&mut dyn Background) -> T) -> T {
         let own = Rc::clone(&self.interrupt);
         interrupt(Some(Box::new(move || own.borrow_mut().access())));
-        let work = self.background.poll();
+        let result = what(&mut *self.background);
         interrupt(None);
+        assert_eq!(self.background.made(), self.interrupt.borrow().position);
+        result
+    }
+
+    fn slice(&mut self) -> Work {
+        let work = self.does(|background| background.poll());
         assert_ne!(work, Work::TooFewSlots);
-        let mut own = self.interrupt.borrow_mut();
-        own.running |= work == Work::Start;
-        assert_eq!(self.background.made(), own.position);
+        self.interrupt.borrow_mut().running |= work == Work::Start;
         work
     }
 
@@ -190,46 +210,57 @@ impl Bench {
             }
             Event::Steps(more) => {
                 let until = self.interrupt.borrow().steps + more;
-                self.until(|bench, work| work == Work::Rest || bench.interrupt.borrow().steps >= until);
+                self.until(5000, |bench, work| work == Work::Rest || bench.interrupt.borrow().steps >= until);
             }
             Event::Starve => self.interrupt.borrow_mut().events(u32::MAX),
-            Event::Rest => self.until(|bench, work| work == Work::Rest && bench.background.is_at_rest()),
-            request => self.background.ask(request),
+            Event::Rest => _ = self.rests(5000),
+            request => self.does(|background| background.ask(request)),
         }
     }
 
-    fn until(&mut self, over: impl Fn(&Self, Work) -> bool) {
+    /// The background, one event at a time when it has nothing to do. Returns whether it has come so far.
+    fn until(&mut self, most: u32, over: impl Fn(&Self, Work) -> bool) -> bool {
         let mut starts = 0;
-        for _ in 0..20_000 {
+        for _ in 0..most {
             let work = self.slice();
             if over(self, work) {
-                return;
+                return true;
             }
             // The first event is a while ahead when the timer has been started.
             starts = if work == Work::Start { starts + 1 } else { 0 };
             if work == Work::Later || starts > 2 {
-                self.interrupt.borrow_mut().events(3);
+                self.interrupt.borrow_mut().events(1);
             }
         }
-        panic!("it stands still at {:?}", self.interrupt.borrow().position);
+        false
+    }
+
+    fn rests(&mut self, most: u32) -> bool {
+        self.until(most, |bench, work| work == Work::Rest && bench.background.is_at_rest())
     }
 }
 
-/// All that happens, and a place to go to afterwards. Returns how often the background has read or written what is shared.
-fn run(halves: (Box<dyn Background>, Fire), events: &[Event], times: Times) -> u32 {
+/// All that happens, and a place to go to afterwards, with a background that is in time. Returns how often the background has read or
+/// written what is shared before that.
+fn run(halves: Halves, events: &[Event], times: Times) -> u32 {
     let mut bench = Bench::new(halves, times);
     for event in events {
         bench.happen(*event);
     }
-    for event in [Event::Override(100), Event::Resume, Event::Rest, Event::To([-7, 5]), Event::Rest] {
+    let accesses = bench.interrupt.borrow().accesses;
+    bench.interrupt.borrow_mut().times = Times::once(u32::MAX, 0, 0);
+    for event in [Event::Override(100), Event::Resume] {
         bench.happen(event);
     }
+    assert!(bench.rests(200_000), "it stands still at {:?}: {times:?} {events:?}", bench.background.made());
+    bench.happen(Event::To([-7, 5]));
+    assert!(bench.rests(200_000), "it stands still at {:?}: {times:?} {events:?}", bench.background.made());
     let own = bench.interrupt.borrow();
     assert!(own.position == [-7, 5] || own.position == [-7, 0], "{:?}: {times:?} {events:?}", own.position);
-    own.accesses
+    accesses
 }
 
-fn axis() -> (Box<dyn Background>, Fire) {
+fn axis(reach: u32) -> Halves {
     let queue: &'static Queue<SLOTS> = Box::leak(Box::default());
     let limits = Limits::new(20_000, 2_000_000).unwrap();
     let (axis, mut timer) = Axis::new(queue, Clock::MICROSECONDS, limits).unwrap();
@@ -237,10 +268,10 @@ fn axis() -> (Box<dyn Background>, Fire) {
         let fired = timer.fire();
         (fired.is_step().into(), fired.direction().dir().into(), fired.wait())
     };
-    (Box::new(axis.with_reach(400)), Box::new(fire))
+    (Box::new(axis.with_reach(reach)), Box::new(fire))
 }
 
-fn axes() -> (Box<dyn Background>, Fire) {
+fn axes(reach: u32) -> Halves {
     let queue: &'static AxesQueue<N, SLOTS> = Box::leak(Box::default());
     let axis = AxisSetup::new(Limits::new(20_000, 2_000_000).unwrap(), 80_000);
     let path = Path::new(Clock::MICROSECONDS, [axis; N], 20).unwrap();
@@ -249,10 +280,10 @@ fn axes() -> (Box<dyn Background>, Fire) {
         let fired = timer.fire();
         (fired.steps(), fired.reverse(), fired.wait())
     };
-    (Box::new(axes.with_reach(400)), Box::new(fire))
+    (Box::new(axes.with_reach(reach)), Box::new(fire))
 }
 
-use Event::{Halt, Hold, Override, Rest, Resume, Slices, Starve, Steps, Stop, To};
+use Event::{Away, Halt, Hold, Override, Quick, Rest, Resume, Slices, Starve, Steps, Stop, To};
 
 /// At least five rests each.
 const SCRIPTS: [&[Event]; 4] = [
@@ -310,15 +341,20 @@ const SCRIPTS: [&[Event]; 4] = [
     ],
 ];
 
-/// Before any access, so many events. All of them take minutes, in the nightly run; otherwise some.
-fn everywhere(halves: fn() -> (Box<dyn Background>, Fire)) {
-    let apart = if std::env::var_os("MOTION_CASES").is_some() { 1 } else { 53 };
+/// How many cases, and all in place of some in the nightly run.
+fn cases() -> Option<u32> {
+    std::env::var("MOTION_CASES").ok()?.parse().ok()
+}
+
+/// Before any access, so many events.
+fn everywhere(halves: fn(u32) -> Halves) {
+    let apart = if cases().is_some() { 1 } else { 19 };
     let mut runs = 0;
     for (script, pace) in SCRIPTS.iter().flat_map(|script| [(script, 0), (script, 97)]) {
-        let all = run(halves(), script, Times { at: u32::MAX, events: 0, pace });
+        let all = run(halves(400), script, Times::once(u32::MAX, 0, pace));
         for (begin, events) in [(0, 1), (7, 2), (23, 5), (41, u32::MAX)] {
             for at in (begin % apart..all).step_by(apart as usize) {
-                run(halves(), script, Times { at, events, pace });
+                run(halves(400), script, Times::once(at, events, pace));
                 runs += 1;
             }
         }
@@ -336,4 +372,38 @@ fn an_axis_can_always_be_started_again() {
 #[cfg_attr(miri, ignore = "too long for an interpreter")]
 fn axes_can_always_be_started_again() {
     everywhere(axes);
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    let place = || prop_oneof![[-40..40_i64, -40..40_i64], [-2..2_i64, -2..2_i64]];
+    prop_oneof![
+        6 => place().prop_map(To),
+        2 => place().prop_map(Away),
+        4 => Just(Rest),
+        3 => (0..60_u64).prop_map(Steps),
+        3 => (0..200_u32).prop_map(Slices),
+        3 => Just(Starve),
+        2 => Just(Hold),
+        2 => Just(Resume),
+        2 => (0..130_u16).prop_map(Override),
+        1 => Just(Stop),
+        1 => Just(Quick),
+        1 => Just(Halt),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases().unwrap_or(150), ..ProptestConfig::default() })]
+
+    /// Blocks without a step too.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn whatever_is_asked_it_can_be_started_again(
+        script in prop::collection::vec(event(), 1..24), reach in prop_oneof![Just(20_u32), 20..60_u32, Just(400)], one in any::<bool>(),
+        at in 0..3000_u32, every in prop_oneof![1..40_u32, 1..2000_u32], events in prop_oneof![1..8_u32, Just(u32::MAX)],
+        pace in prop_oneof![Just(0_u32), 2..300_u32],
+    ) {
+        let halves = if one { axis(reach) } else { axes(reach) };
+        run(halves, &script, Times { at, every, events, pace });
+    }
 }
