@@ -183,12 +183,29 @@ impl Cutter {
         Slice::Steps(few.stretch)
     }
 
-    /// Returns when a step of the present piece is made, as exactly as the arithmetic allows.
-    pub(crate) fn exact(&self, count: u32) -> i128 {
+    /// Returns the time of the next step if it follows from a rest beside it, and makes the step.
+    pub(crate) fn known(&mut self) -> Option<i128> {
+        if self.fresh || self.few.is_some() || self.count >= self.until {
+            return None;
+        }
+        let (time, tick) = self.piece.known_tick(self.count)?;
+        (self.last, self.count) = (Last::At(time), self.count.saturating_add(1));
+        Some(tick)
+    }
+
+    /// Returns whether the present segments are exact but for rounding: the speed is constant.
+    pub(crate) const fn is_even(&self) -> bool {
+        self.piece.even
+    }
+
+    /// Returns when a step of the present piece is made, as exactly as the arithmetic allows; from `about`, if a time near
+    /// it is known.
+    pub(crate) fn exact(&self, count: u32, about: Option<i128>) -> i128 {
         if self.piece.even {
             return self.piece.cruise(count, 1, 0).first;
         }
-        self.piece.tick(self.piece.search(count, None, 0))
+        let about = about.map(|about| self.piece.time(about));
+        self.piece.tick(self.piece.search(count, about, 0))
     }
 }
 
@@ -235,7 +252,7 @@ mod tests {
         while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX }) {
             let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
             for k in 0..u32::from(stretch.count) {
-                let exact = cutter.exact(cutter.count() - u32::from(stretch.count) + k);
+                let exact = cutter.exact(cutter.count() - u32::from(stretch.count) + k, None);
                 worst = f64::max(worst, (time - exact).unsigned_abs() as f64 / most);
                 (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
             }
@@ -311,6 +328,30 @@ mod tests {
             };
             if let Some(worst) = off_by(hz, [v as u64, a as u64, j as u64], (n, ends), off) {
                 prop_assert!(worst <= 1.0, "{worst} of {:?}", off(Clock::new(hz).unwrap()));
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+        #[test]
+        #[cfg_attr(miri, ignore = "too long for an interpreter")]
+        fn a_segment_takes_no_longer_than_is_asked(
+            v in spread(100.0, 1e5), a in spread(1e3, 1e6), j in prop_oneof![Just(0.0), spread(1e4, 1e8)],
+            n in prop_oneof![1..300_u32, 1..20_000_u32],
+            time in spread(1e2, 1e6),
+        ) {
+            let limits = Limits::new(v as u32, a as u32).unwrap();
+            let limits = if j == 0.0 { limits } else { limits.with_jerk(j as u64).unwrap() };
+            let (clock, rest) = (Clock::MICROSECONDS, Motion::steady(Real::ZERO));
+            let curve = plan(rest, Goal::At(Real::new(n.into()), Real::ZERO), &limits.bounds(clock)).unwrap();
+            let frame = Frame { to: Some(i64::from(n) << 32), ..Frame::rest(clock.shift(), 0, 0) };
+            let (mut cutter, time) = (Cutter::new(), (time * 2_f64.powi(32)) as u64);
+            let demand = Demand { off: clock.blur(), coarse: None, time };
+            while let Some(stretch) = cutter.next(&curve, &frame, &demand) {
+                let lasts = stretch.last() - stretch.first;
+                prop_assert!(lasts <= i128::from(time) + (1 << 32), "{lasts} of {time}, {} steps", stretch.count);
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::real::high;
 
 /// How many steps after a rest are found by a root.
-const KNOWN: usize = 24;
+const KNOWN: usize = 32;
 
 /// Roots of 1, 3, 5 and so on, in 2^-60.
 type Roots = [u64; KNOWN];
@@ -50,24 +50,39 @@ static CUBE: Roots = roots(3);
 pub(super) struct FromRest {
     /// The number of the step next to the rest.
     at: u32,
-    /// Time of the first step on either side.
+    /// Time of the first step on either side, as a part of the piece and in 2^-32 ticks; `None` if a piece is too long for these.
     first: u64,
+    ticks: Option<u64>,
     cubic: bool,
 }
 
 impl FromRest {
-    pub(super) const fn new(at: u32, first: u64, cubic: bool) -> Self {
-        Self { at, first, cubic }
+    pub(super) const fn new(at: u32, (first, ticks): (u64, Option<u64>), cubic: bool) -> Self {
+        Self { at, first, ticks, cubic }
     }
 
     /// Returns the time of a step, if it is near the rest.
     pub(super) fn step(&self, count: u32) -> Option<u64> {
+        scaled(self.first, self.root(count)?)
+    }
+
+    /// Returns the same, and how far from the rest it is in 2^-32 ticks.
+    #[inline]
+    pub(super) fn step_and_ticks(&self, count: u32) -> Option<(u64, u64)> {
+        let root = self.root(count)?;
+        Some((scaled(self.first, root)?, scaled(self.ticks?, root)?))
+    }
+
+    fn root(&self, count: u32) -> Option<u64> {
         // Steps behind a rest are counted from it, and those before it backwards.
         let far =
             if count >= self.at { count.wrapping_sub(self.at) } else { self.at.wrapping_sub(count).wrapping_sub(1) };
-        let root = if self.cubic { &CUBE } else { &SQUARE }.get(usize::try_from(far).ok()?)?;
-        // A root of 63 is below 2^4.
-        let time = high(self.first, *root);
-        (time.leading_zeros() >= 4).then_some(time << 4)
+        if self.cubic { &CUBE } else { &SQUARE }.get(usize::try_from(far).ok()?).copied()
     }
+}
+
+/// Multiplies a time by a root, which is below 2^4: that of 63 is 7.9.
+fn scaled(time: u64, root: u64) -> Option<u64> {
+    let time = high(time, root);
+    (time.leading_zeros() >= 4).then_some(time << 4)
 }

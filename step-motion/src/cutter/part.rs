@@ -50,6 +50,9 @@ pub(super) const LONGEST: u64 = 1 << 60;
 /// Maximum duration of a segment.
 pub(super) const ALL: u64 = 1 << 62;
 
+/// A correction of a time after which it is exact, whatever the acceleration is.
+const CLOSE: u64 = 1 << 20;
+
 /// A position, with the speed and half the acceleration at it.
 struct Place {
     p: u64,
@@ -97,7 +100,7 @@ impl Part {
     /// joined.
     pub(super) fn new(curve: &Curve, frame: &Frame, (piece, end): (&crate::curve::Piece, Real), off: Real) -> Self {
         let begin = piece.time.max(curve.skipped.0);
-        let first = piece.after(begin - piece.time);
+        let first = if begin == piece.time { *piece } else { piece.after(begin - piece.time) };
         let even = piece.a.is_zero() && piece.j.is_zero();
         let back = !piece.up && !even;
         let time = end - begin;
@@ -161,12 +164,14 @@ impl Part {
         let (whole, part) = (self.origin >> P2, self.origin & ((1 << P2) - 1));
         let whole = if part >> (P2 - 1) == 0 { whole } else { whole.saturating_add(1) };
         let off = self.origin.saturating_sub(whole << P2).unsigned_abs();
-        if self.speed != 0 || off >> (P2 - 20) != 0 || self.half != 0 && self.sixth != 0 {
+        if self.even || self.speed != 0 || off >> (P2 - 20) != 0 || self.half != 0 && self.sixth != 0 {
             return None;
         }
         let at = u32::try_from(whole).ok()?;
         let first = if self.back { at.checked_sub(1)? } else { at };
-        Some(FromRest::new(at, self.search(first, None, 0), self.half == 0))
+        let first = self.search(first, None, 0);
+        let ticks = (self.lasts.exponent() < 64).then(|| self.ticks(first));
+        Some(FromRest::new(at, (first, ticks), self.half == 0))
     }
 
     /// Returns when the piece begins.
@@ -202,8 +207,8 @@ impl Part {
         let by = up.unsigned_abs();
         if up >= 0 {
             part.checked_shr(by).unwrap_or(0)
-        } else if by < part.leading_zeros() {
-            part << by
+        } else if by <= part.leading_zeros() {
+            part.checked_shl(by).unwrap_or(0)
         } else {
             u64::MAX
         }
@@ -230,6 +235,12 @@ impl Part {
     pub(super) fn tick(&self, time: u64) -> i128 {
         let since = if self.lasts.exponent() < 64 { self.ticks(time).into() } else { self.lasts.times(time, -64) };
         if self.back { self.begin.saturating_sub(since) } else { self.begin.saturating_add(since) }
+    }
+
+    /// Converts a time on the clock, in 2^-32 ticks, to one of the piece.
+    pub(super) fn time(&self, tick: i128) -> u64 {
+        let since = if self.back { self.begin.saturating_sub(tick) } else { tick.saturating_sub(self.begin) };
+        self.part_of(u64::try_from(since.max(0)).unwrap_or(u64::MAX))
     }
 
     /// Returns whether the fourth derivative keeps the sign of the acceleration from end to end.
@@ -272,9 +283,22 @@ impl Part {
         }
     }
 
+    /// Returns the time from the slower end to a step that is near a rest there.
+    pub(super) fn known(&self, count: u32) -> Option<u64> {
+        self.rest?.step(count)
+    }
+
+    /// Returns the same, and that time on the clock, in 2^-32 ticks.
+    #[inline]
+    pub(super) fn known_tick(&self, count: u32) -> Option<(u64, i128)> {
+        let (time, since) = self.rest.as_ref()?.step_and_ticks(count)?;
+        let since = i128::from(since);
+        Some((time, if self.back { self.begin.wrapping_sub(since) } else { self.begin.wrapping_add(since) }))
+    }
+
     /// Returns the time from the slower end to a step: by Newton's method from the `last` one, unless it is known.
     pub(super) fn search(&self, count: u32, last: Option<u64>, near: u64) -> u64 {
-        if let Some(time) = self.rest.filter(|_| near > 0).and_then(|rest| rest.step(count)) {
+        if let Some(time) = self.known(count).filter(|_| near > 0) {
             return time;
         }
         let way = self.target(count);
@@ -289,14 +313,16 @@ impl Part {
         if time == 0 || time == u64::MAX {
             time = self.guess(way);
         }
+        let mut last = u64::MAX;
         for _ in 0..32 {
             let Place { p, v, .. } = self.at(time);
             let by = Inverse::new(v).of(p.abs_diff(way));
-            let next = along(time, by, p < way);
-            if by <= near.max(2) || next == time {
-                return next;
+            time = along(time, by, p < way);
+            // The error is about squared: the next one would be in the last bit, or rounding is all that is left.
+            if by <= near.max(CLOSE) || by >= last && by < u64::MAX {
+                return time;
             }
-            time = next;
+            last = by;
         }
         time
     }
