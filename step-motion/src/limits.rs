@@ -80,6 +80,12 @@ impl Clock {
         let shift = self.shift();
         if tick > u64::MAX >> shift { u64::MAX } else { tick << shift }
     }
+
+    /// Returns a tick, or the last one at which motion may begin: from there on are as many moments as before.
+    pub(super) const fn within_reach(self, tick: u64) -> u64 {
+        let last = u64::MAX >> 1 >> self.shift();
+        if tick < last { tick } else { last }
+    }
 }
 
 impl TryFrom<u32> for Clock {

@@ -259,7 +259,7 @@ impl Mover {
 
     /// Makes no further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
-        let moment = self.clock.moment(now.max(self.free));
+        let moment = self.clock.moment(self.clock.within_reach(now).max(self.free));
         self.halted = !self.is_at_rest(now);
         self.wish = Wish { aim: Aim::Rest, held: false, quick: None, ..self.wish };
         (self.due, self.turn) = (None, None);

@@ -388,7 +388,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Makes the next line begin no earlier than this tick, after a rest.
     pub fn not_before(&mut self, tick: u64) {
         if self.speed.is_zero() {
-            self.moment = self.moment.max(self.clock.moment(tick));
+            self.moment = self.moment.max(self.clock.moment(self.clock.within_reach(tick)));
         }
     }
 

@@ -285,7 +285,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.halted = !self.is_at_rest(now);
         let free = self.free.iter().copied().max().unwrap_or(0);
         (self.held, self.stopping, self.quick) = (false, false, false);
-        self.leave(now.max(free));
+        self.leave(self.clock().within_reach(now).max(free));
     }
 
     pub(super) const fn clock(&self) -> Clock {
@@ -404,7 +404,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// caller's clock says.
     fn tick(&self, now: u64) -> u64 {
         let last = self.free.iter().copied().max().unwrap_or(0).saturating_sub(1);
-        let now = now.max(last);
+        let now = self.clock().within_reach(now).max(last);
         self.due().map_or(now, |due| now.min(due))
     }
 

@@ -15,7 +15,7 @@ impl Mover {
     /// clock says: an earlier time would plan steps that have already been made, and a later one would make the missing
     /// steps in a burst.
     pub(super) fn moment(&self, now: u64) -> u64 {
-        let now = now.max(self.free.saturating_sub(1));
+        let now = self.clock.within_reach(now).max(self.free.saturating_sub(1));
         self.clock.moment(self.due.map_or(now, |due| now.min(due)))
     }
 

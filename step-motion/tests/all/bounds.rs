@@ -1,6 +1,6 @@
 //! The bounds that a caller may ask for before a call refuses.
 
-use step_motion::{Arc, Clock, Limits, Turning};
+use step_motion::{Arc, AxisSetup, Clock, Limits, Mover, Path, PathMover, Turning};
 
 #[test]
 fn the_bounds_that_are_said_are_those_that_are_checked() {
@@ -26,4 +26,36 @@ fn clocks_and_limits_as_numbers() {
         <(u32, u32, Option<u64>)>::from(limits.with_jerk(4_000_000).unwrap()),
         (20_000, 200_000, Some(4_000_000))
     );
+}
+
+/// Steps are as far apart as the speed allows, whenever they begin.
+fn apart(ticks: &[u64], least: u64) -> bool {
+    ticks.windows(2).all(|pair| pair[1] - pair[0] + 1 >= least)
+}
+
+/// At rest any `now` may be the beginning, also the last tick that there is.
+#[test]
+fn no_time_is_too_late_to_begin() {
+    for (hz, now) in [1000, 25_000, 1_000_000, 200_000_000]
+        .into_iter()
+        .flat_map(|hz| [u64::MAX, u64::MAX >> 1, u64::MAX / 1000, 1 << 40].map(|now| (hz, now)))
+    {
+        let limits = Limits::new(1000.min(hz / 2), 100_000).unwrap();
+        let (clock, least) = (Clock::new(hz).unwrap(), u64::from(hz / limits.speed()));
+        let mut axis = Mover::new(clock, limits).unwrap();
+        let path = Path::new(clock, [AxisSetup::new(limits, 80_000)], 20).unwrap();
+        let mut path = PathMover::<1, 4>::new(path);
+        for to in [30, 0, 5] {
+            axis.move_to(to, now).unwrap();
+            path.push([to], 100_000, now).unwrap();
+            let ticks: Vec<_> = core::iter::from_fn(|| axis.pulse()).map(|pulse| pulse.tick).collect();
+            let others: Vec<_> = core::iter::from_fn(|| path.pulse()).map(|pulse| pulse.tick).collect();
+            assert!(apart(&ticks, least), "{ticks:?} from {now} at {hz}");
+            assert!(apart(&others, least), "{others:?} from {now} at {hz}");
+            assert_eq!((axis.commanded(), path.commanded()), (to, [to]));
+            assert!(axis.is_at_rest(u64::MAX) && path.is_at_rest(u64::MAX));
+            axis.halt(now);
+            path.halt(now);
+        }
+    }
 }
