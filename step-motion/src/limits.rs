@@ -332,4 +332,52 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_last_moment_stands_for_all_that_are_later() {
+        for hz in [1000, 1_000_000, 200_000_000] {
+            let (clock, shift) = (Clock::new(hz).unwrap(), Clock::new(hz).unwrap().shift());
+            let last = u64::MAX >> shift;
+            assert_eq!([last, last + 1, u64::MAX].map(|tick| clock.moment(tick)), [last << shift, u64::MAX, u64::MAX]);
+            assert_eq!(clock.within_reach(last), last >> 1);
+            assert_eq!([0, last >> 1].map(|tick| clock.within_reach(tick)), [0, last >> 1]);
+        }
+    }
+
+    fn near(x: Real, want: f64) -> bool {
+        let got = x.to_fixed(40) as f64 / (1_u64 << 40) as f64;
+        (got - want).abs() <= want * 1e-6
+    }
+
+    /// A fifth of a tick, or what is left of 23 ns.
+    #[test]
+    fn segments_may_be_off_by_so_much() {
+        for (hz, ns) in [(1_000_000, 200.0), (25_000_000, 8.0), (40_000_000, 10.5), (200_000_000, 20.5)] {
+            let clock = Clock::new(hz).unwrap();
+            let want = ns * 1e-9 * f64::from(clock.moments());
+            assert!(near(clock.blur(), want), "{hz}: {want}");
+        }
+    }
+
+    /// 10 of acceleration and 20 of jerk: at a speed of 5 a deceleration of 10 needs 10, at 2.5 it needs 20, and at 1 it needs 50.
+    #[test]
+    fn an_acceleration_under_way_is_kept() {
+        let bounds = Bounds::new(Real::new(100), Real::new(10), Some(Real::new(20)));
+        let holding = |v: u64, a: u64, up| {
+            let new = bounds.holding(Real::new(v).half(), (Real::new(a), up));
+            (new.v, new.a, new.jerk.unwrap().j)
+        };
+        let same = |(v, a, j): (Real, Real, Real)| near(v, 100.0) && near(a, 10.0) && near(j, 20.0);
+        for (v, a, up) in [(10, 10, false), (5, 10, false), (2, 10, true), (0, 10, false), (2, 0, false)] {
+            assert!(same(holding(v, a, up)), "{v} {a} {up}");
+        }
+        let (v, a, j) = holding(2, 10, false);
+        assert!(near(v, 100.0) && near(a, 10.0) && near(j, 50.0 * (1.0 + 1.0 / 256.0)));
+        let (v, a, j) = holding(200, 15, true);
+        assert!(near(v, 100.0) && near(a, 15.0) && near(j, 20.0));
+        let (_, a, j) = holding(4, 12, false);
+        assert!(near(a, 12.0) && near(j, 36.0 * (1.0 + 1.0 / 256.0)));
+        let free = Bounds::new(Real::new(100), Real::new(10), None).holding(Real::new(1), (Real::new(15), false));
+        assert!(near(free.a, 10.0) && free.jerk.is_none());
+    }
 }

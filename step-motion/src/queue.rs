@@ -202,3 +202,20 @@ impl<const N: usize> Default for Queue<N> {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_in_words() {
+        let head = |step, reverse, joint| {
+            let kind = Kind { step, reverse, joint };
+            Segment { count: 0x1234, kind, first: 0, interval: 0, add: 0, bend: 0 }.head()
+        };
+        assert_eq!(head(true, false, Joint::No), 0x4000_1234);
+        assert_eq!(head(true, true, Joint::No), 0xe000_1234);
+        assert_eq!(head(false, false, Joint::Block), 0x1000_1234);
+        assert_eq!(head(false, true, Joint::Rest), 0x3800_1234);
+    }
+}

@@ -81,4 +81,12 @@ mod tests {
         let cruise = &ticks[20_000..21_000];
         assert!((cruise[999] - cruise[0]).abs_diff(999 * 1_000_000 / 61_000) <= 1);
     }
+
+    #[test]
+    fn an_interval_as_long_as_the_timer_is_one_reload() {
+        let reloads =
+            |longest| Reloads::new([7_u64, 1007].into_iter(), longest).map(|reload| (reload.ticks, reload.step));
+        assert_eq!(reloads(1000).collect::<Vec<_>>(), [(7, true), (1000, true)]);
+        assert_eq!(reloads(999).collect::<Vec<_>>(), [(7, true), (999, false), (1, true)]);
+    }
 }

@@ -108,3 +108,87 @@ impl Writer {
 pub(crate) fn tick(time: i128) -> u64 {
     u64::try_from(time >> 32).unwrap_or(0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step_timer::StepTimer;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    const SLOTS: usize = 17;
+    const MOST: i128 = LONGEST as i128;
+
+    /// The events of block 0 as the interrupt makes them: when, whether it is a step, and which way.
+    fn events(write: impl FnOnce(&mut Writer, (&Queue<SLOTS>, usize))) -> Vec<(u64, bool, bool)> {
+        let queue: &'static Queue<SLOTS> = Box::leak(Box::default());
+        let mut writer = Writer::new(0, Some(Direction::Forward));
+        write(&mut writer, (queue, 0));
+        queue.link(0, Queue::<SLOTS>::slot(0, 0));
+        let mut timer = StepTimer::new(queue);
+        let (mut now, mut made) = (0, Vec::new());
+        loop {
+            let fired = timer.fire();
+            made.push((now, fired.is_step(), fired.direction().dir()));
+            assert!(fired.wait() <= LONGEST, "{} ticks", fired.wait());
+            if fired.wait() == 0 {
+                // The first one only lets it begin.
+                made.remove(0);
+                return made;
+            }
+            now += u64::from(fired.wait());
+        }
+    }
+
+    fn waits(ticks: i128) -> Vec<u64> {
+        events(|writer, to| writer.put_wait(to, ticks * TICK)).into_iter().map(|(at, ..)| at).collect()
+    }
+
+    #[test]
+    fn a_wait_is_as_many_events_as_it_takes() {
+        let most = u64::from(LONGEST);
+        assert_eq!(events(|writer, to| writer.put_wait(to, TICK - 1)), []);
+        for ticks in [1, 2, 1000, most - 1, most] {
+            assert_eq!(waits(ticks.into()), [ticks]);
+        }
+        assert_eq!(waits(MOST + 1), [most, most + 1]);
+        assert_eq!(waits(3 * MOST + 5), [most, 2 * most, 3 * most, 3 * most + 5]);
+        assert_eq!(waits(2 * MOST), [most, 2 * most]);
+    }
+
+    #[test]
+    fn a_step_waits_for_dir_and_for_its_time() {
+        let most = u64::from(LONGEST);
+        let stretch = |first: i128| Stretch { count: 2, first: first * TICK - TICK / 2, differences: [7 << 32, 0, 0] };
+        let steps = |direction, first| events(|writer, to| writer.put_steps(to, &stretch(first), direction));
+        assert_eq!(steps(Direction::Forward, 10), [(10, true, false), (17, true, false)]);
+        assert_eq!(steps(Direction::Reverse, 10), [(5, false, true), (10, true, true), (17, true, true)]);
+        assert_eq!(steps(Direction::Reverse, 1), [(1, false, true), (2, true, true), (9, true, true)]);
+        assert_eq!(steps(Direction::Forward, MOST), [(most, true, false), (most + 7, true, false)]);
+        let far = [(most, false, false), (most + 1, true, false), (most + 8, true, false)];
+        assert_eq!(steps(Direction::Forward, MOST + 1), far);
+    }
+
+    #[test]
+    fn a_joint_is_one_event_that_may_be_far_ahead() {
+        let most = u64::from(LONGEST);
+        let joint = |ticks: i128| events(|writer, to| writer.put_joint(to, ticks * TICK, Joint::Rest));
+        for ticks in [1, 1000, most] {
+            assert_eq!(joint(ticks.into()), [(ticks, false, false)]);
+        }
+        assert_eq!(joint(MOST + 9), [(most, false, false), (most + 8, false, false), (most + 9, false, false)]);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_counted_and_not_written() {
+        let queue = Queue::<SLOTS>::new();
+        let mut writer = Writer::new(0, None);
+        for tick in 1..=20 {
+            writer.put_joint((&queue, 0), tick * TICK, Joint::No);
+        }
+        assert_eq!(writer.len, 20);
+        let next = Queue::<SLOTS>::slot(1, 0);
+        assert_eq!(queue.slots[next].first(), 0, "the other block is the interrupt's");
+        assert_eq!(queue.slots[next - 1].first(), 1 << 32);
+    }
+}

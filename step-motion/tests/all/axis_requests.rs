@@ -115,3 +115,17 @@ fn each_halt_is_confirmed_by_the_interrupt() {
     bench.until(800_000);
     assert_eq!(bench.at(), at + 5);
 }
+
+/// An interrupt that comes although nothing is to be made.
+#[test]
+fn a_rest_stays_one_whatever_fires() {
+    let mut bench = Bench::new();
+    for (to, fires) in [(20, 1), (0, 2), (30, 3)] {
+        bench.axis.move_to(to).unwrap();
+        bench.until(bench.machine.now + 300_000);
+        for _ in 0..fires {
+            bench.machine.fire();
+            assert!(bench.axis.is_at_rest() && bench.at() == to);
+        }
+    }
+}
