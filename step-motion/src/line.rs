@@ -198,6 +198,15 @@ impl<const N: usize> LinePulses<N> {
         self.axes.get(at).is_some_and(more)
     }
 
+    /// Returns the steps of each axis on the line at the end of the curve.
+    pub(super) fn steps_at_end(&self) -> [u32; N] {
+        let mut all = self.start.made;
+        for (steps, (frame, _)) in all.iter_mut().zip(&self.axes) {
+            *steps = steps.saturating_add(phases::steps(frame.last(&self.curve)));
+        }
+        all
+    }
+
     pub(super) fn pulse(&self, (tick, at): (u64, usize)) -> AxisPulse {
         let direction = self.directions.get(at).copied().unwrap_or_default();
         AxisPulse { axis: u8::try_from(at).unwrap_or(u8::MAX), tick, direction }

@@ -13,7 +13,7 @@ use crate::planner::Motion;
 use crate::real::Real;
 use servowire_core::Direction;
 
-pub(crate) use cut::Leaving;
+pub(crate) use cut::{End, Leaving};
 
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

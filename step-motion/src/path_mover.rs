@@ -267,7 +267,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.ready()?;
         self.path.check(&target)?;
         let stop = self.stop_from(now);
-        let from = stop.map_or(self.commanded, |stop| self.path.place(stop.end, self.begun(), self.made));
+        let from = stop.map_or(self.commanded, |stop| self.path.place(&self.end_of(&stop), self.begun(), self.made));
         Path::<N, M>::steps(from, target)?;
         if stop.is_some_and(|stop| stop.end.0.saturating_add(1) >= M) || M == 0 {
             return Err(Error::QueueFull);

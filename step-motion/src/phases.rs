@@ -152,3 +152,39 @@ impl Phases {
 pub(super) fn steps(p: i64) -> u32 {
     u32::try_from(p.saturating_add(1 << 31) >> P).unwrap_or(if p < 0 { 0 } else { u32::MAX })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit in 64 moments, which is half a step; the curve is joined after one unit, a quarter of a moment late.
+    #[test]
+    fn a_frame_is_where_its_curve_is() {
+        let mut curve = Curve::new();
+        curve.cruise(Real::ONE.scaled(-6), Real::new(10));
+        curve.skipped = (Real::new(64), Real::new(1));
+        let (offset, scale) = (Real::ONE.scaled(-2), Real::ONE.half());
+        let frame = Frame { to: None, offset, scale, ..Frame::rest(10, 1000, 5 << P) };
+        assert!(frame.time(&curve, 1100) + frame.offset == Real::new(164));
+        assert_eq!(frame.end(&curve), 1000 + 576);
+        let place = |moment| frame.within(&curve, moment).p;
+        // In 2^-9 steps.
+        let fine = |quarters: i64| (5 << P) + (quarters << (P - 9));
+        assert_eq!([1000, 1001, 1100].map(place), [fine(-1), fine(3), fine(399)]);
+        assert!(frame.at(&curve, 1575).v == Real::ONE.scaled(-7));
+        let end = frame.at(&curve, 1576);
+        // Steps are whole: the half that is left is rounded up.
+        assert!(end.p == 10 << P && end.v.is_zero());
+    }
+
+    /// 6 units/moment³ from rest, on an axis that makes half a step in a unit.
+    #[test]
+    fn an_axis_has_its_share_of_acceleration_and_jerk() {
+        let mut curve = Curve::new();
+        curve.push((Real::new(8), Real::new(512)), [Real::ZERO, Real::ZERO, Real::new(6)], true, Bend::Growing);
+        let frame = Frame { to: None, scale: Real::ONE.half(), ..Frame::rest(10, 0, 0) };
+        let State { p, v, a, j } = frame.within(&curve, 4);
+        assert!(p.abs_diff(32 << P) < 16 && v == Real::new(24));
+        assert!(a == (Real::new(12), true) && j == (Real::new(3), true));
+    }
+}

@@ -50,3 +50,21 @@ pub(super) fn most_distance(from: Real, to: Real, bounds: &Bounds) -> Real {
     let edge = bounds.jerk.map_or(Real::ZERO, |jerk| jerk.edge);
     (from + to).half() * (from.distance(to) * bounds.per_a + edge)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// From 2 to 6 at 4 of acceleration, with 2 of jerk or without a limit of it: a mean speed of 4, for 1 and 2 more.
+    #[test]
+    fn the_most_that_a_change_of_speed_may_take() {
+        let [from, to, a] = [2, 6, 4].map(Real::new);
+        for (jerk, want) in [(None, 4), (Some(Real::new(2)), 12)] {
+            let (bounds, most) = (Bounds::new(Real::new(10), a, jerk), Real::new(want));
+            for got in [most_distance(from, to, &bounds), most_distance(to, from, &bounds)] {
+                assert!(got.distance(most) < most.scaled(-40));
+            }
+            assert!(distance(from, to, &bounds) <= most + most.scaled(-40));
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::{Path, gone_along};
 use crate::limits::Bounds;
+use crate::line::Line;
 use crate::real::Real;
 
 /// How a stop leaves the lines of its first curve.
@@ -14,19 +15,38 @@ pub(crate) struct Leaving {
     pub(crate) bounds: Option<Bounds>,
 }
 
+/// Where a stop ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct End<const N: usize> {
+    /// The line, and the place on it.
+    pub(crate) at: (usize, Real),
+    /// The steps on that line that the stop before it would make. Rounding must not add one.
+    pub(crate) most: Option<[u32; N]>,
+}
+
+impl<const N: usize> End<N> {
+    fn steps(&self, line: &Line<N>) -> [u32; N] {
+        let mut steps = line.steps_at(self.at.1);
+        for (steps, most) in steps.iter_mut().zip(self.most.unwrap_or([u32::MAX; N])) {
+            *steps = most.min(*steps);
+        }
+        steps
+    }
+}
+
 impl<const N: usize, const M: usize> Path<N, M> {
     /// Returns the line that was cut off, and the place on it.
     pub(crate) fn end_of_cut(&self) -> Option<(usize, Real)> {
         (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
     }
 
-    /// Returns the position in whole steps at a place on line `at`, if the first line begins at `from`.
+    /// Returns the position in whole steps at an end, if the first line begins at `from`.
     /// `made`: the steps made on the first line, which cannot be undone.
-    pub(crate) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
+    pub(crate) fn place(&self, end: &End<N>, from: [i64; N], made: [u32; N]) -> [i64; N] {
         let mut to = from;
-        for i in 0..=at {
+        for i in 0..=end.at.0 {
             let Some(line) = self.line(i) else { break };
-            let mut ends = if i == at { line.steps_at(place) } else { line.ends };
+            let mut ends = if i == end.at.0 { end.steps(line) } else { line.ends };
             if i == 0 {
                 ends = at_least(ends, made);
             }
@@ -38,9 +58,10 @@ impl<const N: usize, const M: usize> Path<N, M> {
         to
     }
 
-    /// Cuts the queue off at a place on line `at`, if the first line begins at `from` and a stop leaves it as `first` says.
-    pub(crate) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], first: Leaving) {
-        self.target = self.place((at, place), from, made);
+    /// Cuts the queue off at an end, if the first line begins at `from` and a stop leaves it as `first` says.
+    pub(crate) fn cut(&mut self, to: &End<N>, from: [i64; N], made: [u32; N], first: Leaving) {
+        self.target = self.place(to, from, made);
+        let (at, place) = to.at;
         let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
         for i in 0..self.len {
             if i > end && i <= at {
@@ -58,7 +79,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 Some(Some(line)) if i < at && i == end => line.leave = line.leave.or(Some(speed)),
                 Some(Some(_)) if i < at => {}
                 Some(Some(line)) if i == at => {
-                    line.ends = line.steps_at(place);
+                    line.ends = to.steps(line);
                     if i == 0 {
                         line.ends = at_least(line.ends, made);
                     }

@@ -1,8 +1,8 @@
 //! Plans of a path mover, from the present motion along its lines.
 
 use crate::limits::Bounds;
-use crate::line::{LinePulses, Start};
-use crate::path::{Course, Leaving};
+use crate::line::{LinePulses, Start, Steps};
+use crate::path::{Course, End, Leaving};
 use crate::planner::Motion;
 use crate::real::Real;
 
@@ -81,6 +81,23 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
     }
 
+    /// Returns where a stop ends, with no more steps than a stop under way makes.
+    pub(super) fn end_of(&self, stop: &Stop<N>) -> End<N> {
+        let (at, under_way) = (stop.end, self.braking && !self.stopping && self.exit.is_zero());
+        let line = self.line.as_ref().filter(|_| under_way && at.0 == self.more);
+        let most = line.and_then(|line| {
+            let next = (at.0 > 0).then(|| {
+                let lengths =
+                    (0..at.0).filter_map(|at| self.path.line(at)).fold(Real::ZERO, |sum, line| sum + line.length);
+                let before = (line.start.before + lengths) - line.start.place;
+                let start = Start { place: Real::ZERO, before, made: [0; N], whole: self.whole, ..line.start };
+                Some(LinePulses::new(self.clock(), &line.curve, self.path.line(at.0)?, start, Steps::Stretches))
+            });
+            next.map_or_else(|| Some(line.steps_at_end()), |next| Some(next?.steps_at_end()))
+        });
+        End { at, most }
+    }
+
     /// Returns the moment at which a stop comes to rest.
     pub(super) fn rest_of(&self, stop: &Stop<N>) -> u64 {
         let first = match &stop.first {
@@ -100,7 +117,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along
     /// the shorter path may differ by its rounding, and leave a line at a speed that it had not.
     pub(super) fn leave_at(&mut self, stop: &Stop<N>) {
-        self.path.cut(stop.end, self.begun(), self.made, stop.left);
+        self.path.cut(&self.end_of(stop), self.begun(), self.made, stop.left);
         if !self.stopping {
             self.stopping = true;
             if let Some((course, start, bounds)) = &stop.first {

@@ -302,3 +302,17 @@ fn a_quick_stop_before_a_corner_is_not_later_than_a_hold() {
         assert!(quick.is_within(held, 0, 2), "{quick:?}, {held:?} of a hold");
     }
 }
+
+/// A stop by override in the tick of a step that is half a step from rest, as near as rounding allows: to be told again adds no step.
+#[test]
+fn a_stop_adds_no_step_to_the_stop_before() {
+    let axes = [(284_758, 16_000), (999, 473_886)].map(|(a, scale)| AxisSetup::new(Limits::new(49, a).unwrap(), scale));
+    let mut machine = Machine::new(Path::new(Clock::new(1000).unwrap(), axes, 0).unwrap());
+    machine.push([-139, 0], 10, 0).unwrap();
+    machine.set_override(0, 3126);
+    let before = ending(&machine, 1);
+    machine.hold(2);
+    machine.stop(3);
+    let after = ending(&machine, 1);
+    assert!(after.is_within(before, 0, 0), "{after:?}, {before:?} before");
+}
