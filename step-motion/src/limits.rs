@@ -298,6 +298,7 @@ impl Bounds {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers to compare with 1e-6 of them")]
 mod tests {
     use super::*;
     use std::string::ToString;
