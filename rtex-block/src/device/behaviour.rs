@@ -27,6 +27,8 @@ flag_set! {
         UNHOMED_BY_SERVO_OFF = 1 << 10;
         /// Homing_Complete goes to 0 when an alarm occurs.
         UNHOMED_BY_ALARM = 1 << 11;
+        /// A homing is busy until it ends; otherwise only In_Progress shows it.
+        BUSY_WHILE_HOMING = 1 << 12;
     }
 }
 

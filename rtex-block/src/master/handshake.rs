@@ -31,6 +31,8 @@ pub struct Handshake {
     code: Code,
     request: NonCyclicCommand,
     left: u32,
+    /// Number of responses with Busy that do not count, for what ends with the axis.
+    busy: Option<u32>,
     /// The index echo is part of the answer.
     any_index: bool,
 }
@@ -46,7 +48,7 @@ impl Handshake {
             NonCyclicCommand::Normal { .. } | NonCyclicCommand::Profile { .. } => None,
             _ => {
                 let code = Code::of(cyclic, request.code());
-                Some(Self { mac_id, code, request, left: limit, any_index: false })
+                Some(Self { mac_id, code, request, left: limit, busy: None, any_index: false })
             }
         }
     }
@@ -58,7 +60,17 @@ impl Handshake {
     /// compared. SX-DSV02310, "Alarm command".
     pub const fn alarm_attributes(mac_id: MacId, cyclic: CyclicCode, type_code: TypeCode, limit: u32) -> Self {
         let request = NonCyclicCommand::Alarm(Arguments { type_code, index: 0, data: 0 });
-        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, any_index: true }
+        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, busy: None, any_index: true }
+    }
+
+    /// Lets the drive be Busy for this many responses, which do not count towards the limit.
+    pub(super) const fn with_busy(self, busy: u32) -> Self {
+        Self { busy: Some(busy), ..self }
+    }
+
+    /// Whether the drive may be Busy for longer than an answer takes, because it moves the axis.
+    pub(super) const fn is_patient(&self) -> bool {
+        self.busy.is_some()
     }
 
     /// Returns what to send while the handshake is pending.
@@ -91,7 +103,7 @@ impl Handshake {
     }
 
     /// `None` while the answer is awaited.
-    fn read(&self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
+    fn read(&mut self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
         if let NonCyclicResponse::CommandError(code) = response {
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }
@@ -99,7 +111,8 @@ impl Handshake {
         if execution.contains(Execution::ERR) {
             Some(Progress::Failed { error: Failure::Execution })
         } else if execution.contains(Execution::BUSY) {
-            None
+            self.busy = Some(self.busy?.checked_sub(1)?);
+            Some(Progress::Pending { left: self.left })
         } else {
             Some(Progress::Done { value: response })
         }

@@ -40,28 +40,34 @@ const CAUSES: [Cause; 10] = [
 
 /// Homing_Complete in all its ways, with the flags that end a motion late or not.
 fn behaviours() -> impl Iterator<Item = Behaviour> {
-    (0..16_u8).map(|bits| {
+    (0..32_u8).map(|bits| {
         let each = [
             Quirks::HOMED_AT_START,
             Quirks::HOMED_THROUGH_HOMING,
             Quirks::UNHOMED_BY_SERVO_OFF,
             Quirks::UNHOMED_BY_ALARM,
+            Quirks::BUSY_WHILE_HOMING,
         ];
         let quirks = each.into_iter().enumerate().filter(|(k, _)| bits >> k & 1 != 0).map(|(_, quirk)| quirk).collect();
         Behaviour::new()
             .with_quirks(quirks)
             .with_echo_lag(bits % 3)
             // Alarm, Servo_Ready and Servo_Active are shown up to two exchanges after the end of In_Progress.
-            .with_status_late([0, 0, 0, 0, 0, bits % 3, bits % 2, bits / 8])
+            .with_status_late([0, 0, 0, 0, 0, bits % 3, bits % 2, bits / 8 % 2])
     })
 }
 
 /// An axis on in PP, standing at 100,000.
 fn pair(behaviour: Behaviour) -> Pair {
+    pair_at(behaviour, -1_000)
+}
+
+/// The same, so far from the origin.
+fn pair_at(behaviour: Behaviour, distance: i32) -> Pair {
     let mac_id = MacId::new(9).unwrap();
     let config = AxisConfig::new(mac_id, ActiveCode::ProfilePosition, 500_000, crate::common::limits());
-    let mut pair =
-        Pair::with(config.with_deceleration(50), DriveConfig::new(mac_id, CODES).with_homing_distance(-1_000));
+    let drive = DriveConfig::new(mac_id, CODES).with_homing_distance(distance);
+    let mut pair = Pair::with(config.with_deceleration(50), drive);
     pair.drive.set_behaviour(behaviour);
     pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
     let homed_before = behaviour.quirks.contains(Quirks::HOMED_AT_START);
@@ -220,6 +226,63 @@ fn a_homing_out_of_time_is_stopped() {
             !pair.drive.is_active()
         });
         assert!(stops.is_some(), "{limit}: the drive goes on");
+    }
+}
+
+/// A drive may be Busy until it has homed, and that takes longer than the answer to a request; an answer that does not come at all is
+/// missed as soon as that of any request.
+#[test]
+fn a_homing_may_be_busy_all_the_time() {
+    for quirks in [Quirks::BUSY_WHILE_HOMING, Quirks::BUSY_WHILE_HOMING.union(Quirks::HOMED_THROUGH_HOMING)] {
+        let behaviour = Behaviour::new().with_quirks(quirks);
+        let home = |behaviour, limit| {
+            let (mut pair, mut home) = (pair_at(behaviour, -40_000), Home::new(0xc8, limit));
+            let from = pair.now;
+            let ended = pair.run(|axis| home.receive(axis));
+            (ended, pair.now - from, pair)
+        };
+        let (ended, took, mut pair) = home(behaviour, 2_000);
+        assert_eq!(ended, Progress::Done { value: () });
+        assert!(took > 200 && settle(&mut pair).abs() < 60, "{took}");
+        let out_of_time = Progress::Failed { error: Failure::TimedOut };
+        for limit in [10, 100, took / 2] {
+            let (ended, after, pair) = home(behaviour, limit);
+            assert_eq!((ended, reason(&pair.axis)), (out_of_time, Some(StopReason::HomingTimeout)), "{limit}");
+            assert!((limit..limit + 80).contains(&after), "{limit}: {after}");
+        }
+        let (ended, after, pair) = home(behaviour.with_stale_answers(u16::MAX), 2_000);
+        assert_eq!((ended, reason(&pair.axis)), (out_of_time, Some(StopReason::HomingTimeout)));
+        assert!(after < 80, "{after}");
+    }
+}
+
+/// A drive that is Busy with a homing when the axis stops, or is switched off: the command is not sent any more, so it cannot begin
+/// again when the servo is switched on.
+#[test]
+fn a_homing_that_was_stopped_is_not_asked_for() {
+    let stops = [
+        |axis: &mut Axis| axis.stop(StopCategory::Zero),
+        |axis: &mut Axis| axis.stop(StopCategory::One),
+        |axis: &mut Axis| axis.stop(StopCategory::Two),
+        Axis::switch_off,
+    ];
+    for (which, stop) in stops.into_iter().enumerate() {
+        let behaviour = Behaviour::new().with_quirks(Quirks::BUSY_WHILE_HOMING);
+        let (mut pair, mut home) = (pair_at(behaviour, -40_000), Home::new(0xc8, 2_000));
+        for _ in 0..30 {
+            pair.update();
+            assert!(home.receive(&mut pair.axis).is_pending());
+        }
+        stop(&mut pair.axis);
+        let ended = pair.axis.take_outcome();
+        let why = reason(&pair.axis).map_or(Failure::ServoOff, Failure::Stopped);
+        assert_eq!(ended, Some(Progress::Failed { error: why }), "{which}");
+        for _ in 0..200 {
+            // Homing commands are 4h.
+            assert_eq!(pair.axis.transmission(pair.sent).main.noncyclic.code().code(), 0, "{which}");
+            pair.update();
+        }
+        assert!(pair.axis.can_ask(), "{which}");
     }
 }
 

@@ -79,6 +79,7 @@ impl Drive {
         };
         let busy = match request.code {
             PROFILE => shown & SHOWN_IN_PROGRESS != 0,
+            HOMING if request.type_code() == u16::from(self.config.codes.homing) => job.busy > 0 || self.homes_busily(),
             _ => job.busy > 0,
         };
         let new = stale.is_none();
@@ -91,6 +92,11 @@ impl Drive {
             }
             _ => request.answer(execution, index, 0, data),
         }
+    }
+
+    /// Whether a homing is under way, in a drive that shows it as Busy.
+    const fn homes_busily(&self) -> bool {
+        self.homing && self.behaviour.does(Quirks::BUSY_WHILE_HOMING)
     }
 
     /// Latch_Comp1 and 2 as they are now; the answers may show them later.

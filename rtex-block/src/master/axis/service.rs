@@ -49,9 +49,19 @@ impl Axis {
     ///
     /// # Errors [`AskError`]; nothing is sent.
     pub fn ask(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
-        let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
         let servo_off = needs_servo_off(&request, self.mode == ActiveCode::CyclicPosition);
-        self.begin(handshake.ok_or(AskError::NotARequest)?, servo_off)
+        self.begin(self.handshake(request)?, servo_off)
+    }
+
+    /// Sends a homing command with which the drive moves the axis, in PP. It may be Busy for `busy` update periods; a stop withdraws
+    /// the command.
+    pub(in crate::master) fn ask_homing(&mut self, request: NonCyclicCommand, busy: u32) -> Result<(), AskError> {
+        self.begin(self.handshake(request)?.with_busy(busy), needs_servo_off(&request, false))
+    }
+
+    fn handshake(&self, request: NonCyclicCommand) -> Result<Handshake, AskError> {
+        let (mac_id, limit) = (self.config.mac_id, self.config.limits.answer);
+        Handshake::new(mac_id, self.mode.cyclic(), request, limit).ok_or(AskError::NotARequest)
     }
 
     /// Sends a homing command of the latch mode, in any mode and with the servo on or off. `type_code` arms the latches,
@@ -67,8 +77,7 @@ impl Axis {
         monitor_sel: u8,
     ) -> Result<(), AskError> {
         let request = NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data: 0 };
-        let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
-        self.begin(handshake.ok_or(AskError::NotARequest)?, needs_servo_off(&request, false))
+        self.begin(self.handshake(request)?, needs_servo_off(&request, false))
     }
 
     /// Reads the attributes of the present alarm, with the type code given in the drive's manual.
@@ -89,8 +98,7 @@ impl Axis {
         if self.mode != ActiveCode::CyclicVelocity || !still {
             return Err(AskError::ServoOn);
         }
-        let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
-        self.begin(handshake.ok_or(AskError::NotARequest)?, false)
+        self.begin(self.handshake(request)?, false)
     }
 
     /// Returns whether a request can be sent now.

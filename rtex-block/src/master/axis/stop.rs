@@ -1,8 +1,11 @@
 //! How an axis stops. A stop takes precedence over everything, and a later stop never makes the one in progress gentler.
 
 use super::Axis;
+use super::asking::{Quiet, Slot};
 use crate::control::ControlBits;
 use crate::master::config::StopCategory;
+use crate::master::handshake::Handshake;
+use crate::master::progress::{Failure, Progress};
 use crate::master::servo_off::ActiveCode;
 use crate::master::state::{AxisState, StopReason};
 use crate::status::StatusFlags;
@@ -139,6 +142,11 @@ impl Axis {
             AxisState::Stopped(reason) | AxisState::Stopping(reason) | AxisState::Held(reason) => Some(reason),
             _ => None,
         };
+        if self.main.slot.asking().is_some_and(Handshake::is_patient) {
+            // It must not begin again with the next servo-on.
+            let error = reason.map_or(Failure::ServoOff, Failure::Stopped);
+            (self.main.slot, self.main.quiet) = (Slot::Ended(Progress::Failed { error }), Quiet::BROKEN);
+        }
         let confirmed = self.main.quiet.is_kept();
         if let Some(profile) = &mut self.profile {
             // While it slows down the drive keeps the code of the motion, and its end is awaited.

@@ -208,12 +208,17 @@ impl Blocks {
         if self.said.is_some() || unsound * 10 < WINDOW && !doubts && !self.leaning {
             return None;
         }
-        self.leaning &= certain(&window) != Some(now);
-        let other = LogShape::guess(&window).ok().filter(|other| *other != now || doubts)?;
+        let sure = certain(&window);
+        self.leaning &= sure != Some(now);
+        // While the shape is not known, neither is whether the window begins with a block.
+        let guess = if doubts { sure } else { LogShape::guess(&window).ok() };
+        let other = guess.filter(|other| *other != now || doubts)?;
         self.doubt = None;
-        let size = other.size.bytes();
+        self.leaning = leans(other) && sure != Some(other);
+        let (size, flow) = (other.size.bytes(), self.flow);
         // The window begins with a block of the old shape, and ends where the next bytes continue.
         self.take(Some(other), (other.skip + size - window.len() % size) % size);
+        self.flow |= flow;
         Some(other)
     }
 }

@@ -93,6 +93,20 @@ fn a_log_that_may_have_either_of_two_shapes() {
     // Nor are there figures of a drive.
     let figures = bench.decode("log.txt", lines(&standing(60)), &["--protocol", "rtex", "--bytes", "--stats"]);
     assert!(!figures.out.contains("drive") && !figures.out.contains("address"), "{}", figures.out);
+    // However long it goes on, whichever of the two it is, and whether or not a line is as long as a block.
+    for (word, size) in [(2, 16), (4, 16), (2, 32), (4, 32)] {
+        let bytes: Vec<u8> = (1..=300_u16)
+            .flat_map(|k| {
+                let mut block = [0; 32];
+                (block[0], block[1], block[16]) = ((k % 4 * 32 + 5) as u8, 0x20, 0x80);
+                block.into_iter().take(size)
+            })
+            .collect();
+        let read: Vec<u8> = bytes.chunks(word).flat_map(|word| word.iter().rev()).copied().skip(5).collect();
+        let run = bench.decode("log.txt", lines(&read), &options);
+        assert!(run.code != 0 && run.err.contains("nothing in it tells which"), "{word} {size}: {}", run.err);
+        assert!(run.json().iter().all(|event| event["address"].is_null()), "{word} {size}: {:?}", run.verdicts());
+    }
     // What follows is told once the motor turns: from there on it is shown.
     let turning: Vec<u8> = (1..=200_u8)
         .flat_map(|k| {
