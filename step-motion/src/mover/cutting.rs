@@ -138,3 +138,34 @@ impl Mover {
         self.rest(self.phases.end());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::{Clock, Limits};
+
+    /// More steps than 32 bits count, without a stop or a change of speed.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn a_run_has_no_end() {
+        let limits = Limits::new(400_000, 8_000_000).unwrap();
+        let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap().cutting();
+        mover.ask_run(Direction::Forward, 400_000);
+        assert!(mover.pursue(News::Aim, 0));
+        let demand = Demand { off: Clock::MICROSECONDS.blur(), coarse: None, time: u64::MAX };
+        let (mut last, interval) = (None, 5_i128 << 31);
+        while mover.commanded() < 3 << 32 {
+            mover.proceed();
+            match mover.cut(&demand, u64::MAX) {
+                Cut::Steps(stretch, direction) => {
+                    let gap = last.map(|last: i128| stretch.first - last);
+                    assert!(gap.is_none_or(|gap| mover.commanded() < 20_000 || gap.abs_diff(interval) < 1 << 32));
+                    assert_eq!(direction, Direction::Forward);
+                    last = Some(stretch.last());
+                }
+                Cut::More => {}
+                other => panic!("{other:?} at {}", mover.commanded()),
+            }
+        }
+    }
+}

@@ -189,3 +189,35 @@ fn a_background_that_is_late_costs_a_stop_and_no_step() {
         assert_eq!(bench.axes.commanded(), [8000, 0]);
     }
 }
+
+/// A stop that nobody asked for lasts until the machine is at rest, which is later than its last step: next motion may begin then.
+#[test]
+fn a_stop_lasts_until_rest() {
+    let (mut waits, mut wants) = (0.0, 0.0);
+    for at in (300_000..302_000).step_by(97) {
+        let mut bench = Bench::running();
+        bench.until(at, true);
+        bench.machine.drain();
+        let [.., before, last] = bench.machine.steps[..] else { panic!("no steps") };
+        // 80,000 steps/s².
+        let gap = (last.0 - before.0) as f64 / 1e6;
+        wants += f64::max(0.0, 1.0 / gap / 80_000.0 - gap / 2.0);
+        waits += (bench.machine.now - last.0) as f64 / 1e6;
+    }
+    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s behind the last steps, {wants} s are needed");
+}
+
+/// A corner of 90 degrees on a machine that is in motion.
+#[test]
+fn the_deviation_counts_for_the_lines_that_follow() {
+    let over = |deviation| {
+        let mut bench = Bench::running();
+        bench.axes.set_deviation(deviation);
+        bench.axes.push([8000, 4000], 100_000).unwrap();
+        bench.machine.run(&mut bench.axes, 500, u64::MAX);
+        assert_eq!(bench.machine.position, [8000, 4000]);
+        bench.machine.steps.last().unwrap().0
+    };
+    let [none, some, much] = [0, 100, 2000].map(over);
+    assert!(none > some && some > much && none - much > 50_000, "{none} {some} {much}");
+}

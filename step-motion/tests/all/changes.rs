@@ -393,8 +393,11 @@ fn a_move_has_two_to_the_31_steps_at_most() {
         let refused = mover().move_to(target, 0);
         assert_eq!(refused, Err(Error::TooManySteps { steps, limit: u32::MAX / 2 }));
     }
-    mover().move_to(-most, 0).unwrap();
-    mover().move_to(most, 0).unwrap();
+    for target in [-most, most] {
+        let mut mover = mover();
+        mover.move_to(target, 0).unwrap();
+        assert_eq!(mover.pulse().map(|pulse| pulse.direction.dir()), Some(target < 0));
+    }
 }
 
 /// 10,000 steps/s, 100,000 steps/s² and 2,000,000 steps/s³ to 4000, which brakes from 0.4 to 0.55 s; at 0.475 s the axis is at

@@ -461,4 +461,8 @@ fn at_rest_is_when_nothing_moves() {
     // Half a step from rest takes sqrt(1 / 100,000) s.
     let first = machine.due().unwrap();
     assert!(first >= rest + 3161, "{first} after {rest}");
+    to_rest(&mut machine);
+    machine.push([-3, 2], 1_000_000, 1 << 40).unwrap();
+    to_rest(&mut machine);
+    assert_eq!(machine.at(1 << 41).map(|state| (state.position, state.speed)), [(-3 << 32, 0), (2 << 32, 0)]);
 }
