@@ -400,6 +400,37 @@ fn a_move_has_two_to_the_31_steps_at_most() {
     }
 }
 
+/// Told to run the other way it stops and does so, at the new speed.
+#[test]
+fn a_run_turns_round() {
+    for (soft, jerk) in [(false, None), (true, None), (false, Some(1_000_000)), (true, Some(1_000_000))] {
+        let limits = Limits::new(2000, 20_000).unwrap();
+        let limits = jerk.map_or(limits, |jerk| limits.with_jerk(jerk).unwrap());
+        let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+        if soft {
+            mover = mover.with_soft_limits(-100_000, 100_000);
+        }
+        for (direction, speed, sign) in
+            [(Direction::Forward, 2000, 1), (Direction::Reverse, 500, -1), (Direction::Forward, 1000, 1)]
+        {
+            let now = mover.due().unwrap_or(0);
+            mover.run(direction, speed, now).unwrap();
+            for _ in 0..1000 {
+                mover.pulse();
+            }
+            let (from, since) = (mover.commanded(), mover.due().unwrap());
+            while mover.due().is_some_and(|due| due < since + 1_000_000) {
+                mover.pulse();
+            }
+            let made = mover.commanded() - from;
+            assert!(
+                (made * sign).abs_diff(speed.into()) <= 1,
+                "{made} steps in a second at {speed} steps/s {direction:?}"
+            );
+        }
+    }
+}
+
 /// 10,000 steps/s, 100,000 steps/s² and 2,000,000 steps/s³ to 4000, which brakes from 0.4 to 0.55 s; at 0.475 s the axis is at
 /// 3864.583, at 5000 steps/s and -100,000 steps/s², and is told another target. Gives when it is at rest.
 fn another_target(target: i64) -> u64 {
