@@ -39,9 +39,9 @@ impl<const N: usize> Line<N> {
         Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None }
     }
 
-    /// Returns the limits with the speed set to a fraction of the requested one, never above the limits of the axes.
-    pub(super) fn bounds(&self, part: Real) -> Bounds {
-        self.bounds.slower(self.feed * part)
+    /// Returns a fraction of the requested speed, never above the limits of the axes.
+    pub(super) fn speed(&self, part: Real) -> Real {
+        self.bounds.v.min(self.feed * part)
     }
 
     /// Returns the steps that each axis has made at a place on the line; all steps at its end.
@@ -123,29 +123,49 @@ pub(super) enum Steps {
 }
 
 impl<const N: usize> LinePulses<N> {
+    /// Creates the steps along a line, none of which is taken yet.
     pub(super) fn new(clock: Clock, curve: &Curve, line: &Line<N>, start: Start<N>, steps: Steps) -> Self {
+        let mut new = Self::none(clock, start);
+        new.begin(curve, line, start, steps);
+        new
+    }
+
+    /// No steps, on no line.
+    pub(super) fn none(clock: Clock, start: Start<N>) -> Self {
+        let axes = [(Frame::rest(clock.shift(), 0, 0), Stepper::new()); N];
+        let directions = [Direction::Forward; N];
+        Self { clock, curve: Curve::new(), axes, due: [None; N], directions, start, end: 0, left: 0 }
+    }
+
+    /// Begins a line on a curve. All of this is done in place, because it is large.
+    pub(super) fn begin(&mut self, curve: &Curve, line: &Line<N>, start: Start<N>, steps: Steps) {
+        self.curve.clone_from(curve);
+        self.go_on(line, start, steps);
+    }
+
+    /// Goes on along another line, to which the same curve leads.
+    pub(super) fn go_on(&mut self, line: &Line<N>, start: Start<N>, steps: Steps) {
         let Start { moment, offset, .. } = start;
-        let rest = Frame::rest(clock.shift(), moment, 0);
-        let mut axes = line.steps.map(|steps| {
+        let rest = Frame::rest(self.clock.shift(), moment, 0);
+        let ends = line.steps.into_iter().zip(start.made).zip(line.ends);
+        for ((frame, stepper), ((steps, made), end)) in self.axes.iter_mut().zip(ends) {
             let scale = Real::new(steps.unsigned_abs().into()) / line.whole;
             let from = line.place(steps, start.place).saturating_sub(line.place(steps, start.before));
-            (Frame { from, offset, scale, ..rest }, Stepper::new())
-        });
-        for (((frame, _), made), end) in axes.iter_mut().zip(start.made).zip(line.ends) {
-            frame.from = frame.from.saturating_sub(i64::from(made) << P);
-            frame.to = start.whole.then_some(i64::from(end.saturating_sub(made)) << P);
+            let from = from.saturating_sub(i64::from(made) << P);
+            let to = start.whole.then_some(i64::from(end.saturating_sub(made)) << P);
+            *frame = Frame { from, to, offset, scale, ..rest };
+            *stepper = Stepper::new();
         }
-        let end = axes.first().map_or(moment, |(frame, _)| frame.end(curve));
-        let directions = line.steps.map(|steps| Direction::of(steps.into()));
-        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end, left: end };
-        for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
+        let end = self.axes.first().map_or(moment, |(frame, _)| frame.end(&self.curve));
+        (self.start, self.end, self.left) = (start, end, end);
+        self.directions = line.steps.map(|steps| Direction::of(steps.into()));
+        for ((frame, stepper), due) in self.axes.iter_mut().zip(&mut self.due) {
             *due = match steps {
-                Steps::Single => stepper.next(&new.curve, frame),
-                Steps::Stretches if new.curve.pieces().is_empty() => None,
-                Steps::Stretches => (phases::steps(frame.last(&new.curve)) > 0).then_some(0),
+                Steps::Single => stepper.next(&self.curve, frame),
+                Steps::Stretches if self.curve.pieces().is_empty() => None,
+                Steps::Stretches => (phases::steps(frame.last(&self.curve)) > 0).then_some(0),
             };
         }
-        new
     }
 
     /// Tick at which the line ends.

@@ -287,7 +287,8 @@ pub(super) struct Inverse {
 }
 
 impl Inverse {
-    pub(super) const ONE: Self = Self { per: u64::MAX, zeros: 63 };
+    /// No divisor.
+    pub(super) const NONE: Self = Self { per: 0, zeros: 0 };
 
     pub(super) const fn new(x: u64) -> Self {
         let zeros = x.leading_zeros();

@@ -104,7 +104,7 @@ impl Stepper {
         if part.wrapping_add(self.blur) < self.blur << 1 {
             return self.exact();
         }
-        self.first.saturating_add(self.since >> 32)
+        self.first.wrapping_add(self.since >> 32)
     }
 
     /// Returns the same if it is in doubt.

@@ -1,9 +1,11 @@
 //! The times of steps near a rest, from the first of them: roots of odd numbers.
 
+use core::num::NonZeroU64;
+
 use crate::real::high;
 
 /// How many steps after a rest are found by a root.
-const KNOWN: usize = 32;
+const KNOWN: usize = 64;
 
 /// Roots of 1, 3, 5 and so on, in 2^-60.
 type Roots = [u64; KNOWN];
@@ -52,12 +54,12 @@ pub(super) struct FromRest {
     at: u32,
     /// Time of the first step on either side, as a part of the piece and in 2^-32 ticks; `None` if a piece is too long for these.
     first: u64,
-    ticks: Option<u64>,
+    ticks: Option<NonZeroU64>,
     cubic: bool,
 }
 
 impl FromRest {
-    pub(super) const fn new(at: u32, (first, ticks): (u64, Option<u64>), cubic: bool) -> Self {
+    pub(super) const fn new(at: u32, (first, ticks): (u64, Option<NonZeroU64>), cubic: bool) -> Self {
         Self { at, first, ticks, cubic }
     }
 
@@ -70,7 +72,7 @@ impl FromRest {
     #[inline]
     pub(super) fn step_and_ticks(&self, count: u32) -> Option<(u64, u64)> {
         let root = self.root(count)?;
-        Some((scaled(self.first, root)?, scaled(self.ticks?, root)?))
+        Some((scaled(self.first, root)?, scaled(self.ticks?.get(), root)?))
     }
 
     fn root(&self, count: u32) -> Option<u64> {
@@ -81,7 +83,7 @@ impl FromRest {
     }
 }
 
-/// Multiplies a time by a root, which is below 2^4: that of 63 is 7.9.
+/// Multiplies a time by a root, which is below 2^4: that of 127 is 11.3.
 fn scaled(time: u64, root: u64) -> Option<u64> {
     let time = high(time, root);
     (time.leading_zeros() >= 4).then_some(time << 4)

@@ -1,5 +1,7 @@
 //! A piece of a curve, scaled to its own time and distance, and the segments that fit into it.
 
+use core::num::NonZeroU64;
+
 use super::near_rest::FromRest;
 use super::stretch::Stretch;
 use crate::curve::{Bend, Curve};
@@ -53,6 +55,10 @@ pub(super) const ALL: u64 = 1 << 62;
 /// A correction of a time after which it is exact, whatever the acceleration is.
 const CLOSE: u64 = 1 << 20;
 
+/// A step so much shorter than the time from the slower end, as a power of 2, is exact if the acceleration is taken into
+/// account: the error is about the cube of that ratio.
+const NEAR: u32 = 21;
+
 /// A position, with the speed and half the acceleration at it.
 struct Place {
     p: u64,
@@ -75,22 +81,23 @@ pub(super) struct Spot {
 }
 
 impl Part {
+    /// All bytes are zero, so it is cleared rather than copied.
     pub(super) const NONE: Self = Self {
         speed: 0,
         half: 0,
         sixth: 0,
         grows: false,
         back: false,
-        even: true,
+        even: false,
         begin: 0,
         origin: 0,
         lasts: Real::ZERO,
-        per: Inverse::ONE,
+        per: Inverse::NONE,
         pace: Real::ZERO,
         steps: Real::ZERO,
-        bits: 32,
+        bits: 0,
         first: 0,
-        way: (Inverse::ONE, 0),
+        way: (Inverse::NONE, 0),
         step: 0,
         off: 0,
         rest: None,
@@ -170,7 +177,7 @@ impl Part {
         let at = u32::try_from(whole).ok()?;
         let first = if self.back { at.checked_sub(1)? } else { at };
         let first = self.search(first, None, 0);
-        let ticks = (self.lasts.exponent() < 64).then(|| self.ticks(first));
+        let ticks = NonZeroU64::new(self.ticks(first)).filter(|_| self.lasts.exponent() < 64);
         Some(FromRest::new(at, (first, ticks), self.half == 0))
     }
 
@@ -302,14 +309,18 @@ impl Part {
             return time;
         }
         let way = self.target(count);
-        let mut time = last.map_or(0, |last| {
-            // By the speed, and the change of it.
+        let mut time = 0;
+        if let Some(last) = last {
+            // By the speed, and the change of it: what is left is of the third order.
             let Place { p, v, half } = self.at(last);
             let v = Inverse::new(v);
             let ahead = v.of(p.abs_diff(way));
             let w = v.of(high(half, ahead));
-            along(last, along(ahead, high(ahead, w), self.back), p < way)
-        });
+            time = along(last, along(ahead, high(ahead, w), p >= way), p < way);
+            if ahead <= last >> NEAR {
+                return time;
+            }
+        }
         if time == 0 || time == u64::MAX {
             time = self.guess(way);
         }
@@ -318,8 +329,9 @@ impl Part {
             let Place { p, v, .. } = self.at(time);
             let by = Inverse::new(v).of(p.abs_diff(way));
             time = along(time, by, p < way);
-            // The error is about squared: the next one would be in the last bit, or rounding is all that is left.
-            if by <= near.max(CLOSE) || by >= last && by < u64::MAX {
+            // The error that is left is about the square of this one over the time: near enough, or in the last bit; or
+            // rounding is all that is left.
+            if by <= near.max(CLOSE) || high(by, by) < high(near, time) || by >= last && by < u64::MAX {
                 return time;
             }
             last = by;

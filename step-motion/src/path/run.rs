@@ -6,6 +6,7 @@
 use super::{Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
+use crate::line::Line;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
 
@@ -19,18 +20,21 @@ pub(crate) struct Run {
     bounds: Bounds,
 }
 
+impl Run {
+    /// All bytes are zero, so an array of it is cleared rather than copied.
+    const NONE: Self = Self {
+        more: 0,
+        length: Real::ZERO,
+        bounds: Bounds { v: Real::ZERO, a: Real::ZERO, per_a: Real::ZERO, jerk: None },
+    };
+}
+
 /// How much more acceleration or jerk a line may allow than another one of the same run.
 const ALIKE: Real = Real::fixed(3, 1);
 /// How much more speed it may allow.
 const EQUAL: Real = Real::fixed(129, 7);
 
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// Returns what a line allows at a fraction of the requested speeds; without a fraction, all that its axes allow.
-    fn allowed(&self, at: usize, part: Option<Real>) -> Option<Bounds> {
-        let line = self.line(at)?;
-        Some(part.map_or(line.bounds, |part| line.bounds(part)))
-    }
-
     /// Returns the run that begins at line `at`, with a speed of at most `speed` and of what its lines allow, and with an
     /// acceleration and jerk under way: limits below these would make them jump. It has at most `most` lines after the
     /// first one; with `any`, also such as allow other accelerations.
@@ -42,28 +46,33 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (most, any): (usize, bool),
     ) -> Option<Run> {
         let mut last = self.line(at)?;
-        let mut run = Run { more: 0, length: last.length, bounds: self.allowed(at, part)? };
+        // A fraction of the requested speed; without one, all that the axes allow.
+        let allowed = |line: &Line<N>| part.map_or(line.bounds.v, |part| line.speed(part));
+        let mut run = Run { more: 0, length: last.length, bounds: Bounds { v: allowed(last), ..last.bounds } };
         while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
             if run.more >= most {
                 break;
             }
             let next = at.saturating_add(run.more).saturating_add(1);
-            let (Some(line), Some(own)) = (self.line(next), self.allowed(next, part)) else { break };
-            let Some(other) = own.jerk else { break };
+            let Some(line) = self.line(next) else { break };
+            let Bounds { a: own, jerk: Some(other), .. } = &line.bounds else { break };
+            let most = allowed(line);
             let fastest = if part.is_some() { run.bounds.v.max(speed) } else { speed };
             let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
-            let fits = line.corner >= fastest && own.v >= speed;
-            let v = part.is_none() || alike(own.v, run.bounds.v, EQUAL);
-            let same = any || alike(own.a, run.bounds.a, ALIKE) && alike(other.j, jerk.j, ALIKE);
+            let fits = line.corner >= fastest && most >= speed;
+            let v = part.is_none() || alike(most, run.bounds.v, EQUAL);
+            let same = any || alike(*own, run.bounds.a, ALIKE) && alike(other.j, jerk.j, ALIKE);
             if !fits || !v || !same {
                 break;
             }
-            let (a, j) = (run.bounds.a.min(own.a), jerk.j.min(other.j));
+            let (a, j) = (run.bounds.a.min(*own), jerk.j.min(other.j));
             if a < held[0] || j < held[1] {
                 break;
             }
-            let bounds = Bounds::new(run.bounds.v.min(own.v), a, Some(j));
-            run = Run { more: run.more.saturating_add(1), length: run.length + line.length, bounds };
+            let v = run.bounds.v.min(most);
+            let same = a == run.bounds.a && j == jerk.j;
+            run.bounds = if same { Bounds { v, ..run.bounds } } else { Bounds::new(v, a, Some(j)) };
+            (run.more, run.length) = (run.more.saturating_add(1), run.length + line.length);
             last = line;
         }
         Some(run)
@@ -232,17 +241,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
-        let mut runs = [None; M];
-        let mut next = at.saturating_add(1);
+        let (mut runs, mut next) = ([(0, Run::NONE); M], at.saturating_add(1));
         for place in &mut runs {
             let Some(run) = self.run(next, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false)) else { break };
-            *place = Some((next, run));
+            *place = (next, run);
             next = next.saturating_add(run.more).saturating_add(1);
         }
         let mut speed = Real::ZERO;
-        for (at, run) in runs.into_iter().rev().flatten() {
-            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(at)) {
-                let most = line.corner.min(before.bounds(part).v).min(run.bounds.v);
+        for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
+            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(*at)) {
+                let most = line.corner.min(before.speed(part)).min(run.bounds.v);
                 speed = fastest(speed, run.length, &run.bounds).min(most);
             }
         }

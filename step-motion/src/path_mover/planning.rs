@@ -156,50 +156,60 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Begins the first line.
     pub(super) fn begin(&mut self) {
-        (self.line, self.made, self.exit, self.more) = (None, [0; N], Real::ZERO, 0);
-        let part = self.part();
-        if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
-            return;
-        }
-        self.path.not_before_steps(self.free);
-        self.path.not_before_turning();
-        if let Some((course, bounds)) = self.path.begin(0, self.path.speed(), part) {
-            self.adopt(&course, self.path.start(), bounds);
+        (self.made, self.exit, self.more) = ([0; N], Real::ZERO, 0);
+        if !self.begins() {
+            self.line = None;
         }
     }
 
-    /// Replaces the running curve, unless rounding has left the new one without the remaining steps.
-    pub(super) fn adopt(&mut self, course: &Course, start: Start<N>, bounds: Bounds) {
-        let Some(first) = self.path.line(0) else { return };
-        let whole = course.more > 0 || course.whole;
-        let mut line = LinePulses::new(self.clock(), &course.curve, first, Start { whole, ..start }, self.steps);
-        if whole && line.first().is_none() && self.made != first.ends {
-            return;
+    /// Begins the first line in place of the one before, if it can be begun; returns whether it has.
+    fn begins(&mut self) -> bool {
+        let part = self.part();
+        if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
+            return false;
         }
-        let begin = start.moment.div_ceil(self.clock().moment(1));
+        self.path.not_before_steps(self.free);
+        self.path.not_before_turning();
+        let course = self.path.begin(0, self.path.speed(), part);
+        course.is_some_and(|(course, bounds)| self.adopt(&course, self.path.start(), bounds))
+    }
+
+    /// Replaces the running curve, unless rounding has left the new one without the remaining steps; returns whether it has.
+    pub(super) fn adopt(&mut self, course: &Course, start: Start<N>, bounds: Bounds) -> bool {
+        let Some(first) = self.path.line(0) else { return false };
+        let whole = course.more > 0 || course.whole;
+        let none = course.curve.pieces().is_empty() || first.ends.iter().zip(&self.made).all(|(end, made)| end <= made);
+        if whole && none && self.made != first.ends {
+            return false;
+        }
+        let (clock, start) = (self.path.clock(), Start { whole, ..start });
+        let line = self.line.get_or_insert_with(|| LinePulses::none(clock, start));
+        line.begin(&course.curve, first, start, self.steps);
+        let begin = start.moment.div_ceil(clock.moment(1));
         for (due, free) in line.due.iter_mut().zip(self.free) {
             *due = due.map(|due| due.max(free).max(begin));
         }
-        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
+        (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
         self.braking = self.part().is_none();
         self.left = [None; N];
+        true
     }
 
     /// Continues with the next line on the same curve.
     pub(super) fn go_on(&mut self) {
-        let (Some(line), Some(length)) = (&self.line, self.path.line(0).map(|line| line.length)) else { return };
+        let (Some(line), Some(length)) = (&mut self.line, self.path.line(0).map(|line| line.length)) else { return };
         let before = (line.start.before + length) - line.start.place;
         self.path.pass();
         let Some(next) = self.path.line(0) else { return };
         self.more = self.more.saturating_sub(1);
         let (place, whole) = (Real::ZERO, self.more > 0 || self.whole);
         let start = Start { place, before, made: [0; N], whole, ..line.start };
-        let mut line = LinePulses::new(self.clock(), &line.curve, next, start, self.steps);
+        line.go_on(next, start, self.steps);
         for (due, free) in line.due.iter_mut().zip(self.free) {
             *due = due.map(|due| due.max(free));
         }
-        (self.line, self.origin, self.made, self.left) = (Some(line), self.commanded, [0; N], [None; N]);
+        (self.origin, self.made, self.left) = (self.commanded, [0; N], [None; N]);
     }
 
     /// Takes out lines that have ended, and begins the next one.
