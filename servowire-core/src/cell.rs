@@ -112,7 +112,8 @@ pub struct Reader<'a, F, const W: usize> {
 impl<F: Feedback + Words<W>, const W: usize> Reader<'_, F, W> {
     /// Returns the value of the newest evidence, if it may be used at this time.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     #[inline]
     pub fn at(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<F::Sample, F::Doubt> {
         self.latest().at(now_ns, policy)

@@ -130,7 +130,8 @@ pub trait Feedback: Copy {
 
     /// Returns the value, if it may be used at this time.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     fn at(&self, now_ns: u64, policy: Policy<Self::Tolerated>) -> Result<Self::Sample, Self::Doubt>;
 }
 

@@ -130,7 +130,8 @@ pub struct ShaftReader<'a, F, const W: usize> {
 impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     /// Returns the value of the newest evidence, if it may be used at this time.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     #[inline]
     pub fn at(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<F::Sample, F::Doubt> {
         self.latest().at(now_ns, policy)
@@ -138,7 +139,8 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 
     /// Returns the speed and the mechanical angle, if the newest evidence may be used at this time.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     #[inline]
     pub fn motion(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<Motion, F::Doubt> {
         let (evidence, motion) = self.newest();
@@ -148,7 +150,8 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     /// Returns the electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
     /// tolerate; if the speed is not known, the bound is half a turn.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     #[inline]
     pub fn angle(
         &mut self,

@@ -21,7 +21,8 @@ pub(crate) const MAX_LOOKS: u32 = 200_000;
 pub trait Clock {
     /// Returns the time in nanoseconds from any origin; it never goes backwards.
     ///
-    /// # Errors A fault that the clock itself has detected.
+    /// # Errors
+    /// A fault that the clock itself has detected.
     fn now_ns(&mut self) -> Result<u64, ClockError>;
 }
 
@@ -77,9 +78,8 @@ impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
 #[cfg(feature = "async")]
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
-    /// Waits for this many ns; it should end late rather than early. The driver then reads the clock: a wait
-    /// that ended too early is
-    /// followed by another, and a clock that does not advance ends the call.
+    /// Waits for this many ns; it should end late rather than early. The driver then reads the clock: a wait that ended too early
+    /// is followed by another, and a clock that does not advance ends the call.
     async fn wait_ns(&mut self, ns: u64);
 }
 

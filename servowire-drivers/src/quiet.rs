@@ -135,7 +135,8 @@ impl Line {
     /// since the request began, it is not certain that any of that time has passed; if the clock has stopped, looking at it has
     /// taken longer than that.
     ///
-    /// # Errors The first fault of the clock; the time has passed even so.
+    /// # Errors
+    /// The first fault of the clock; the time has passed even so.
     #[cfg(feature = "tformat")]
     pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, ns: u64, longest_ns: u64) -> Result<(), ClockError> {
         let mut told = Ok(());

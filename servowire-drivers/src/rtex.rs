@@ -191,7 +191,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// it from the NC interrupt, before anything else is calculated. `began_ns` is the start of the frame that began the
     /// period, by the driver's clock: the time of the interrupt.
     ///
-    /// # Errors The first [`Error::Io`] or [`Error::Clock`]; every block that could be read or written was, and the next
+    /// # Errors
+    /// The first [`Error::Io`] or [`Error::Clock`]; every block that could be read or written was, and the next
     /// exchange continues.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]

@@ -67,7 +67,8 @@ pub(crate) fn reorder(samples: &mut [u8], order: Order) {
 /// and up to whole bytes, and followed by at least a byte of ones up to the end of a word, because the state of a data line
 /// between transfers is undefined. Switch the line driver on and off during these ones. Returns the number of bytes written.
 ///
-/// # Errors [`TooShort`] if `out` ends earlier; its contents are then undefined.
+/// # Errors
+/// [`TooShort`] if `out` ends earlier; its contents are then undefined.
 pub fn write(
     bits: impl IntoIterator<Item = bool>,
     per_bit: u8,

@@ -94,7 +94,8 @@ impl Evidence {
     /// Returns the position, if it may be used at this time. The doubts are checked in the order in which [`Doubt`]
     /// declares them.
     ///
-    /// # Errors The reason why it must not be used.
+    /// # Errors
+    /// The reason why it must not be used.
     pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
         let Some(address) = self.from else { return Err(Doubt::Never) };
         let Some(told) = self.told else { return Err(Doubt::NoPosition { address }) };

@@ -36,7 +36,8 @@ impl<'t> Axis<'t> {
     ///
     /// A move of 0 steps does nothing, not even to DIR.
     ///
-    /// # Errors [`Error::Moving`] while a move is in progress.
+    /// # Errors
+    /// [`Error::Moving`] while a move is in progress.
     pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
         if self.steps.is_some() {
             return Err(Error::Moving);

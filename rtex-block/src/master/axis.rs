@@ -210,7 +210,8 @@ impl Axis {
 
     /// Switches the servo on, from `Off`.
     ///
-    /// # Errors [`SwitchOnError`]; nothing is changed.
+    /// # Errors
+    /// [`SwitchOnError`]; nothing is changed.
     pub fn switch_on(&mut self) -> Result<(), SwitchOnError> {
         self.can_switch_on()?;
         self.passive = 0;

@@ -102,7 +102,8 @@ pub trait Run<const N: usize> {
 
     /// Waits for the next update period and makes its exchange; returns when the period began, in ns.
     ///
-    /// # Errors The errors of the line.
+    /// # Errors
+    /// The errors of the line.
     fn update(&mut self) -> Result<u64, Self::Error>;
 
     /// Lets this many update periods pass.

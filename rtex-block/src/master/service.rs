@@ -194,7 +194,8 @@ impl<const N: usize> Master<N> {
     /// Makes the exchange over memory of bytes, or of 16- or 32-bit words packed as described in [`pack`](crate::pack), heard
     /// until `end_ns`: the blocks of all axes follow one another, in the order of the axes.
     ///
-    /// # Errors [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written.
+    /// # Errors
+    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written.
     pub fn exchange_words<W: Word>(&mut self, rx: &[W], tx: &mut [W], end_ns: u64) -> Result<(), SizeMismatch> {
         let size = self.config.size;
         let bytes = size.bytes().saturating_mul(N);

@@ -45,9 +45,9 @@ pub struct Bench {
     pub fifo: VecDeque<Frame>,
     /// Whether frames carry the time of their end.
     stamped: bool,
-    /// The turn of the shaft; each frame on the line turns it on.
-    pub shaft: u32,
-    /// Where it was when the encoders heard the last request.
+    /// Frames that the first encoder has heard; each turns the shaft on.
+    turns: u32,
+    /// Where the shaft was when the encoders heard the last request.
     pub asked_at: u32,
     pub request: Option<Id>,
     /// How often the host had been preempted when the last call ended.
@@ -75,7 +75,7 @@ impl Bench {
             heard: Vec::new(),
             fifo: VecDeque::new(),
             stamped,
-            shaft: 0,
+            turns: 0,
             asked_at: 0,
             request: None,
             preempts: 0,
@@ -198,14 +198,14 @@ impl Bench {
                 Event::Heard { device, unit } => {
                     let (content, framed) = unit.bits.content();
                     if device == 0 {
-                        self.shaft += 1;
+                        self.turns += 1;
                     }
                     self.heard.push((device, content as u16, framed));
                     let Some((contents, start_ns)) = self.answer(device, content as u16, framed, unit.end_ns) else {
                         continue;
                     };
-                    self.asked_at = self.shaft;
-                    let message = Message::frames(16, contents).tagged(self.shaft.into());
+                    self.asked_at = place(self.turns);
+                    let message = Message::frames(16, contents).tagged(place(self.turns).into());
                     self.world.answer(device, unit.origin.transmission, &message, start_ns);
                 }
             }
@@ -215,12 +215,12 @@ impl Bench {
     /// What an encoder says to a frame, and when.
     fn answer(&mut self, device: u8, content: u16, framed: bool, end_ns: u64) -> Option<(Vec<u64>, u64)> {
         if let Some(second) = self.seconds.get_mut(usize::from(device)) {
-            second.single = self.shaft;
+            second.single = place(self.turns);
             let answer = second.hear(content, framed, end_ns)?;
             return Some((answer.frames.into_iter().map(u64::from).collect(), answer.start_ns));
         }
         let encoder = self.encoders.get_mut(usize::from(device))?;
-        encoder.set_position(self.shaft, 3 + u32::from(device));
+        encoder.set_position(place(self.turns), 3 + u32::from(device));
         if !framed {
             encoder.framing_error(end_ns);
             return None;
@@ -334,7 +334,21 @@ pub fn scenario(seed: u64, encoders: u32, delivery: Delivery) -> Scenario {
     Scenario { host: host(scenario.host.echo, delivery), ..scenario }
 }
 
-/// The turn of the shaft in the whole position of an encoder.
+/// Where the shaft is, 20 bits: the last ten of the count, and their complement. Where two speak at once a 0 wins, and as all places
+/// have ten bits set, an answer that somebody else has cleared bits of never names another place.
+pub fn place(turn: u32) -> u32 {
+    let count = turn & 0x3ff;
+    count | (count ^ 0x3ff) << 10
+}
+
+/// Where the shaft is by the whole position of an encoder.
 pub fn shaft(response: nikon_aformat::Response) -> u32 {
     response.abs40().map_or(0, |abs| (abs.get() & 0xf_ffff) as u32)
+}
+
+#[test]
+fn no_place_is_another_one_with_bits_cleared() {
+    for (one, other) in (0..1024).flat_map(|one| (0..one).map(move |other| (place(one), place(other)))) {
+        assert!(one & other != one && one & other != other && (one | other) < 1 << 20);
+    }
 }

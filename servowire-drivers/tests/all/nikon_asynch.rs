@@ -1,6 +1,6 @@
 //! The async A-format driver: futures that are dropped at every point, and the hostile line.
 
-use crate::frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
+use crate::frames::{Bench, Port, Shared, deliveries, line, place, scenario, shaft};
 use crate::hostile::live_through;
 use crate::late::{Late, World};
 use crate::polls::{FOR_EVER, Looks, pause, run};
@@ -69,9 +69,9 @@ fn a_doubt_of_the_crate_is_one_of_the_driver() {
     let mut encoder = Driver::new(port.clone(), port, widths(20, 16), line());
     let evidence = run(encoder.read_evidence(EncoderAddress::ZERO), FOR_EVER).unwrap().unwrap();
     let sample = evidence.at(bench.borrow().world.now_ns(), Policy::new(60_000)).unwrap();
-    assert_eq!((sample.single_turn(), sample.turns()), (1, Some(3)));
+    assert_eq!((sample.single_turn(), sample.turns()), (place(1), Some(3)));
     let sample = run(encoder.read_position(EncoderAddress::ZERO, Policy::new(60_000)), FOR_EVER).unwrap().unwrap();
-    assert_eq!((sample.single_turn(), sample.turns()), (2, Some(3)));
+    assert_eq!((sample.single_turn(), sample.turns()), (place(2), Some(3)));
     // The lower 24 bits say less of the turns than the encoder counts.
     let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
     let evidence = run(encoder.transact(request), FOR_EVER).unwrap().unwrap().evidence(widths(20, 16));

@@ -1,6 +1,6 @@
 //! The A-format driver on the hostile line.
 
-use crate::frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
+use crate::frames::{Bench, Port, Shared, deliveries, host, line, place, scenario, shaft};
 use crate::hostile::live_through;
 use crate::late::{Late, World};
 use crate::refusals::nikon::{STRICT, rows, widths};
@@ -22,9 +22,9 @@ fn driver(bench: &Shared) -> Driver<Port, Port> {
 fn positions_come() {
     let bench = Bench::new(Scenario::quiet());
     let mut encoder = driver(&bench);
-    for turn in 1..=10_u64 {
+    for turn in 1..=10 {
         let abs = encoder.read_abs40(EncoderAddress::ZERO).unwrap().response.abs40().unwrap().get();
-        assert_eq!(abs, turn | 3 << 20);
+        assert_eq!(abs, u64::from(place(turn)) | 3 << 20);
     }
     assert_eq!(bench.borrow().world.truth().clashes(), 0);
 }
@@ -48,9 +48,9 @@ fn a_doubt_of_the_crate_is_one_of_the_driver() {
     let mut encoder = Driver::new(port.clone(), port, widths(20, 16), line());
     let evidence = encoder.read_evidence(EncoderAddress::ZERO).unwrap();
     let sample = evidence.at(bench.borrow().world.now_ns(), Policy::new(60_000)).unwrap();
-    assert_eq!((sample.single_turn(), sample.turns()), (1, Some(3)));
+    assert_eq!((sample.single_turn(), sample.turns()), (place(1), Some(3)));
     let sample = encoder.read_position(EncoderAddress::ZERO, Policy::new(60_000)).unwrap();
-    assert_eq!((sample.single_turn(), sample.turns()), (2, Some(3)));
+    assert_eq!((sample.single_turn(), sample.turns()), (place(2), Some(3)));
     // The lower 24 bits say less of the turns than the encoder counts.
     let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
     let evidence = encoder.transact(request).unwrap().evidence(widths(20, 16));
@@ -126,7 +126,7 @@ fn frames_may_come_in_blocks() {
         let mut encoder = driver(&bench);
         for turn in 1..=5_u32 {
             let position = encoder.read_position(EncoderAddress::ZERO, Policy::new(100_000)).unwrap();
-            assert_eq!((position.single_turn(), position.turns()), (turn, Some(3)), "{delivery:?}");
+            assert_eq!((position.single_turn(), position.turns()), (place(turn), Some(3)), "{delivery:?}");
         }
         assert_eq!(bench.borrow().world.truth().clashes(), 0);
     }

@@ -26,7 +26,8 @@ pub struct Recorded<P> {
 impl<P> Recorded<P> {
     /// Nothing is logged without a file.
     ///
-    /// # Errors [`Fault::File`]: the file cannot be created.
+    /// # Errors
+    /// [`Fault::File`]: the file cannot be created.
     pub fn new(port: P, file: Option<&Path>) -> Result<Self, Fault> {
         let made = |path: &Path| File::create(path).map_err(Fault::file(path));
         let log = file.map(made).transpose()?.map(|file| (file, Instant::now()));

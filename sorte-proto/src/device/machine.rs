@@ -129,7 +129,8 @@ impl Device {
 
     /// The line to the next device in ns, once it is measured; 0 for a last device.
     ///
-    /// # Errors [`Error::ImplausibleRoundTrip`], which carries 0 ns if round trips are missing.
+    /// # Errors
+    /// [`Error::ImplausibleRoundTrip`], which carries 0 ns if round trips are missing.
     pub const fn line_delay_next_ns(&self) -> Result<u16, Error> {
         if self.is_last() {
             return Ok(0);

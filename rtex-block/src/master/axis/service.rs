@@ -47,7 +47,8 @@ impl Axis {
     /// A homing type that is not confirmed may set new coordinates. In CP the set-point would stay in the old
     /// ones, so such a type is refused there with the servo on; for latches use [`ask_latch`](Self::ask_latch).
     ///
-    /// # Errors [`AskError`]; nothing is sent.
+    /// # Errors
+    /// [`AskError`]; nothing is sent.
     pub fn ask(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
         let servo_off = needs_servo_off(&request, self.mode == ActiveCode::CyclicPosition);
         self.begin(self.handshake(request)?, servo_off)
