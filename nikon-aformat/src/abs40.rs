@@ -135,6 +135,26 @@ mod tests {
     use crate::response::Response;
     use proptest::prelude::*;
 
+    /// A wrong head and a wrong check field do not hide each other: of all values of the first eight content bits and of the CRC-8, one
+    /// pair is taken.
+    #[test]
+    fn two_faults_are_not_none() {
+        let expected = Expected::new(Layout::Abs40, Command::Abs40).from_address(EncoderAddress::ZERO);
+        let abs = U40::truncate(0x12_3456_789a);
+        let sent = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::empty(), abs };
+        let line = Window::read(&sent.emit_line(BitOrder::LsbFirst, &expected), 0, 72, BitOrder::LsbFirst).unwrap();
+        let mut taken = std::vec::Vec::new();
+        for (head, crc) in (0..=255_u8).flat_map(|head| (0..=255_u8).map(move |crc| (head, crc))) {
+            let other = Window::from_bits(line.bits() ^ u128::from(head) << 1 ^ u128::from(crc) << 63, 72).unwrap();
+            let words: [u16; 4] = core::array::from_fn(|at| (other.bits() >> (18 * at + 1)) as u16);
+            let bytes = *other.to_bytes(BitOrder::LsbFirst).first_chunk().unwrap();
+            let by_line = Abs40::parse_line(&expected, &bytes, BitOrder::LsbFirst);
+            assert_eq!(by_line, Abs40::parse_words(&expected, &words, BitOrder::LsbFirst), "{head} {crc}");
+            taken.extend(by_line.map(|response| (head, crc, response)));
+        }
+        assert_eq!(taken, [(0, 0, sent)]);
+    }
+
     proptest! {
         /// It gives what the decoder for all layouts gives, of good lines and of any other.
         #[test]

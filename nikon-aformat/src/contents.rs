@@ -177,6 +177,19 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
+    /// A wrong start bit or delimiter is seen whatever remains of the CRC-8.
+    #[test]
+    fn framing_and_check_do_not_hide_each_other() {
+        for (frames, at) in (2..=6_u8).flat_map(|frames| (0..18 * u32::from(frames)).map(move |at| (frames, at))) {
+            let bits = u32::from(frames) * FRAME_BITS;
+            for crc in (0..=255_u128).filter(|_| at % 18 == 0 || at % 18 == 17) {
+                let line = pack([0x1234; 6]) ^ 1 << at ^ crc << (bits - 9);
+                let (_, wrong) = sound_line(frames, &Window::from_bits(line, bits).unwrap()).unwrap();
+                assert!(wrong != 0, "{frames} frames, bit {at}, {crc:#x}");
+            }
+        }
+    }
+
     proptest! {
         /// Line and words of any number of frames give the same contents, nothing after the last frame counts, and what remains of
         /// the CRC-8 is what a table over all bytes gives.

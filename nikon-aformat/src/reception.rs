@@ -237,6 +237,18 @@ mod tests {
         }
     }
 
+    /// Whole frames of a response that never ended are told at the end of the line, however long it was idle before.
+    #[test]
+    fn the_line_ends_between_two_frames() {
+        let line = Response::abs17(EncoderAddress::MAX, EncoderStatus::empty(), U17::truncate(0x1_2345)).emit().line();
+        for idle in 0..3 {
+            let mut receiver = LineReceiver::bits(Layout::Abs17).allowing_idle_between_frames();
+            let first = (0..18 + idle).map(|at| at >= 18 || line.bits() >> at & 1 == 1);
+            assert!(first.into_iter().all(|level| receiver.push(level).is_none()));
+            assert_eq!(receiver.finish(), Some(Error::Truncated { got: 18, want: 36 }), "{idle} idle bits");
+        }
+    }
+
     /// Samples, runs and words are counted alike and give the same; the end of a line leaves the receiver as it was made.
     #[test]
     fn all_three_ways_and_what_the_end_of_a_line_leaves() {

@@ -219,6 +219,35 @@ proptest! {
     }
 }
 
+/// A low of any length, cut wherever it ends: a start bit that is high in its middle is none, also if that is the first sample of the
+/// next piece.
+#[test]
+fn a_piece_that_ends_in_a_start_bit() {
+    for (samples, low) in (4..=80).flat_map(|samples| (1..=samples).map(move |low| (samples, low))) {
+        let format = Format::new(samples, 8).unwrap();
+        let (mut plain, mut pieces) = (Receiver::new(format), Receiver::new(format));
+        let (idle, rest) = (3_u32, 12 * samples);
+        let want: Vec<_> = (0..idle + low + rest).filter_map(|at| plain.push(at < idle || at >= idle + low)).collect();
+        let mut got = Vec::new();
+        let mut feed = |mut word: u128, mut len: u32| {
+            while len > 0 {
+                let mut part = Samples::partial(word as u64, len.min(64));
+                while let Some(field) = pieces.feed(&mut part) {
+                    got.push(field);
+                }
+                word = word.wrapping_shr(64);
+                len = len.saturating_sub(64);
+            }
+        };
+        feed(0b111, idle + low);
+        for at in (0..rest).step_by(64) {
+            feed(u128::MAX, (rest - at).min(64));
+        }
+        assert_eq!(got, want, "{samples} samples a bit, low for {low}");
+        assert_eq!((pieces.spikes, pieces.is_receiving()), (plain.spikes, plain.is_receiving()), "{samples}, {low}");
+    }
+}
+
 /// Hours of idle line, and a field after it: indices are exact, whichever way the line is fed.
 #[test]
 fn long_idle_lines() {
