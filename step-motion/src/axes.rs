@@ -102,9 +102,12 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Idle,
+    /// The lines that were added are to be taken into account.
+    LookAhead,
     Block,
-    /// The stop behind it is to be planned.
+    /// The stop behind it is to be planned: from a copy of the path that has still to be made, or from that copy.
     Brake,
+    Hold,
     Stop,
 }
 
@@ -225,6 +228,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             other.append(line, target, end);
             Ok(())
         };
+        if self.stage == Stage::Hold {
+            // The copy does not have the line.
+            self.stage = Stage::Brake;
+        }
         if self.stage != Stage::Idle {
             // The same lines, or some of them: there is room for this one.
             let _: Result<(), Error> = add(&mut self.work, like[0], self.end);
@@ -341,8 +348,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
                 }
             }
             Stage::Idle => self.begin(),
+            Stage::LookAhead => self.look_ahead(),
             Stage::Block => self.cut_block(),
             Stage::Brake => self.brake(),
+            Stage::Hold => self.hold_stop(),
             Stage::Stop => self.cut_stop(),
         }
     }

@@ -31,12 +31,27 @@ pub(super) struct Line<const N: usize> {
     pub(super) cut: bool,
     /// The speed at which a stop that ends on a later line leaves this one.
     pub(super) leave: Option<Real>,
+    /// The speed at its start from which all lines from here on can slow down in time, worked out when the path had an edition.
+    pub(super) enter: Real,
+    pub(super) edition: u32,
 }
 
 impl<const N: usize> Line<N> {
     pub(super) fn new(steps: [i32; N], whole: Real, bounds: Bounds, (feed, corner): (Real, Real)) -> Self {
         let ends = steps.map(i32::unsigned_abs);
-        Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None }
+        Self {
+            steps,
+            whole,
+            length: whole,
+            ends,
+            bounds,
+            feed,
+            corner,
+            cut: false,
+            leave: None,
+            enter: Real::ZERO,
+            edition: 0,
+        }
     }
 
     /// Returns a fraction of the requested speed, never above the limits of the axes.

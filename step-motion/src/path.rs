@@ -116,6 +116,9 @@ pub struct Path<const N: usize, const M: usize> {
     /// the queue into account.
     on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
+    /// Speeds at the start of lines are known for this fraction of the requested speeds, and since the lines last changed.
+    part: Real,
+    edition: u32,
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {
@@ -150,6 +153,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
             offset: Real::ZERO,
             on: None,
             knows_all: false,
+            part: Real::ONE,
+            edition: 1,
         };
         new.set_deviation(deviation);
         Ok(new)
@@ -222,8 +227,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
             self.before = Some((line.steps, line.whole));
             self.target = target;
             self.knows_all = false;
+            self.changed();
             gone_along(&mut self.ways, &line.steps);
         }
+    }
+
+    /// Forgets the speeds at the start of lines. A stop need not do so: it does not use them, and a line is added before
+    /// they are used again.
+    pub(super) const fn changed(&mut self) {
+        self.edition = self.edition.wrapping_add(1);
     }
 
     /// Returns whether another path of the same axes ends in the same way, so that the same line would be added to it.
@@ -240,7 +252,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             Some(on) => self.anew(&on).unwrap_or(on),
             None => {
                 self.not_before_turning();
-                let (course, bounds) = self.begin(0, self.speed, Some(Real::ONE))?;
+                let (course, bounds) = self.begin(0, self.speed, Real::ONE)?;
                 (course, self.start(), bounds)
             }
         };
@@ -262,9 +274,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Plans again from the motion on a curve at the start of the first line, along lines that were added since.
-    fn anew(&self, (old, start, bounds): &(Course, Start<N>, Bounds)) -> Option<(Course, Start<N>, Bounds)> {
+    fn anew(&mut self, (old, start, bounds): &(Course, Start<N>, Bounds)) -> Option<(Course, Start<N>, Bounds)> {
         let Piece { time, v, a, up, .. } = old.curve.after(start.before)?;
-        let how = (Some(Real::ONE), Some(*bounds), false);
+        let how = (Real::ONE, Some(*bounds));
         let (course, bounds) = self.course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), how)?;
         let time = start.offset + (time - old.curve.skipped.0);
         let whole = self.whole(time);

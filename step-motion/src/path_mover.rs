@@ -366,8 +366,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
-        let other = |part| self.path.exit(self.more, part) != self.wish;
-        if self.line.is_none() || self.part().is_some_and(other) {
+        let part = self.part();
+        if self.line.is_none() || part.is_some_and(|part| self.path.exit(self.more, part) != self.wish) {
             self.replan(now);
         }
     }

@@ -7,10 +7,18 @@ use crate::path_mover::PathMover;
 use crate::queue::{Joint, Queue};
 
 impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
-    /// Plans the stop from the end of the block.
+    /// Begins the stop from the end of the block.
     pub(super) fn brake(&mut self) -> Work {
         if let Some(stop) = self.stops.get_mut(self.block) {
             stop.clone_from(&self.work);
+        }
+        self.stage = Stage::Hold;
+        Work::More
+    }
+
+    /// Plans it.
+    pub(super) fn hold_stop(&mut self) -> Work {
+        if let Some(stop) = self.stops.get_mut(self.block) {
             stop.hold(self.until);
         }
         self.writers = self.joint;

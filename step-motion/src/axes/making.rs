@@ -17,13 +17,19 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             return self.give_up();
         }
         self.work.clone_from(&self.path);
-        self.work.look_ahead(self.end);
         let end = i128::from(self.end) << 32;
         for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
             *writer = Writer::new(end, dir);
         }
         (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
-        (self.stage, self.axis, self.quiet, self.coarse) = (Stage::Block, 0, 0, self.finest);
+        (self.stage, self.axis, self.quiet, self.coarse) = (Stage::LookAhead, 0, 0, self.finest);
+        Work::More
+    }
+
+    /// Plans the block along the lines that were added.
+    pub(super) fn look_ahead(&mut self) -> Work {
+        self.work.look_ahead(self.end);
+        self.stage = Stage::Block;
         Work::More
     }
 

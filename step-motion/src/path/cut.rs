@@ -65,7 +65,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
         for i in 0..self.len {
             if i > end && i <= at {
-                let course = self.begin(i, speed, None);
+                let course = self.begin_to_brake(i, speed);
                 (end, speed, bounds) = course.map_or((i, speed, None), |(course, bounds)| {
                     (i.saturating_add(course.more), course.exit, Some(bounds))
                 });

@@ -78,29 +78,36 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(run)
     }
 
-    /// Plans from a motion at a place on line `at`, or a distance before it. With `part` it keeps to that fraction of the
-    /// requested speeds; without, it brakes at once and may come to rest before the end. `None` if rounding leaves no
-    /// solution.
+    /// Plans from a motion at a place on line `at`, or a distance before it: it brakes at once, and may come to rest before
+    /// the end. `None` if rounding leaves no solution.
     ///
     /// Also returns the limits of the run. `present` are those of the motion; braking under way keeps them if lines have
     /// been added that allow less.
-    pub(crate) fn course(
+    pub(crate) fn brake(
         &self,
         at: usize,
         start: Motion,
         (place, before): (Real, Real),
-        (part, present, brakes): (Option<Real>, Option<Bounds>, bool),
+        how: (Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
-        let Some(part) = part else {
-            // If it does not fit, as far as it can to the end of the run.
-            return self.stop(at, start, (place, before), (present, brakes), false)?.map_or_else(
-                |(run, own)| {
-                    let left = (run.length + before) - place;
-                    self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
-                },
-                Some,
-            );
-        };
+        // If it does not fit, as far as it can to the end of the run.
+        self.stop(at, start, (place, before), how, false)?.map_or_else(
+            |(run, own)| {
+                let left = (run.length + before) - place;
+                self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
+            },
+            Some,
+        )
+    }
+
+    /// Plans in the same way, keeping to a fraction of the requested speeds.
+    pub(crate) fn course(
+        &mut self,
+        at: usize,
+        start: Motion,
+        (place, before): (Real, Real),
+        (part, present): (Real, Option<Bounds>),
+    ) -> Option<(Course, Bounds)> {
         let run = self.run(at, Some(part), self.under_way(at, start, present)?, (M, false))?;
         let left = (run.length + before) - place;
         let most = self.exit(at.saturating_add(run.more), part);
@@ -199,23 +206,32 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, way)
     }
 
-    /// Plans from the start of line `at`, at a speed. If rounding leaves no solution, it continues at that speed.
-    pub(crate) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<(Course, Bounds)> {
+    /// Plans from the start of line `at`, at a speed, keeping to a fraction of the requested speeds. If rounding leaves no
+    /// solution, it continues at that speed.
+    pub(crate) fn begin(&mut self, at: usize, speed: Real, part: Real) -> Option<(Course, Bounds)> {
+        let course = self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None));
+        course.or_else(|| self.steady(at, speed))
+    }
+
+    /// Plans in the same way, braking at once.
+    pub(crate) fn begin_to_brake(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
+        let course = self.brake(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (None, false));
+        course.or_else(|| self.steady(at, speed))
+    }
+
+    /// Continues along line `at` at a speed.
+    fn steady(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
         let line = self.line(at)?;
-        Some(self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None, false)).unwrap_or_else(
-            || {
-                let mut curve = Curve::new();
-                curve.cruise(speed, line.length);
-                (Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds)
-            },
-        ))
+        let mut curve = Curve::new();
+        curve.cruise(speed, line.length);
+        Some((Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds))
     }
 
     /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`; and how long
     /// it takes from there.
     pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> ((usize, Real), Real) {
         let mut time = Real::ZERO;
-        while let Some((Course { curve, exit, more, .. }, _)) = self.begin(at, speed, None) {
+        while let Some((Course { curve, exit, more, .. }, _)) = self.begin_to_brake(at, speed) {
             time = time + curve.time;
             if exit.is_zero() {
                 return (self.locate(at, curve.way(), at.saturating_add(more)), time);
@@ -227,9 +243,27 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time; worked out from the
-    /// last line back.
-    pub(crate) fn exit(&self, at: usize, part: Real) -> Real {
-        self.slow_down(at, part, greatest)
+    /// last line back, unless it is known since the lines last changed.
+    pub(crate) fn exit(&mut self, at: usize, part: Real) -> Real {
+        if part != self.part {
+            self.part = part;
+            self.changed();
+        }
+        let (edition, mut found, mut count) = (self.edition, [(0, Real::ZERO); M], 0_usize);
+        let known = |line: &Line<N>| (line.edition == edition).then_some(line.enter);
+        let speed = self.slow_down(at, (part, greatest), known, |found_at, speed| {
+            if let Some(place) = found.get_mut(count) {
+                *place = (found_at, speed);
+                count = count.saturating_add(1);
+            }
+        });
+        for (at, enter) in found.into_iter().take(count) {
+            let place = self.first.wrapping_add(at).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            if let Some(Some(line)) = place {
+                (line.enter, line.edition) = (enter, edition);
+            }
+        }
+        speed
     }
 
     /// Returns the greatest speed at which line `at` may end, whatever was requested: one from which each run that follows
@@ -237,21 +271,32 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// left at its corner's speed or, which takes less distance than some speeds between, come to rest at its end.
     fn most(&self, at: usize) -> Real {
         let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
-        self.slow_down(at, Real::HUGE, fastest)
+        self.slow_down(at, (Real::HUGE, fastest), |_| None, |_, _| {})
     }
 
-    fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
-        let (mut runs, mut next) = ([(0, Run::NONE); M], at.saturating_add(1));
+    /// `known` is the speed at the start of a line if that is known; `each` takes those that are worked out.
+    fn slow_down(
+        &self,
+        at: usize,
+        (part, fastest): (Real, impl Fn(Real, Real, &Bounds) -> Real),
+        known: impl Fn(&Line<N>) -> Option<Real>,
+        mut each: impl FnMut(usize, Real),
+    ) -> Real {
+        let (mut runs, mut next, mut speed) = ([(0, Run::NONE); M], at.saturating_add(1), Real::ZERO);
         for place in &mut runs {
+            if let Some(known) = self.line(next).and_then(&known) {
+                speed = known;
+                break;
+            }
             let Some(run) = self.run(next, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false)) else { break };
             *place = (next, run);
             next = next.saturating_add(run.more).saturating_add(1);
         }
-        let mut speed = Real::ZERO;
         for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
             if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(*at)) {
                 let most = line.corner.min(before.speed(part)).min(run.bounds.v);
                 speed = fastest(speed, run.length, &run.bounds).min(most);
+                each(*at, speed);
             }
         }
         speed

@@ -67,7 +67,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             // It is whole once the path has been cut off where it ends.
             Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
         };
-        let stop = match self.path.course(0, motion, from, (None, how.0, how.1)) {
+        let stop = match self.path.brake(0, motion, from, how) {
             Some(course) => planned(course),
             None => present((self.more, self.path.line(self.more)?.length)),
         };
@@ -147,9 +147,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Plans the rest of the running line.
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
-        let part = self.part();
-        let how = (part, self.bounds, self.braking);
-        if let Some((course, bounds)) = self.path.course(0, motion, (start.place, start.before), how) {
+        let from = (start.place, start.before);
+        let course = match self.part() {
+            Some(part) => self.path.course(0, motion, from, (part, self.bounds)),
+            None => self.path.brake(0, motion, from, (self.bounds, self.braking)),
+        };
+        if let Some((course, bounds)) = course {
             self.adopt(&course, start, bounds);
         }
     }
@@ -170,7 +173,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         self.path.not_before_steps(self.free);
         self.path.not_before_turning();
-        let course = self.path.begin(0, self.path.speed(), part);
+        let speed = self.path.speed();
+        let course = match part {
+            Some(part) => self.path.begin(0, speed, part),
+            None => self.path.begin_to_brake(0, speed),
+        };
         course.is_some_and(|(course, bounds)| self.adopt(&course, self.path.start(), bounds))
     }
 

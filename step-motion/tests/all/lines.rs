@@ -1,7 +1,7 @@
 //! Lines in several axes: on the line, within the limits of every axis, at rest only where it must be.
 
 use proptest::prelude::*;
-use step_motion::{Arc, AxisPulse, AxisSetup, Clock, Direction, Error, Limits, Path, Plan, Turning};
+use step_motion::{Arc, AxisPulse, AxisSetup, Clock, Direction, Error, Limits, Path, PathMover, Plan, Turning};
 
 fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
     let limits = Limits::new(v, a).unwrap();
@@ -283,5 +283,28 @@ fn short_lines_carry_their_acceleration_over_the_joints() {
         let last = chords[chords.len() - 1];
         let (chords, whole) = (run(&chords), run(&[last]));
         assert!(chords <= whole * 1.05, "{jerk}, {lines}: {chords} us in short lines, {whole} in one");
+    }
+}
+
+/// Lines that were pushed under an override of 50 % are joined at the full speed once the override is 100 %.
+#[test]
+fn an_override_holds_at_joints_too() {
+    let path = Path::<1, 8>::new(Clock::MICROSECONDS, [axis(20_000, 200_000, 0, 80_000)], 20).unwrap();
+    let mut machine = PathMover::new(path);
+    machine.set_override(50, 0);
+    for line in 1..=8 {
+        machine.push([line * 800], 100_000, 0).unwrap();
+    }
+    let mut ticks: Vec<u64> = Vec::new();
+    while let Some(pulse) = machine.pulse() {
+        ticks.push(pulse.tick);
+        if ticks.len() == 1000 {
+            machine.set_override(100, pulse.tick);
+        }
+    }
+    assert_eq!(ticks.len(), 6400);
+    // 4000 and 8000 steps/s, on a line and where two meet.
+    for (step, wants) in [(600, 250), (800, 250), (2400, 125), (2800, 125), (4000, 125)] {
+        assert!((ticks[step] - ticks[step - 1]).abs_diff(wants) <= 1, "{step}: {:?}", &ticks[step - 1..=step]);
     }
 }
