@@ -20,15 +20,16 @@ pub(crate) struct Leaving {
 pub(crate) struct End<const N: usize> {
     /// The line, and the place on it.
     pub(crate) at: (usize, Real),
-    /// The steps on that line that the stop before it would make. Rounding must not add one.
-    pub(crate) most: Option<[u32; N]>,
+    /// The least and the most steps on that line: those of a stop under way. Rounding must not add one.
+    pub(crate) least: [u32; N],
+    pub(crate) most: [u32; N],
 }
 
 impl<const N: usize> End<N> {
     fn steps(&self, line: &Line<N>) -> [u32; N] {
         let mut steps = line.steps_at(self.at.1);
-        for (steps, most) in steps.iter_mut().zip(self.most.unwrap_or([u32::MAX; N])) {
-            *steps = most.min(*steps);
+        for ((steps, least), most) in steps.iter_mut().zip(self.least).zip(self.most) {
+            *steps = most.min(least.max(*steps));
         }
         steps
     }

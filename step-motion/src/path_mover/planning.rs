@@ -59,6 +59,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let Some((motion, start)) = here else {
             return Some(present((self.more, self.path.line(self.more)?.length)));
         };
+        if self.braking && !self.quick {
+            // A stop under way stays the same.
+            let line = self.line.as_ref()?;
+            let end = if self.exit.is_zero() {
+                self.path.locate(0, (line.start.place + line.curve.way()) - line.start.before, self.more)
+            } else {
+                self.path.end_of_stop(self.more.saturating_add(1), self.exit).0
+            };
+            return Some(present(end));
+        }
         let from = (start.place, start.before);
         let how = (self.bounds, self.braking);
         let planned = |(course, bounds): (Course, Bounds)| {
@@ -81,7 +91,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
     }
 
-    /// Returns where a stop ends, with no more steps than a stop under way makes.
+    /// Returns where a stop ends: with the steps of a stop under way, or no more than these.
     pub(super) fn end_of(&self, stop: &Stop<N>) -> End<N> {
         let (at, under_way) = (stop.end, self.braking && !self.stopping && self.exit.is_zero());
         let line = self.line.as_ref().filter(|_| under_way && at.0 == self.more);
@@ -95,7 +105,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             });
             next.map_or_else(|| Some(line.steps_at_end()), |next| Some(next?.steps_at_end()))
         });
-        End { at, most }
+        let least = most.filter(|_| stop.first.is_none()).unwrap_or([0; N]);
+        End { at, least, most: most.unwrap_or([u32::MAX; N]) }
     }
 
     /// Returns the moment at which a stop comes to rest.

@@ -316,3 +316,22 @@ fn a_stop_adds_no_step_to_the_stop_before() {
     let after = ending(&machine, 1);
     assert!(after.is_within(before, 0, 0), "{after:?}, {before:?} before");
 }
+
+/// A hold that goes around a corner, as slow as rounding allows there: a stop that is asked for meanwhile is the same.
+#[test]
+fn a_stop_during_a_hold_is_that_hold() {
+    let jerk = Limits::new(180, 3_046_482).unwrap().with_jerk(45_905_882_855).unwrap();
+    let axes = [AxisSetup::new(Limits::new(16_624, 2844).unwrap(), 550_099), AxisSetup::new(jerk, 3022)];
+    let mut machine = Machine::new(Path::new(Clock::MICROSECONDS, axes, 10).unwrap());
+    machine.move_to([-4, 3], 166_192, 0).unwrap();
+    machine.set_override(61, 1);
+    machine.push([157, 0], 130, 2).unwrap();
+    while machine.due().is_some_and(|due| due <= 52_104) {
+        machine.pulse();
+    }
+    machine.hold(52_104);
+    let before = ending(&machine, 52_105);
+    machine.stop(53_352);
+    let after = ending(&machine, 52_105);
+    assert_eq!((after.steps, after.rest), (before.steps, before.rest));
+}
