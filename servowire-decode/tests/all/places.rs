@@ -84,6 +84,12 @@ fn fields_of_rtex_blocks_have_bytes_and_a_line() {
         .and_then(|field| field.span);
     let data = data.unwrap_or_else(|| panic!("{all:?}"));
     assert_eq!((data.first, data.last, data.place), (32, 63, Place::Line(1)));
+    // A response: its position wraps at 32 bits.
+    let log = "85 20 41 00 46 00 00 00 00 00 00 00 00 00 00 00\n";
+    let capture =
+        capture::open(Input::over("log", log.as_bytes()), Hints { format: Some(Format::Hex), ..Hints::default() });
+    let position = events("log", capture.unwrap(), rtex)[0].position.unwrap();
+    assert_eq!((position.counts, position.span), (70, Some(0x1_0000_0000)));
 }
 
 #[test]

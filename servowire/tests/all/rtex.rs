@@ -2,6 +2,7 @@
 
 mod blocks;
 mod findings;
+mod lines;
 mod report;
 mod shape;
 

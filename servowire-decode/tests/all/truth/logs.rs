@@ -319,3 +319,54 @@ fn a_shape_that_nothing_tells_yet_waits_for_what_does() {
         }
     }
 }
+
+/// Motors that stand, energised, and turn later: what was sent before that is shown in the shape that is told only then, from the first
+/// block on.
+#[test]
+fn what_stands_is_shown_in_the_shape_that_is_told_later() {
+    for (word, from) in [(2, 30), (4, 2), (4, 0), (2, 0)] {
+        for (nops, standing) in [(30, 10), (30, 40), (0, 10), (0, 40)] {
+            let mut text = String::new();
+            let mut bytes = Vec::new();
+            for k in 0..nops + standing + 60_i32 {
+                let (counter, code) = if k < nops { (0, 0) } else { (((k - nops + 1) % 4 * 32) as u8, 0x20) };
+                let [l, ml, mh, h] = (70_000 * (k - nops - standing).max(0)).to_le_bytes();
+                for (byte0, status, sub) in [(counter + 3, 0x80, 0x80), (0x80 + counter + 3, 0xc1, 0)] {
+                    let mut block = [0; 32];
+                    block[0] = byte0;
+                    if code != 0 {
+                        block[..8].copy_from_slice(&[byte0, code, status, 0, l, ml, mh, h]);
+                    }
+                    block[16] = sub;
+                    bytes.extend(block.chunks(word).flat_map(|word| word.iter().rev().copied()));
+                }
+            }
+            for line in bytes[from..].chunks_exact(32) {
+                // A String takes everything.
+                let _ = writeln!(text, "{}", line.iter().fold(String::new(), |all, byte| all + &format!("{byte:02x}")));
+            }
+            let capture = capture::open(Input::over("log.txt", Cursor::new(text)), Hints::default()).unwrap();
+            let settings = Settings { rtex: Rtex { whole: true, ..Rtex::default() }, ..Settings::default() };
+            let (events, notes) = read(capture, Some(protocol("rtex")), &settings);
+            let said = format!("{word} {from}, {nops} NOPs, {standing}: {notes}");
+            for (kind, name, due) in [("cmd 3", "Control_Bits", 0x80), ("rsp 3", "Status_Flags", 0xc1)] {
+                let raw: Vec<u64> = events
+                    .iter()
+                    .filter(|event| event.kind == kind && event.verdict.is_ok())
+                    .flat_map(|event| &event.fields)
+                    .filter_map(|field| match field.value {
+                        Value::Flags { raw, .. } if field.name == name => Some(raw),
+                        _ => None,
+                    })
+                    .collect();
+                let shown = raw.iter().filter(|raw| **raw == due).count() as i32;
+                assert!(
+                    shown >= standing + 58 && raw.iter().all(|raw| [0, due].contains(raw)),
+                    "{said} {kind} {shown}"
+                );
+                let zero = raw.iter().filter(|raw| **raw == 0).count() as i32;
+                assert!(zero <= nops, "{said} {kind}: {zero} without flags");
+            }
+        }
+    }
+}

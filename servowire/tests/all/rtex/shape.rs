@@ -137,6 +137,7 @@ fn a_bus_of_ones() {
     let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--json"]);
     assert_eq!((run.code, run.verdicts()), (1, vec!["reserved".to_owned(); 6]));
     assert!(run.err.contains("nothing answers on this bus"), "{}", run.err);
+    assert!(run.json().iter().all(|event| event["position"].is_null()), "{}", run.out);
 }
 
 /// Blocks of 32 bytes are recognised as such: their sub blocks are no drives.
@@ -244,6 +245,7 @@ fn a_log_that_begins_or_goes_on_in_the_middle_of_a_block() {
         let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--json"]);
         assert_eq!(run.code, 1, "{}", run.err);
         assert!(run.err.contains("begins in the middle of a block: its first 11 bytes are left out"), "{}", run.err);
+        assert!(run.err.contains("looks like blocks of 16 bytes, the first of which begins at byte 11"), "{}", run.err);
         assert!(
             of_5(&run) >= 478 && run.verdicts().iter().all(|it| *it == "ok" || *it == "truncated"),
             "{}",
