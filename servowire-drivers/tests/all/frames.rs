@@ -134,7 +134,14 @@ impl Bench {
             let own = answer.speaker == Speaker::Device(ea) && answer.delivered_ns < now_ns;
             own && answer.start_ns == answer.asked_ns && answer.end_ns - answer.start_ns == ANSWER_NS
         };
-        !self.was_preempted() && sent_once && truth.intact_answers(sent.id).any(on_time)
+        let whole = !self.was_preempted() && sent_once && truth.intact_answers(sent.id).any(on_time);
+        whole && self.has_heard_request(ea)
+    }
+
+    /// Whether this encoder has heard the request as it was asked. The three check bits of a request pass two wrong bits: what it
+    /// answers to another command is no answer to this one.
+    fn has_heard_request(&self, ea: u8) -> bool {
+        self.asked.iter().all(|content| self.heard.contains(&(ea, *content, true)))
     }
 
     /// Judges what a bus said of one of its encoders, unless nobody can say what it should be.

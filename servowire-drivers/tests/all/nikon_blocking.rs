@@ -1,7 +1,7 @@
 //! The A-format driver on the hostile line.
 
 use crate::frames::{Bench, Port, Shared, deliveries, host, line, place, scenario, shaft};
-use crate::hostile::live_through;
+use crate::hostile::{Calls, live_through};
 use crate::late::{Late, World};
 use crate::refusals::nikon::{STRICT, rows, widths};
 use embedded_io::ErrorKind;
@@ -11,7 +11,7 @@ use nikon_aformat::{BitRate, Doubt, EncoderAddress, Operation, Policy, Request, 
 use servowire_drivers::Error;
 use servowire_drivers::nikon::Frame;
 use servowire_drivers::nikon::blocking::{Driver, FramePort};
-use servowire_world::{Delivery, Fault, Planned, Scenario, Script};
+use servowire_world::{Delivery, Fault, Planned, Scenario, Script, Tally};
 
 fn driver(bench: &Shared) -> Driver<Port, Port> {
     let port = Port(bench.clone());
@@ -99,23 +99,41 @@ fn hostile_events_are_survived() {
     });
 }
 
-/// The same for three encoders at once: what comes whole of one is not lost, whatever becomes of the others.
+/// A hundred calls with three encoders at once: what comes whole of one is not lost, whatever becomes of the others.
+fn live_with_a_bus(calls: &mut Calls, seed: u64) -> Tally {
+    let asked = Addresses::first(3);
+    let bench = Bench::with(scenario(seed, 3, Delivery::Each), 3, true);
+    let mut bus = driver(&bench);
+    for call in 0..100 {
+        let answers = bus.read_bus(Operation::Abs40Mt, asked).unwrap();
+        for ea in asked.iter() {
+            let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
+            bench.borrow().judge_of_bus(calls, answers.bus(), ea, value, seed, call);
+        }
+        bench.borrow_mut().end_call();
+    }
+    *bench.borrow().world.tally()
+}
+
 #[test]
 fn hostile_events_on_a_bus_are_survived() {
-    let asked = Addresses::first(3);
-    live_through(|calls, seed| {
-        let bench = Bench::with(scenario(seed, 3, Delivery::Each), 3, true);
-        let mut bus = driver(&bench);
-        for call in 0..100 {
-            let answers = bus.read_bus(Operation::Abs40Mt, asked).unwrap();
-            for ea in asked.iter() {
-                let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
-                bench.borrow().judge_of_bus(calls, answers.bus(), ea, value, seed, call);
-            }
-            bench.borrow_mut().end_call();
-        }
-        *bench.borrow().world.tally()
-    });
+    live_through(live_with_a_bus);
+}
+
+/// Two bits of the request are hurt, and the encoders answer to another command: those answers are refused.
+#[test]
+fn answers_to_another_command_are_not_lost_ones() {
+    live_with_a_bus(&mut Calls::default(), 16_908);
+}
+
+/// The answer to a request that was heard must not be lost.
+#[test]
+#[should_panic(expected = "lost")]
+fn an_answer_that_is_lost_is_noticed() {
+    let bench = Bench::with(Scenario::quiet(), 3, true);
+    let answers = driver(&bench).read_bus(Operation::Abs40Mt, Addresses::first(3)).unwrap();
+    let ea = EncoderAddress::truncate(2);
+    bench.borrow().judge_of_bus(&mut Calls::default(), answers.bus(), ea, Err("lost"), 0, 0);
 }
 
 /// Bytes one by one, in DMA blocks, at idle: the values are the same.
