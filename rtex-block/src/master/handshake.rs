@@ -31,8 +31,8 @@ pub struct Handshake {
     code: Code,
     request: NonCyclicCommand,
     left: u32,
-    /// Number of responses with Busy that do not count, for what ends with the axis.
-    busy: Option<u32>,
+    /// Responses with Busy do not count: the drive moves the axis.
+    patient: bool,
     /// The index echo is part of the answer.
     any_index: bool,
 }
@@ -48,7 +48,7 @@ impl Handshake {
             NonCyclicCommand::Normal { .. } | NonCyclicCommand::Profile { .. } => None,
             _ => {
                 let code = Code::of(cyclic, request.code());
-                Some(Self { mac_id, code, request, left: limit, busy: None, any_index: false })
+                Some(Self { mac_id, code, request, left: limit, patient: false, any_index: false })
             }
         }
     }
@@ -60,17 +60,17 @@ impl Handshake {
     /// compared. SX-DSV02310, "Alarm command".
     pub const fn alarm_attributes(mac_id: MacId, cyclic: CyclicCode, type_code: TypeCode, limit: u32) -> Self {
         let request = NonCyclicCommand::Alarm(Arguments { type_code, index: 0, data: 0 });
-        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, busy: None, any_index: true }
+        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, patient: false, any_index: true }
     }
 
-    /// Lets the drive be Busy for this many responses, which do not count towards the limit.
-    pub(super) const fn with_busy(self, busy: u32) -> Self {
-        Self { busy: Some(busy), ..self }
+    /// Lets the drive be Busy for as long as it likes: who asks has a limit of its own for that.
+    pub(super) const fn patient(self) -> Self {
+        Self { patient: true, ..self }
     }
 
     /// Whether the drive may be Busy for longer than an answer takes, because it moves the axis.
     pub(super) const fn is_patient(&self) -> bool {
-        self.busy.is_some()
+        self.patient
     }
 
     /// Returns what to send while the handshake is pending.
@@ -103,7 +103,7 @@ impl Handshake {
     }
 
     /// `None` while the answer is awaited.
-    fn read(&mut self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
+    fn read(&self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
         if let NonCyclicResponse::CommandError(code) = response {
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }
@@ -111,8 +111,7 @@ impl Handshake {
         if execution.contains(Execution::ERR) {
             Some(Progress::Failed { error: Failure::Execution })
         } else if execution.contains(Execution::BUSY) {
-            self.busy = Some(self.busy?.checked_sub(1)?);
-            Some(Progress::Pending { left: self.left })
+            self.patient.then_some(Progress::Pending { left: self.left })
         } else {
             Some(Progress::Done { value: response })
         }

@@ -54,10 +54,10 @@ impl Axis {
         self.begin(self.handshake(request)?, servo_off)
     }
 
-    /// Sends a homing command with which the drive moves the axis, in PP. It may be Busy for `busy` update periods; a stop withdraws
-    /// the command.
-    pub(in crate::master) fn ask_homing(&mut self, request: NonCyclicCommand, busy: u32) -> Result<(), AskError> {
-        self.begin(self.handshake(request)?.with_busy(busy), needs_servo_off(&request, false))
+    /// Sends a homing command with which the drive moves the axis, in PP. The drive may be Busy for as long as it likes; a stop
+    /// withdraws the command.
+    pub(in crate::master) fn ask_homing(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
+        self.begin(self.handshake(request)?.patient(), needs_servo_off(&request, false))
     }
 
     fn handshake(&self, request: NonCyclicCommand) -> Result<Handshake, AskError> {

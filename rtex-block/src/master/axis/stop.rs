@@ -143,9 +143,7 @@ impl Axis {
             _ => None,
         };
         if self.main.slot.asking().is_some_and(Handshake::is_patient) {
-            // It must not begin again with the next servo-on.
-            let error = reason.map_or(Failure::ServoOff, Failure::Stopped);
-            (self.main.slot, self.main.quiet) = (Slot::Ended(Progress::Failed { error }), Quiet::BROKEN);
+            self.withdraw(reason);
         }
         let confirmed = self.main.quiet.is_kept();
         if let Some(profile) = &mut self.profile {
@@ -155,5 +153,16 @@ impl Axis {
         if !state.is_servo_on() {
             self.rest();
         }
+    }
+
+    /// Ends a request with which the drive moves the axis: it must not begin again with the next servo-on.
+    #[cold]
+    #[inline(never)]
+    const fn withdraw(&mut self, reason: Option<StopReason>) {
+        let error = match reason {
+            Some(reason) => Failure::Stopped(reason),
+            None => Failure::ServoOff,
+        };
+        (self.main.slot, self.main.quiet) = (Slot::Ended(Progress::Failed { error }), Quiet::BROKEN);
     }
 }

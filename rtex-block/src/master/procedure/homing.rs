@@ -112,8 +112,8 @@ pub struct Home {
 procedure!(Home, ());
 
 impl Home {
-    /// Creates a homing of this type. The drive may be Busy for `limit` update periods, and has as many after it has accepted
-    /// the command; a motion before it has as many in which to end.
+    /// Creates a homing of this type. The drive may be Busy for `limit` update periods more than an answer may take, and has as many
+    /// after it has accepted the command; a motion before it has as many in which to end.
     pub const fn new(type_code: u8, limit: u32) -> Self {
         let ask = Ask::NEW;
         Self { ask, type_code, limit, left: limit, accepted: false, fresh: false, blocks: 0, end: None }
@@ -144,8 +144,18 @@ impl Home {
         }
         self.fresh |= on_its_way && (moves || !complete);
         if !self.accepted {
-            let (request, limit) = (command(self.type_code, 0), self.limit);
-            let answer = self.ask.receive_with(axis, |axis| axis.ask_homing(request, limit));
+            let request = command(self.type_code, 0);
+            if !self.ask.asked {
+                self.left = self.limit.saturating_add(axis.config().limits.answer);
+            }
+            let mut answer = self.ask.receive_with(axis, |axis| axis.ask_homing(request));
+            if self.ask.asked {
+                // The handshake counts what is not Busy.
+                match self.left.checked_sub(1) {
+                    Some(left) => self.left = left,
+                    None => answer = Progress::Failed { error: Failure::TimedOut },
+                }
+            }
             if answer == (Progress::Failed { error: Failure::TimedOut }) {
                 // It may be under way.
                 axis.stop_for(StopReason::HomingTimeout, StopCategory::One);
