@@ -17,7 +17,7 @@
 //! frame. The counter echoes of one frame are equal, so the exchange compares those of what it has read, reads one block
 //! again, looks at [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails
 //! again, every block is read a third time, and one whose echo has changed is not taken, because it may be the halves of two; of
-//! the others, each axis takes its block only if it is on time ([`Arrival`](rtex_block::master::Arrival)). If the receive
+//! the others, each axis takes its block only if it is on time ([`Arrival`]). If the receive
 //! interrupt came meanwhile, none is taken: with two communications per update period, two frames have the same counter. System
 //! Design Guide for Master, chapters 1 and 2.
 //!

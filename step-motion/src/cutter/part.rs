@@ -55,6 +55,9 @@ pub(super) const ALL: u64 = 1 << 62;
 /// A correction of a time after which it is exact, whatever the acceleration is.
 const CLOSE: u64 = 1 << 20;
 
+/// What counts as exact, in 2^-32 ticks.
+const EXACT: u64 = 1 << 15;
+
 /// A step so much shorter than the time from the slower end, as a power of 2, is exact if the acceleration is taken into
 /// account: the error is about the cube of that ratio.
 const NEAR: u32 = 21;
@@ -177,7 +180,10 @@ impl Part {
         let at = u32::try_from(whole).ok()?;
         let first = if self.back { at.checked_sub(1)? } else { at };
         let first = self.search(first, None, 0);
-        let ticks = NonZeroU64::new(self.ticks(first)).filter(|_| self.lasts.exponent() < 64);
+        // A rest beside the step makes the first step early or late by half of that part of its time.
+        let off = u64::try_from(off).unwrap_or(u64::MAX);
+        let exact = |ticks: &NonZeroU64| self.lasts.exponent() < 64 && high(off, ticks.get()) < EXACT;
+        let ticks = NonZeroU64::new(self.ticks(first)).filter(exact);
         Some(FromRest::new(at, (first, ticks), self.half == 0))
     }
 
