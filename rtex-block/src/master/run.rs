@@ -188,7 +188,8 @@ pub trait Run<const N: usize> {
         self.procedure(place, Home::new(type_code, limit))
     }
 
-    /// Makes a profile motion in PP, up to the end of the position command: [`Axis::start_move`].
+    /// Makes a profile motion in PP, up to the end of the position command: [`Axis::start_move`]. It has no time limit: at a speed
+    /// of 0 it waits until something else ends the motion.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Place`], [`Ended::Setpoint`], [`Ended::Failed`]

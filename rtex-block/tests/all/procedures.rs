@@ -426,3 +426,18 @@ fn feed_forward_of_the_sub_block() {
         pair.until("free", |pair| pair.axis.can_ask());
     }
 }
+
+/// A feed-forward is meant for the mode in which it was set.
+#[test]
+fn a_change_of_mode_ends_the_feed_forward() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+    (0..9).for_each(|_| pair.update());
+    let mut plain = pair.axis;
+    pair.axis.set_feed_forward(7).unwrap();
+    pair.axis.set_sub_feed_forward(70, -71).unwrap();
+    assert_ne!(pair.axis.transmission(pair.sent), plain.transmission(pair.sent));
+    for axis in [&mut pair.axis, &mut plain] {
+        axis.set_mode(ActiveCode::CyclicVelocity).unwrap();
+    }
+    assert_eq!(pair.axis.transmission(pair.sent), plain.transmission(pair.sent));
+}

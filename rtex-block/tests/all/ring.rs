@@ -231,21 +231,27 @@ fn after_every_fault_every_servo_is_off_in_time() {
     assert!(faults.iter().all(|&n| n > 0), "{faults:?}");
 }
 
+/// An axis that slows down in CP for a stop on request.
+fn stopping() -> Pair {
+    let mac_id = MacId::new(9).unwrap();
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits()).with_deceleration(100);
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES));
+    pair.switch_on();
+    for speed in (0..5_000).step_by(100) {
+        let to = pair.axis.setpoint().wrapping_add(speed);
+        pair.axis.set_position(to).unwrap();
+        pair.update();
+    }
+    pair.axis.stop(StopCategory::One);
+    pair.update();
+    pair
+}
+
 /// Two axes that fail in the same update period do not make up for each other: an axis that slows down on request is switched off
 /// as it is configured to be beside a fault.
 #[test]
 fn two_faults_in_one_period_are_faults() {
-    let mac_id = MacId::new(9).unwrap();
-    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits()).with_deceleration(100);
-    let mut fellow = Pair::with(config, DriveConfig::new(mac_id, CODES));
-    fellow.switch_on();
-    for speed in (0..5_000).step_by(100) {
-        let to = fellow.axis.setpoint().wrapping_add(speed);
-        fellow.axis.set_position(to).unwrap();
-        fellow.update();
-    }
-    fellow.axis.stop(StopCategory::One);
-    fellow.update();
+    let mut fellow = stopping();
     assert_eq!(fellow.axis.state(), AxisState::Stopping(StopReason::Requested));
     let mut faulty = Pair::on(ActiveCode::CyclicPosition, Behaviour::default());
     faulty.drive.set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
@@ -256,4 +262,21 @@ fn two_faults_in_one_period_are_faults() {
     fellows.tell(&mut fellow.axis);
     // At once, and the first reason stays.
     assert_eq!(fellow.axis.state(), AxisState::Stopped(StopReason::Requested));
+}
+
+/// A fault stays one, whoever is looked at after it: here an axis that was stopped on request.
+#[test]
+fn a_fault_beside_a_stop_on_request_is_a_fault() {
+    let mut faulty = Pair::on(ActiveCode::CyclicPosition, Behaviour::default());
+    faulty.drive.set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
+    faulty.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Alarm));
+    let mut stopped = stopping();
+    stopped.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Requested));
+    for all in [[&faulty.axis, &stopped.axis], [&stopped.axis, &faulty.axis]] {
+        let (mut fellow, mut fellows) = (stopping(), Fellows::new());
+        fellows.begin();
+        (0..).zip(all).for_each(|(place, axis)| fellows.look(place, axis));
+        fellows.tell(&mut fellow.axis);
+        assert_eq!(fellow.axis.state(), AxisState::Stopped(StopReason::Requested));
+    }
 }

@@ -94,19 +94,23 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns where a stop ends: with the steps of a stop under way, or no more than these.
     pub(super) fn end_of(&self, stop: &Stop<N>) -> End<N> {
         let (at, under_way) = (stop.end, self.braking && !self.stopping && self.exit.is_zero());
-        let line = self.line.as_ref().filter(|_| under_way && at.0 == self.more);
-        let most = line.and_then(|line| {
-            let next = (at.0 > 0).then(|| {
-                let lengths =
-                    (0..at.0).filter_map(|at| self.path.line(at)).fold(Real::ZERO, |sum, line| sum + line.length);
-                let before = (line.start.before + lengths) - line.start.place;
-                let start = Start { place: Real::ZERO, before, made: [0; N], whole: self.whole, ..line.start };
-                Some(LinePulses::new(self.clock(), &line.curve, self.path.line(at.0)?, start, Steps::Stretches))
-            });
-            next.map_or_else(|| Some(line.steps_at_end()), |next| Some(next?.steps_at_end()))
-        });
+        let most = if under_way && at.0 == self.more { self.steps_at_end() } else { None };
         let least = most.filter(|_| stop.first.is_none()).unwrap_or([0; N]);
         End { at, least, most: most.unwrap_or([u32::MAX; N]) }
+    }
+
+    /// Returns the steps of each axis on the last line of the present curve, at the end of the curve.
+    fn steps_at_end(&self) -> Option<[u32; N]> {
+        let line = self.line.as_ref()?;
+        if self.more == 0 {
+            return Some(line.steps_at_end());
+        }
+        let lengths =
+            (0..self.more).filter_map(|at| self.path.line(at)).fold(Real::ZERO, |sum, line| sum + line.length);
+        let before = (line.start.before + lengths) - line.start.place;
+        let start = Start { place: Real::ZERO, before, made: [0; N], whole: self.whole, ..line.start };
+        let last = self.path.line(self.more)?;
+        Some(LinePulses::new(self.clock(), &line.curve, last, start, Steps::Stretches).steps_at_end())
     }
 
     /// Returns the moment at which a stop comes to rest.

@@ -45,6 +45,20 @@ trait Background {
     fn is_at_rest(&self) -> bool;
 }
 
+/// The requests that are the same ones for both.
+macro_rules! ask {
+    ($machine:ident, $request:ident) => {
+        match $request {
+            Event::Hold => $machine.hold(),
+            Event::Resume => $machine.resume(),
+            Event::Stop => $machine.stop(),
+            Event::Halt => $machine.halt(),
+            Event::Override(percent) => $machine.set_override(percent),
+            other => unreachable!("{other:?}"),
+        }
+    };
+}
+
 impl Background for Axis<'static, SLOTS> {
     fn poll(&mut self) -> Work {
         self.poll()
@@ -54,12 +68,7 @@ impl Background for Axis<'static, SLOTS> {
         match event {
             Event::To([to, _]) | Event::Away([to, _]) => _ = self.move_to(to),
             Event::Quick => self.quick_stop(Limits::new(1, 9_000_000).unwrap()),
-            Event::Hold => self.hold(),
-            Event::Resume => self.resume(),
-            Event::Stop => self.stop(),
-            Event::Halt => self.halt(),
-            Event::Override(percent) => self.set_override(percent),
-            _ => unreachable!("{event:?}"),
+            request => ask!(self, request),
         }
     }
 
@@ -82,12 +91,7 @@ impl Background for Axes<'static, N, 4, SLOTS> {
             Event::To(to) => _ = self.push(to, 250_000),
             Event::Away(to) => _ = self.move_to(to, 250_000),
             Event::Quick => self.quick_stop([Limits::new(1, 9_000_000).unwrap(); N]),
-            Event::Hold => self.hold(),
-            Event::Resume => self.resume(),
-            Event::Stop => self.stop(),
-            Event::Halt => self.halt(),
-            Event::Override(percent) => self.set_override(percent),
-            _ => unreachable!("{event:?}"),
+            request => ask!(self, request),
         }
     }
 

@@ -5,6 +5,7 @@
 mod axes_requests;
 mod axis_requests;
 mod bounds;
+mod brakes;
 mod changes;
 mod laws;
 mod lines;
