@@ -29,6 +29,8 @@ mod reloads;
 mod slope;
 mod step_timer;
 mod stepper;
+#[cfg(test)]
+mod tests;
 mod word;
 mod writer;
 

@@ -149,7 +149,8 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
     }
     let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
     let high = low.min(bounds.v).max(exit);
-    let v = crossing(exit, high, target, need);
+    // All of what is left may be cruised at this speed, which is low if there is little room.
+    let v = crossing(exit, high, target, SLACK.max((target - least).scaled(-10)), need);
     bent.on_the_slope(curve);
     finish(curve, [base, v, exit], Some(target), bounds);
     Ok(())
@@ -242,16 +243,19 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
     }
     match bounds.jerk {
         None => (from.squared() - (bounds.a * n).scaled(1)).sqrt().max(exit),
-        Some(_) => from - crossing(least, (from - exit).max(least), n, |by| distance(from, from - by, bounds)),
+        Some(_) => {
+            from - crossing(least, (from - exit).max(least), n, n.scaled(-14), |by| distance(from, from - by, bounds))
+        }
     }
 }
 
-/// Returns, closely enough, the largest speed between `low` and `high` for which `need` is not above `n`. The result is
-/// above `low`.
+/// Returns the largest speed between `low` and `high` for which `need` is not above `n`, but for what `enough` of `n` is
+/// worth.
 ///
 /// Near `low` the need grows with the square root of the excess speed, so the search runs over that root: by false
-/// position, with less weight on the end that stays (Illinois), and by halving if that takes long.
-fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
+/// position, with less weight on the end that stays (Illinois) and at least by a sixteenth of what is left, and by halving
+/// if that takes long.
+fn crossing(low: Real, high: Real, n: Real, enough: Real, need: impl Fn(Real) -> Real) -> Real {
     let top = need(high);
     if top <= n {
         return high;
@@ -262,10 +266,11 @@ fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real
     let (mut below, mut above, mut rose) = (left, top - n, None);
     for round in 0..40_u8 {
         let width = high - low;
-        if left.scaled(14) <= n || width.scaled(40) <= high {
+        if left <= enough || width.scaled(40) <= high {
             break;
         }
-        let part = if round % 16 > 8 { width.half() } else { width * (below / (below + above)) };
+        let part =
+            if round % 16 > 8 { width.half() } else { (width * (below / (below + above))).max(width.scaled(-4)) };
         let middle = low + part;
         let speed = base + middle.squared();
         let got = need(speed);

@@ -157,6 +157,39 @@ fn the_reversal_pause_is_kept_after_a_halt() {
     assert!(turned && mover.commanded() == 0);
 }
 
+/// A new target a few steps behind the place where a long brake under way would end: it brakes a little less. What it has to go beyond
+/// that place is a very small part of the way, and is not made up for at the end: neither at once, nor at hardly any speed.
+#[test]
+fn a_target_right_behind_the_end_of_a_long_brake() {
+    let limits = Limits::new(400_000, 200_000).unwrap().with_jerk(200_000).unwrap();
+    let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+    mover.run(Direction::Forward, 400_000, 0).unwrap();
+    take(&mut mover, 6_000_000);
+    mover.hold(6_000_000);
+    let now = 6_600_000;
+    take(&mut mover, now);
+    let end = |target: Option<i64>| {
+        let mut mover = mover.clone();
+        if let Some(target) = target {
+            mover.resume(now);
+            mover.move_to(target, now).unwrap();
+        }
+        let (mut last, mut least) = (mover.pulse().unwrap().tick, u64::MAX);
+        while let Some(pulse) = mover.pulse() {
+            (last, least) = (pulse.tick, least.min(pulse.tick - last));
+        }
+        (mover.commanded(), last, least)
+    };
+    let (stop, rest, _) = end(None);
+    assert_eq!(stop, 2_400_000);
+    for more in [0, 1, 2, 5, 10, 20, 40, 100] {
+        let (place, last, least) = end(Some(stop + more));
+        assert_eq!(place, stop + more);
+        assert!(least >= 2, "{least} ticks between two of {more} steps more, at 2.5 for full speed");
+        assert!(last < rest + 200_000, "{more} steps more take {} us", last - rest);
+    }
+}
+
 #[test]
 fn a_slow_jog_is_slow() {
     for speed in [1, 7, 50] {
