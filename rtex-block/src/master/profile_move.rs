@@ -16,9 +16,9 @@ use crate::type_code::Nibble;
 pub enum MoveStage {
     /// Code 10h has been sent; the drive has not echoed it yet, or is still moving.
     Preparing,
-    /// Code 17h has been sent, and In_Progress has not been 1 yet.
+    /// Code 17h has been sent, and neither In_Progress nor Busy has been 1 yet.
     Starting,
-    /// In_Progress was 1: the drive generates the position command.
+    /// In_Progress or Busy was 1: the drive generates the position command.
     Moving,
     /// The motion has ended, successfully or not; the code is 10h again.
     Ended,
@@ -121,7 +121,7 @@ impl ProfileMove {
         self.stage
     }
 
-    /// Returns whether In_Progress was 1 and the motion has not ended.
+    /// Returns whether In_Progress or Busy was 1 and the motion has not ended.
     pub const fn is_moving(&self) -> bool {
         matches!(self.stage, MoveStage::Moving)
     }
@@ -141,9 +141,12 @@ impl ProfileMove {
     pub(super) fn break_off(&mut self, reason: Option<StopReason>, confirmed: bool, slows: bool) {
         match self.progress {
             Progress::Pending { .. } if slows => self.broken = self.broken.or(reason),
-            Progress::Pending { .. } => self.fail(broken(self.broken.or(reason))),
-            Progress::Done { .. } if !confirmed => self.fail(broken(reason)),
-            Progress::Done { .. } | Progress::Failed { .. } => {}
+            Progress::Done { .. } if confirmed => {}
+            Progress::Pending { .. } | Progress::Done { .. } => {
+                self.broken = self.broken.or(reason);
+                self.fail(Failure::ServoOff);
+            }
+            Progress::Failed { .. } => {}
         }
     }
 
@@ -177,9 +180,11 @@ impl ProfileMove {
             self.fail(Failure::Execution);
         } else if moves {
             self.stage = MoveStage::Moving;
-        } else if let (MoveStage::Moving, Some(reason)) = (self.stage, self.broken) {
-            self.fail(Failure::Stopped(reason));
-        } else if self.stage == MoveStage::Moving {
+        } else if self.stage != MoveStage::Moving {
+            // In_Progress may still rise.
+        } else if self.broken.is_some() {
+            self.fail(Failure::ServoOff);
+        } else {
             let in_position = response.status.contains(StatusFlags::IN_POSITION);
             let warning = execution.contains(Execution::WNG);
             self.progress = Progress::Done { value: CommandEnded { in_position, warning } };
@@ -208,13 +213,10 @@ impl ProfileMove {
         }
     }
 
-    const fn fail(&mut self, error: Failure) {
+    /// Ends a motion that is being aborted for the reason of that, any other for this one.
+    fn fail(&mut self, error: Failure) {
+        let error = self.broken.map_or(error, Failure::Stopped);
         self.progress = Progress::Failed { error };
         self.stage = MoveStage::Ended;
     }
-}
-
-/// Why a motion is aborted.
-fn broken(reason: Option<StopReason>) -> Failure {
-    reason.map_or(Failure::ServoOff, Failure::Stopped)
 }

@@ -301,3 +301,31 @@ fn a_servo_that_is_not_switched_on_says_why() {
     assert_eq!(pair.axis.switch_on(), Ok(()));
     assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::State(AxisState::SwitchingOn)));
 }
+
+/// Up to four blocks in a row that are each as old as a turn of the counter, while a motion begins that the drive was slow to show: they
+/// look new and say that nothing moves, and are not its end.
+#[test]
+fn blocks_of_a_turn_ago_do_not_end_a_motion() {
+    for (late, old) in [0, 1, 2, 4, 9].into_iter().flat_map(|late| (1..=4).map(move |old| (late, old))) {
+        for from in 0..20 {
+            let behaviour = Behaviour::new().with_in_progress_late(late);
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
+            pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+            let (mut heard, mut ended) = (Vec::new(), None);
+            for now in 0..1_000 {
+                pair.update();
+                ended = pair.axis.take_move().filter(|progress| !progress.is_pending());
+                if ended.is_some() {
+                    break;
+                }
+                heard.push(pair.received);
+                if now >= 4 && (from..from + old).contains(&(now - 4)) {
+                    pair.received = heard[now - 4];
+                }
+            }
+            assert!(matches!(ended, Some(Progress::Done { .. })), "{late} {old} {from}: {ended:?}");
+            let at = pair.drive.position();
+            assert!((at - 20_000).abs() < 400, "{late} {old} {from}: at {at}");
+        }
+    }
+}

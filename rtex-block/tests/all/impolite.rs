@@ -153,6 +153,64 @@ fn a_motion_that_starts_late_is_not_done_early() {
     assert_eq!(pair.axis.take_move(), Some(Progress::Failed { error: Failure::TimedOut }));
 }
 
+/// Sets bits of byte 9 in the answer to 17h that the master hears next; returns whether there is one.
+fn mark_start(pair: &mut Pair, bits: i32) -> bool {
+    match &mut pair.received {
+        Heard::Main(response) if response.code == Code::PROFILE_START => {
+            response.response_data2 |= bits << 8;
+            true
+        }
+        _ => false,
+    }
+}
+
+/// Busy while the drive takes the command, for some answers, and In_Progress only up to a turn of the counter later: what lies between is
+/// not the end of the motion.
+#[test]
+fn busy_that_falls_before_in_progress_rises() {
+    for busy in 1..=6_u16 {
+        for late in busy..=busy + 4 {
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new().with_in_progress_late(late));
+            pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+            let (mut answers, mut ended) = (0, None);
+            for _ in 0..1_000 {
+                pair.update();
+                ended = pair.axis.take_move().filter(|progress| !progress.is_pending());
+                if ended.is_some() {
+                    break;
+                }
+                answers += u16::from(mark_start(&mut pair, if answers < busy { 0x10 } else { 0 }));
+            }
+            assert!(matches!(ended, Some(Progress::Done { .. })), "{busy} {late}: {ended:?}");
+            assert!((pair.drive.position() - 20_000).abs() < 400, "{busy} {late}: at {}", pair.drive.position());
+        }
+    }
+}
+
+/// A stop of category 2 while a motion begins: whatever the drive says to the motion that it breaks off, or if it does not begin, the
+/// stop is the reason for its end.
+#[test]
+fn the_end_of_a_motion_that_a_stop_breaks_off() {
+    let stopped = Progress::Failed { error: Failure::Stopped(StopReason::Requested) };
+    for (late, marked) in [(u16::MAX, 0), (0, 0x80), (0, 0x90)] {
+        let behaviour = Behaviour::new().with_in_progress_late(late);
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
+        pair.axis.start_move(0x11, 200_000, 1_000_000).unwrap();
+        pair.until("sent", |pair| pair.axis.profile().unwrap().stage() != MoveStage::Preparing);
+        pair.axis.stop(StopCategory::Two);
+        let mut ended = None;
+        for _ in 0..200 {
+            pair.update();
+            ended = pair.axis.take_move().filter(|progress| !progress.is_pending());
+            if ended.is_some() {
+                break;
+            }
+            mark_start(&mut pair, marked);
+        }
+        assert_eq!(ended, Some(stopped), "{late} {marked:x}");
+    }
+}
+
 /// ERR counts with Busy or without, and a request that is only busy goes on to its limit.
 #[test]
 fn err_and_busy_in_either_order() {

@@ -66,8 +66,8 @@ pub(super) struct Main {
     /// It must have ended before the servo is switched on.
     pub(super) needs_servo_off: bool,
     pub(super) quiet: Quiet,
-    /// In_Progress was 0 in the last block of a motion.
-    pub(super) fell: bool,
+    /// Number of consecutive blocks that say that the motion has ended.
+    pub(super) falls: u8,
 }
 
 /// The request in the sub block.
@@ -79,7 +79,7 @@ pub(super) struct Sub {
 }
 
 impl Main {
-    pub(super) const NONE: Self = Self { slot: Slot::Empty, needs_servo_off: false, quiet: Quiet::BROKEN, fell: false };
+    pub(super) const NONE: Self = Self { slot: Slot::Empty, needs_servo_off: false, quiet: Quiet::BROKEN, falls: 0 };
 }
 
 impl Sub {

@@ -4,7 +4,9 @@ use super::Axis;
 use super::asking::{Quiet, Slot};
 use crate::control::ControlBits;
 use crate::error_code::ErrorCode;
+use crate::execution::Execution;
 use crate::header::MacId;
+use crate::master::echo::TURN;
 use crate::master::handshake::Handshake;
 use crate::master::profile_move::MoveStage;
 use crate::master::progress::Progress;
@@ -36,6 +38,12 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
 /// already be in progress.
 fn is_thrown_away(response: &Response) -> bool {
     response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
+}
+
+/// Whether the drive generates the position command, or executes the command whose answer this is.
+fn is_at_work(response: &Response) -> bool {
+    let execution = response.noncyclic().execution().unwrap_or(Execution::empty());
+    response.status.contains(StatusFlags::IN_PROGRESS) || execution.contains(Execution::BUSY)
 }
 
 impl Axis {
@@ -173,14 +181,17 @@ impl Axis {
         if self.control.intersects(ControlBits::HARD_STOP.union(ControlBits::SMOOTH_STOP)) {
             profile.break_off(Some(StopReason::Requested), true, true);
         }
-        // An old block tells neither the beginning nor, by itself, the end.
-        let falls = response.is_some_and(|response| !response.status.contains(StatusFlags::IN_PROGRESS));
+        // Old blocks tell neither the beginning nor the end, and Busy may fall before In_Progress rises.
+        let moves = response.is_none_or(is_at_work);
         let counts = match profile.stage() {
             MoveStage::Preparing => self.main.quiet.is_kept(),
-            MoveStage::Moving => !falls || self.main.fell,
+            MoveStage::Moving => moves || self.main.falls >= TURN,
             MoveStage::Starting | MoveStage::Ended => true,
         };
-        self.main.fell = falls;
+        if response.is_some() {
+            let falls = !moves && profile.is_moving();
+            self.main.falls = if falls { self.main.falls.saturating_add(1) } else { 0 };
+        }
         let heard = response.filter(|_| counts);
         if !profile.receive(heard).is_pending() {
             self.main.quiet = Quiet::BROKEN;

@@ -205,8 +205,8 @@ impl Axis {
     }
 
     /// Returns the progress of the profile motion; once the motion has ended, returns its end and forgets it. It is done when
-    /// the axis has stayed on for a turn of the counter after In_Progress went to 0, because the reason for an abort may appear
-    /// later than that.
+    /// In_Progress and Busy have been 0 for a turn of the counter, because they may come late and a block may be old, and the axis has
+    /// stayed on for another, because the reason for an abort may appear later.
     pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let progress = self.profile?.progress();
         if matches!(progress, Progress::Done { .. }) && !self.main.quiet.is_kept() {
