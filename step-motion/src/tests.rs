@@ -6,6 +6,7 @@
 )]
 
 mod model;
+mod path;
 mod planner;
 mod real;
 

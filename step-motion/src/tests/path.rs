@@ -1,0 +1,293 @@
+//! Runs of lines, beside sums of their lengths and the least of their limits.
+
+use super::model::{Most, change, coasted};
+use super::{float, real};
+use crate::limits::{Bounds, Clock, Limits};
+use crate::path::{AxisSetup, Course, Path};
+use crate::planner::Motion;
+use crate::real::Real;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+const N: usize = 3;
+type Lines = Path<N, 8>;
+
+/// The second axis limits the acceleration, and the third one the jerk; lines are nearly along the first one.
+const LIMITS: [(u32, u32, u64); N] = [(100_000, 1 << 30, 1 << 43), (100_000, 50, 1 << 43), (100_000, 1 << 30, 1000)];
+
+fn clock() -> Clock {
+    Clock::new(1_000_000).unwrap()
+}
+
+/// Moments in a second.
+fn second() -> f64 {
+    f64::from(clock().moments())
+}
+
+fn axes(pause: u32) -> [AxisSetup; N] {
+    LIMITS.map(|(v, a, j)| {
+        AxisSetup::new(Limits::new(v, a).unwrap().with_jerk(j).unwrap(), 1_000_000).with_reversal_pause(pause)
+    })
+}
+
+/// A line in steps, and its speed in steps/s.
+type To = ([i64; N], u32);
+
+fn path(lines: &[To]) -> Lines {
+    let (mut path, mut at) = (Lines::new(clock(), axes(0), 1000).unwrap(), [0; N]);
+    for (by, feed) in lines {
+        at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
+        path.push(at, *feed).unwrap();
+    }
+    path
+}
+
+/// Lengths in steps and limits in seconds.
+fn modelled((by, feed): &To) -> (f64, Most) {
+    let length = by.iter().map(|steps| (*steps as f64).powi(2)).sum::<f64>().sqrt();
+    let least = |of: fn((u32, u32, u64)) -> f64| {
+        let own = |axis: usize| of(LIMITS[axis]) * length / by[axis].abs() as f64;
+        (0..N).map(own).fold(f64::INFINITY, f64::min)
+    };
+    let v = f64::from(*feed).min(least(|(v, ..)| v.into()));
+    (length, Most { v, a: least(|(_, a, _)| a.into()), j: Some(least(|(.., j)| j as f64)) })
+}
+
+fn limits(bounds: &Bounds) -> Most {
+    let second = second();
+    let jerk = bounds.jerk.map(|jerk| float(jerk.j) * second.powi(3));
+    Most { v: float(bounds.v) * second, a: float(bounds.a) * second.powi(2), j: jerk }
+}
+
+fn motion([v, a]: [f64; 2]) -> Motion {
+    Motion { v: real(v / second()), a: real(a.abs() / second().powi(2)), up: a >= 0.0 }
+}
+
+/// The distance of a curve, its time in seconds and the speed at its end.
+fn outcome(course: &Course) -> (f64, f64, f64) {
+    let curve = &course.curve;
+    (float(curve.way()), float(curve.time - curve.skipped.0) / second(), float(course.exit) * second())
+}
+
+fn near(got: f64, want: f64) -> bool {
+    (got - want).abs() <= want.abs() * 1e-6 + 1e-4
+}
+
+fn lines() -> impl Strategy<Value = Vec<To>> {
+    let way = prop_oneof![Just([10, 10]), Just([13, 10]), Just([10, 13]), Just([16, 10]), Just([10, 16]), [8..18_i64, 8..18_i64]];
+    let feed = prop_oneof![8 => Just(1000_u32), 1 => Just(1005), 1 => Just(1010), 1 => 300..1000_u32];
+    prop::collection::vec((prop_oneof![60..200_i64, 200..2000_i64], way, feed).prop_map(|(x, [y, z], feed)| ([x, y * x / 1000, z * x / 1000], feed)), 2..8)
+}
+
+/// How many lines after the first one belong to its run, and the limits there; `None` if rounding decides.
+fn run(path: &Lines, lines: &[(f64, Most)], [v, a]: [f64; 2], fastest: f64) -> Option<(usize, Most)> {
+    let (first, mut more) = (lines[0].1, 0);
+    let mut most = first;
+    let sure = core::cell::Cell::new(true);
+    let is_at_least = |a: f64, b: f64| {
+        sure.set(sure.get() && (a / b - 1.0).abs() > 1e-6);
+        a >= b
+    };
+    let alike = |a: f64, b: f64, by: f64| is_at_least(by, a.max(b) / a.min(b));
+    let held = if a == 0.0 { [0.0; 2] } else { [a.abs(), first.j?] };
+    for (at, (_, line)) in lines.iter().enumerate().skip(1) {
+        let corner = float(path.line(at)?.corner) * second();
+        let is_open = is_at_least(corner, most.v.max(fastest));
+        let same = [alike(line.v, most.v, 129.0 / 128.0), alike(line.a, most.a, 1.5), alike(line.j?, most.j?, 1.5)];
+        let least = Most { v: most.v.min(line.v), a: most.a.min(line.a), j: Some(most.j?.min(line.j?)) };
+        if same != [true; 3] || !is_open || line.v < fastest.max(v) || least.a < held[0] * 0.999_999 || least.j? < held[1] * 0.999_999 {
+            break;
+        }
+        (more, most) = (more + 1, least);
+    }
+    sure.get().then_some((more, most))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(miri) { 1 } else { 2000 }))]
+
+    /// A curve leads along all lines of a run, within the least of their limits, from anywhere on its first line or right before it.
+    #[test]
+    fn a_curve_leads_to_the_end_of_its_run(
+        lines in lines(), part in 0.0..0.9, a in prop_oneof![Just(0.0), Just(1.0), 0.0..1.0], place in prop_oneof![Just(0.0), -50.0..100.0_f64],
+    ) {
+        let (mut path, all) = (path(&lines), lines.iter().map(modelled).collect::<Vec<_>>());
+        let (first, case) = (all[0].1, std::format!("{lines:?} {part} {a} {place}"));
+        let (v, place): (f64, f64) = (first.v * part, place.min(all[0].0 / 2.0));
+        let j = first.j.unwrap();
+        // As it speeds up, below its greatest speed.
+        let most = (2.0 * j * v.min(first.v - v)).sqrt() * 0.999;
+        let a = if a == 1.0 && most >= first.a { first.a } else { a * most.min(first.a) };
+        let fastest = coasted([v, a], first);
+        let Some((more, least)) = run(&path, &all, [v, a], fastest) else { return Ok(()) };
+        let at = [place, -place].map(|x: f64| real(x.max(0.0)));
+        let start = motion([v, a]);
+        let Some((course, bounds)) = path.course(0, start, (at[0], at[1]), (Real::ONE, None)) else { return Ok(()) };
+        let got = limits(&bounds);
+        prop_assert_eq!(course.more, more, "{}", case);
+        prop_assert!(near(got.v, least.v) && near(got.a / least.a, 1.0) && near(got.j.unwrap() / least.j.unwrap(), 1.0), "{got:?} {least:?} {case}");
+        let length: f64 = all[..=more].iter().map(|(length, _)| length).sum();
+        let (way, ..) = outcome(&course);
+        prop_assert!(near(way, length - place) && course.whole, "{way} of {length} {case}");
+    }
+
+    /// A stop is as short as the limits of the lines that it takes allow, and knows where it ends.
+    #[test]
+    fn a_stop_ends_where_its_curve_ends(
+        lines in lines(), part in 0.1..1.0, a in prop_oneof![Just(0.0), -1.0..1.0], place in prop_oneof![Just(0.0), -50.0..200.0_f64], any: bool,
+    ) {
+        let (path, all) = (path(&lines), lines.iter().map(modelled).collect::<Vec<_>>());
+        let (first, case) = (all[0].1, std::format!("{lines:?} {part} {a} {place}"));
+        let (v, place): (f64, f64) = (first.v * part, place.min(all[0].0 / 2.0));
+        let room = if a > 0.0 { first.v - v } else { v };
+        let most: f64 = 2.0 * first.j.unwrap() * room;
+        let a = a * most.sqrt().min(first.a);
+        let at = [place, -place].map(|x: f64| real(x.max(0.0)));
+        let Some(stop) = path.stop(0, motion([v, a]), (at[0], at[1]), (None, false), any) else { return Ok(()) };
+        // The longest run that the motion may take, whatever was asked for as its speed.
+        let alike = |a: f64, b: f64| a.max(b) / a.min(b) < 1.499_999;
+        let Ok((course, bounds)) = stop else {
+            // Then it would take more lines than there are, or lines that are too different.
+            let way = change([v, a], 0.0, first).1;
+            let open = (1..all.len()).all(|at| float(path.line(at).unwrap().corner) * second() > v);
+            let same = open && all.iter().all(|(_, line)| alike(line.a, first.a) && alike(line.j.unwrap(), first.j.unwrap()));
+            let total: f64 = all.iter().map(|(length, _)| length).sum();
+            prop_assert!(!(same || any && open) || a != 0.0 || way * 1.6 > total - place, "{way} of {total} {case}");
+            return Ok(());
+        };
+        let least = limits(&bounds);
+        let (way, time, exit) = outcome(&course);
+        let (want_time, want) = change([v, a], 0.0, least);
+        prop_assert!(near(way, want) && near(time, want_time) && exit == 0.0, "{way} for {want} {case}");
+        let (mut before, mut at) = (0.0, 0);
+        while at + 1 < all.len() && before + all[at].0 < place + way - 2e-5 {
+            (before, at) = (before + all[at].0, at + 1);
+        }
+        prop_assert_eq!(course.more, at, "{}", case);
+        let left = before + all[at].0 - (place + way);
+        prop_assert!(left.abs() < 3e-5 || course.whole == (left < 0.0), "{left} {case}");
+        for (_, line) in &all[..=at] {
+            prop_assert!(least.a <= line.a * 1.000_001 && least.j.unwrap() <= line.j.unwrap() * 1.000_001, "{case}");
+        }
+    }
+
+    #[test]
+    fn a_place_on_a_path(lines in lines(), first in 0..3_usize, way in 0.0..9000.0, last in 0..9_usize) {
+        let (path, all) = (path(&lines), lines.iter().map(modelled).collect::<Vec<_>>());
+        prop_assume!(first < all.len() && first <= last);
+        let (mut left, mut at) = (way, first);
+        while at < last.min(all.len() - 1) && left > all[at].0 {
+            (left, at) = (left - all[at].0, at + 1);
+        }
+        let (got, place) = path.locate(first, real(way), last);
+        prop_assert!(got == at && near(float(place), left), "{got} {place:?} for {at} {left}");
+    }
+}
+
+/// Four lines of 1000 steps.
+fn four(ways: [[i64; 2]; 4]) -> Lines {
+    path(&ways.map(|[y, z]| ([1000, y, z], 1000)))
+}
+
+/// What is under way is kept up: a line that allows less is not in the same run.
+#[test]
+fn an_acceleration_or_jerk_under_way_is_held() {
+    let more = |path: &mut Lines, a: f64| {
+        path.course(0, motion([300.0, a]), (Real::ZERO, Real::ZERO), (Real::ONE, None)).unwrap().0.more
+    };
+    // 5000 steps/s² on the first line, 4167 on the others.
+    let mut path = four([[10, 10], [12, 10], [12, 10], [12, 10]]);
+    assert_eq!([0.0, 2000.0, 4100.0, 4200.0, 5000.0].map(|a| more(&mut path, a)), [3, 3, 3, 0, 0]);
+    // 100,000 and 83,333 steps/s³: more than nothing is under way.
+    let mut path = four([[10, 10], [10, 12], [10, 12], [10, 12]]);
+    assert_eq!([0.0, 10.0, 4100.0].map(|a| more(&mut path, a)), [3, 0, 0]);
+    let mut path = four([[10, 10]; 4]);
+    assert_eq!(more(&mut path, 5000.25), 3, "rounding must not end a run");
+}
+
+fn steady(v: f64) -> Motion {
+    motion([v, 0.0])
+}
+
+/// A stop that is whole ends with its line, to 2^-16 of a step.
+#[test]
+fn a_stop_right_at_the_end_of_a_line() {
+    let path = four([[10, 10]; 4]);
+    let stop = |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), false).unwrap().unwrap().0;
+    let (way, ..) = outcome(&stop(0.0));
+    let (length, slack) = (float(path.line(0).unwrap().length), 16_f64.exp2().recip());
+    for (short, more, whole) in [(1.0, 0, false), (2.0 * slack, 0, false), (0.5 * slack, 0, true), (-2.0 * slack, 1, false), (-1.0, 1, false)] {
+        let course = stop(length - way - short);
+        assert_eq!((course.more, course.whole), (more, whole), "{short}");
+    }
+}
+
+/// If it does not fit: as slow as it can get to the end of the run, which is all that is left of the line.
+#[test]
+fn a_brake_that_is_too_late() {
+    let path = path(&[([100, 1, 1], 1000), ([1000, 10, 20], 1000)]);
+    for (place, before) in [(0.0, 0.0), (30.0, 0.0), (0.0, 20.0)] {
+        let (course, _) = path.brake(0, steady(1000.0), (real(place), real(before)), (None, false)).unwrap();
+        let (way, _, exit) = outcome(&course);
+        let (length, most) = modelled(&([100, 1, 1], 1000));
+        assert!(near(way, length + before - place), "{way}");
+        let need = change([1000.0, 0.0], exit, most).1;
+        assert!(exit > 0.0 && (need / way - 1.0).abs() < 1e-3, "{need} of {way} to {exit}");
+    }
+}
+
+/// The time of a stop over several lines is that of all its curves.
+#[test]
+fn the_time_of_a_stop_over_lines_that_differ() {
+    let path = path(&[([60, 1, 1], 1000), ([60, 40, 1], 1000), ([60, 1, 1], 1000), ([600, 1, 1], 1000)]);
+    let (mut at, mut speed, mut want, mut curves) = (0, real(1000.0 / second()), 0.0, 0);
+    while let Some((course, _)) = path.begin_to_brake(at, speed) {
+        curves += 1;
+        want += outcome(&course).1;
+        if course.exit.is_zero() {
+            break;
+        }
+        (at, speed) = (at + course.more + 1, course.exit);
+    }
+    let (_, time) = path.end_of_stop(0, real(1000.0 / second()));
+    assert!(curves > 1 && near(float(time) / second(), want), "{time:?} for {want} in {curves}");
+}
+
+/// If rounding leaves nothing else: a line that is too short to slow down on is run at the speed that is.
+#[test]
+fn a_line_without_a_plan_is_run_at_the_speed_that_is() {
+    let mut path = path(&[([10, 1, 1], 1000)]);
+    let (course, _) = path.begin(0, real(1000.0 / second()), Real::ONE).unwrap();
+    let (way, time, exit) = outcome(&course);
+    let length = 102_f64.sqrt();
+    assert!(near(way, length) && near(time, length / 1000.0) && near(exit, 1000.0), "{course:?}");
+}
+
+/// So that a line for one of two paths may be added to the other.
+#[test]
+fn paths_that_end_in_the_same_way() {
+    let one = path(&[([100, 1, 1], 1000), ([100, 1, 1], 1000)]);
+    assert!(one.ends_as(&one.clone()));
+    // At another place, after another line, with another direction of an axis, or full.
+    let place = path(&[([100, 1, 1], 1000), ([100, 1, 1], 1000), ([-1, 0, 0], 10), ([1, 0, 0], 10), ([100, 1, 1], 10)]);
+    let before = path(&[([90, 1, 1], 1000), ([110, 1, 1], 1000)]);
+    let way = path(&[([100, 1, 2], 1000), ([50, 1, -1], 1000), ([50, 0, 1], 1000)]);
+    let same = path(&[([100, 1, 2], 1000), ([50, 1, 0], 1000), ([50, 0, 0], 1000)]);
+    let full = path(&[([10, 1, 1], 1000); 8]);
+    assert!(way.target() == same.target() && one.target() == before.target());
+    for (one, other) in [(&one, &place), (&one, &before), (&way, &same), (&full, &full)] {
+        assert!(!one.ends_as(other));
+    }
+}
+
+/// Lines for a quick stop, and as they were.
+#[test]
+fn lines_that_hurry_and_calm_down() {
+    let mut path = four([[10, 10]; 4]);
+    let accelerations = |path: &Lines| [0, 3].map(|at| (limits(&path.line(at).unwrap().bounds).a).round());
+    assert_eq!(accelerations(&path), [5000.0; 2]);
+    let lines = path.hurry(&[Limits::new(1, 1 << 30).unwrap().with_jerk(1 << 43).unwrap(); N]);
+    assert!(accelerations(&path)[1] > 1e8);
+    path.calm(lines);
+    assert_eq!(accelerations(&path), [5000.0; 2]);
+}
