@@ -238,7 +238,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn settle(&mut self) {
         for _ in 0..=M {
             let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };
-            if line.first().is_some() || self.made != first.ends {
+            if line.first().is_some() {
+                return;
+            }
+            if self.made != first.ends {
+                if self.braking && self.part().is_some() {
+                    // It could not leave a brake that is no longer asked for: on from where that comes to rest.
+                    self.plan(self.over());
+                }
                 return;
             }
             let cut = first.cut;

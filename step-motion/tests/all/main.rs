@@ -19,4 +19,5 @@ mod replans;
 #[cfg(feature = "serde")]
 mod serde;
 mod stops;
+mod straight;
 mod toolpaths;
