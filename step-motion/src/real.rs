@@ -73,7 +73,6 @@ impl Real {
         let shift = self.e().saturating_add(bits);
         match shift {
             _ if self.is_zero() => 0,
-            0 => self.m(),
             1.. => u64::MAX,
             _ => match self.m().checked_shr(shift.unsigned_abs()) {
                 Some(n) => n,
@@ -86,8 +85,8 @@ impl Real {
     pub(super) const fn to_wide(self, bits: i32) -> i128 {
         let shift = self.e().saturating_add(bits);
         match shift {
-            _ if shift <= 0 => self.to_fixed(bits) as i128,
-            ..=62 => (self.m() as i128) << shift,
+            ..=0 => self.to_fixed(bits) as i128,
+            1..=62 => (self.m() as i128) << shift,
             _ => i128::MAX >> 1,
         }
     }
@@ -374,11 +373,12 @@ const fn reciprocal(d: u64) -> u64 {
     let better = rough.wrapping_add(((rough as i64).wrapping_mul(off >> 18) >> 45) as u64);
     let x = if better >> 32 == 0 { better << 32 } else { u64::MAX };
     let (whole, _) = product(x, d);
+    // Twice what is missing from 2^63, or too much: its top bit is shifted out.
     if whole < 1 << 63 {
-        let (more, _) = product(x, (1_u64 << 63).wrapping_sub(whole) << 1);
+        let (more, _) = product(x, whole.wrapping_neg() << 1);
         x.saturating_add(more)
     } else {
-        let (less, _) = product(x, whole.wrapping_sub(1 << 63) << 1);
+        let (less, _) = product(x, whole << 1);
         x.wrapping_sub(less)
     }
 }
