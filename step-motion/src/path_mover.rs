@@ -396,8 +396,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Fraction of the requested speeds; `None` to brake.
     fn part(&self) -> Option<Real> {
-        let brakes = self.held || self.stopping || self.percent == 0;
-        (!brakes).then(|| Real::new(self.percent.into()) / Real::new(100))
+        (!self.brakes()).then(|| Real::new(self.percent.into()) / Real::new(100))
+    }
+
+    /// Returns whether it is to come to rest.
+    const fn brakes(&self) -> bool {
+        self.held || self.stopping || self.percent == 0
     }
 
     /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the

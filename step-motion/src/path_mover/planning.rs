@@ -145,11 +145,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Plans the rest of the motion after a request.
     pub(super) fn replan(&mut self, now: u64) {
         // A stop that is under way is the same one whoever asks for it.
-        if self.stopping || self.line.is_some() && self.braking && self.part().is_none() {
+        if self.stopping || self.line.is_some() && self.braking && self.brakes() {
             return;
         }
         if self.line.is_none() {
-            if self.part().is_some() {
+            if !self.brakes() {
                 self.path.not_before(now);
             }
             self.begin();
@@ -213,7 +213,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
-        self.braking = self.part().is_none();
+        self.braking = self.brakes();
         self.left = [None; N];
         true
     }
@@ -242,7 +242,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
                 return;
             }
             if self.made != first.ends {
-                if self.braking && self.part().is_some() {
+                if self.braking && !self.brakes() {
                     // It could not leave a brake that is no longer asked for: on from where that comes to rest.
                     self.plan(self.over());
                 }

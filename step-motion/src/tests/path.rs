@@ -3,7 +3,7 @@
 use super::model::{Most, change, coasted};
 use super::{float, real};
 use crate::limits::{Bounds, Clock, Limits};
-use crate::path::{AxisSetup, Course, Path};
+use crate::path::{AxisSetup, Course, End, Leaving, Path};
 use crate::planner::Motion;
 use crate::real::Real;
 use proptest::prelude::*;
@@ -309,4 +309,84 @@ fn lines_that_hurry_and_calm_down() {
     assert!(accelerations(&path)[1] > 100_000_000);
     path.calm(lines);
     assert_eq!(accelerations(&path), [5000; 2]);
+}
+
+/// The second axis turns round with a pause of a tenth of a second on either side: from half a step off at 2.5 steps/s it gets there in
+/// that time with its 50 steps/s². Where it stood before, it has all of the pause behind the corner. Nothing turns where it comes to rest.
+#[test]
+fn the_speed_at_which_an_axis_turns_round() {
+    let corner = |pause: u32, lines: &[[i64; N]]| {
+        let (mut path, mut at) = (Lines::new(clock(), axes(pause), 1000).unwrap(), [0; N]);
+        for by in lines {
+            at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
+            path.push(at, 1000).unwrap();
+        }
+        float(path.line(lines.len() - 1).unwrap().corner) * second()
+    };
+    let turned = corner(200_000, &[[1000, -10, 0], [1000, 10, 0]]);
+    assert!((turned - 250.0).abs() < 0.1, "{turned}");
+    let late = corner(100_000, &[[1000, -10, 0], [1000, 0, 0], [1000, 10, 0]]);
+    assert!((late - 250.0).abs() < 0.1, "{late}");
+    let straight = corner(200_000, &[[1000, -10, 0], [1000, 0, 0]]);
+    assert!(straight > 1500.0 && straight < 3000.0, "{straight}");
+    // Nearly back the way that it came is back.
+    assert!(corner(0, &[[1000, 0, 0], [-1000, 1, 0]]) < 1e-9);
+}
+
+/// Lines that a stop leaves one by one, and the curves on them: more lines, exit, time and distance.
+fn chain(path: &Lines, mut at: usize, mut speed: Real) -> Vec<(usize, f64, f64, f64)> {
+    let mut found = Vec::new();
+    while let Some((course, _)) = path.begin_to_brake(at, speed).filter(|_| found.len() < 9) {
+        let (way, time, exit) = outcome(&course);
+        found.push((course.more, exit, time, way));
+        if course.exit.is_zero() {
+            break;
+        }
+        (at, speed) = (at + course.more + 1, course.exit);
+    }
+    found
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(miri) { 1 } else { 2000 }))]
+
+    /// A stop stays the same when the path is cut off where it ends; what is cut off is not made, and no step that has been made is undone.
+    #[test]
+    fn a_path_is_cut_off_where_a_stop_ends(
+        lines in prop::collection::vec((30..200_i64, prop_oneof![2 => 0..6_i64, 1 => 0..20_i64], 0..6_i64), 2..8), part in 0.3..1.0, made in 0..30_u32,
+    ) {
+        let lines: Vec<To> = lines.into_iter().map(|(x, y, z)| ([x, y, z], 1000)).collect();
+        let (mut path, all) = (path(&lines), lines.iter().map(modelled).collect::<Vec<_>>());
+        let case = std::format!("{lines:?} {part} {made}");
+        let start = steady(all[0].1.v * part);
+        let Some((course, bounds)) = path.brake(0, start, (Real::ZERO, Real::ZERO), (None, false)) else { return Ok(()) };
+        let (more, exit) = (course.more, course.exit);
+        let end = if exit.is_zero() { path.locate(0, course.curve.way(), more) } else { path.end_of_stop(more + 1, exit).0 };
+        let before = if exit.is_zero() { Vec::new() } else { chain(&path, more + 1, exit) };
+        let made = [made, 0, 0];
+        let place = path.place(&End { at: end, least: [0; N], most: [u32::MAX; N] }, [7; N], made);
+        path.cut(&End { at: end, least: [0; N], most: [u32::MAX; N] }, [7; N], made, Leaving { more, exit, bounds: Some(bounds) });
+        prop_assert_eq!((path.len(), path.target()), (end.0 + 1, place), "{}", case);
+        prop_assert!(path.end_of_cut().is_some_and(|(at, length)| at == end.0 && near(float(length), float(end.1))), "{case}");
+        for axis in 0..N {
+            let whole: i64 = lines[..end.0].iter().map(|(by, _)| by[axis]).sum();
+            let last = lines[end.0].0[axis] as f64 * float(end.1) / all[end.0].0;
+            let last = if end.0 == 0 { last.max(made[axis].into()) } else { last };
+            prop_assert!((place[axis] - 7 - whole) as f64 - last <= 0.501 && last - (place[axis] - 7 - whole) as f64 <= 0.501, "{axis} at {place:?} {case}");
+        }
+        // The first curve's limits hold on its lines, however many of them are left.
+        let want = limits(&bounds);
+        for at in 0..=more.min(end.0) {
+            let got = limits(&path.line(at).unwrap().bounds);
+            prop_assert!(near(got.a, want.a) && near(got.j.unwrap() / want.j.unwrap(), 1.0), "{at}: {got:?} {want:?} {case}");
+        }
+        let after = if exit.is_zero() { Vec::new() } else { chain(&path, more + 1, exit) };
+        prop_assert_eq!(before.len(), after.len(), "{} {:?} {:?}", case, before, after);
+        for (before, after) in before.iter().zip(&after) {
+            let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs() + 1e-4;
+            prop_assert!(same(before.1, after.1) && same(before.2, after.2) && same(before.3, after.3), "{before:?} {after:?} {case}");
+        }
+        let leaves = (0..path.len()).filter(|at| path.line(*at).unwrap().leave.is_some()).count();
+        prop_assert_eq!(leaves, before.len(), "{}", case);
+    }
 }
