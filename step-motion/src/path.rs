@@ -257,8 +257,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
         };
         self.knows_all = true;
-        let whole = course.more > 0 || course.whole;
-        let mut pulses = LinePulses::new(self.clock, &course.curve, &line, Start { whole, ..start }, Steps::Single);
+        let mut pulses = LinePulses::new(self.clock, &course.curve, &line, start, Steps::Single);
         if course.more > 0 {
             let before = start.before + line.length;
             if let (Some(Piece { time, .. }), Some((frame, _))) = (course.curve.after(before), pulses.axes.first()) {

@@ -182,6 +182,11 @@ proptest! {
         prop_assert_eq!(course.more, at, "{}", case);
         let left = before + all[at].0 - (place + way);
         prop_assert!(left.abs() < 3e-5 || course.whole == (left < 0.0), "{left} {case}");
+        for next in 1..=at {
+            let corner = float(path.line(next).unwrap().corner) * second();
+            prop_assert!(corner >= coasted([v, a.max(0.0)], first) * 0.999_999, "{corner} {case}");
+        }
+        prop_assert!(at > 0 || left > -3e-5 && near(least.a, first.a), "{least:?} {case}");
         for (_, line) in &all[..=at] {
             prop_assert!(least.a <= line.a * 1.000_001 && least.j.unwrap() <= line.j.unwrap() * 1.000_001, "{case}");
         }
@@ -233,9 +238,14 @@ fn a_stop_right_at_the_end_of_a_line() {
         |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), false).unwrap().unwrap().0;
     let (way, ..) = outcome(&stop(0.0));
     let (length, slack) = (float(path.line(0).unwrap().length), 16_f64.exp2().recip());
-    for (short, more, whole) in
-        [(1.0, 0, false), (2.0 * slack, 0, false), (0.5 * slack, 0, true), (-2.0 * slack, 1, false), (-1.0, 1, false)]
-    {
+    for (short, more, whole) in [
+        (1.0, 0, false),
+        (2.0 * slack, 0, false),
+        (0.5 * slack, 0, true),
+        (-0.5 * slack, 0, true),
+        (-2.0 * slack, 1, false),
+        (-1.0, 1, false),
+    ] {
         let course = stop(length - way - short);
         assert_eq!((course.more, course.whole), (more, whole), "{short}");
     }

@@ -122,7 +122,7 @@ fn refusals_leave_the_path_as_it_was() {
     path.push([0], 5).unwrap();
     assert!(path.is_empty());
     for far in [1 << 31, -(1 << 31), 1 << 40, i64::MIN] {
-        assert!(matches!(path.push([far], 5), Err(Error::TooManySteps { .. })), "{far}");
+        assert!(matches!(path.push([far], 5), Err(Error::TooManySteps { limit: 0x7fff_ffff, .. })), "{far}");
     }
     path.push([10], 5).unwrap();
     assert_eq!((path.push([20], 5), path.len(), path.target()), (Err(Error::QueueFull), 1, [10]));
@@ -307,4 +307,49 @@ fn an_override_holds_at_joints_too() {
     for (step, wants) in [(600, 250), (800, 250), (2400, 125), (2800, 125), (4000, 125)] {
         assert!((ticks[step] - ticks[step - 1]).abs_diff(wants) <= 1, "{step}: {:?}", &ticks[step - 1..=step]);
     }
+}
+
+/// An axis that goes on as before does not wait for its pause, nor does one that stands; one that turns round does.
+#[test]
+fn only_an_axis_that_turns_round_waits() {
+    let axes = [axis(20_000, 400_000, 0, 80_000).with_reversal_pause(50_000); 2];
+    let first = |lines: &[[i64; 2]]| {
+        let mut path = Path::<2, 4>::new(Clock::MICROSECONDS, axes, 0).unwrap();
+        let (mut rest, mut wait) = (0, 0);
+        for to in lines {
+            path.push(*to, 100_000).unwrap();
+            let mut line = path.next_line().unwrap();
+            let end = line.end();
+            wait = line.next().unwrap().tick - rest;
+            rest = end;
+        }
+        wait
+    };
+    assert!(first(&[[400, 0]]) < 3000 && first(&[[400, 0], [800, 0]]) < 3000 && first(&[[400, 0], [400, 200]]) < 3000);
+    assert!(first(&[[400, 0], [0, 0]]) > 50_000 && first(&[[-400, 0]]) > 50_000);
+}
+
+/// Lines that come one by one while it moves are planned for again and again, from where the line before ends: no step is too early.
+#[test]
+fn lines_that_come_one_by_one_continue_each_other() {
+    let axes = [axis(20_000, 200_000, 2_000_000, 80_000)];
+    let mut path = Path::<1, 3>::new(Clock::new(100_000_000).unwrap(), axes, 20).unwrap();
+    let (mut ticks, mut at) = (Vec::new(), 0);
+    for _ in 0..60 {
+        while !path.is_full() {
+            at += 97;
+            path.push([at], 250_000).unwrap();
+        }
+        ticks.extend(path.next_line().unwrap().map(|pulse| pulse.tick as f64 / 1e8));
+    }
+    for three in ticks.windows(3) {
+        let speeds = [1.0 / (three[1] - three[0]), 1.0 / (three[2] - three[1])];
+        let acceleration = (speeds[1] - speeds[0]) / (three[2] - three[0]) * 2.0;
+        assert!(
+            speeds[1] <= 20_010.0 && acceleration.abs() <= 200_000.0 * 1.05,
+            "{speeds:?} {acceleration} at {}",
+            three[2]
+        );
+    }
+    assert!(ticks.len() == 60 * 97);
 }
