@@ -4,6 +4,7 @@ use super::model::{Most, change, coasted};
 use super::{float, real};
 use crate::limits::{Bounds, Clock, Limits};
 use crate::path::{AxisSetup, Course, End, Leaving, Path};
+use crate::path_mover::PathMover;
 use crate::planner::Motion;
 use crate::real::Real;
 use proptest::prelude::*;
@@ -399,4 +400,20 @@ proptest! {
         let leaves = (0..path.len()).filter(|at| path.line(*at).unwrap().leave.is_some()).count();
         prop_assert_eq!(leaves, before.len(), "{}", case);
     }
+}
+
+/// The same of movers; in a quick stop no line is added.
+#[test]
+fn movers_that_end_in_the_same_way() {
+    let mover = |lines: &[To]| PathMover::new(path(lines));
+    let one = mover(&[([500, 1, 1], 1000), ([500, 1, 1], 1000)]);
+    let mut moving = one.clone();
+    moving.resume(0);
+    for _ in 0..50 {
+        moving.pulse().unwrap();
+    }
+    assert!(one.ends_as(&one.clone()) && moving.ends_as(&moving.clone()));
+    assert!(!one.ends_as(&mover(&[([500, 1, 1], 1000), ([400, 1, 1], 1000)])));
+    moving.quick_stop(LIMITS.map(|(v, a, _)| Limits::new(v, a).unwrap()), 0);
+    assert!(moving.due().is_some() && !moving.ends_as(&moving.clone()));
 }
