@@ -68,9 +68,11 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     end: u64,
     dirs: [Option<Direction>; N],
     made: [u32; N],
-    /// The block being made from it: the stage of the work, its copy of the path, the block and its writers.
+    /// The block being made from it: the stage of the work, its copy of the path, whether that is still the same, the block
+    /// and its writers.
     stage: Stage,
     work: PathMover<N, M>,
+    same: bool,
     block: usize,
     writers: [Writer; N],
     /// The axis being cut, and how many axes before it had nothing to cut.
@@ -146,6 +148,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             dirs: none,
             made: [0; N],
             stage: Stage::Idle,
+            same: false,
             block: 0,
             writers: [Writer::new(0, None); N],
             axis: 0,
@@ -232,7 +235,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             // The copy does not have the line.
             self.stage = Stage::Brake;
         }
-        if self.stage != Stage::Idle {
+        if self.stage != Stage::Idle || self.same {
             // The same lines, or some of them: there is room for this one.
             let _: Result<(), Error> = add(&mut self.work, like[0], self.end);
         }
@@ -398,7 +401,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Forgets what has been cut but not handed out.
     const fn begin_anew(&mut self) {
-        self.stage = Stage::Idle;
+        (self.stage, self.same) = (Stage::Idle, false);
     }
 
     /// Confirms a halt once the interrupt has stopped for it.
@@ -436,6 +439,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         for out in &mut self.outs {
             out.valid = false;
         }
-        (self.stage, self.standing, self.pending, self.lost) = (Stage::Idle, true, false, false);
+        self.begin_anew();
+        (self.standing, self.pending, self.lost) = (true, false, false);
     }
 }

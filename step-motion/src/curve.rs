@@ -51,6 +51,15 @@ impl Piece {
         let dp = (speed.half().along(bent * THIRD, growing)) * t;
         (p + (v * t).along(dp, up), v.along(dv, up))
     }
+
+    /// Returns the speed and the size of the acceleration `t` after the start.
+    fn speed(&self, t: Real) -> (Real, Real) {
+        let Self { v, a, j, up, bend, .. } = *self;
+        match bend {
+            Bend::Flat => (v.along(a * t, up), a),
+            _ => (self.way(t).1, a.along(j * t, bend == Bend::Growing)),
+        }
+    }
 }
 
 /// Up to eight pieces: a return to acceleration 0, a slope, a cruise, and another slope.
@@ -87,6 +96,16 @@ impl Curve {
 
     pub(super) fn pieces(&self) -> &[Piece] {
         self.pieces.get(..self.len).unwrap_or(&[])
+    }
+
+    /// Returns time, place, speed and size of the acceleration at the end of a piece.
+    pub(super) fn end(&self, at: usize, piece: &Piece) -> [Real; 4] {
+        let (time, p) = match self.pieces().get(at.saturating_add(1)) {
+            Some(next) => (next.time, next.p),
+            None => (self.time, self.p),
+        };
+        let (v, a) = piece.speed(time - piece.time);
+        [time, p, v, a]
     }
 
     /// Returns the state at a time of the curve, even before its start or after its end; `None` without pieces.

@@ -2,7 +2,7 @@
 //!
 //! A segment leads from one time to another. It takes the time and the pace at both ends from the curve; its maximum error
 //! also follows from these (`segment`). Near rest, where a segment would hold few steps, up to four steps are found one by
-//! one and make a segment (`near_rest`, `part`).
+//! one and make a segment: by a table if the rest is at a step, whatever the piece is (`near_rest`), or by a search (`part`).
 //!
 //! Within a piece everything is scaled to it: times are fractions of its duration, positions fractions of its length, in
 //! 64-bit words. With t from 0 to 1
@@ -14,7 +14,9 @@ mod part;
 mod segment;
 mod stretch;
 
-use part::{LONGEST, Part, Spot};
+use near_rest::FromRest;
+pub(crate) use near_rest::Roots;
+use part::{LONGEST, Part, Slower, Spot};
 pub(crate) use stretch::Stretch;
 
 use crate::curve::Curve;
@@ -27,12 +29,12 @@ use crate::real::Real;
 pub(crate) struct Cutter {
     /// Steps made, counted from the origin of the positions.
     count: u32,
-    /// Nothing has been made of the piece yet.
-    fresh: bool,
     /// The piece after the present one, and the steps made where the present one ends.
     next: u8,
     until: u32,
-    piece: Part,
+    /// The steps of the present piece beside a rest; and the piece itself, once it is needed.
+    rest: Option<FromRest>,
+    piece: Option<Part>,
     /// Where the next segment may begin.
     last: Last,
     /// Steps that have been counted but do not form a stretch yet.
@@ -43,8 +45,12 @@ pub(crate) struct Cutter {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Last {
+    /// At the start of the piece.
+    Entry,
     /// The time from the slower end of the piece.
     At(u64),
+    /// The time on the clock, in 2^-32 ticks.
+    Tick(i128),
     /// Where the next segment begins, and about how long it may take.
     There(Spot, u64),
 }
@@ -62,8 +68,7 @@ pub(crate) enum Slice {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Few {
     stretch: Stretch,
-    /// Time of the first step in the piece, how much later the last one is, and the differences there.
-    begin: u64,
+    /// How much later than the first step the last one is, and the differences there.
     since: u64,
     interval: i64,
     add: i64,
@@ -82,9 +87,10 @@ pub(crate) struct Demand {
 
 /// Up to this many steps fit into a segment whatever the curve is; each of them is found by itself.
 const FEW: u16 = 4;
+
 impl Cutter {
     pub(crate) const fn new() -> Self {
-        Self { count: 0, fresh: false, next: 0, until: 0, piece: Part::NONE, last: Last::At(0), few: None }
+        Self { count: 0, next: 0, until: 0, rest: None, piece: None, last: Last::Entry, few: None }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -111,19 +117,24 @@ impl Cutter {
         if self.count >= self.until {
             return if self.take_piece(curve, frame, demand) { Slice::More } else { Slice::End };
         }
-        if core::mem::take(&mut self.fresh) && self.piece.looks_for_rest() {
-            return Slice::More;
+        if self.rest.as_mut().is_some_and(|rest| rest.is_near(self.count, frame, demand)) {
+            if let Some(stretch) = self.beside_rest(demand) {
+                return Slice::Steps(stretch);
+            }
         }
-        let left = self.left();
-        if self.piece.even {
-            let stretch = self.piece.cruise(self.count, left, demand.time);
+        let steps = (self.count, self.left());
+        let Some(piece) = &self.piece else {
+            self.piece = self.scaled(curve, frame, demand.off);
+            return Slice::More;
+        };
+        if piece.even {
+            let stretch = piece.cruise(steps, demand.time);
             self.count = self.count.saturating_add(stretch.count.into());
             return Slice::Steps(stretch);
         }
-        let steps = (self.count, left);
         let many = match &self.last {
-            Last::At(time) => self.piece.spot(*time).and_then(|last| self.piece.many(steps, &last, None, demand)),
-            Last::There(spot, long) => self.piece.many(steps, spot, Some(*long), demand),
+            Last::There(spot, long) => piece.many(steps, spot, Some(*long), demand),
+            last => piece.spot(last.time(piece)).and_then(|last| piece.many(steps, &last, None, demand)),
         };
         if let Some((stretch, end, long)) = many {
             (self.last, self.count) = (Last::There(end, long), self.count.saturating_add(stretch.count.into()));
@@ -140,37 +151,55 @@ impl Cutter {
     /// Goes on to the next piece with steps; returns false after the last one.
     fn take_piece(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> bool {
         while self.count >= self.until {
-            let Some((piece, end, until)) = frame.piece(curve, self.next) else { return false };
-            self.next = self.next.saturating_add(1);
+            let at = self.next;
+            let Some(until) = frame.until(curve, at) else { return false };
+            self.next = at.saturating_add(1);
             if until > self.count {
-                self.piece = Part::new(curve, frame, (piece, end), demand.off);
-                (self.until, self.last, self.fresh) = (until, Last::At(self.piece.entry()), true);
+                let Some(slower) = Slower::new(curve, frame, at) else { return false };
+                (self.until, self.last) = (until, Last::Entry);
+                self.rest = FromRest::new(&slower, frame, self.rest.as_ref());
+                self.piece = if self.rest.is_none() { Some(Part::new(&slower, frame, demand.off)) } else { None };
             }
         }
         true
     }
 
+    /// Scales the present piece, for what its table does not say.
+    fn scaled(&self, curve: &Curve, frame: &Frame, off: Real) -> Option<Part> {
+        let slower = Slower::new(curve, frame, self.next.saturating_sub(1))?;
+        Some(Part::new(&slower, frame, off))
+    }
+
+    /// Returns the next few steps, if they are beside a rest.
+    fn beside_rest(&mut self, demand: &Demand) -> Option<Stretch> {
+        let (rest, mut few) = (self.rest.as_ref()?, Few::NONE);
+        for _ in 0..self.left().min(FEW.into()) {
+            let Some(time) = rest.time(self.count).filter(|time| few.add(*time, demand.time.min(LONGEST))) else {
+                break;
+            };
+            (self.last, self.count) = (Last::Tick(time), self.count.saturating_add(1));
+        }
+        (few.stretch.count > 0).then_some(few.stretch)
+    }
+
     /// Finds the next two of the steps that are found one by one.
     fn search(&mut self, mut few: Few, demand: &Demand) -> Slice {
-        let mut coarse = 0;
-        let mut last = match self.last {
-            Last::At(time) => time,
-            Last::There(spot, _) => spot.time,
-        };
-        if let Some((by, spot)) = demand.coarse.and_then(|by| Some((by, self.piece.spot(last)?))) {
-            coarse = spot.v.of(self.piece.step) >> by;
+        let Some(piece) = &self.piece else { return Slice::More };
+        let (mut last, mut coarse) = (self.last.time(piece), 0);
+        if let Some((by, spot)) = demand.coarse.and_then(|by| Some((by, piece.spot(last)?))) {
+            coarse = spot.v.of(piece.step) >> by;
         }
-        let near = self.piece.off.max(coarse) >> 4;
+        let near = piece.off.max(coarse) >> 4;
         for _ in 0..self.left().min(2) {
-            let time = self.piece.search(self.count, Some(last), near);
-            if !few.add(&self.piece, time, demand.time.min(LONGEST)) {
+            let time = piece.search(self.count, Some(last), near);
+            if !few.add(piece.tick(time), demand.time.min(LONGEST)) {
                 return Slice::Steps(few.stretch);
             }
             self.count = self.count.saturating_add(1);
             // A step that was due before the piece began is made at its start, not at its own place, so no segment begins
             // at it.
-            if time.abs_diff(self.piece.entry()) <= near {
-                self.last = Last::At(self.piece.entry());
+            if time.abs_diff(piece.entry()) <= near {
+                self.last = Last::Entry;
                 return Slice::Steps(few.stretch);
             }
             last = time;
@@ -183,46 +212,59 @@ impl Cutter {
         Slice::Steps(few.stretch)
     }
 
-    /// Returns the time of the next step if it follows from a rest beside it, and makes the step.
-    pub(crate) fn known(&mut self) -> Option<i128> {
-        if self.fresh || self.few.is_some() || self.count >= self.until {
+    /// Returns a time, and the steps that follow from a rest beside them as from there, if the next step is one. They are
+    /// made.
+    pub(crate) fn roots(&mut self) -> Option<(i128, Roots)> {
+        if self.few.is_some() || self.count >= self.until {
             return None;
         }
-        let (time, tick) = self.piece.known_tick(self.count)?;
-        (self.last, self.count) = (Last::At(time), self.count.saturating_add(1));
-        Some(tick)
+        let rest = self.rest.as_ref()?;
+        let (begin, roots) = rest.steps(self.count, self.left())?;
+        self.count = self.count.saturating_add(u32::try_from(roots.left()).ok()?);
+        self.last = Last::Tick(rest.time(self.count.saturating_sub(1))?);
+        Some((begin, roots))
     }
 
     /// Returns whether the present segments are exact but for rounding: the speed is constant.
-    pub(crate) const fn is_even(&self) -> bool {
-        self.piece.even
+    pub(crate) fn is_even(&self) -> bool {
+        self.piece.as_ref().is_some_and(|piece| piece.even)
     }
 
-    /// Returns when a step of the present piece is made, as exactly as the arithmetic allows; from `about`, if a time near
-    /// it is known.
-    pub(crate) fn exact(&self, count: u32, about: Option<i128>) -> i128 {
-        if self.piece.even {
-            return self.piece.cruise(count, 1, 0).first;
+    /// Returns when a step of the present piece is made, as exactly as the arithmetic allows, from a time near it.
+    pub(crate) fn exact(&self, curve: &Curve, frame: &Frame, (count, about): (u32, i128)) -> i128 {
+        let Some(piece) = self.piece.or_else(|| self.scaled(curve, frame, Real::ZERO)) else { return about };
+        if piece.even {
+            return piece.cruise((count, 1), 0).first;
         }
-        let about = about.map(|about| self.piece.time(about));
-        self.piece.tick(self.piece.search(count, about, 0))
+        piece.tick(piece.search(count, Some(piece.time(about)), 0))
+    }
+}
+
+impl Last {
+    /// Returns the time from the slower end of the piece.
+    fn time(&self, piece: &Part) -> u64 {
+        match self {
+            Self::Entry => piece.entry(),
+            Self::At(time) => *time,
+            Self::Tick(tick) => piece.time(*tick),
+            Self::There(spot, _) => spot.time,
+        }
     }
 }
 
 impl Few {
     const NONE: Self =
-        Self { stretch: Stretch { count: 0, first: 0, differences: [0; 3] }, begin: 0, since: 0, interval: 0, add: 0 };
+        Self { stretch: Stretch { count: 0, first: 0, differences: [0; 3] }, since: 0, interval: 0, add: 0 };
 
-    /// Adds a step at a time of the piece, if that is within `longest` of the first one.
-    fn add(&mut self, piece: &Part, time: u64, longest: u64) -> bool {
+    /// Adds a step at a time, if that is within `longest` of the first one.
+    fn add(&mut self, time: i128, longest: u64) -> bool {
         let Stretch { count, first, differences } = &mut self.stretch;
         if *count == 0 {
-            (*first, self.begin) = (piece.tick(time), time);
+            *first = time;
         } else {
-            let since = piece.ticks(time.abs_diff(self.begin));
-            if since > longest {
+            let Some(since) = u64::try_from(time.wrapping_sub(*first)).ok().filter(|since| *since <= longest) else {
                 return false;
-            }
+            };
             let interval = i64::try_from(since.saturating_sub(self.since)).unwrap_or(0);
             let add = interval.wrapping_sub(self.interval);
             match *count {
@@ -252,7 +294,7 @@ mod tests {
         while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX }) {
             let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
             for k in 0..u32::from(stretch.count) {
-                let exact = cutter.exact(cutter.count() - u32::from(stretch.count) + k, None);
+                let exact = cutter.exact(curve, frame, (cutter.count() - u32::from(stretch.count) + k, 0));
                 worst = f64::max(worst, (time - exact).unsigned_abs() as f64 / most);
                 (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
             }

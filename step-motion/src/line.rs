@@ -113,7 +113,7 @@ pub(super) struct Start<const N: usize> {
 }
 
 /// The steps of all axes on a line, in the order of time.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinePulses<const N: usize> {
     clock: Clock,
@@ -125,6 +125,17 @@ pub struct LinePulses<const N: usize> {
     /// Moments at which the curve and the line end.
     end: u64,
     pub(super) left: u64,
+}
+
+/// By hand, because the derived `clone_from` copies it twice.
+impl<const N: usize> Clone for LinePulses<N> {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        *self = Self { ..*source };
+    }
 }
 
 /// How the steps of a line are taken.

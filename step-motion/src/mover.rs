@@ -66,7 +66,7 @@ struct Wish {
 /// assert_eq!(x.commanded(), -50);
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mover {
     clock: Clock,
@@ -100,6 +100,17 @@ pub struct Mover {
     /// The present plan is a stop.
     braking: bool,
     halted: bool,
+}
+
+/// By hand, because the derived `clone_from` copies it twice.
+impl Clone for Mover {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        *self = Self { ..*source };
+    }
 }
 
 impl Mover {

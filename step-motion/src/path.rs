@@ -86,7 +86,7 @@ pub(super) struct Course {
 /// assert_eq!(steps, [1600, 800]);
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Path<const N: usize, const M: usize> {
     clock: Clock,
@@ -119,6 +119,17 @@ pub struct Path<const N: usize, const M: usize> {
     /// Speeds at the start of lines are known for this fraction of the requested speeds, and since the lines last changed.
     part: Real,
     edition: u32,
+}
+
+/// By hand, because the derived `clone_from` copies it twice.
+impl<const N: usize, const M: usize> Clone for Path<N, M> {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        *self = Self { ..*source };
+    }
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {

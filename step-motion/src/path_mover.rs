@@ -42,7 +42,7 @@ use servowire_core::Direction;
 /// assert_eq!(machine.commanded(), [8000, 4000]);
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PathMover<const N: usize, const M: usize> {
     /// The path; its first line is the one that is running.
@@ -76,6 +76,45 @@ pub struct PathMover<const N: usize, const M: usize> {
     /// The stop is a quick one: until its last step, lines are refused.
     quick: bool,
     halted: bool,
+}
+
+/// By hand, because the derived `clone_from` copies much of it twice.
+impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
+    fn clone(&self) -> Self {
+        Self { path: self.path.clone(), line: self.line.clone(), ..*self }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        // All fields by name, so that none is forgotten.
+        let Self {
+            path,
+            line,
+            exit,
+            wish,
+            more,
+            whole,
+            bounds,
+            made,
+            commanded,
+            origin,
+            free,
+            steps,
+            left,
+            percent,
+            held,
+            braking,
+            stopping,
+            quick,
+            halted,
+        } = source;
+        self.path.clone_from(path);
+        self.line.clone_from(line);
+        (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
+        (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
+        (self.free, self.steps, self.left, self.percent) = (*free, *steps, *left, *percent);
+        (self.held, self.braking, self.stopping) = (*held, *braking, *stopping);
+        (self.quick, self.halted) = (*quick, *halted);
+    }
 }
 
 /// Half a tick, in times.

@@ -73,21 +73,15 @@ impl Frame {
         self.to.unwrap_or_else(|| i64::from(steps(self.position(curve, curve.p))) << P)
     }
 
-    /// Returns piece `at`, its end and the steps made by then (0 if that is before the curve was joined); `None` after the
-    /// last piece.
-    pub(super) fn piece<'c>(&self, curve: &'c Curve, at: u8) -> Option<(&'c Piece, Real, u32)> {
+    /// Returns the steps made at the end of piece `at`, 0 if that is before the curve was joined; `None` after the last piece.
+    pub(super) fn until(&self, curve: &Curve, at: u8) -> Option<u32> {
         let at = usize::from(at);
-        let piece = curve.pieces().get(at)?;
-        let (over, _) = curve.skipped;
-        let last = || steps(self.last(curve));
+        curve.pieces().get(at)?;
+        let last = || if self.endless { u32::MAX } else { steps(self.last(curve)) };
         Some(match curve.pieces().get(at.saturating_add(1)) {
-            Some(next) if next.time <= over => (piece, next.time, 0),
-            Some(next) => (
-                piece,
-                next.time,
-                steps(self.position(curve, next.p)).min(if self.endless { u32::MAX } else { last() }),
-            ),
-            None => (piece, curve.time, if self.endless { u32::MAX } else { last() }),
+            Some(next) if next.time <= curve.skipped.0 => 0,
+            Some(next) => steps(self.position(curve, next.p)).min(last()),
+            None => last(),
         })
     }
 

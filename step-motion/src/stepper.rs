@@ -1,7 +1,7 @@
 //! From curves to the ticks of steps.
 
 use crate::curve::Curve;
-use crate::cutter::{Cutter, Demand, Slice, Stretch};
+use crate::cutter::{Cutter, Demand, Roots, Slice, Stretch};
 use crate::phases::Frame;
 use crate::real::Real;
 
@@ -13,10 +13,12 @@ use crate::real::Real;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
     pub(super) cutter: Cutter,
-    /// Steps left in the segment, and how far off their times may be.
+    /// Steps left in the segment, those left beside a rest, and how far off their times may be.
     left: u32,
+    roots: Roots,
     blur: u32,
-    /// The tick of its first step, the time of the last one made since the start of that tick, and the differences from there.
+    /// The tick of the first step, the time of the last one made since the start of that tick, and the differences to the next
+    /// one.
     /// A compiler adds neighbours in one instruction, whose load then waits for the store of the one before: so the
     /// differences are not neighbours.
     interval: i64,
@@ -29,90 +31,93 @@ pub(super) struct Stepper {
 /// Half a tick in units of time.
 const HALF: i128 = 1 << 31;
 /// How far off a time may be; at constant speed, and near a rest, where only rounding makes a difference.
-const BLUR: u32 = 1 << 26;
+const BLUR: u32 = 1 << 25;
 const FINE: u32 = 1 << 17;
 
 impl Stepper {
     pub(super) const fn new() -> Self {
-        Self { cutter: Cutter::new(), left: 0, blur: BLUR, interval: 0, first: 0, add: 0, since: 0, bend: 0 }
+        let (cutter, roots) = (Cutter::new(), Roots::NONE);
+        Self { cutter, left: 0, roots, blur: BLUR, interval: 0, first: 0, add: 0, since: 0, bend: 0 }
     }
 
     /// Steps made, counted from the origin of the positions.
     pub(super) const fn count(&self) -> u32 {
-        self.cutter.count().wrapping_sub(self.left)
+        #[expect(clippy::cast_possible_truncation, reason = "as many as in a table")]
+        let roots = self.roots.left() as u32;
+        self.cutter.count().wrapping_sub(self.left).wrapping_sub(roots)
     }
 
     /// Returns the tick of the next step; `None` after the last one.
     #[inline]
     pub(super) fn next(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
-        if self.left == 0 {
-            return self.begin(curve, frame);
-        }
-        self.since = self.since.wrapping_add_signed(self.interval);
-        self.interval = self.interval.wrapping_add(self.add);
-        self.add = self.add.wrapping_add(self.bend);
-        self.left = self.left.wrapping_sub(1);
-        Some(self.tick())
-    }
-
-    /// Returns the tick of a step that is known by itself, or of the first step of the next segment.
-    #[inline(never)]
-    fn begin(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
-        let first = match self.known() {
-            Some(first) => first,
-            None => self.segment(curve, frame)?,
-        };
-        self.first = tick(first);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the part of a tick")]
-        let since = first.wrapping_add(HALF).max(0) as u32;
-        self.since = since.into();
-        Some(self.tick())
-    }
-
-    fn known(&mut self) -> Option<i128> {
-        self.blur = FINE;
-        self.cutter.known()
-    }
-
-    /// Begins the next segment, unless there is a step that is known.
-    #[inline(never)]
-    fn segment(&mut self, curve: &Curve, frame: &Frame) -> Option<i128> {
-        // Half of the tolerance is left for rounding.
-        let demand = Demand { off: Real::fixed(1 << frame.shift, 7), coarse: None, time: u64::MAX };
-        loop {
-            match self.cutter.slice(curve, frame, &demand) {
-                Slice::More => {}
-                Slice::Steps(Stretch { count, first, differences }) => {
-                    self.left = u32::from(count).saturating_sub(1);
-                    [self.interval, self.add, self.bend] = differences;
-                    self.blur = if self.cutter.is_even() { FINE } else { BLUR };
-                    return Some(first);
-                }
-                Slice::End => return None,
-            }
-            if let Some(first) = self.known() {
-                return Some(first);
-            }
+        match self.step(curve, frame) {
+            None => self.begin(curve, frame),
+            tick => tick,
         }
     }
 
-    /// Returns the tick of the present step.
-    #[inline]
-    fn tick(&self) -> u64 {
+    /// Makes the next of the steps that are left.
+    #[inline(always)]
+    fn step(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
+        if self.left > 0 {
+            self.left = self.left.wrapping_sub(1);
+            self.since = self.since.wrapping_add_signed(self.interval);
+            self.interval = self.interval.wrapping_add(self.add);
+            self.add = self.add.wrapping_add(self.bend);
+        } else {
+            self.since = self.roots.next()?;
+        }
         #[expect(clippy::cast_possible_truncation, reason = "the part of a tick")]
         let part = self.since as u32;
         if part.wrapping_add(self.blur) < self.blur << 1 {
-            return self.exact();
+            return Some(self.exact(curve, frame));
         }
-        self.first.wrapping_add(self.since >> 32)
+        Some(self.first.wrapping_add(self.since >> 32))
     }
 
-    /// Returns the same if it is in doubt.
+    /// Begins with the steps beside a rest, or with the next segment, and makes the first step of them.
+    #[inline(never)]
+    fn begin(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
+        // Half of the tolerance is left for rounding.
+        let demand = Demand { off: Real::fixed(1 << frame.shift, 8), coarse: None, time: u64::MAX };
+        loop {
+            if let Some((begin, roots)) = self.cutter.roots() {
+                (self.blur, self.roots) = (FINE, roots);
+                self.roots.base = self.roots.base.wrapping_add(self.begin_at(begin));
+                return self.step(curve, frame);
+            }
+            match self.cutter.slice(curve, frame, &demand) {
+                Slice::More => {}
+                Slice::Steps(Stretch { count, first, differences }) => {
+                    self.left = count.into();
+                    // As one step earlier.
+                    let [interval, add, bend] = differences;
+                    (self.add, self.bend) = (add.wrapping_sub(bend), bend);
+                    self.interval = interval.wrapping_sub(self.add);
+                    self.blur = if self.cutter.is_even() { FINE } else { BLUR };
+                    self.since = self.begin_at(first).wrapping_add_signed(self.interval.wrapping_neg());
+                    return self.step(curve, frame);
+                }
+                Slice::End => return None,
+            }
+        }
+    }
+
+    /// Counts from the tick of a time; returns the time since the start of that tick.
+    fn begin_at(&mut self, first: i128) -> u64 {
+        self.first = tick(first);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the part of a tick")]
+        let since = first.wrapping_add(HALF).max(0) as u32;
+        since.into()
+    }
+
+    /// Returns the tick of the present step if it is in doubt.
     #[cold]
     #[inline(never)]
-    fn exact(&self) -> u64 {
+    fn exact(&self, curve: &Curve, frame: &Frame) -> u64 {
         let about = (i128::from(self.first) << 32).saturating_add(self.since.into()).saturating_sub(HALF);
-        tick(self.cutter.exact(self.count().wrapping_sub(1), Some(about)))
+        let count = self.count().wrapping_sub(1);
+        tick(self.cutter.exact(curve, frame, (count, about)))
     }
 }
 

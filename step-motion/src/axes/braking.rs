@@ -62,7 +62,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
 
     /// The block cannot be run: the path is abandoned, and the machine comes to rest where the interrupt stops.
     pub(super) fn give_up(&mut self) -> Work {
-        self.stage = Stage::Idle;
+        self.begin_anew();
         self.shorter = 0;
         if self.standing {
             self.path.halt_at(self.commanded(), self.end, false);

@@ -16,7 +16,9 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         if reach < 4 {
             return self.give_up();
         }
-        self.work.clone_from(&self.path);
+        if !core::mem::take(&mut self.same) {
+            self.work.clone_from(&self.path);
+        }
         let end = i128::from(self.end) << 32;
         for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
             *writer = Writer::new(end, dir);
@@ -102,6 +104,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             *made = made.wrapping_add(steps);
         }
         self.path.clone_from(&self.work);
+        self.same = true;
         (self.end, self.dirs) = (self.until, dirs(self.joint));
         self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
         let from = if self.standing { REST } else { 0 };

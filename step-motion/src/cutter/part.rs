@@ -1,10 +1,7 @@
 //! A piece of a curve, scaled to its own time and distance, and the segments that fit into it.
 
-use core::num::NonZeroU64;
-
-use super::near_rest::FromRest;
 use super::stretch::Stretch;
-use crate::curve::{Bend, Curve};
+use crate::curve::{Bend, Curve, Piece};
 use crate::phases::{Frame, P};
 use crate::real::{Inverse, Real, THIRD, high};
 
@@ -39,12 +36,61 @@ pub(super) struct Part {
     pub(super) step: u64,
     /// How far off a step may be.
     pub(super) off: u64,
-    /// The piece begins or ends at rest, at a step, with zero or constant acceleration.
-    rest: Option<FromRest>,
+}
+
+/// The slower end of a piece, or of what is left of the piece after the point where the curve was joined.
+pub(super) struct Slower {
+    /// Speed, acceleration and jerk there.
+    pub(super) v: Real,
+    pub(super) a: Real,
+    pub(super) j: Real,
+    /// It is the end of the piece, rather than the start.
+    pub(super) back: bool,
+    /// The speed of the piece is constant; or the acceleration grows from here on.
+    even: bool,
+    grows: bool,
+    /// Duration of the piece, in moments.
+    pub(super) lasts: Real,
+    /// Time and position there: in 2^-32 ticks of the clock, and in 2^-64 steps from position 0.
+    pub(super) begin: i128,
+    pub(super) origin: i128,
+}
+
+impl Slower {
+    /// Finds it for a piece by its number; `None` if there is no such piece.
+    pub(super) fn new(curve: &Curve, frame: &Frame, at: u8) -> Option<Self> {
+        let piece = curve.pieces().get(usize::from(at))?;
+        let &Piece { time, p, v, a, j, up, bend } = piece;
+        let (joined, skipped) = curve.skipped;
+        let even = a.is_zero() && j.is_zero();
+        let back = !up && !even;
+        let end = curve.end(at.into(), piece);
+        let begin = time.max(joined);
+        let lasts = end[0] - begin;
+        let [time, p, v, a] = if back {
+            end
+        } else if begin == time {
+            [time, p, v, a]
+        } else {
+            let Piece { time, p, v, a, .. } = piece.after(begin - time);
+            [time, p, v, a]
+        };
+        let bits = bits(frame);
+        let since = frame.since(curve, time).to_wide(bits);
+        let steps = |p: Real| (p * frame.scale).to_wide(P2);
+        let origin = (i128::from(frame.from) << P).saturating_add(steps(p)).saturating_sub(steps(skipped));
+        let begin = (i128::from(frame.begin) << bits.unsigned_abs()).saturating_add(since);
+        Some(Self { v, a, j, back, even, grows: (bend != Bend::Fading) != back, lasts, begin, origin })
+    }
+}
+
+/// A moment has 2^this times 2^-32 ticks.
+pub(super) fn bits(frame: &Frame) -> i32 {
+    32_i32.saturating_sub(i32::try_from(frame.shift).unwrap_or(0))
 }
 
 /// Fraction bits of a position in this file.
-const P2: i32 = 2 * P;
+pub(super) const P2: i32 = 2 * P;
 /// Fraction bits of a position that has to be as exact as a step.
 const FINEST: i32 = 44;
 /// Intervals within a segment are below 2^28 ticks, so that three of them do not overflow.
@@ -54,9 +100,6 @@ pub(super) const ALL: u64 = 1 << 62;
 
 /// A correction of a time after which it is exact, whatever the acceleration is.
 const CLOSE: u64 = 1 << 20;
-
-/// What counts as exact, in 2^-32 ticks.
-const EXACT: u64 = 1 << 15;
 
 /// A step so much shorter than the time from the slower end, as a power of 2, is exact if the acceleration is taken into
 /// account: the error is about the cube of that ratio.
@@ -103,42 +146,23 @@ impl Part {
         way: (Inverse::NONE, 0),
         step: 0,
         off: 0,
-        rest: None,
     };
 
-    /// Creates the part from a piece and its end, or from what is left of the piece after the point where the curve was
-    /// joined.
-    pub(super) fn new(curve: &Curve, frame: &Frame, (piece, end): (&crate::curve::Piece, Real), off: Real) -> Self {
-        let begin = piece.time.max(curve.skipped.0);
-        let first = if begin == piece.time { *piece } else { piece.after(begin - piece.time) };
-        let even = piece.a.is_zero() && piece.j.is_zero();
-        let back = !piece.up && !even;
-        let time = end - begin;
-        let slow = if back { first.after(time) } else { first };
-        let scale = frame.scale;
-        let bits = 32_i32.saturating_sub(i32::try_from(frame.shift).unwrap_or(0));
-        let ticks = |time: Real| time.scaled(bits);
-        let since = frame.since(curve, slow.time).to_wide(bits);
-        let steps = |p: Real| (p * scale).to_wide(P2);
-        let own = Self {
-            even,
-            back,
-            grows: (piece.bend != Bend::Fading) != back,
-            begin: (i128::from(frame.begin) << bits.unsigned_abs()).saturating_add(since),
-            origin: (i128::from(frame.from) << P).saturating_add(steps(slow.p)).saturating_sub(steps(curve.skipped.1)),
-            ..Self::NONE
-        };
+    /// Scales a piece.
+    pub(super) fn new(slower: &Slower, frame: &Frame, off: Real) -> Self {
+        let Slower { v, a, j, back, even, grows, lasts: time, begin, origin } = *slower;
+        let (scale, bits) = (frame.scale, bits(frame));
+        let own = Self { grows, back, even, begin, origin, ..Self::NONE };
         if even {
-            return Self { pace: ticks(Real::ONE / (piece.v * scale)), ..own };
+            return Self { pace: (Real::ONE / (v * scale)).scaled(bits), ..own };
         }
-        let (v, a, j) =
-            (slow.v * time, slow.a * time.squared().half(), slow.j * (time.squared() * time) * (THIRD.half()));
+        let (v, a, j) = (v * time, a * time.squared().half(), j * (time.squared() * time) * (THIRD.half()));
         let all = (v + a).along(j, own.grows);
         let way = all * scale;
         let step = Real::ONE / way;
         let per = step * scale;
         let part = |x: Real| (x * per).to_fixed(62);
-        let lasts = ticks(time);
+        let lasts = time.scaled(bits);
         // Up to 2^63 for all of it.
         let bits = 62_i32.saturating_sub(way.exponent()).clamp(P, FINEST);
         Self {
@@ -162,29 +186,6 @@ impl Part {
     const fn first_of(&self, bits: u32) -> i64 {
         let origin = (self.origin >> (64_u32.wrapping_sub(bits) & 63)) as i64;
         origin.wrapping_sub(1 << (bits.wrapping_sub(1) & 63))
-    }
-
-    /// Checks whether the slower end is a rest at a step; records and returns the result.
-    pub(super) fn looks_for_rest(&mut self) -> bool {
-        self.rest = self.beside_rest();
-        self.rest.is_some()
-    }
-
-    fn beside_rest(&self) -> Option<FromRest> {
-        let (whole, part) = (self.origin >> P2, self.origin & ((1 << P2) - 1));
-        let whole = if part >> (P2 - 1) == 0 { whole } else { whole.saturating_add(1) };
-        let off = self.origin.saturating_sub(whole << P2).unsigned_abs();
-        if self.even || self.speed != 0 || off >> (P2 - 20) != 0 || self.half != 0 && self.sixth != 0 {
-            return None;
-        }
-        let at = u32::try_from(whole).ok()?;
-        let first = if self.back { at.checked_sub(1)? } else { at };
-        let first = self.search(first, None, 0);
-        // A rest beside the step makes the first step early or late by half of that part of its time.
-        let off = u64::try_from(off).unwrap_or(u64::MAX);
-        let exact = |ticks: &NonZeroU64| self.lasts.exponent() < 64 && high(off, ticks.get()) < EXACT;
-        let ticks = NonZeroU64::new(self.ticks(first)).filter(exact);
-        Some(FromRest::new(at, (first, ticks), self.half == 0))
     }
 
     /// Returns when the piece begins.
@@ -268,7 +269,7 @@ impl Part {
     }
 
     /// Returns up to `left` steps at constant speed.
-    pub(super) fn cruise(&self, count: u32, left: u32, time: u64) -> Stretch {
+    pub(super) fn cruise(&self, (count, left): (u32, u32), time: u64) -> Stretch {
         let interval = self.pace.to_fixed(0);
         let away = self.away(count);
         let (far, wide) = (away.max(0).unsigned_abs(), 64_u32.saturating_sub(away.max(0).leading_zeros()));
@@ -296,24 +297,8 @@ impl Part {
         }
     }
 
-    /// Returns the time from the slower end to a step that is near a rest there.
-    pub(super) fn known(&self, count: u32) -> Option<u64> {
-        self.rest?.step(count)
-    }
-
-    /// Returns the same, and that time on the clock, in 2^-32 ticks.
-    #[inline]
-    pub(super) fn known_tick(&self, count: u32) -> Option<(u64, i128)> {
-        let (time, since) = self.rest.as_ref()?.step_and_ticks(count)?;
-        let since = i128::from(since);
-        Some((time, if self.back { self.begin.wrapping_sub(since) } else { self.begin.wrapping_add(since) }))
-    }
-
-    /// Returns the time from the slower end to a step: by Newton's method from the `last` one, unless it is known.
+    /// Returns the time from the slower end to a step: by Newton's method from the `last` one.
     pub(super) fn search(&self, count: u32, last: Option<u64>, near: u64) -> u64 {
-        if let Some(time) = self.known(count).filter(|_| near > 0) {
-            return time;
-        }
         let way = self.target(count);
         let mut time = 0;
         if let Some(last) = last {

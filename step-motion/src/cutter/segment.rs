@@ -186,7 +186,7 @@ const fn times(x: i64, part: u32) -> i64 {
 
 /// Returns the base-2 logarithm in 256ths, linear between the powers of 2: at most 22 too small.
 #[inline(never)]
-fn log(x: u64) -> i32 {
+pub(super) fn log(x: u64) -> i32 {
     let zeros = x.leading_zeros();
     let part = x.checked_shl(zeros).unwrap_or(0) << 1 >> 56;
     i32::try_from(u64::from(63_u32.saturating_sub(zeros)) << 8 | part).unwrap_or(0)
@@ -194,7 +194,7 @@ fn log(x: u64) -> i32 {
 
 /// Multiplies a number by a power of 2 whose exponent is in 256ths, linear between whole exponents: at most 6 per cent too
 /// much.
-fn power(x: u64, by: i32) -> u64 {
+pub(super) fn power(x: u64, by: i32) -> u64 {
     let part = u64::from(by.rem_euclid(256).unsigned_abs());
     let x = x.saturating_add(high(x, part << 56));
     let whole = by >> 8;

@@ -21,6 +21,7 @@ static SHORT: Queue<129> = Queue::new();
 static ASKED: Queue<9> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
 static MOVES: [Queue<129>; 3] = [const { Queue::new() }; 3];
+static RAMPS: [Queue<129>; 6] = [const { Queue::new() }; 6];
 static PATHS: [AxesQueue<3, 257>; 3] = [const { AxesQueue::new() }; 3];
 
 mod toolpaths {
@@ -41,6 +42,13 @@ impl Shuttle {
         let limits = Limits::new(50_000, 100_000).ok()?.with_jerk(jerk).ok()?;
         let (axis, timer) = Axis::new(queue, Clock::new(168_000_000)?, limits).ok()?;
         Some(Self { axis, timer, way })
+    }
+
+    /// On a clock of `hz`, over two ramps of so many steps to 100,000 steps/s.
+    fn ramps(queue: &'static Queue<129>, hz: u32, ramp: u32) -> Option<Self> {
+        let limits = Limits::new(100_000, 5_000_000_000_u64.div_ceil(ramp.into()).try_into().ok()?).ok()?;
+        let (axis, timer) = Axis::new(queue, Clock::new(hz)?, limits).ok()?;
+        Some(Self { axis, timer, way: i64::from(ramp) })
     }
 
     fn slice(&mut self) -> Work {
@@ -279,6 +287,55 @@ kernels_on_states! {
     } as {
         let Some(own) = Shuttle::new(&MOVES[2], 12_500, 1_000_000) else { return 0 };
         tenths_of(2 * 25_000, &mut own.at_its_end(), step_motion_axis_25000, &[0])
+    }
+
+    /// A step with all of its background, in moves of two ramps of 32, 250 and 2500 steps to 100,000 steps/s; first in ticks of
+    /// 1 us, then at 168 MHz.
+    fn step_motion_ramps_32_us(shuttle: &mut Shuttle, input: &[u8; 1]) -> (Fired, [u8; 1]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[0], 1_000_000, 32) else { return 0 };
+        tenths_of(20 * 2 * 32, &mut own.at_its_end(), step_motion_ramps_32_us, &[[0; 1]])
+    }
+
+    /// The same.
+    fn step_motion_ramps_250_us(shuttle: &mut Shuttle, input: &[u8; 2]) -> (Fired, [u8; 2]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[1], 1_000_000, 250) else { return 0 };
+        tenths_of(20 * 2 * 250, &mut own.at_its_end(), step_motion_ramps_250_us, &[[0; 2]])
+    }
+
+    /// The same.
+    fn step_motion_ramps_2500_us(shuttle: &mut Shuttle, input: &[u8; 3]) -> (Fired, [u8; 3]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[2], 1_000_000, 2500) else { return 0 };
+        tenths_of(20 * 2 * 2500, &mut own.at_its_end(), step_motion_ramps_2500_us, &[[0; 3]])
+    }
+
+    /// The same.
+    fn step_motion_ramps_32(shuttle: &mut Shuttle, input: &[u8; 4]) -> (Fired, [u8; 4]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[3], 168_000_000, 32) else { return 0 };
+        tenths_of(20 * 2 * 32, &mut own.at_its_end(), step_motion_ramps_32, &[[0; 4]])
+    }
+
+    /// The same.
+    fn step_motion_ramps_250(shuttle: &mut Shuttle, input: &[u8; 5]) -> (Fired, [u8; 5]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[4], 168_000_000, 250) else { return 0 };
+        tenths_of(20 * 2 * 250, &mut own.at_its_end(), step_motion_ramps_250, &[[0; 5]])
+    }
+
+    /// The same.
+    fn step_motion_ramps_2500(shuttle: &mut Shuttle, input: &[u8; 6]) -> (Fired, [u8; 6]) {
+        (shuttle.step(), *input)
+    } as {
+        let Some(own) = Shuttle::ramps(&RAMPS[5], 168_000_000, 2500) else { return 0 };
+        tenths_of(20 * 2 * 2500, &mut own.at_its_end(), step_motion_ramps_2500, &[[0; 6]])
     }
 
     /// A step of any axis with all of its background, on the ten toolpaths of step-motion's tests.
