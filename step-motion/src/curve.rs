@@ -35,6 +35,7 @@ pub(super) struct Piece {
 
 impl Piece {
     /// Returns the state `t` after the start.
+    #[inline(never)]
     pub(super) fn after(&self, t: Real) -> Self {
         let Self { time, a, j, up, bend, .. } = *self;
         let (p, v) = self.way(t);
@@ -53,7 +54,7 @@ impl Piece {
     }
 
     /// Returns the speed and the size of the acceleration `t` after the start.
-    fn speed(&self, t: Real) -> (Real, Real) {
+    pub(super) fn speed(&self, t: Real) -> (Real, Real) {
         let Self { v, a, j, up, bend, .. } = *self;
         match bend {
             Bend::Flat => (v.along(a * t, up), a),
@@ -98,14 +99,12 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns time, place, speed and size of the acceleration at the end of a piece.
-    pub(super) fn end(&self, at: usize, piece: &Piece) -> [Real; 4] {
-        let (time, p) = match self.pieces().get(at.saturating_add(1)) {
+    /// Returns time and place at the end of piece `at`.
+    pub(super) fn end(&self, at: usize) -> (Real, Real) {
+        match self.pieces().get(at.saturating_add(1)) {
             Some(next) => (next.time, next.p),
             None => (self.time, self.p),
-        };
-        let (v, a) = piece.speed(time - piece.time);
-        [time, p, v, a]
+        }
     }
 
     /// Returns the state at a time of the curve, even before its start or after its end; `None` without pieces.

@@ -82,6 +82,7 @@ impl Real {
     }
 
     /// Does the same as [`to_fixed`](Self::to_fixed), up to 2^126.
+    #[inline(never)]
     pub(super) const fn to_wide(self, bits: i32) -> i128 {
         let shift = self.e().saturating_add(bits);
         match shift {
@@ -204,6 +205,7 @@ impl Real {
         reason = "differences in two's complement"
     )]
     pub(super) fn cbrt(self) -> Self {
+        const THIRD_OF_A_WORD: u32 = u32::MAX / 3 + 1;
         /// The roots of 2 and 4.
         const ROOTS: [Real; 2] =
             [Real::from_parts(0xa145_17cc_6b94_5711, -63), Real::from_parts(0xcb2f_f529_eb71_e416, -63)];
@@ -216,12 +218,13 @@ impl Real {
         for _ in 0..3 {
             let cube = shifted(shifted(y, y, 30), y, 30);
             let rest = (1_u32 << 30).wrapping_sub(shifted(self.high, cube, 32)) as i32;
-            let more = i64::from(y).wrapping_mul(rest.into()) >> 30;
-            y = y.wrapping_add((more / 3) as u32);
+            let more = i64::from(shifted(y, THIRD_OF_A_WORD, 32)).wrapping_mul(rest.into()) >> 30;
+            y = y.wrapping_add(more as u32);
         }
         let y = u64::from(y) << 32;
         let rest = (1_u64 << 58).wrapping_sub(high(m, high(high(y, y), y))) as i64;
-        let y = y.wrapping_add((((y >> 32) as i64).wrapping_mul(rest) >> 26).wrapping_div(3) as u64);
+        let third = i64::from(shifted((y >> 32) as u32, THIRD_OF_A_WORD, 32));
+        let y = y.wrapping_add((third.wrapping_mul(rest) >> 26) as u64);
         let root = Self::from_parts(m, -64) * Self::fixed(y, 62).squared();
         let root = match ROOTS.get((e.rem_euclid(3) as usize).wrapping_sub(1)) {
             Some(more) => root * *more,

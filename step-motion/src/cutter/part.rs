@@ -64,22 +64,23 @@ impl Slower {
         let (joined, skipped) = curve.skipped;
         let even = a.is_zero() && j.is_zero();
         let back = !up && !even;
-        let end = curve.end(at.into(), piece);
+        let (end, p_end) = curve.end(at.into());
         let begin = time.max(joined);
-        let lasts = end[0] - begin;
-        let [time, p, v, a] = if back {
-            end
+        let lasts = end - begin;
+        let (time, p, (v, a)) = if back {
+            (end, p_end, piece.speed(end - time))
         } else if begin == time {
-            [time, p, v, a]
+            (time, p, (v, a))
         } else {
             let Piece { time, p, v, a, .. } = piece.after(begin - time);
-            [time, p, v, a]
+            (time, p, (v, a))
         };
         let bits = bits(frame);
+        // Each is less than 2^126.
         let since = frame.since(curve, time).to_wide(bits);
+        let begin = (i128::from(frame.begin) << (bits.unsigned_abs() & 63)).wrapping_add(since);
         let steps = |p: Real| (p * frame.scale).to_wide(P2);
-        let origin = (i128::from(frame.from) << P).saturating_add(steps(p)).saturating_sub(steps(skipped));
-        let begin = (i128::from(frame.begin) << bits.unsigned_abs()).saturating_add(since);
+        let origin = (i128::from(frame.from) << P).wrapping_add(steps(p).wrapping_sub(steps(skipped)));
         Some(Self { v, a, j, back, even, grows: (bend != Bend::Fading) != back, lasts, begin, origin })
     }
 }
