@@ -6,6 +6,8 @@
 
 mod blocks;
 mod describe;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 use std::io;

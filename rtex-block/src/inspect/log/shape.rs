@@ -67,11 +67,10 @@ impl LogShape {
             }
         }
         let (best, sum) = first.filter(|(_, sum)| sum.is_enough()).ok_or(ShapeDoubt::Unknown)?;
-        match second.filter(|(_, other)| sum.is_close_to(other)) {
-            None => Ok(best),
+        match second {
             Some((other, _)) if best.is_twin_of(other) => best.or_twin(other, bytes),
-            Some(_) if best.skip == 0 => Ok(best),
-            Some(_) => Err(ShapeDoubt::Unknown),
+            Some((_, other)) if best.skip > 0 && sum.is_close_to(&other) => Err(ShapeDoubt::Unknown),
+            _ => Ok(best),
         }
     }
 
@@ -152,11 +151,21 @@ struct Sum {
     counters: [Option<(u8, bool)>; 64],
     /// Of a direction and drive, the last position; with cyclic positions those of both directions are nearly the same.
     positions: [Option<i32>; 64],
+    /// Its own last position, and the step to it.
+    steps: [Option<(i32, Option<i32>)>; 64],
 }
 
 impl Sum {
-    const NEW: Self =
-        Self { points: 0, all: 0, good: 0, again: 0, followed: 0, counters: [None; 64], positions: [None; 64] };
+    const NEW: Self = Self {
+        points: 0,
+        all: 0,
+        good: 0,
+        again: 0,
+        followed: 0,
+        counters: [None; 64],
+        positions: [None; 64],
+        steps: [None; 64],
+    };
 
     fn take(&mut self, block: &[u8; 32], is_sound: bool, wide: bool) {
         let [byte0, code, _, _, l, ml, mh, h, ..] = *block;
@@ -165,7 +174,7 @@ impl Sum {
         let is_nop = code & 0x7f == 0;
         self.all = self.all.saturating_add(1);
         if is_nop && self.good.saturating_mul(2) <= self.all {
-            *self = Self { counters: self.counters, positions: self.positions, ..Self::NEW };
+            *self = Self { counters: self.counters, positions: self.positions, steps: self.steps, ..Self::NEW };
             return;
         }
         if !is_sound {
@@ -192,15 +201,22 @@ impl Sum {
         if follows { FOLLOWS } else { STANDS }
     }
 
-    /// Returns by how many bits the position has changed.
+    /// Returns by how many bits the position is not where it was, or where the step before leads: a motor that turns fast does not
+    /// stay near. Cyclic positions of both directions are near each other.
     fn moved(&mut self, byte0: u8, cyclic: bool, position: i32) -> i32 {
         let own = place(byte0);
         let before = self.positions.get_mut(own).and_then(|last| last.replace(position));
         if let Some(other) = self.positions.get_mut(own ^ 32).filter(|_| cyclic) {
             *other = Some(position);
         }
-        let distance = before.map_or(0, |before| position.wrapping_sub(before).unsigned_abs());
-        distance.checked_ilog2().map_or(0, |bits| i32::try_from(bits).unwrap_or(0).saturating_add(1))
+        let near = before.map_or(0, |before| bits(before, position));
+        let both = cyclic && self.steps.get(own ^ 32).is_some_and(Option::is_some);
+        let Some(last) = self.steps.get_mut(own) else { return near };
+        let step = last.map(|(last, _)| position.wrapping_sub(last));
+        match last.replace((position, step)) {
+            Some((last, Some(step))) if !both => near.min(bits(last.wrapping_add(step), position)),
+            _ => near,
+        }
     }
 
     /// Whether most of the blocks make sense, and counters advance, which NOPs in another shape do not seem to. One block fewer than
@@ -227,6 +243,12 @@ impl Sum {
         let two_blocks = FOLLOWS.saturating_add(SUB).saturating_mul(2);
         self.points.saturating_sub(other.points) <= two_blocks
     }
+}
+
+/// Returns the number of bits of the distance between two positions.
+fn bits(from: i32, to: i32) -> i32 {
+    let distance = to.wrapping_sub(from).unsigned_abs();
+    distance.checked_ilog2().map_or(0, |bits| i32::try_from(bits).unwrap_or(0).saturating_add(1))
 }
 
 /// Returns the place of a direction and drive.

@@ -215,9 +215,9 @@ impl Blocks {
         let other = guess.filter(|other| *other != now || doubts)?;
         self.doubt = None;
         self.leaning = leans(other) && sure != Some(other);
-        let (size, flow) = (other.size.bytes(), self.flow);
-        // The window begins with a block of the old shape, and ends where the next bytes continue.
-        self.take(Some(other), (other.skip + size - window.len() % size) % size);
+        let flow = self.flow;
+        // The window begins with a block of the old shape, and its blocks fill it; the next bytes continue like its first ones.
+        self.take(Some(other), other.skip);
         self.flow |= flow;
         Some(other)
     }

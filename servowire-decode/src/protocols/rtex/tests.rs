@@ -1,0 +1,135 @@
+//! When a log that is read line by line is shown, and in which shape; by blocks made here.
+
+use super::*;
+
+#[derive(Default)]
+struct Kept(Vec<Event>);
+
+impl Sink for Kept {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.0.push(event.clone());
+        Ok(())
+    }
+}
+
+/// A response of drive 5 in cyclic position, with status and speed as they are.
+fn response(k: u32, position: i32, in_position: bool, speed: i32) -> [u8; 16] {
+    let mut block = [0; 16];
+    block[..4].copy_from_slice(&[0x85 | (k % 4 * 32) as u8, 0x20, 0xc0 | u8::from(in_position), 0]);
+    block[4..8].copy_from_slice(&position.to_le_bytes());
+    block[8..12].copy_from_slice(&speed.to_le_bytes());
+    block
+}
+
+fn nop() -> [u8; 16] {
+    [5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+}
+
+/// Blocks as bytes, with those of each word of so many in the other order.
+fn bytes(word: usize, blocks: impl IntoIterator<Item = [u8; 16]>) -> Vec<u8> {
+    blocks
+        .into_iter()
+        .flat_map(|block| block.chunks(word).flat_map(|word| word.iter().rev().copied()).collect::<Vec<_>>())
+        .collect()
+}
+
+/// A motor that turns, with an actual speed around 0 and a flag that comes and goes; or one that stands, where all is the same.
+fn run(from: u32, count: u32, speed: i32) -> impl Iterator<Item = [u8; 16]> {
+    (from..from + count).map(move |k| match speed {
+        0 => response(k, 0, true, 0),
+        _ => response(k, k as i32 * speed, k / 2 % 2 == 0, if k % 3 == 0 { -7 } else { 9 }),
+    })
+}
+
+/// One of which everything but the position stays.
+fn steady(count: u32, speed: i32) -> impl Iterator<Item = [u8; 16]> {
+    (1..=count).map(move |k| response(k, k as i32 * speed, false, 9_000))
+}
+
+/// Gives a decoder lines of 16 bytes, without a sample; returns its events, and after how many lines there were the first.
+fn decoded(bytes: &[u8]) -> (Vec<Event>, Option<usize>) {
+    let (mut decoder, mut kept, mut first) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default(), None);
+    for (line, bytes) in (1..).zip(bytes.chunks_exact(16)) {
+        decoder.burst(&Burst::new(line, bytes.to_vec()), &mut kept).unwrap();
+        if first.is_none() && !kept.0.is_empty() {
+            first = Some(line as usize);
+        }
+    }
+    decoder.end(&mut kept).unwrap();
+    (kept.0, first)
+}
+
+fn positions(events: &[Event]) -> Vec<i64> {
+    events.iter().filter_map(|event| Some(event.position.as_ref()?.counts)).collect()
+}
+
+/// NOPs are held back, and shown with the first sixteen lines that tell the shape.
+#[test]
+fn sixteen_lines_that_tell_are_enough() {
+    for word in [1, 2, 4] {
+        let log = bytes(word, core::iter::repeat_n(nop(), 70).chain(run(1, 40, 1_001)));
+        let (events, first) = decoded(&log);
+        assert_eq!(first, Some(86), "{word}");
+        let want: Vec<i64> = (1..=40).map(|k| k * 1_001).collect();
+        assert_eq!(positions(&events), want, "{word}");
+    }
+}
+
+/// Lines that have one of two shapes because they begin with a block wait for what is certain, but not for ever; NOPs alone do not either.
+#[test]
+fn a_log_of_which_nothing_tells_waits() {
+    for word in [2, 4] {
+        let log = bytes(word, run(1, 1_100, 0));
+        assert_eq!(decoded(&log).1, Some(ENOUGH), "{word}");
+    }
+    let nops = bytes(1, core::iter::repeat_n(nop(), MOST_HELD + 3));
+    assert_eq!(decoded(&nops).1, Some(MOST_HELD));
+}
+
+/// A log that goes on in another byte order is read in the first one up to there.
+#[test]
+fn the_first_piece_decides_for_the_beginning() {
+    let log = [bytes(4, run(1, 192, 1_001)), bytes(1, run(193, 400, 1_001))].concat();
+    let (events, _) = decoded(&log);
+    let shown = positions(&events);
+    assert_eq!(shown[..190], (1..=190).map(|k| k * 1_001).collect::<Vec<_>>());
+    assert_eq!(shown.last(), Some(&(592 * 1_001)));
+    // As a sample, too: the piece that it begins with counts.
+    let sample: Vec<Burst> =
+        (1..).zip(log.chunks_exact(16)).map(|(line, bytes)| Burst::new(line, bytes.to_vec())).collect();
+    let decoder = Decoder::new(settings::Rtex::default(), &sample);
+    assert_eq!(decoder.blocks.shape().0.map(|shape| (shape.word, shape.skip)), Some((4, 0)));
+}
+
+/// Bytes are lost, and what follows stands: it is taken for blocks that begin with a line until the motor turns, which tells that it is
+/// not so.
+#[test]
+fn what_was_preferred_in_the_middle_gives_way() {
+    let turned = bytes(4, run(193, 130, 0).chain(run(323, 400, 1_001)));
+    let log = [bytes(1, run(1, 192, 1_001)), turned[2..].to_vec()].concat();
+    let (events, _) = decoded(&log);
+    let said = |what: &str| events.iter().filter(|event| event.remark && format!("{event:?}").contains(what)).count();
+    assert_eq!(
+        said("from here on the log looks like"),
+        2,
+        "{:?}",
+        events.iter().filter(|it| it.remark).collect::<Vec<_>>()
+    );
+    let shown = positions(&events);
+    assert_eq!(shown[shown.len() - 200..], (522..=721).map(|k| k * 1_001).collect::<Vec<_>>());
+}
+
+/// A motor that turns by just over 2^16 in each update period, in a log of responses that begins inside a block: the lower half of its
+/// position alone moves less than the whole. No wrong position is shown.
+#[test]
+fn a_fast_motor_is_not_misread() {
+    for (word, from) in [(4, 1), (2, 5), (4, 7), (2, 11)] {
+        for speed in [65_540, 65_700, 70_001, -65_600, 131_100] {
+            let log = bytes(word, steady(700, speed));
+            let (events, _) = decoded(&log[from..]);
+            let is_wrong = |position: &i64| position % i64::from(speed) != 0;
+            let wrong = positions(&events).iter().filter(|position| is_wrong(position)).count();
+            assert_eq!(wrong, 0, "{word} {from} {speed}: {:?}", events.first());
+        }
+    }
+}
