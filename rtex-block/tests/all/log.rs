@@ -83,6 +83,9 @@ fn steps_of_the_command_position() {
         block
     });
     assert_eq!(findings(&mut analysis(), &off), []);
+    // A speed is no position, nor is the position after it a step.
+    let speeds = [(1, 0x20, 0), (2, 0x30, 900_000), (3, 0x30, -900_000), (0, 0x20, 500_000), (1, 0x20, 500_001)];
+    assert_eq!(findings(&mut analysis(), &speeds.map(|(c, code, at)| command(c, code, at))), []);
 }
 
 #[test]
@@ -136,7 +139,13 @@ fn requests_without_an_answer() {
     assert_eq!(findings(&mut log, &busy(4)), []);
     assert!(log.end().eq([at_end(Unfinished::Request { code, responses: 4, busy: 4 })]));
     // The master gives up: the normal command, or another request.
-    for next in [command(1, 0x20, 0), with(command(1, 0x26, 0), 8), command(1, 0x2a, 0)] {
+    let index = |at: usize| {
+        let mut next = with(command(1, 0x26, 0), 7);
+        next[at] = 7;
+        next
+    };
+    let others = [with(command(1, 0x26, 0), 8), command(1, 0x2a, 0), index(10), index(11)];
+    for next in [command(1, 0x20, 0)].into_iter().chain(others) {
         let mut log = analysis();
         findings(&mut log, &busy(4));
         assert_eq!(findings(&mut log, &[next]), [(0, LogFinding::GivenUp { code, responses: 4, busy: 4 })]);

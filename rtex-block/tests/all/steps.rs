@@ -248,3 +248,20 @@ fn lost_drives_do_not_make_up_for_each_other() {
         assert_eq!(pair.axis.state(), want, "{lost} lost");
     }
 }
+
+/// A stop of category 2 beside a change from CT to CP whose block is lost: the axis goes back to CT, in which nothing holds it, so its
+/// servo is switched off. It was held with the torque of before.
+#[test]
+fn a_torque_is_not_held() {
+    let mut pair = on(ActiveCode::CyclicTorque);
+    pair.axis.set_rate(-5).unwrap();
+    (0..3).for_each(|_| pair.update());
+    pair.axis.set_mode(ActiveCode::CyclicPosition).unwrap();
+    pair.axis.stop(StopCategory::Two);
+    pair.received = Heard::Nothing;
+    for _ in 0..3 {
+        pair.update();
+        assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::Requested));
+        assert_eq!((pair.axis.mode(), pair.axis.setpoint()), (ActiveCode::CyclicTorque, 0));
+    }
+}

@@ -67,13 +67,17 @@ impl Axis {
     }
 
     /// Begins CP, which was requested and has not been sent yet, at the position of this update period. Without one the axis
-    /// stays in the mode of the last block.
+    /// stays in the mode of the last block; if it is to be held at rest and nothing can do that in this mode, it is switched off.
     #[cold]
     pub(super) fn begin_positions(&mut self) {
         if self.is_current() {
             self.rest();
         } else {
             (self.mode, self.setpoint) = (self.wire.mode, self.wire.value);
+            match self.state {
+                AxisState::Stopping(reason) | AxisState::Held(reason) if !self.can_slow_down() => self.fail(reason),
+                _ => {}
+            }
         }
     }
 

@@ -96,7 +96,7 @@ impl Axis {
     }
 
     /// Returns whether the deceleration is known, in case the host makes it.
-    const fn can_slow_down(&self) -> bool {
+    pub(super) const fn can_slow_down(&self) -> bool {
         match self.mode {
             ActiveCode::CyclicPosition | ActiveCode::CyclicVelocity => self.config.deceleration > 0,
             ActiveCode::ProfilePosition => true,

@@ -92,7 +92,7 @@ fn blocks_that_become_longer() {
     });
     let log = lines(1, turning(100).chain(wide)).join("\n");
     let run = bench.decode("log.txt", &log, &OPTIONS);
-    assert!(run.err.contains("from here on the log looks like blocks of 32 bytes"), "{}", run.err);
+    assert!(run.err.contains("from here on the log looks like blocks of 32 bytes (line 320)"), "{}", run.err);
     let given = bench.decode("log.txt", &log, &[&OPTIONS[..], &["--block-size", "16"]].concat());
     assert!(!given.err.contains("from here on"), "{}", given.err);
     assert_eq!(given.json().iter().filter(|event| event["kind"] != "log").count(), 1_000);

@@ -82,6 +82,7 @@ fn a_log_of_a_monitor() {
     // What the log says of the direction and C/R have to agree.
     let run = bench.decode("log.txt", text.replacen("TX", "RX", 1), &["--protocol", "rtex", "--json"]);
     assert_eq!((run.code, run.verdicts()[0].as_str()), (1, "direction"));
+    assert_eq!(run.json()[0]["reason"], "the log has a response, C/R says command");
 }
 
 /// Times that are counted by Update_Counter and --period say nothing of a jitter.
@@ -106,4 +107,37 @@ fn an_alarm_in_words() {
                 e52520000000000000000000 1b040000\n";
     let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--stats"]);
     assert!(run.out.contains("Err27.4 (too large a step of the position command)"), "{}", run.out);
+}
+
+/// Two axes, each with its own count of update periods, of which one is missing; what is refused is an event of its axis.
+#[test]
+fn periods_are_counted_for_each_axis() {
+    let bench = Bench::new();
+    let line = |counter: u8, drive: u8, code: u8| format!("{:02x}{code:02x}{:028x}\n", counter << 5 | drive, 0);
+    let text: String = [1, 2, 0].map(|counter| line(counter, 5, 0x20) + &line(counter, 7, 0x20)).concat();
+    let options = ["--protocol", "rtex", "--bytes", "--period", "500us"];
+    let run = bench.decode("log.txt", &text, &[&options[..], &["--json"]].concat());
+    let begins: Vec<_> = run.json().iter().map(|event| event["start_ps"].as_i64().unwrap() / 1_000_000).collect();
+    assert_eq!(begins, [0, 0, 500, 500, 1_500, 1_500]);
+    let run = bench.decode("log.txt", text + &line(0, 5, 0x50), &["--protocol", "rtex", "--bytes", "--stats"]);
+    let (five, seven) = run.out.split_once("  address 7").unwrap();
+    let refused = "    line         7  refused: cyclic code 5 is not defined\n";
+    assert!(five.contains(refused) && !seven.contains("refused:"), "{}", run.out);
+}
+
+/// A block of 32 bytes in two lines is from when the first of them was.
+#[test]
+fn a_block_in_two_lines_has_the_time_of_the_first() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    for (k, (command, response)) in exchanges().into_iter().enumerate() {
+        for (block, at, told, sub) in [(command, 500 * k, "TX", 0x8a_u8), (response, 500 * k + 30, "RX", 0x0a)] {
+            writeln!(text, "14:02:07.{at:06} {told} {:032x}", u128::from_be_bytes(block)).unwrap();
+            writeln!(text, "14:02:07.{:06} {told} {sub:02x}{:030x}", at + 7, 0).unwrap();
+        }
+    }
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--json"]);
+    let begins: Vec<_> = run.json().iter().map(|event| event["start_ps"].as_i64().unwrap() / 1_000_000).collect();
+    let want: Vec<_> = (0..6).flat_map(|k| [500 * k, 500 * k + 30]).collect();
+    assert_eq!(begins, want);
 }
