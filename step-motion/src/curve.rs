@@ -176,3 +176,37 @@ impl Curve {
         self.push((distance / v, distance), [v, Real::ZERO, Real::ZERO], true, Bend::Flat);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of whole numbers: 3 and 5 as speed and acceleration, 2 as jerk, each way.
+    #[test]
+    fn the_speed_of_a_piece() {
+        let [three, five, two, zero] = [3, 5, 2, 0].map(Real::new);
+        for (up, bend, a, j, t, speed, after) in [
+            (true, Bend::Flat, five, zero, 4, 23, 5),
+            (false, Bend::Flat, two, zero, 1, 1, 2),
+            (true, Bend::Growing, five, two, 4, 39, 13),
+            (true, Bend::Fading, five, two, 2, 9, 1),
+            (false, Bend::Growing, zero, two, 1, 2, 2),
+        ] {
+            let piece = Piece { time: five, p: two, v: three, a, j, up, bend };
+            let (v, a) = piece.speed(Real::new(t));
+            assert!(v == Real::new(speed) && a == Real::new(after), "{v:?} {a:?} for {piece:?}");
+            let then = piece.after(Real::new(t));
+            assert!(then.v == v && then.a == a && then.time == Real::new(5 + t), "{then:?} for {piece:?}");
+        }
+    }
+
+    #[test]
+    fn a_piece_ends_where_the_next_one_begins() {
+        let mut curve = Curve::new();
+        for (time, v) in [(32, 2), (16, 4)] {
+            curve.push((Real::new(time), Real::new(64)), [Real::new(v), Real::ZERO, Real::ZERO], true, Bend::Flat);
+        }
+        let (middle, end) = ((Real::new(32), Real::new(64)), (Real::new(48), Real::new(128)));
+        assert_eq!([0, 1, 2].map(|at| curve.end(at)), [middle, end, end]);
+    }
+}

@@ -181,4 +181,30 @@ mod tests {
         assert!(p.abs_diff(32 << P) < 16 && v == Real::new(24));
         assert!(a == (Real::new(12), true) && j == (Real::new(3), true));
     }
+
+    /// Three pieces of 64 units, at half a step each, joined in the first one, at its end or in the second one.
+    #[test]
+    fn steps_made_at_the_end_of_each_piece() {
+        let mut curve = Curve::new();
+        for _ in 0..3 {
+            curve.cruise(Real::ONE, Real::new(64));
+        }
+        let frame = Frame { to: None, scale: Real::ONE.half(), ..Frame::rest(10, 0, 5 << P) };
+        let until = |curve: &Curve, frame: &Frame| [0, 1, 2, 3].map(|at| frame.until(curve, at));
+        assert_eq!(until(&curve, &frame), [Some(37), Some(69), Some(101), None]);
+        let ends = Frame { to: Some(60 << P), ..frame };
+        assert_eq!(until(&curve, &ends), [Some(37), Some(60), Some(60), None]);
+        assert_eq!(until(&curve, &Frame { endless: true, ..ends }), [Some(37), Some(69), Some(u32::MAX), None]);
+        for (joined, wants) in [
+            (10, [Some(32), Some(64), Some(96), None]),
+            (63, [Some(6), Some(38), Some(70), None]),
+            (64, [Some(0), Some(37), Some(69), None]),
+            (74, [Some(0), Some(32), Some(64), None]),
+            (128, [Some(0), Some(0), Some(37), None]),
+        ] {
+            curve.skipped = (Real::new(joined), Real::new(joined));
+            assert_eq!(until(&curve, &frame), wants, "{joined}");
+        }
+        assert_eq!(until(&Curve::new(), &frame), [None; 4]);
+    }
 }
