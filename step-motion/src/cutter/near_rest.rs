@@ -210,7 +210,7 @@ fn few(first: u64, off: u64, coarse: Option<u32>) -> u32 {
     reason = "numbers of small cases, compared with floating point"
 )]
 mod tests {
-    use super::super::Cutter;
+    use super::super::{Cutter, Slice};
     use super::*;
     use crate::curve::{Bend, Curve};
     use crate::stepper::Stepper;
@@ -253,11 +253,13 @@ mod tests {
     impl Case {
         fn curve(self) -> (Curve, Frame) {
             let Self { cubic, back, first, lasts, steps, cut, off } = self;
-            let (mut curve, unit, units) = (Curve::new(), Real::new(first), Real::new(lasts));
-            let time = unit * units;
-            // A unit of the curve is a quarter of a step.
-            let way = Real::new(steps).scaled(2);
-            let (a, j) = (Real::new(4) / unit.squared(), Real::new(12) / (unit.squared() * unit));
+            let (mut curve, unit) = (Curve::new(), Real::new(first));
+            let time = unit * Real::new(lasts);
+            // A unit of the curve is a quarter of a step, or four steps.
+            let units = if steps == 500 { -2 } else { 2 };
+            let way = Real::new(steps).scaled(units);
+            let (a, j) = (Real::ONE / unit.squared(), Real::new(3) / (unit.squared() * unit));
+            let (a, j) = (a.scaled(units), j.scaled(units));
             let (speed, most) = if cubic { (j * time.squared().half(), j * time) } else { (a * time, a) };
             let state = [
                 if back { speed } else { Real::ZERO },
@@ -272,7 +274,7 @@ mod tests {
             curve.push((time, way), state, !back, bend);
             let joined = (unit * Real::new(cut)).scaled(-4);
             curve.skipped = (joined, curve.pieces()[0].way(joined).0);
-            let scale = Real::ONE.scaled(-2);
+            let scale = Real::ONE.scaled(-units);
             let left = ((way - curve.skipped.1) * scale).to_wide(32) as i64;
             let from = (REST << 32) + off - if back { left } else { 0 };
             let frame = Frame { to: None, scale, offset: Real::ONE.half(), ..Frame::rest(SHIFT, 77 << SHIFT, from) };
@@ -493,6 +495,38 @@ mod tests {
                 assert!((got as f64 - want).abs() <= 0.500_001, "{got} for {want}, step {count} of {case:?}");
             }
             assert_eq!((stepper.count(), stepper.next(&curve, &frame)), (end, None), "{case:?}");
+        }
+    }
+
+    /// Segments of a piece begin with few steps, for which nothing is scaled, and have all of its steps.
+    #[test]
+    fn segments_beside_a_rest() {
+        for case in cases().filter(|case| case.first > 3000) {
+            let ((curve, frame), mut cutter) = (case.curve(), Cutter::new());
+            let begin = if case.back { crate::phases::steps(frame.from) } else { REST as u32 };
+            let end = if case.back { REST as u32 } else { REST as u32 + case.steps as u32 };
+            cutter.count = begin;
+            let (off, mut near) = (Real::new(4), 0);
+            let few = few(case.rest().unwrap().first.get(), off.to_fixed(22), None);
+            let demand = Demand { off, coarse: None, time: u64::MAX };
+            let mut next = begin;
+            while cutter.count() < end {
+                let Slice::Steps(stretch) = cutter.slice(&curve, &frame, &demand) else { continue };
+                let count = next;
+                next = cutter.count();
+                assert!(stretch.count > 0 && next == count + u32::from(stretch.count), "{case:?}");
+                let far = if case.back { end - 1 - count } else { count - begin };
+                if far < few && case.time(count.into()).is_some() {
+                    near += 1;
+                    assert!(stretch.count <= 4 && (cutter.piece.is_none() || case.back), "{case:?}");
+                    assert!(u32::from(stretch.count) == 4.min(end - count), "{case:?}");
+                }
+                for (count, first) in [(count, stretch.first), (next - 1, stretch.last())] {
+                    let want = wide(case.time(count.into()).unwrap_or(77.0));
+                    assert!(first.abs_diff(want) <= (5 << 22), "{first} for {want}, {count} of {case:?}");
+                }
+            }
+            assert!(near > 0 && cutter.next(&curve, &frame, &demand).is_none(), "{near} {few} of {case:?}");
         }
     }
 

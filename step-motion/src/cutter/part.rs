@@ -356,3 +356,137 @@ impl Part {
 pub(super) fn along(x: u64, by: u64, up: bool) -> u64 {
     if up { x.saturating_add(by) } else { x.saturating_sub(by) }
 }
+
+#[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers compared with floating point")]
+mod tests {
+    use super::*;
+
+    /// 2^-62 and 2^-64.
+    const ONE: u64 = 1 << 62;
+    const WHOLE: f64 = 18_446_744_073_709_551_616.0;
+
+    /// Pieces that gather speed and pieces whose acceleration fades, by the shares of their terms in 16ths.
+    fn parts() -> impl Iterator<Item = Part> {
+        let growing = [[0, 0, 16], [0, 16, 0], [0, 5, 11], [1, 0, 15], [8, 0, 8], [5, 5, 6], [15, 1, 0], [12, 0, 4]];
+        let fading = [[0, 24, 8], [1, 20, 5], [8, 12, 4], [0, 20, 4], [15, 1, 0]];
+        let part = |grows| {
+            move |shares: [u64; 3]| {
+                let [speed, half, sixth] = shares.map(|share| share * (ONE / 16));
+                Part { speed, half, sixth, grows, ..Part::NONE }
+            }
+        };
+        growing.into_iter().map(part(true)).chain(fading.into_iter().map(part(false)))
+    }
+
+    /// 1000 steps, from position 0 or to it.
+    fn steps(part: Part, back: bool) -> Part {
+        let way = Real::new(1000);
+        let origin = if back { 1000 << P2 } else { 0 };
+        let own = Part { back, origin, way: way.inverse(), step: (Real::ONE / way).to_fixed(62), ..part };
+        Part { bits: P as u32, first: own.first_of(P as u32), steps: way.scaled(P + 1), ..own }
+    }
+
+    #[test]
+    fn a_guess_is_late_but_not_by_much() {
+        for part in parts() {
+            for by in 0..60 {
+                for time in [u64::MAX, 0xb << 60, 0x9_5555 << 44].map(|time| time >> by) {
+                    let way = part.at(time).p;
+                    if way < 1 << 12 {
+                        continue;
+                    }
+                    let (guess, most) = (part.guess(way), time as f64 * 1.8);
+                    assert!(guess >= time - (time >> 9) && guess as f64 <= most, "{guess} for {time} of {part:?}");
+                }
+            }
+        }
+    }
+
+    /// Whatever is known of the step before.
+    #[test]
+    fn a_search_finds_each_step() {
+        for part in parts() {
+            for back in [false, true] {
+                let part = steps(part, back);
+                for count in [0, 1, 2, 17, 500, 501, 998, 999] {
+                    let way = part.target(count);
+                    let from = part.search(count, None, 0);
+                    let lasts =
+                        [from, from - (from >> 22), from - (from >> 10), from / 2, from | from >> 3, u64::MAX, 0];
+                    for time in lasts.into_iter().map(|last| part.search(count, Some(last), 0)).chain([from]) {
+                        let Place { p, v, .. } = part.at(time);
+                        let off = p.abs_diff(way);
+                        assert!(off <= high(v, 64) + 8, "{off} at {time}, {count} of {part:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// From ticks to parts of a piece and back, from a piece of 2^-40 ticks to one of 2^40 ticks.
+    #[test]
+    fn times_of_a_piece_and_of_the_clock() {
+        for (size, back) in (-7..72).flat_map(|size| [(size, false), (size, true)]) {
+            for digits in [4, 5, 6, 7] {
+                let lasts = Real::new(digits).scaled(size - 2);
+                let part = Part { lasts, per: lasts.inverse().0, back, begin: 1 << 90, ..Part::NONE };
+                for time in [u64::MAX, 3 << 62, 1 << 63, 5 << 61, 0x123_4567 << 39, 1 << 40] {
+                    let since = (time as f64 / WHOLE) * digits as f64 * 2_f64.powi(size - 2);
+                    let tick = part.tick(time) - part.begin;
+                    let tick = if back { -tick } else { tick };
+                    assert!((tick as f64 - since).abs() <= since * 1e-12 + 1.0, "{tick} for {since}, {size} {digits}");
+                    let ticks = part.ticks(time) as f64;
+                    assert!(size > 63 || (ticks - since).abs() <= since * 1e-12 + 1.0, "{ticks} for {since}");
+                    if tick > 1 << 50 && size < 64 {
+                        let got = part.time(part.begin + if back { -tick } else { tick }) as f64;
+                        assert!((got - time as f64).abs() <= 1e-12 * WHOLE, "{got} for {time}, {size} {digits}");
+                        assert_eq!(part.time(part.begin - if back { -tick } else { tick }), 0);
+                    }
+                }
+                if size < 63 {
+                    let whole = part.part_of(lasts.to_fixed(0).saturating_mul(2).saturating_add(2));
+                    assert_eq!(whole, u64::MAX, "{size} {digits}");
+                }
+            }
+        }
+    }
+
+    /// (10 a j v - 15 a³) / v⁷ is the fourth derivative.
+    #[test]
+    fn where_the_fourth_derivative_changes_its_sign() {
+        for part in parts() {
+            let [v, h, s] = [part.speed, part.half, part.sixth].map(|x| x as f64 / ONE as f64);
+            let sign = if part.grows { 1.0 } else { -1.0 };
+            let (mut up, mut down) = (false, false);
+            for t in (1..=1000).map(|t| f64::from(t) / 1000.0) {
+                let (v, a, j) =
+                    (v + 2.0 * h * t + 3.0 * sign * s * t * t, 2.0 * h + 6.0 * sign * s * t, 6.0 * sign * s);
+                let bent = 10.0 * a * j * v - 15.0 * a.powi(3);
+                (up, down) = (up || bent > 1e-9, down || bent < -1e-9);
+            }
+            assert!(!(part.is_bent_one_way() && up && down), "{part:?}");
+            assert!(part.is_bent_one_way() || part.grows && part.speed > 0, "{part:?}");
+        }
+    }
+
+    /// A step that is late already is alone, and so is one before a wait that is too long; the others are as many as fit.
+    #[test]
+    fn steps_at_constant_speed() {
+        let cruise = |(place, pace): (i128, u64), time| {
+            // `place` is how far behind step 7 the piece begins.
+            let origin = (15 << (P2 - 1)) + place;
+            let part = Part { even: true, begin: 5000, origin, pace: Real::new(pace), ..Part::NONE };
+            let Stretch { count, first, differences } = part.cruise((7, 50), time);
+            assert_eq!(differences[1..], [0, 0]);
+            (count, first, differences[0])
+        };
+        assert_eq!(cruise((1, 1000), u64::MAX), (1, 5000, 1000));
+        assert_eq!(cruise((0, 1000), u64::MAX), (50, 5000, 1000));
+        assert_eq!(cruise((-(1 << P2), 1000), 7999), (7, 6000, 1000));
+        assert_eq!(cruise((-(1 << (P2 - 1)), 1000), 0), (1, 5500, 1000));
+        assert_eq!(cruise((0, LONGEST - 1), u64::MAX), (4, 5000, (1 << 60) - 1));
+        assert_eq!(cruise((0, LONGEST), u64::MAX), (1, 5000, 1 << 60));
+        assert_eq!(cruise((0, 1 << 62), u64::MAX).0, 1);
+    }
+}

@@ -206,3 +206,80 @@ pub(super) fn power(x: u64, by: i32) -> u64 {
         u64::MAX
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers compared with floating point")]
+mod tests {
+    use super::super::part::Slower;
+    use super::*;
+    use crate::curve::{Bend, Curve};
+    use crate::phases::Frame;
+    use crate::real::Real;
+
+    #[test]
+    fn logarithms_and_powers() {
+        for bits in 0..64 {
+            for x in [1_u64 << 63, u64::MAX, 3 << 62, 0xb504_f333 << 32, 0x9_0101 << 44].map(|x| x >> bits) {
+                let (got, exact) = (log(x), (x as f64).log2() * 256.0);
+                assert!(f64::from(got) > exact - 24.0 && f64::from(got) <= exact + 0.1, "{got} for {exact}");
+            }
+        }
+        for by in -3000..3000 {
+            for x in [1 << 16, 1 << 40, 0xb504_f333_u64] {
+                let (got, exact) = (power(x, by), x as f64 * (f64::from(by) / 256.0).exp2());
+                if exact < 2_f64.powi(62) {
+                    assert!(got as f64 <= exact * 1.062 && got as f64 + 1.0 >= exact * 0.9999, "{got} for {exact}");
+                } else {
+                    assert!(got as f64 >= exact.min(2_f64.powi(63)), "{got} for {exact}");
+                }
+            }
+        }
+        assert_eq!(
+            [power(1, -1 << 20), power(1 << 20, 0), power(1, 63 << 8), power(3, 1 << 30)],
+            [0, 1 << 20, u64::MAX, u64::MAX]
+        );
+    }
+
+    /// A piece of 2^16 steps and 2^30 ticks whose slower end has half the mean speed; how far off they may be, in moments.
+    fn part(back: bool, off: Real) -> Part {
+        let (mut curve, slow) = (Curve::new(), Real::ONE.scaled(-25));
+        let v = if back { slow + slow.scaled(1) } else { slow };
+        let state = [v, Real::ONE.scaled(-64), Real::ZERO];
+        curve.push((Real::new(1 << 40), Real::new(1 << 16)), state, !back, Bend::Flat);
+        let frame = Frame { to: None, ..Frame::rest(10, 0, 0) };
+        Part::new(&Slower::new(&curve, &frame, 0).unwrap(), &frame, off)
+    }
+
+    /// The first estimate is off by about as much as may be.
+    #[test]
+    fn a_first_estimate() {
+        for back in [false, true] {
+            let part = part(back, Real::ZERO);
+            for time in [1 << 61, 3 << 62, 5 << 61, 15 << 60] {
+                let begin = part.spot(time).unwrap();
+                for most in (16..40).map(|by| 1 << by) {
+                    let step = begin.v.of(part.step);
+                    let Some(about) = part.about(step, &begin, most) else { continue };
+                    let to = along(time, about, !back);
+                    let off = part.off_by(&begin, &part.spot(to).unwrap());
+                    assert!(off >> 4 <= most && off >= most >> 5, "{off} for {most} from {time}, {about}, {back}");
+                }
+            }
+        }
+    }
+
+    /// A segment begins at the next step: if that is more than a step ahead, there is none.
+    #[test]
+    fn a_segment_begins_at_a_step() {
+        for back in [false, true] {
+            let part = part(back, Real::ONE);
+            let demand = Demand { off: Real::ZERO, coarse: None, time: u64::MAX };
+            let begin = part.spot(1 << 63).unwrap();
+            let next = (0..1 << 16).find(|count| part.ahead(begin.way, part.place(*count)).is_some()).unwrap();
+            for (more, some) in [(-1, false), (0, true), (1, false), (9, false)] {
+                let got = part.many((next.wrapping_add_signed(more), 1000), &begin, None, &demand);
+                assert_eq!(got.is_some(), some, "{more} {back}");
+            }
+        }
+    }
+}

@@ -53,3 +53,27 @@ impl Stretch {
         (Self { count: before, ..self }, Some(left))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The steps before a time, at least one, and then those that are left, each at its own time.
+    #[test]
+    fn a_stretch_is_split_at_a_time() {
+        for differences in [[100, 0, 0], [100, 7, 0], [1000, -50, 2], [500, -20, 0]] {
+            for count in [1, 2, 3, 9, 20] {
+                let whole = Stretch { count, first: 5000, differences };
+                let times = |stretch: Stretch| (0..stretch.count).map(move |k| stretch.time(k));
+                for until in times(whole).flat_map(|time| [time - 1, time, time + 1]).chain([0, 1 << 90]) {
+                    let (before, after) = whole.split(until);
+                    let want = times(whole).filter(|time| *time < until).count().max(1);
+                    assert_eq!(usize::from(before.count), want, "{whole:?} at {until}");
+                    assert_eq!(after.map_or(0, |after| usize::from(after.count)), usize::from(count) - want);
+                    assert!(times(before).chain(after.into_iter().flat_map(times)).eq(times(whole)), "{after:?}");
+                    assert_eq!(before.last(), whole.time(before.count - 1));
+                }
+            }
+        }
+    }
+}
