@@ -107,3 +107,41 @@ fn what_moves_decides_between_twins() {
     assert_eq!(LogShape::guess(&inputs(5, 4, 31)), Ok(EXCHANGED));
     assert_eq!(LogShape::guess(&inputs(5, 12, 31)), Ok(EXCHANGED));
 }
+
+/// Responses of a drive that turns, from byte `from` on, with the bytes of each word of so many in the other order.
+fn turning(blocks: usize, (word, from): (usize, usize), speed: i32, is_damaged: impl Fn(usize) -> bool) -> Vec<u8> {
+    let log = (0..blocks).flat_map(|k| {
+        let mut block = [0; 16];
+        let code = if is_damaged(k) { 0x50 } else { 0x20 };
+        block[..4].copy_from_slice(&[0x85 | (k % 4 * 32) as u8, code, 0xc0, 0]);
+        block[4..8].copy_from_slice(&(k as i32 * speed).to_le_bytes());
+        block[8..12].copy_from_slice(&9_000_i32.to_le_bytes());
+        block
+    });
+    let log: Vec<u8> = log.collect();
+    log.chunks(word).flat_map(|word| word.iter().rev()).copied().skip(from).collect()
+}
+
+/// Four of five sound blocks are enough for a log that begins with one, and not for one that begins inside a block.
+#[test]
+fn nine_of_ten_blocks_of_a_log_that_begins_inside_one_are_sound() {
+    let fifth = |k| k % 5 == 4;
+    assert_eq!(LogShape::guess(&turning(60, (1, 0), 1_001, fifth)), Ok(shape(BlockSize::Bytes16, 1, 0)));
+    assert_eq!(LogShape::guess(&turning(60, (1, 4), 1_001, fifth)), Err(ShapeDoubt::Unknown));
+    let twentieth = |k| k % 20 == 4;
+    assert_eq!(LogShape::guess(&turning(60, (1, 4), 1_001, twentieth)), Ok(shape(BlockSize::Bytes16, 1, 12)));
+}
+
+/// A drive of which only responses are logged, and that turns by just over 2^16 in a period, is where its last step leads: that the
+/// lower half of its position moves less is no reason to read it in the other order.
+#[test]
+fn responses_alone_are_followed_by_their_steps() {
+    for (word, from) in [(4, 0), (4, 1), (2, 5), (4, 7), (2, 11)] {
+        for speed in [65_540, 70_001, -65_600, 131_100] {
+            let guess = LogShape::guess(&turning(64, (word, from), speed, |_| false));
+            let want = shape(BlockSize::Bytes16, word, (16 - from) % 16);
+            let is_doubt = from > 0 && matches!(guess, Err(ShapeDoubt::Either(a, b)) if a == want || b == want);
+            assert!(guess == Ok(want) || is_doubt, "{word} {from} {speed}: {guess:?}");
+        }
+    }
+}
