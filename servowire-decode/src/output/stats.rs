@@ -130,9 +130,6 @@ impl Spread {
 
 impl Figures {
     fn add(&mut self, event: &Event, limit: Option<u64>) {
-        if event.remark {
-            return;
-        }
         match event.direction {
             _ if event.verdict.is_silence() => {}
             Some(Direction::Request) => self.requests += 1,
@@ -153,9 +150,7 @@ impl Figures {
             Verdict::Refused(refusal) => *self.refused.entry(refusal.class).or_default() += 1,
         }
         self.counted |= event.counted;
-        self.events += event.happened.len();
-        let room = EVENTS.saturating_sub(self.happened.len());
-        self.happened.extend(event.happened.iter().take(room).map(|what| (event.place, what.clone())));
+        self.list(event);
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
@@ -170,6 +165,13 @@ impl Figures {
         if let Some(position) = event.position {
             self.follow(start, position, limit);
         }
+    }
+
+    /// Lists what happened.
+    fn list(&mut self, event: &Event) {
+        self.events += event.happened.len();
+        let room = EVENTS.saturating_sub(self.happened.len());
+        self.happened.extend(event.happened.iter().take(room).map(|what| (event.place, what.clone())));
     }
 
     /// Returns what is missing to detect jumps.
@@ -312,11 +314,11 @@ impl Gathered {
 
     /// Takes the next event of a file.
     pub fn add(&mut self, origin: &Origin, event: &Event) {
-        if event.remark {
-            return;
-        }
         let (speaker, limit) = (origin.speaker(event), self.limit);
         match self.by.get_mut(&speaker) {
+            // No frame, and nobody speaks in it.
+            Some(figures) if event.remark => figures.list(event),
+            None if event.remark => {}
             Some(figures) => figures.add(event, limit),
             None => self.by.entry(speaker).or_default().add(event, limit),
         }

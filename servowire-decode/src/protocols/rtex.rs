@@ -336,14 +336,20 @@ impl LogDecoder for Decoder {
         if !self.held.is_empty() {
             self.let_go(out)?;
         }
-        let mut notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
+        for finding in self.analysis.end() {
+            let address = match finding {
+                LogFinding::NeverAnswered(drive) | LogFinding::NeverAsked(drive) | LogFinding::AtEnd(drive, _) => {
+                    Some(drive.get().into())
+                }
+                _ => None,
+            };
+            let happened = vec![finding.to_string()];
+            out.event(&Event { address, happened, ..Event::remark(self.place, "log", finding) })?;
+        }
         if self.blocks.is_open() {
-            notes.push("the log ends in the middle of a block".to_owned());
+            out.event(&Event::remark(self.place, "log", "the log ends in the middle of a block"))?;
         }
-        if notes.is_empty() {
-            return Ok(());
-        }
-        out.event(&Event { happened: notes.clone(), ..Event::remark(self.place, "log", notes.join("; ")) })
+        Ok(())
     }
 }
 
@@ -373,7 +379,6 @@ fn is_block(report: &Report) -> bool {
 fn verdict(report: &Report) -> Verdict {
     let Some(error) = report.error().filter(|_| !is_block(report)) else { return Verdict::Ok };
     let at = match error {
-        Error::Direction { .. } | Error::MacId { .. } => Some(0),
         Error::CyclicCode { .. } | Error::NonCyclicCode { .. } => Some(1),
         Error::SubChk { .. } | Error::SubCommandCode { .. } => Some(16),
         _ => None,

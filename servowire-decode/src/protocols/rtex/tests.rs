@@ -117,6 +117,57 @@ fn what_was_preferred_in_the_middle_gives_way() {
     assert_eq!(shown[shown.len() - 200..], (522..=721).map(|k| k * 1_001).collect::<Vec<_>>());
 }
 
+/// A log whose last line ends inside a block says so, however little of the block there is; one that ends with a block does not.
+#[test]
+fn a_cut_last_block_is_said() {
+    let log = bytes(1, run(1, 60, 1_001));
+    let said = |log: &[u8]| {
+        let (events, _) = decoded(log);
+        let last = events.last().unwrap();
+        last.remark && format!("{last:?}").contains("the log ends in the middle of a block")
+    };
+    for from in 1..16 {
+        assert!(said(&log[from..]), "{from}");
+    }
+    assert!(!said(&log));
+}
+
+/// Bytes are lost twice, and each time the blocks go on over the ends of lines.
+#[test]
+fn bytes_are_lost_again() {
+    let log = [&bytes(1, run(1, 192, 1_001))[4..], &bytes(1, run(193, 400, 1_001))[2..]].concat();
+    let (events, _) = decoded(&log);
+    let changes = |event: &&Event| format!("{event:?}").contains("from here on the log looks like");
+    assert_eq!(events.iter().filter(changes).count(), 1);
+    let shown = positions(&events);
+    assert_eq!(shown[..180], (2..=181).map(|k| k * 1_001).collect::<Vec<_>>());
+    assert_eq!(shown[shown.len() - 200..], (392..=591).map(|k| k * 1_001).collect::<Vec<_>>());
+}
+
+/// A refusal names the byte that it is about.
+#[test]
+fn a_refused_block_names_the_byte() {
+    let refused = |bytes: &[u8]| match verdict(&inspect(bytes)) {
+        Verdict::Refused(refusal) => (refusal.class, refusal.field),
+        Verdict::Ok => panic!("{bytes:02x?}"),
+    };
+    let mut wide = [0; 32];
+    let mut block = |[one, sixteen]: [u8; 2]| {
+        (wide[0], wide[1], wide[16]) = (5, one, sixteen);
+        wide
+    };
+    let byte = |number: u8| Some(format!("byte {number}"));
+    for (with, class, at) in [
+        ([0x50, 0x80], "cyclic_code", 1),
+        ([0x23, 0x80], "non_cyclic_code", 1),
+        ([0x20, 0x00], "sub_chk", 16),
+        ([0x20, 0x81], "sub_command_code", 16),
+    ] {
+        assert_eq!(refused(&block(with)), (class, byte(at)));
+    }
+    assert_eq!(refused(&block([0x20, 0x80])[..3]), ("truncated", None));
+}
+
 /// A motor that turns by just over 2^16 in each update period, in a log of responses that begins inside a block: the lower half of its
 /// position alone moves less than the whole. No wrong position is shown.
 #[test]

@@ -119,9 +119,9 @@ fn findings_between_blocks() {
 fn what_is_left_open() {
     let bench = Bench::new();
     let block = |bytes: [u8; 10]| format!("{}000000000000", bytes.map(|byte| format!("{byte:02x}")).concat());
+    let options = ["--protocol", "rtex", "--bytes"];
     let at_end = |lines: &[String], more: &[&str]| {
-        let run =
-            bench.decode("log.txt", lines.join("\n"), &[&["--protocol", "rtex", "--bytes", "--json"], more].concat());
+        let run = bench.decode("log.txt", lines.join("\n"), &[&options[..], &["--json"], more].concat());
         (run.code, run.json().last().unwrap()["fields"]["note"].as_str().unwrap().to_owned())
     };
     let command = |k: u8, code| block([(k % 4) << 5 | 5, code, 0x80, 0, 0, 0, 0, 0, 7, 0]);
@@ -133,6 +133,10 @@ fn what_is_left_open() {
             at_end(&asked, more),
             (0, "at the end drive 5 has not answered CP parameter (26h) in 9 responses, 9 of them busy".to_owned())
         );
+        // In the figures, too, as an event of the drive, though not as a frame.
+        let figures = bench.decode("log.txt", asked.join("\n"), &[&options[..], more, &["--stats"]].concat()).out;
+        assert!(figures.contains("at the end drive 5 has not answered CP parameter (26h) in 9 responses"), "{figures}");
+        assert!(figures.contains("9 requests, 9 answers, 0 others"), "{figures}");
         // A drive that is silent has to be looked after.
         assert_eq!(at_end(&silent, more), (4, "at the end drive 5 has not answered the last 8 commands".to_owned()));
     }
@@ -148,10 +152,18 @@ fn a_drive_that_never_answers() {
     let run = bench.decode("log.txt", hex_log(&all), &["--protocol", "rtex", "--bytes", "--json"]);
     assert_eq!(run.code, 4);
     assert!(run.err.ends_with("drive 7 did not answer\n"), "{}", run.err);
-    assert_eq!(
-        run.json().last().unwrap()["fields"]["note"],
-        "drive 5 answers and was never sent a command; drive 7 never answered"
+    let said: Vec<_> =
+        run.json().iter().filter(|it| it["kind"] == "log").map(|it| it["fields"]["note"].clone()).collect();
+    assert_eq!(said, ["drive 5 answers and was never sent a command", "drive 7 never answered"]);
+    // In the figures, each stands with its drive.
+    let run = bench.decode("log.txt", hex_log(&all), &["--protocol", "rtex", "--bytes", "--stats"]);
+    let (five, seven) = run.out.split_once("  address 7").unwrap();
+    assert!(
+        five.contains("drive 5 answers and was never sent a command\n") && !five.contains("drive 7"),
+        "{}",
+        run.out
     );
+    assert!(seven.contains("drive 7 never answered\n") && !seven.contains("drive 5"), "{}", run.out);
 }
 
 /// What is said of the log as a whole is no frame of it.
@@ -169,7 +181,7 @@ fn a_remark_on_the_log_is_counted_nowhere() {
     assert!(run.code == 5 && run.err.contains("8 of 20 frames refused"), "{}", run.err);
     let events = run.json();
     let last = events.last().unwrap();
-    assert_eq!((events.len(), last["kind"].as_str()), (21, Some("log")), "{last}");
+    assert_eq!((events.len(), last["kind"].as_str()), (22, Some("log")), "{last}");
     // It stands at the end of the log.
     assert_eq!(last["line"], events[19]["line"]);
     // All drives together.

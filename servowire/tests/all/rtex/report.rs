@@ -109,12 +109,12 @@ fn an_alarm_in_words() {
     assert!(run.out.contains("Err27.4 (too large a step of the position command)"), "{}", run.out);
 }
 
-/// Two axes, each with its own count of update periods, of which one is missing; what is refused is an event of its axis.
+/// Two axes, each with its own counter and count of update periods, of which one is missing; what is refused is an event of its axis.
 #[test]
 fn periods_are_counted_for_each_axis() {
     let bench = Bench::new();
     let line = |counter: u8, drive: u8, code: u8| format!("{:02x}{code:02x}{:028x}\n", counter << 5 | drive, 0);
-    let text: String = [1, 2, 0].map(|counter| line(counter, 5, 0x20) + &line(counter, 7, 0x20)).concat();
+    let text: String = [1, 2, 0].map(|counter| line(counter, 5, 0x20) + &line((counter + 1) % 4, 7, 0x20)).concat();
     let options = ["--protocol", "rtex", "--bytes", "--period", "500us"];
     let run = bench.decode("log.txt", &text, &[&options[..], &["--json"]].concat());
     let begins: Vec<_> = run.json().iter().map(|event| event["start_ps"].as_i64().unwrap() / 1_000_000).collect();
