@@ -283,15 +283,18 @@ impl Few {
 #[expect(clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "numbers for random cases, and compared with 1")]
 mod tests {
     use super::*;
+    use crate::curve::Bend;
     use crate::limits::{Clock, Limits};
     use crate::planner::{Goal, Motion, plan};
     use proptest::prelude::*;
+    use std::vec::Vec;
 
     /// Returns the largest error of the segments' steps as a share of the permitted one, and how many steps a segment has.
     fn worst(curve: &Curve, frame: &Frame, off: Real) -> (f64, f64) {
         let (mut cutter, mut worst, mut segments) = (Cutter::new(), 0.0, 0.0);
         let most = off.scaled(48).to_wide(32 - i32::try_from(frame.shift).unwrap()) as f64 / 2_f64.powi(48);
         while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX }) {
+            assert!(stretch.count > 0);
             let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
             for k in 0..u32::from(stretch.count) {
                 let exact = cutter.exact(curve, frame, (cutter.count() - u32::from(stretch.count) + k, 0));
@@ -420,5 +423,65 @@ mod tests {
                 assert!(got >= want, "{got} steps a segment of {steps}, {want} are wanted");
             }
         }
+    }
+
+    /// From one speed to another a little above or below it: segments have as many steps as they may, but for the last two,
+    /// which share what is left, and none has a step alone.
+    #[test]
+    fn segments_with_the_most_steps() {
+        for (up, coarse, most) in [(true, None, 512), (false, None, 512), (true, Some(4), 2048), (false, Some(4), 2048)]
+        {
+            let (mut curve, v, steps) = (Curve::new(), Real::ONE.scaled(-20), Real::new(20_000));
+            let more = v.scaled(-6);
+            let lasts = steps / (v + more.half());
+            let state = [if up { v } else { v + more }, more / lasts, Real::ZERO];
+            curve.push((lasts, steps), state, up, Bend::Flat);
+            let (frame, mut cutter) = (Frame { to: None, ..Frame::rest(10, 0, 0) }, Cutter::new());
+            let demand = Demand { off: Real::new(1 << 20), coarse, time: u64::MAX };
+            let counts: Vec<_> =
+                core::iter::from_fn(|| cutter.next(&curve, &frame, &demand).map(|some| some.count)).collect();
+            let (full, last) = counts.split_at(counts.len() - 2);
+            assert!(full.iter().all(|count| (most * 31 / 32..=most).contains(count)), "{counts:?}");
+            assert!(last[0].abs_diff(last[1]) * 64 < last[0] && last[0] > most / 4, "{counts:?}");
+            assert_eq!(counts.into_iter().map(u32::from).sum::<u32>(), 20_000);
+        }
+    }
+
+    /// A stop that is only a precaution is as exact as a part of an interval, and has longer segments.
+    #[test]
+    fn segments_of_a_precaution() {
+        for (coarse, least) in [(None, 42.5), (Some(12), 42.0), (Some(4), 106.0), (Some(2), 102.0)] {
+            let bounds =
+                Limits::new(50_000, 100_000).unwrap().with_jerk(1_000_000).unwrap().bounds(Clock::MICROSECONDS);
+            let goal = Goal::At(Real::new(5000), Real::ZERO);
+            let curve = plan(Motion::steady(Real::ZERO), goal, &bounds).unwrap();
+            let frame = Frame { to: Some(5000 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
+            let off = Real::new(Clock::MICROSECONDS.moment(1)) * Real::fixed(20, 0) / Real::new(1000);
+            let (mut cutter, mut segments) = (Cutter::new(), 0.0);
+            while let Some(stretch) = cutter.next(&curve, &frame, &Demand { off, coarse, time: u64::MAX }) {
+                let first = cutter.count() - u32::from(stretch.count);
+                let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
+                for count in first..cutter.count() {
+                    let most = interval.unsigned_abs() >> coarse.unwrap_or(63);
+                    let exact = cutter.exact(&curve, &frame, (count, time));
+                    let off = (time - exact).unsigned_abs();
+                    assert!(off <= u128::from(most.max(20 << 32) / 100 * 102), "{off} for {most}, {count} {coarse:?}");
+                    (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
+                }
+                segments += 1.0;
+            }
+            let each = 5000.0 / segments;
+            assert!(each >= least, "{each} steps a segment, {least} are wanted: {coarse:?}");
+        }
+    }
+
+    /// Steps that take up to a time after the first one, to the last bit.
+    #[test]
+    fn few_steps_within_a_time() {
+        let mut few = Few::NONE;
+        let added = [100, 110, 130, 160, 161].map(|time| few.add(time, 60));
+        assert_eq!(added, [true, true, true, true, false]);
+        assert_eq!((few.stretch.count, few.stretch.first, few.stretch.differences), (4, 100, [10, 10, 0]));
+        assert_eq!(few.stretch.last(), 160);
     }
 }
