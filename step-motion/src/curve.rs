@@ -208,5 +208,9 @@ mod tests {
         }
         let (middle, end) = ((Real::new(32), Real::new(64)), (Real::new(48), Real::new(128)));
         assert_eq!([0, 1, 2].map(|at| curve.end(at)), [middle, end, end]);
+        for way in [1, 63, 65, 100] {
+            let there = curve.after(Real::new(way)).unwrap();
+            assert!(there.p.distance(Real::new(way)) <= Real::ONE.scaled(-40), "{there:?} for {way}");
+        }
     }
 }

@@ -440,6 +440,7 @@ mod tests {
             let demand = Demand { off: Real::new(1 << 20), coarse, time: u64::MAX };
             let counts: Vec<_> =
                 core::iter::from_fn(|| cutter.next(&curve, &frame, &demand).map(|some| some.count)).collect();
+            assert!(counts.len() > 2 && counts.iter().all(|count| *count <= most), "{counts:?}");
             let (full, last) = counts.split_at(counts.len() - 2);
             assert!(full.iter().all(|count| (most * 31 / 32..=most).contains(count)), "{counts:?}");
             assert!(last[0].abs_diff(last[1]) * 64 < last[0] && last[0] > most / 4, "{counts:?}");

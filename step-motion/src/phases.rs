@@ -187,7 +187,8 @@ mod tests {
     fn steps_made_at_the_end_of_each_piece() {
         let mut curve = Curve::new();
         for _ in 0..3 {
-            curve.cruise(Real::ONE, Real::new(64));
+            let all = Real::new(64);
+            curve.push((all, all), [Real::ONE, Real::ZERO, Real::ZERO], true, Bend::Flat);
         }
         let frame = Frame { to: None, scale: Real::ONE.half(), ..Frame::rest(10, 0, 5 << P) };
         let until = |curve: &Curve, frame: &Frame| [0, 1, 2, 3].map(|at| frame.until(curve, at));
