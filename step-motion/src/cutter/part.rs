@@ -215,7 +215,8 @@ impl Part {
         self.lasts.part(part)
     }
 
-    /// Converts 2^-32 ticks to a part of the piece's time; the greatest number for its whole time or more.
+    /// Converts 2^-32 ticks to a part of the piece's time; the greatest number for its whole time or more. In a piece of
+    /// 2^32 ticks or more the later parts come out too small: enough for where a search begins.
     pub(super) fn part_of(&self, ticks: u64) -> u64 {
         let part = self.per.of(ticks);
         let up = self.lasts.exponent().saturating_sub(63);
