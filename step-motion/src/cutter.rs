@@ -220,8 +220,8 @@ impl Cutter {
         }
         let rest = self.rest.as_ref()?;
         let (begin, roots) = rest.steps(self.count, self.left())?;
-        self.count = self.count.saturating_add(u32::try_from(roots.left()).ok()?);
-        self.last = Last::Tick(rest.time(self.count.saturating_sub(1))?);
+        let count = self.count.saturating_add(u32::try_from(roots.left()).ok()?);
+        (self.last, self.count) = (Last::Tick(rest.time(count.saturating_sub(1))?), count);
         Some((begin, roots))
     }
 
@@ -232,7 +232,14 @@ impl Cutter {
 
     /// Returns when a step of the present piece is made, as exactly as the arithmetic allows, from a time near it.
     pub(crate) fn exact(&self, curve: &Curve, frame: &Frame, (count, about): (u32, i128)) -> i128 {
-        let Some(piece) = self.piece.or_else(|| self.scaled(curve, frame, Real::ZERO)) else { return about };
+        let scaled;
+        let piece = if let Some(piece) = &self.piece {
+            piece
+        } else {
+            let Some(piece) = self.scaled(curve, frame, Real::ZERO) else { return about };
+            scaled = piece;
+            &scaled
+        };
         if piece.even {
             return piece.cruise((count, 1), 0).first;
         }

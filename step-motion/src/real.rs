@@ -205,7 +205,6 @@ impl Real {
         reason = "differences in two's complement"
     )]
     pub(super) fn cbrt(self) -> Self {
-        const THIRD_OF_A_WORD: u32 = u32::MAX / 3 + 1;
         /// The roots of 2 and 4.
         const ROOTS: [Real; 2] =
             [Real::from_parts(0xa145_17cc_6b94_5711, -63), Real::from_parts(0xcb2f_f529_eb71_e416, -63)];
@@ -244,8 +243,9 @@ impl Real {
     }
 }
 
-/// 1/3.
+/// 1/3, as a number and in 2^-32.
 pub(super) const THIRD: Real = Real::from_parts(0xaaaa_aaaa_aaaa_aaab, -65);
+pub(super) const THIRD_OF_A_WORD: u32 = u32::MAX / 3 + 1;
 
 impl PartialOrd for Real {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
@@ -428,110 +428,4 @@ const fn reciprocal(d: u64) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    #[expect(clippy::cast_precision_loss, reason = "compared within 2^-50")]
-    fn float(x: Real) -> f64 {
-        // The power of two is built from its bits: Miri makes the last bits of `exp2` wrong, as they may be.
-        if x.is_zero() { 0.0 } else { x.m() as f64 * f64::from_bits(u64::try_from(x.e() + 1023).unwrap() << 52) }
-    }
-
-    fn near(got: Real, want: f64) {
-        assert!((float(got) - want).abs() <= want.abs() * 1e-15 * 4.0, "{} for {want}", float(got));
-    }
-
-    fn any_real() -> impl Strategy<Value = Real> {
-        (any::<u64>(), -100..100_i32).prop_map(|(n, bits)| Real::fixed(n, bits))
-    }
-
-    proptest! {
-        #[test]
-        fn as_with_floats(a in any_real(), b in any_real()) {
-            let (x, y) = (float(a), float(b));
-            near(a + b, x + y);
-            near(a * b, x * y);
-            near(a.sqrt(), x.sqrt());
-            let third = float(a.cbrt());
-            prop_assert!((third.powi(3) - x).abs() <= x * 3.0 / 2.0_f64.powi(50), "{third} of {x}");
-            prop_assert!(a.cmp(&b) == b.cmp(&a).reverse() && (x - y).abs() <= x * 1e-15 || (a < b) == (x < y));
-            if b > Real::ZERO {
-                near(a / b, x / y);
-                let wide = ((u128::from(u64::MAX) << 63) / u128::from(b.m())) as u64;
-                prop_assert!(reciprocal(b.m()).abs_diff(wide) <= 32, "{} for {wide}", reciprocal(b.m()));
-            }
-            let (high, low) = if a > b { (a, b) } else { (b, a) };
-            prop_assert!((float(high - low) - (x - y).abs()).abs() <= x.max(y) * 1e-15);
-            prop_assert_eq!(low - high, Real::ZERO);
-            prop_assert!(high >= low && high.max(low) == high && high.min(low) == low);
-            prop_assert!(low.max(high) == high && low.min(high) == low && low.distance(high) == high.distance(low));
-        }
-
-        #[test]
-        fn there_and_back(n: u64, bits in -10..60_i32) {
-            prop_assert_eq!(Real::fixed(n, bits).to_fixed(bits), n);
-            prop_assert_eq!(Real::new(n).to_fixed(0), n);
-            prop_assert_eq!(Real::fixed(n, 7).to_fixed(0), n >> 7);
-        }
-    }
-
-    /// The roots of squares of whole numbers are exact to 58 bits.
-    #[test]
-    fn roots_of_squares() {
-        for bits in 0..32_u32 {
-            for n in [
-                1_u64 << bits,
-                (1 << bits) + 1,
-                (2 << bits) - 1,
-                (3 << bits) / 2,
-                (1 << bits) | 0x5555_5555 >> (31 - bits),
-            ] {
-                let (n, root) = (Real::new(n), Real::new(n * n).sqrt());
-                assert!(root.distance(n) <= n.scaled(-58), "{root:?} for {n:?}");
-                let root = Real::new(n.to_fixed(0) * n.to_fixed(0)).scaled(-63).sqrt();
-                let want = n.scaled(-32) * Real::new(2).sqrt();
-                assert!(root.distance(want) <= want.scaled(-57), "{root:?} for {want:?}");
-            }
-        }
-        for m in
-            [u64::MAX, u64::MAX - 1, 1 << 63, (1 << 63) + 1, u64::MAX >> 1, 1 << 62, u64::MAX << 32, u64::MAX << 31]
-        {
-            let root = Real::new(m).sqrt();
-            assert!(root.squared().distance(Real::new(m)) <= Real::new(m).scaled(-57), "{root:?} of {m}");
-        }
-    }
-
-    /// The cube roots of cubes of whole numbers, and of twice and four times these.
-    #[test]
-    fn roots_of_cubes() {
-        for n in (1..2000).chain((1..1_321_123).step_by(997)).chain([1_321_122, 1 << 20, 1_048_575]) {
-            let cube = Real::new(n * n).scaled(-3) * Real::new(n).scaled(3);
-            for (more, want) in
-                [(0, 1.0), (1, 2.0_f64.cbrt()), (2, 4.0_f64.cbrt()), (-1, 0.5_f64.cbrt()), (-300, 2.0_f64.powi(-100))]
-            {
-                let root = cube.scaled(more).cbrt();
-                near(root, want * float(Real::new(n)));
-                assert!(more != 0 || root.distance(Real::new(n)) <= root.scaled(-55), "{root:?} for {n}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_edges() {
-        let (zero, one) = (Real::ZERO, Real::new(1));
-        assert_eq!((zero + one, one - one, zero * one, zero / one, zero.sqrt()), (one, zero, zero, zero, zero));
-        assert_eq!((one / zero, zero - one, one + zero, one - zero), (Real::HUGE, zero, one, one));
-        assert_eq!((Real::HUGE.to_fixed(0), Real::HUGE.to_fixed(-2000)), (u64::MAX, 0));
-        near(Real::new(9).sqrt(), 3.0);
-        assert!(reciprocal(1 << 63) > u64::MAX - 16);
-        assert_eq!(one.along(one, false), zero);
-        near(THIRD, 1.0 / 3.0);
-        assert_eq!(
-            (zero.cmp(&zero), zero.cmp(&one), one.cmp(&zero)),
-            (Ordering::Equal, Ordering::Less, Ordering::Greater)
-        );
-        // 2^64 - 1, to the last bit.
-        assert_eq!(Real::new((1 << 32) - 1) * Real::new((1 << 32) + 1), Real::new(u64::MAX));
-    }
-}
+mod tests;

@@ -8,7 +8,6 @@
 mod model;
 mod path;
 mod planner;
-mod real;
 
 use crate::limits::Bounds;
 use crate::real::Real;

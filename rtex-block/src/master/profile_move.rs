@@ -182,8 +182,8 @@ impl ProfileMove {
             self.stage = MoveStage::Moving;
         } else if self.stage != MoveStage::Moving {
             // In_Progress may still rise.
-        } else if self.broken.is_some() {
-            self.fail(Failure::ServoOff);
+        } else if let Some(reason) = self.broken {
+            self.fail(Failure::Stopped(reason));
         } else {
             let in_position = response.status.contains(StatusFlags::IN_POSITION);
             let warning = execution.contains(Execution::WNG);
@@ -213,7 +213,7 @@ impl ProfileMove {
         }
     }
 
-    /// Ends a motion that is being aborted for the reason of that, any other for this one.
+    /// Ends the motion with an error; if a stop is breaking it off, with the reason of the stop instead.
     fn fail(&mut self, error: Failure) {
         let error = self.broken.map_or(error, Failure::Stopped);
         self.progress = Progress::Failed { error };

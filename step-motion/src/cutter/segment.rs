@@ -3,7 +3,7 @@
 use super::Demand;
 use super::part::{ALL, LONGEST, Part, Spot, along};
 use super::stretch::Stretch;
-use crate::real::{Inverse, high, middle, upper};
+use crate::real::{Inverse, THIRD_OF_A_WORD, high, middle, upper};
 
 /// Maximum number of steps in a segment; a segment of a stop that is only a precaution may have more.
 const MOST: u32 = 512;
@@ -147,7 +147,7 @@ impl Part {
         let bow = begin.wrapping_add(end).wrapping_sub(mean << 1);
         let c6 = over(over(bow.wrapping_mul(6)));
         let bend = i64::try_from(middle(c6.unsigned_abs(), way, self.bits)).unwrap_or(0);
-        let bend = times(if c6 < 0 { bend.wrapping_neg() } else { bend }, THIRD);
+        let bend = times(if c6 < 0 { bend.wrapping_neg() } else { bend }, THIRD_OF_A_WORD);
         let b2 = over(mean.wrapping_sub(begin) << 1).wrapping_sub(bend);
         let part = word(x);
         let c = times(c6, SIXTH);
@@ -163,9 +163,8 @@ impl Part {
     }
 }
 
-/// 2^32 / 6, and 2^32 / 3.
+/// 2^32 / 6.
 const SIXTH: u32 = u32::MAX / 6 + 1;
-const THIRD: u32 = u32::MAX / 3 + 1;
 
 /// Returns the upper half of a number.
 const fn word(x: u64) -> u32 {

@@ -39,16 +39,18 @@ struct Shuttle {
 impl Shuttle {
     /// At 168 MHz, to 50,000 steps/s if the way is long enough.
     fn new(queue: &'static Queue<129>, way: i64, jerk: u64) -> Option<Self> {
-        let limits = Limits::new(50_000, 100_000).ok()?.with_jerk(jerk).ok()?;
-        let (axis, timer) = Axis::new(queue, Clock::new(168_000_000)?, limits).ok()?;
-        Some(Self { axis, timer, way })
+        Self::on(queue, 168_000_000, Limits::new(50_000, 100_000).ok()?.with_jerk(jerk).ok()?, way)
     }
 
     /// On a clock of `hz`, over two ramps of so many steps to 100,000 steps/s.
     fn ramps(queue: &'static Queue<129>, hz: u32, ramp: u32) -> Option<Self> {
-        let limits = Limits::new(100_000, 5_000_000_000_u64.div_ceil(ramp.into()).try_into().ok()?).ok()?;
+        let acceleration = 5_000_000_000_u64.div_ceil(ramp.into()).try_into().ok()?;
+        Self::on(queue, hz, Limits::new(100_000, acceleration).ok()?, ramp.into())
+    }
+
+    fn on(queue: &'static Queue<129>, hz: u32, limits: Limits, way: i64) -> Option<Self> {
         let (axis, timer) = Axis::new(queue, Clock::new(hz)?, limits).ok()?;
-        Some(Self { axis, timer, way: i64::from(ramp) })
+        Some(Self { axis, timer, way })
     }
 
     fn slice(&mut self) -> Work {
