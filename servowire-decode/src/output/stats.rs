@@ -214,8 +214,25 @@ impl Figures {
         }
     }
 
+    /// Returns whether anybody spoke, or should have; otherwise all that is known are events.
+    fn has_frames(&self) -> bool {
+        self.ok > 0 || !self.refused.is_empty()
+    }
+
     /// Returns the figures by their names; a row that belongs to the one above has no name.
     fn rows(&self, limit: Option<u64>) -> Vec<(&'static str, String)> {
+        let mut rows = if self.has_frames() || self.events == 0 { self.rows_of_frames(limit) } else { Vec::new() };
+        if self.events > 0 {
+            rows.push(("events", self.events.to_string()));
+            rows.extend(self.happened.iter().map(|(place, what)| match place {
+                Place::Line(line) => ("", format!("line {line:>9}  {what}")),
+                Place::Time { start, .. } => ("", format!("{:>14.3} us  {what}", start.us())),
+            }));
+        }
+        rows
+    }
+
+    fn rows_of_frames(&self, limit: Option<u64>) -> Vec<(&'static str, String)> {
         let missing = self.refused.get(NO_RESPONSE).copied().unwrap_or(0);
         let refused = self.refused.values().sum::<u64>() - missing;
         let list = |all: Vec<String>| if all.is_empty() { "none".to_owned() } else { all.join(", ") };
@@ -244,13 +261,6 @@ impl Figures {
                 }));
             }
             (None, _) => {}
-        }
-        if self.events > 0 {
-            rows.push(("events", self.events.to_string()));
-            rows.extend(self.happened.iter().map(|(place, what)| match place {
-                Place::Line(line) => ("", format!("line {line:>9}  {what}")),
-                Place::Time { start, .. } => ("", format!("{:>14.3} us  {what}", start.us())),
-            }));
         }
         rows
     }
@@ -314,14 +324,12 @@ impl Gathered {
 
     /// Takes the next event of a file.
     pub fn add(&mut self, origin: &Origin, event: &Event) {
-        let (speaker, limit) = (origin.speaker(event), self.limit);
-        match self.by.get_mut(&speaker) {
-            // No frame, and nobody speaks in it.
-            Some(figures) if event.remark => figures.list(event),
-            None if event.remark => {}
-            Some(figures) => figures.add(event, limit),
-            None => self.by.entry(speaker).or_default().add(event, limit),
+        // A remark is no frame; most have nothing for the figures.
+        if event.remark && event.happened.is_empty() {
+            return;
         }
+        let figures = self.by.entry(origin.speaker(event)).or_default();
+        if event.remark { figures.list(event) } else { figures.add(event, self.limit) }
     }
 
     /// Returns a table for each speaker.
@@ -374,7 +382,8 @@ impl Gathered {
                 name if name.is_empty() => name,
                 name => format!("{name}: "),
             };
-            let said = self.by.get(speaker).map_or_else(|| "nothing".to_owned(), Figures::brief);
+            let figures = self.by.get(speaker).filter(|figures| figures.has_frames());
+            let said = figures.map_or_else(|| "nothing".to_owned(), Figures::brief);
             format!("{name}{said}")
         };
         all.by.keys().map(one).collect()

@@ -110,7 +110,7 @@ impl Decoder {
         self.began = true;
         self.look_at(&held);
         if let Some(note) = self.note() {
-            out.event(&Event::remark(Place::Line(1), "log", note))?;
+            out.event(&remark(Place::Line(1), note))?;
         }
         held.iter().try_for_each(|burst| self.decode(burst, out))
     }
@@ -153,7 +153,7 @@ impl Decoder {
         let Some(shape) = self.blocks.goes_on(&piece.bytes, is_sound) else { return Ok(()) };
         let note = format!("from here on the log looks like {}", said(shape));
         self.misread.get_or_insert_with(|| format!("{note} (line {})", piece.line));
-        out.event(&Event::remark(self.place, "log", note))
+        out.event(&remark(self.place, note))
     }
 
     /// Returns where a block is: at its time, if the log has times; in update periods, if the period is known; otherwise by
@@ -216,6 +216,11 @@ impl Decoder {
         let address = Some(header.mac_id.get().into());
         Some(Event { position: position(report), address, happened, counted, ..event })
     }
+}
+
+/// Creates a remark about the log, which is also one of its events.
+fn remark(place: Place, what: String) -> Event {
+    Event { happened: vec![what.clone()], ..Event::remark(place, "log", what) }
 }
 
 /// Returns the actual position.
@@ -343,11 +348,10 @@ impl LogDecoder for Decoder {
                 }
                 _ => None,
             };
-            let happened = vec![finding.to_string()];
-            out.event(&Event { address, happened, ..Event::remark(self.place, "log", finding) })?;
+            out.event(&Event { address, ..remark(self.place, finding.to_string()) })?;
         }
         if self.blocks.is_open() {
-            out.event(&Event::remark(self.place, "log", "the log ends in the middle of a block"))?;
+            out.event(&remark(self.place, "the log ends in the middle of a block".to_owned()))?;
         }
         Ok(())
     }

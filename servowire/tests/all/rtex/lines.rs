@@ -93,9 +93,12 @@ fn blocks_that_become_longer() {
     let log = lines(1, turning(100).chain(wide)).join("\n");
     let run = bench.decode("log.txt", &log, &OPTIONS);
     assert!(run.err.contains("from here on the log looks like blocks of 32 bytes (line 320)"), "{}", run.err);
-    // Nobody says so: there are no figures but those of drives.
+    // Nobody says so: it is no frame.
     let figures = bench.decode("log.txt", &log, &[&OPTIONS[..], &["--stats"]].concat()).json();
-    assert!(!figures.is_empty() && figures.iter().all(|own| own["address"].is_number()), "{figures:?}");
+    let [nobodys, drives @ ..] = &figures[..] else { panic!() };
+    assert!(nobodys["events"][0]["what"].as_str().unwrap().starts_with("from here on"), "{nobodys}");
+    assert_eq!(["requests", "answers", "others"].map(|frames| nobodys[frames].as_u64()), [Some(0); 3]);
+    assert!(!drives.is_empty() && drives.iter().all(|own| own["address"].is_number()), "{figures:?}");
     let given = bench.decode("log.txt", &log, &[&OPTIONS[..], &["--block-size", "16"]].concat());
     assert!(!given.err.contains("from here on"), "{}", given.err);
     assert_eq!(given.json().iter().filter(|event| event["kind"] != "log").count(), 1_000);

@@ -141,3 +141,36 @@ fn a_block_in_two_lines_has_the_time_of_the_first() {
     let want: Vec<_> = (0..6).flat_map(|k| [500 * k, 500 * k + 30]).collect();
     assert_eq!(begins, want);
 }
+
+/// What the decoder says of the log itself is an event of nobody, above the figures of the drives, and no frame of it.
+#[test]
+fn what_is_said_of_a_log_is_one_of_its_events() {
+    let bench = Bench::new();
+    let bytes: Vec<u8> = (0..40).flat_map(|_| exchanges()).flat_map(|(c, r)| [c, r]).flatten().collect();
+    // Five bytes are missing after 100 blocks, and the last block is cut.
+    let hole = [&bytes[..1_600], &bytes[1_605..]].concat();
+    let stats = |log: &[u8], more: &[&str]| {
+        let options = ["--protocol", "rtex", "--record-size", "16", "--stats"];
+        bench.decode("log.bin", &log[..log.len() / 16 * 16], &[&options[..], more].concat())
+    };
+    let out = stats(&hole, &[]).out;
+    let (log, drives) = out.split_once("  address ").unwrap();
+    let [_, number, shape, end] = log.lines().collect::<Vec<_>>()[..] else { panic!("{log}") };
+    assert_eq!(number, "  events        2");
+    let from = "from here on the log looks like blocks of 16 bytes, the first of which begins at byte 11";
+    assert!(shape.starts_with("    line ") && shape.ends_with(from), "{shape}");
+    assert!(end.ends_with("the log ends in the middle of a block"), "{end}");
+    assert!(drives.contains("  frames ") && !drives.contains("the log "), "{drives}");
+    let json = stats(&hole, &["--json"]).json();
+    let [log, drives @ ..] = &json[..] else { panic!("{json:?}") };
+    assert!(log["address"].is_null() && drives.iter().all(|drive| drive["address"].is_number()));
+    assert_eq!(["requests", "answers", "others", "ok"].map(|frames| log[frames].as_u64()), [Some(0); 4]);
+    assert_eq!(log["events"][1]["what"], "the log ends in the middle of a block");
+    // A log of which there is nothing to say has no such part.
+    let out = stats(&bytes, &[]).out;
+    assert!(!out.contains("the log ") && out.lines().nth(1) == Some("  address 5"), "{out}");
+    // The shape that follows from NOPs before it.
+    let started = [[5_u8].into_iter().chain([0; 15]).cycle().take(16 * 300).collect(), bytes[5..].to_vec()].concat();
+    let out = stats(&started, &[]).out;
+    assert!(out.contains("\n    line         1  the log looks like blocks of 16 bytes, "), "{out}");
+}
