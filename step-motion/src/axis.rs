@@ -366,3 +366,13 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.ready(self.is_at_rest())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_gets_coarser_by_a_factor_of_two() {
+        assert_eq!([63, 4, 3].map(coarser), [4, 3, 2]);
+    }
+}

@@ -87,10 +87,9 @@ impl<const N: usize> Axis<'_, N> {
         (Queue::<N>::place(slot).filter(|_| current & IDLE == 0), slot)
     }
 
-    /// Returns whether a slot is one of the steps of the block that was linked last.
+    /// Returns whether a slot belongs to the block that was linked last.
     pub(super) fn is_in(&self, slot: usize) -> bool {
-        let out = |block: usize| self.out.get(block).map_or(0, |out| out.len);
-        Queue::<N>::place(slot).is_some_and(|(block, at)| block == self.block && at < out(block))
+        Queue::<N>::place(slot).is_some_and(|(block, _)| block == self.block)
     }
 
     /// Reads where the interrupt is. Returns whether the interrupt is in a stop that was not requested.
@@ -101,16 +100,18 @@ impl<const N: usize> Axis<'_, N> {
         (self.position, self.made) = (self.position.wrapping_add(since.into()), made);
         let (running, slot) = self.current();
         let Some((block, place)) = Queue::<N>::place(slot) else { return false };
-        if self.stage == Stage::Linked && block == self.block {
-            self.go_over();
+        if self.stage == Stage::Linked {
+            if block == self.block {
+                self.go_over();
+            } else if slot > self.joint {
+                self.miss();
+            }
         }
         if self.out.get(block).is_some_and(|out| place >= out.len) {
             if running.is_some() {
                 return true;
             }
             self.recover(block, slot);
-        } else if self.stage == Stage::Linked && block != self.block && slot > self.joint {
-            self.miss();
         }
         false
     }
@@ -143,7 +144,7 @@ impl<const N: usize> Axis<'_, N> {
         let Some(out) = self.out.get_mut(block) else { return };
         // The slot at which it has stopped now counts as one before the stop.
         out.len = usize::MAX;
-        (self.end, self.last) = (Writer { len: 0, ..out.rest }, slot);
+        (self.end, self.last) = (out.rest, slot);
         self.mover.rest_at(out.position, tick(self.end.end));
     }
 
@@ -218,17 +219,17 @@ impl<const N: usize> Axis<'_, N> {
         let lead = lead.checked_shl(self.missed).filter(|far| far.checked_shr(self.missed) == Some(lead));
         let Some(from) = lead.and_then(|lead| lead.checked_add(self.ends(block, place))) else { return };
         let Some(at) = (place..out.len.saturating_sub(1)).find(|at| mark(*at).end >= from) else { return };
-        let Mark { end, steps } = mark(at);
-        // The tick after the last step before it.
-        let (mut free, mut seen) = (out.free, 0);
-        for Mark { end, steps } in (0..=at).map(mark).filter(|mark| mark.end > 0) {
-            if steps > seen {
-                (free, seen) = (tick(out.begin.saturating_add(end.into())).saturating_add(1), steps);
-            }
-        }
-        let dir = self.end.dir.filter(|_| steps > 0);
+        let steps = mark(at).steps;
+        let time = |mark: Mark| out.begin.saturating_add(mark.end.into());
+        // The tick after the last step before it, and DIR there.
+        let (free, dir) = if steps == 0 {
+            (out.free, None)
+        } else {
+            let last = (0..=at).map(mark).find(|mark| mark.steps == steps);
+            (last.map_or(out.free, |last| tick(time(last)).saturating_add(1)), self.end.dir)
+        };
         self.joint = Queue::<N>::slot(block, at);
-        self.writer = Writer::new(out.begin.saturating_add(end.into()), dir);
+        self.writer = Writer::new(time(mark(at)), dir);
         self.work.back_to(out.steps.saturating_sub(steps), tick(self.writer.end), (free, dir));
     }
 
@@ -242,7 +243,7 @@ impl<const N: usize> Axis<'_, N> {
     /// Cuts a segment of the block.
     fn cut(&mut self) -> Work {
         let (now, before) = (tick(self.writer.end), self.writer.len);
-        if before > 0 && self.work.has_steps() && self.is_long_enough(now) {
+        if self.work.has_steps() && self.is_long_enough(now) {
             return Work::More;
         }
         let until = now.saturating_add(self.part());
@@ -258,8 +259,8 @@ impl<const N: usize> Axis<'_, N> {
             Cut::Later => self.writer.put_wait(to, i128::from(until.saturating_sub(BEFORE)) << 32),
             Cut::Rest => {
                 let over = i128::from(self.work.over().saturating_add(1)) << 32;
-                let least = if before == 0 { self.writer.end.saturating_add(2 * TICK) } else { over };
-                self.writer.put_wait(to, over.max(least));
+                // A block has at least one event.
+                self.writer.put_wait(to, over.max(self.writer.end.saturating_add(TICK)));
                 self.mark(before);
                 return self.complete(None);
             }
@@ -311,9 +312,9 @@ impl<const N: usize> Axis<'_, N> {
         let Some(out) = self.out.get(self.block) else { return };
         let end = u64::try_from(self.writer.end.saturating_sub(out.begin)).unwrap_or(0);
         for at in before..self.writer.len {
-            let end = if at.saturating_add(1) == self.writer.len { end } else { 0 };
+            let is_last = at.saturating_add(1) == self.writer.len;
             if let Some(mark) = self.marks.get_mut(Queue::<N>::slot(self.block, at)) {
-                *mark = Mark { end, steps: out.steps };
+                *mark = if is_last { Mark { end, steps: out.steps } } else { Mark::default() };
             }
         }
     }

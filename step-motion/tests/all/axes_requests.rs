@@ -190,6 +190,32 @@ fn a_background_that_is_late_costs_a_stop_and_no_step() {
     }
 }
 
+/// At 100 MHz and 200,000 steps/s²: how far from that the speed changes from step to step of a stop that nobody asked for, if times
+/// are right to 25 ns.
+#[test]
+fn a_stop_is_as_exact_as_all_steps_if_that_is_asked_for() {
+    let hz = 100_000_000;
+    let worst = |exact: bool| {
+        let axis = AxisSetup::new(Limits::new(20_000, 200_000).unwrap(), 80_000);
+        let path = Path::<1, 4>::new(Clock::new(hz).unwrap(), [axis], 20).unwrap();
+        let queue: &'static AxesQueue<1, SLOTS> = Box::leak(Box::default());
+        let (axes, timer) = Axes::new(queue, path);
+        let (mut axes, mut machine) = (if exact { axes.with_exact_stops() } else { axes }, Machine::new(timer));
+        axes.push([100_000], 250_000).unwrap();
+        machine.run(&mut axes, 100_000, 15_000_000);
+        machine.drain();
+        let worst = machine.steps.windows(3).map(|step| {
+            let [first, second] =
+                [step[1].0 - step[0].0, step[2].0 - step[1].0].map(|ticks| f64::from(hz) / ticks as f64);
+            let noise = (first.powi(2) + second.powi(2)) * 50e-9;
+            (second - first).abs() / (200_000.0 * (step[2].0 - step[0].0) as f64 / 2.0 / f64::from(hz) + noise)
+        });
+        worst.fold(0.0, f64::max)
+    };
+    let (exact, coarse) = (worst(true), worst(false));
+    assert!(exact < 1.005 && coarse > 1.03, "{exact}, {coarse}");
+}
+
 /// A stop that nobody asked for lasts until the machine is at rest, which is later than its last step: next motion may begin then.
 #[test]
 fn a_stop_lasts_until_rest() {

@@ -53,7 +53,9 @@ fn an_axis_is_at_rest_when_nothing_is_to_come() {
     // From slice to slice and event to event, until the last step has been made.
     while bench.at() < 100 {
         assert!(!bench.axis.is_at_rest(), "at {}", bench.at());
-        if bench.machine.slice(&mut bench.axis) != Work::More {
+        let work = bench.machine.slice(&mut bench.axis);
+        assert_ne!(work, Work::Start, "it runs");
+        if work != Work::More {
             let next = bench.machine.compare.unwrap();
             bench.machine.until(next);
         }
@@ -114,6 +116,80 @@ fn each_halt_is_confirmed_by_the_interrupt() {
     bench.axis.move_to(at + 5).unwrap();
     bench.until(800_000);
     assert_eq!(bench.at(), at + 5);
+}
+
+/// What is ready is not made yet; what has been made is known before the background is called.
+#[test]
+fn an_axis_is_at_rest_when_the_interrupt_has_come_to_the_end() {
+    let mut bench = Bench::new();
+    for to in [30, 0, 7, 90] {
+        bench.axis.move_to(to).unwrap();
+        while bench.axis.poll() == Work::More {}
+        assert!(!bench.axis.is_at_rest(), "before the first event of the way to {to}");
+        bench.machine.fire();
+        bench.machine.drain();
+        assert!(bench.axis.is_at_rest() && bench.at() == to);
+    }
+    bench.axis.halt();
+    assert!(!bench.axis.is_at_rest(), "the interrupt has not seen the halt");
+}
+
+/// While the timer runs nobody asks for its start.
+#[test]
+fn a_timer_that_runs_is_not_started() {
+    let mut bench = Bench::new();
+    bench.axis.move_to(2000).unwrap();
+    bench.until(100);
+    while let Some(next) = bench.machine.compare {
+        assert_ne!(bench.machine.slice(&mut bench.axis), Work::Start);
+        bench.machine.until(next);
+    }
+    assert_eq!(bench.at(), 2000);
+}
+
+#[test]
+fn a_quick_stop_is_shorter_and_lasts_until_rest() {
+    let ends = [None, Some(40_000), Some(800_000)].map(|quick| {
+        let mut bench = Bench::new();
+        bench.axis.run(Direction::Forward, 8000).unwrap();
+        bench.until(300_000);
+        let before = bench.at();
+        match quick {
+            None => bench.axis.stop(),
+            Some(a) => {
+                bench.axis.quick_stop(Limits::new(8000, a).unwrap());
+                assert_eq!(bench.axis.move_to(0), Err(Error::Moving));
+                assert_eq!(bench.axis.run(Direction::Reverse, 100), Err(Error::Moving));
+            }
+        }
+        bench.until(600_000);
+        assert!(bench.axis.is_at_rest() && !bench.axis.is_halted());
+        let way = bench.at() - before;
+        bench.axis.move_to(0).unwrap();
+        bench.until(2_000_000);
+        assert_eq!(bench.at(), 0);
+        way
+    });
+    // 8000 steps/s: 400 steps at 80,000 steps/s², 40 at ten times of that, and at most 20 ms of reaction.
+    assert!((400..=562).contains(&ends[0]) && ends[0] == ends[1], "{ends:?}");
+    assert!((359..=361).contains(&(ends[0] - ends[2])), "{ends:?}");
+}
+
+#[test]
+fn a_position_is_set_at_rest_and_targets_are_counted_from_it() {
+    let mut bench = Bench::new();
+    bench.axis.move_to(500).unwrap();
+    bench.until(100_000);
+    assert_eq!(bench.axis.set_commanded(0), Err(Error::Moving));
+    assert_eq!(bench.axis.commanded(), bench.at());
+    bench.until(1_000_000);
+    assert_eq!((bench.at(), bench.axis.set_commanded(-20)), (500, Ok(())));
+    assert_eq!(bench.axis.commanded(), -20);
+    // The machine counts on from 500.
+    bench.machine.position = [-20];
+    bench.axis.move_to(10).unwrap();
+    bench.until(2_000_000);
+    assert_eq!((bench.at(), bench.axis.commanded()), (10, 10));
 }
 
 /// An interrupt that comes although nothing is to be made.

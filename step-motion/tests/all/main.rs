@@ -3,6 +3,7 @@
 #![allow(clippy::cast_sign_loss, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 mod axes_requests;
+mod axis_blocks;
 mod axis_requests;
 mod bounds;
 mod brakes;

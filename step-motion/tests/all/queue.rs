@@ -217,10 +217,15 @@ fn a_stop_that_nobody_asked_for_is_exact_if_that_is_asked_for() {
     let limits = limits(20_000, 200_000, 0);
     let worst = |exact: bool| {
         let mut worst = 0.0;
-        for at in (10..160).step_by(7) {
+        for (at, short) in (50..200).step_by(7).zip([false, true].into_iter().cycle()) {
             let queue: &'static Queue<513> = Box::leak(Box::default());
             let (axis, mut timer) = Axis::new(queue, Clock::new(hz).unwrap(), limits).unwrap();
             let mut axis = if exact { axis.with_exact_stops() } else { axis };
+            if short {
+                // The first stop has few slots.
+                axis.run(Direction::Forward, 200).unwrap();
+                while axis.poll() == Work::More {}
+            }
             axis.run(Direction::Forward, 20_000).unwrap();
             let (mut now, mut steps) = (0_u64, Vec::new());
             loop {

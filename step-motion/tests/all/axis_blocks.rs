@@ -1,0 +1,229 @@
+//! Where a request meets what has been handed out: nothing of it is lost, late or too near, whatever the interrupt has made of it.
+
+use step_motion::{Axis, Clock, Direction, Limits, Queue, StepTimer, Work};
+
+use crate::machine;
+
+const MOST: u32 = 2_000_000_000;
+
+struct Bench<const S: usize> {
+    axis: Axis<'static, S>,
+    machine: machine::Machine<StepTimer<'static, S>, 1>,
+}
+
+impl<const S: usize> Bench<S> {
+    /// At 1 MHz, with a reach in us.
+    fn new(speed: u32, acceleration: u32, reach: u32) -> Self {
+        let queue: &'static Queue<S> = Box::leak(Box::default());
+        let limits = Limits::new(speed, acceleration).unwrap();
+        let (axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits).unwrap();
+        Self { axis: axis.with_reach(reach), machine: machine::Machine::new(timer) }
+    }
+
+    fn until(&mut self, every: u64, time: u64) {
+        assert_ne!(self.machine.run(&mut self.axis, every, time), Work::TooFewSlots);
+        self.machine.until(time);
+    }
+
+    fn at(&self) -> i64 {
+        self.machine.position[0]
+    }
+}
+
+/// 20 steps/s, and no way to rest: the steps that had been handed out behind the request are not made.
+#[test]
+fn a_hold_without_a_step_takes_back_those_behind_it() {
+    let mut bench = Bench::<129>::new(20, MOST, 100_000);
+    bench.axis.move_to(12).unwrap();
+    bench.until(20_000, 60_000);
+    bench.axis.hold();
+    bench.until(20_000, 2_000_000);
+    // Twice the reach.
+    assert!(bench.at() <= 6 && bench.axis.is_at_rest(), "{}", bench.at());
+    bench.axis.resume();
+    bench.until(20_000, 4_000_000);
+    assert_eq!(bench.at(), 12);
+}
+
+/// A background that has not been called for a while hears of a quick stop: at full speed it is within the reaction, without the 1000
+/// steps of the other stop.
+#[test]
+fn a_quick_stop_without_a_step_is_in_time_before_the_other_stop() {
+    let late = || {
+        let mut bench = Bench::<129>::new(20_000, 200_000, 10_000);
+        bench.axis.run(Direction::Forward, 20_000).unwrap();
+        bench.until(5000, 200_000);
+        bench
+    };
+    let mut alone = late();
+    alone.machine.drain();
+    let (mut in_time, stops) = (0, alone.at() - 1002);
+    for at in (200_000..300_000).step_by(311) {
+        let mut bench = late();
+        bench.machine.until(at);
+        let made = bench.at();
+        bench.axis.quick_stop(Limits::new(20_000, MOST).unwrap());
+        bench.until(2500, at + 400_000);
+        assert!(bench.axis.is_at_rest());
+        if made < stops {
+            in_time += 1;
+            assert!(bench.at() - made <= 402, "{at}: {} steps", bench.at() - made);
+        }
+    }
+    assert!(in_time > 50, "{in_time}");
+}
+
+/// After a stop that nobody asked for, a request without steps leaves nothing to start.
+#[test]
+fn a_stop_after_a_stop_is_a_rest() {
+    for ask in [Axis::stop, Axis::hold] {
+        let mut bench = Bench::<129>::new(20_000, 200_000, 10_000);
+        bench.axis.run(Direction::Forward, 20_000).unwrap();
+        bench.until(5000, 200_000);
+        bench.machine.drain();
+        ask(&mut bench.axis);
+        assert!(bench.axis.is_at_rest());
+        assert_eq!(bench.machine.slice(&mut bench.axis), Work::Rest);
+    }
+}
+
+/// 1000 steps/s, and no way to rest, with a reaction that is shorter than an interval: back after a step as soon as may be, and not
+/// before.
+#[test]
+fn a_way_back_begins_behind_the_last_step() {
+    for at in 20_000..22_000 {
+        let mut bench = Bench::<129>::new(1000, MOST, 64);
+        bench.axis.run(Direction::Forward, 1000).unwrap();
+        bench.until(20, at);
+        let made = bench.machine.steps.len();
+        bench.axis.run(Direction::Reverse, 1000).unwrap();
+        bench.until(20, at + 4000);
+        let back = bench.machine.steps.iter().position(|step| step.2 < 0).unwrap();
+        assert!(back <= made + 1);
+        let (last, first) = (bench.machine.steps[back - 1].0, bench.machine.steps[back].0);
+        let soon = (last + 1000).max(at + 2 * 64 + 500);
+        assert!((last + 999..=soon + 2).contains(&first), "{at}: {first} after {last}");
+    }
+}
+
+/// From rest, before the first step and before or after the change of DIR: DIR is right at each step, which the machine checks.
+#[test]
+fn a_request_before_the_first_step_of_a_way_back() {
+    for at in (300_000..360_000).step_by(977) {
+        for to in [-200, 300] {
+            let mut bench = Bench::<129>::new(2000, 1000, 10_000);
+            bench.axis.move_to(5).unwrap();
+            bench.until(2000, 300_000);
+            assert!(bench.axis.is_at_rest());
+            bench.axis.move_to(-100).unwrap();
+            bench.until(2000, at);
+            bench.axis.move_to(to).unwrap();
+            bench.until(2000, 3_000_000);
+            assert_eq!(bench.at(), to, "{at}");
+        }
+    }
+}
+
+/// A change of DIR takes 1 s; the same direction takes none, whether the axis was held or has stopped by itself.
+#[test]
+fn a_pause_is_for_a_change_of_direction() {
+    for late in [false, true] {
+        let mut bench = Bench::<129>::new(20, MOST, 20_000);
+        bench.axis = bench.axis.with_reversal_pause(1_000_000);
+        bench.axis.run(Direction::Forward, 20).unwrap();
+        bench.until(5000, 220_000);
+        if late {
+            bench.machine.drain();
+        } else {
+            bench.axis.hold();
+            bench.until(5000, 400_000);
+            assert!(bench.axis.is_at_rest());
+            bench.axis.resume();
+        }
+        let (now, made) = (bench.machine.now, bench.at());
+        bench.until(5000, now + 150_000);
+        assert!(bench.at() >= made + 2, "{late}: {} steps", bench.at() - made);
+        bench.axis.run(Direction::Reverse, 20).unwrap();
+        let turned = bench.machine.now;
+        bench.until(5000, turned + 1_500_000);
+        let back = bench.machine.steps.iter().find(|step| step.2 < 0).unwrap().0;
+        assert!((turned + 950_000..turned + 1_150_000).contains(&back), "{late}: {}", back - turned);
+    }
+}
+
+/// A slice takes 100 us: a block is ready too late for the nearest joint, so one farther ahead is taken, without a stop.
+#[test]
+fn a_slow_background_finds_a_joint_farther_ahead() {
+    let mut bench = Bench::<257>::new(20_000, 2_000_000, 10_000);
+    let go = |bench: &mut Bench<257>, time: u64| {
+        while bench.machine.now < time {
+            let work = bench.machine.slice(&mut bench.axis);
+            assert!(matches!(work, Work::More | Work::Later), "{work:?}");
+            bench.machine.until(bench.machine.now + 100);
+        }
+    };
+    bench.axis.run(Direction::Forward, 20_000).unwrap();
+    go(&mut bench, 200_000);
+    for percent in [50, 100, 50, 100] {
+        bench.axis.set_override(percent);
+        let now = bench.machine.now;
+        go(&mut bench, now + 100_000);
+        let before = bench.at();
+        go(&mut bench, now + 110_000);
+        let made = bench.at() - before;
+        assert!((made - 2 * i64::from(percent)).abs() <= 1, "{percent} %: {made}");
+    }
+    let worst = bench.machine.steps.windows(2).skip(200).map(|pair| pair[1].0 - pair[0].0).max();
+    assert!(worst <= Some(102), "{worst:?}");
+}
+
+/// Blocks of 11 slots, which these moves fill to the last one.
+#[test]
+fn a_move_that_just_fits_is_made() {
+    for (speed, acceleration) in [(2000, 20_000), (20_000, 1_000_000)] {
+        for to in 1..100 {
+            let mut bench = Bench::<23>::new(speed, acceleration, 10_000);
+            bench.axis.move_to(to).unwrap();
+            while bench.at() < to {
+                let work = bench.machine.slice(&mut bench.axis);
+                assert!(matches!(work, Work::More | Work::Later), "{work:?} at {} of {to}", bench.at());
+                if work == Work::Later {
+                    bench.machine.until(bench.machine.now + 2000);
+                }
+            }
+        }
+    }
+}
+
+/// Blocks of 4 slots: a wait, DIR, a step, and a wait to rest.
+#[test]
+fn a_step_back_fills_the_smallest_block() {
+    for acceleration in (50_000..200_000).step_by(5000) {
+        let mut bench = Bench::<9>::new(2000, acceleration, 10_000);
+        for to in [1, 0, 1, 0] {
+            bench.axis.move_to(to).unwrap();
+            while bench.at() != to {
+                assert_ne!(bench.machine.slice(&mut bench.axis), Work::TooFewSlots, "{acceleration}");
+                bench.machine.until(bench.machine.now + 500);
+            }
+            bench.machine.drain();
+        }
+    }
+}
+
+/// Rest is later than the last step of a stop: what the speed there takes at 80,000 steps/s².
+#[test]
+fn a_stop_lasts_until_rest() {
+    let (mut waits, mut wants) = (0.0, 0.0);
+    for at in (300_000..302_000).step_by(97) {
+        let mut bench = Bench::<129>::new(8000, 80_000, 10_000);
+        bench.axis.run(Direction::Forward, 8000).unwrap();
+        bench.until(500, at);
+        bench.machine.drain();
+        let [.., before, last] = bench.machine.steps[..] else { panic!("no steps") };
+        let gap = (last.0 - before.0) as f64 / 1e6;
+        wants += f64::max(0.0, 1.0 / gap / 80_000.0 - gap / 2.0);
+        waits += (bench.machine.now - last.0) as f64 / 1e6;
+    }
+    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s behind the last steps, {wants} s are needed");
+}
