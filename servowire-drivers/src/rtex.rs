@@ -18,8 +18,8 @@
 //! again, looks at [`FrameCount`] before and after, and reads once more if the blocks were not of one frame. If that fails
 //! again, every block is read a third time, and one whose echo has changed is not taken, because it may be the halves of two; of
 //! the others, each axis takes its block only if it is on time ([`Arrival`]). If the receive
-//! interrupt came meanwhile, none is taken: with two communications per update period, two frames have the same counter. System
-//! Design Guide for Master, chapters 1 and 2.
+//! interrupt came meanwhile, or XSYNC by the clock, none is taken: two frames have the same counter if there are two
+//! communications per update period, or if an exchange was late. System Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
 //! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place
@@ -34,6 +34,7 @@ mod port;
 use core::convert::Infallible;
 
 use rtex_block::master::{Arrival, Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
+use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, pack};
 use servowire_core::{ClockCheck, ClockError};
 
@@ -199,7 +200,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         {
             self.began_ns = Some(began_ns);
         }
-        let Read { heard, torn, fault } = self.read();
+        let Read { heard, torn, fault, clock } = self.read(began_ns);
         let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
@@ -214,6 +215,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.late = self.late.saturating_add(frames_late.is_ok_and(|frames| frames > 0).into());
         fault.map_or(Ok(()), Err)?;
         written.map_err(Error::Io)?;
+        clock.map_or(Ok(()), Err)?;
         Ok(Exchanged { frames_late: frames_late?, torn })
     }
 
@@ -223,11 +225,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// Reads the blocks of one frame, if possible; otherwise those that are surely not halves of two.
-    fn read(&mut self) -> Read<P, N> {
-        let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None };
-        let mut frames = self.received.get();
+    fn read(&mut self, began_ns: u64) -> Read<P, N> {
+        let mut read = Read { heard: [Heard::Nothing; N], torn: false, fault: None, clock: None };
+        let mut bank = (0, 0);
         for _ in 0..READS {
-            frames = self.received.get();
+            bank = self.bank(began_ns, &mut read.clock);
             read.fault = None;
             for (place, heard) in read.heard.iter_mut().enumerate() {
                 *heard = self.block(place).unwrap_or_else(|fault| {
@@ -236,7 +238,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
                 });
             }
             let mixed = self.master.ring().is_torn(&read.heard) || self.has_changed(&read.heard);
-            read.torn = mixed || self.received.get() != frames;
+            read.torn = mixed || self.bank(began_ns, &mut read.clock) != bank;
             if !read.torn {
                 return read;
             }
@@ -246,11 +248,25 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
                 *heard = Heard::Nothing;
             }
         }
-        if self.received.get() != frames {
+        if self.bank(began_ns, &mut read.clock) != bank {
             // They may look like one frame and are not.
             read.heard = [Heard::Nothing; N];
         }
         read
+    }
+
+    /// Returns what is another number once the bank may have been switched: the frames that have come and, if the ASIC switches it,
+    /// those that have begun.
+    fn bank(&mut self, began_ns: u64, fault: &mut Option<ClockError>) -> (u32, u32) {
+        let begun = match self.master.config().timer {
+            TimerSystem::External => Ok(0),
+            TimerSystem::Internal => self.frames_since(began_ns),
+        };
+        let begun = begun.unwrap_or_else(|error| {
+            fault.get_or_insert(error);
+            u32::MAX
+        });
+        (self.received.get(), begun)
     }
 
     /// Returns the number of frames that have begun since the one at `began_ns`.
@@ -306,6 +322,7 @@ struct Read<P: Port, const N: usize> {
     heard: [Heard; N],
     torn: bool,
     fault: Option<Failure<P>>,
+    clock: Option<ClockError>,
 }
 
 /// Returns as many of these words as a block has.

@@ -117,6 +117,42 @@ fn a_late_interrupt_mixes_no_frames() {
     assert!(mixed > 150, "{mixed}");
 }
 
+/// Two exchanges in a row are late, so two frames carry the same commands and bring the same echoes, and XSYNC switches the bank in the
+/// middle of the second exchange: its clock tells what the echoes cannot.
+#[test]
+fn frames_with_the_same_echoes_are_not_mixed_either() {
+    let ring = Ring::new(false, false);
+    let mut driver = on::<u16>(&ring);
+    let words = (AXES + 1) * 8;
+    let mut twice = 0;
+    for at in 0..words {
+        ring.borrow_mut().stall_in = Some((words as u32, 499_000));
+        assert_eq!(update(&ring, &mut driver).unwrap().frames_late, 1);
+        // The interrupt of the frame that has begun meanwhile was waiting.
+        let began_ns = {
+            let mut ring = ring.borrow_mut();
+            (ring.in_exchange, ring.stall_in) = (true, Some((at as u32, 499_000)));
+            ring.read_of.clear();
+            ring.next_frame_ns() - COM_NS
+        };
+        let exchanged = driver.exchange(began_ns).unwrap();
+        let read = {
+            let mut ring = ring.borrow_mut();
+            (ring.in_exchange, ring.stall_in) = (false, None);
+            ring.let_in();
+            std::mem::take(&mut ring.read_of)
+        };
+        let taken = &read[read.len() - words..][..AXES * 8];
+        assert!(taken.iter().all(|frame| *frame == taken[0]), "{at}: {read:?}");
+        assert_eq!((exchanged.torn, driver.master().ring().failure()), (false, None), "{at}");
+        twice += usize::from(read.len() > words);
+        for _ in 0..4 {
+            update(&ring, &mut driver).unwrap();
+        }
+    }
+    assert!(twice > words / 2, "{twice}");
+}
+
 /// One drive that answers at once, at an ASIC that receives a frame in every reading, while it is `busy`.
 struct Restless<'a> {
     frames: &'a FrameCount,
