@@ -12,7 +12,8 @@ pub(super) const TURN: u8 = 4;
 pub enum Arrival {
     /// The block has the expected echo, which is as far behind the last counter sent as in every exchange of this system.
     OnTime,
-    /// The block has the echo of the previous one: no frame came, or the drive has stopped.
+    /// The block has the echo of the previous one: no frame came, or the drive has stopped. Also the first block after four
+    /// periods or more without one: it may be as old as they are.
     Repeated,
     /// The block has the echo of another period: the answer is late or belongs to the next frame, or the wrong bank was read.
     OffTime {
@@ -50,6 +51,8 @@ pub struct EchoWatch {
     /// Number of samples since the last one on time.
     updates: u16,
     last: Option<UpdateCounter>,
+    /// Number of samples without a block since the last block.
+    unseen: u8,
     lag: Option<u8>,
     /// A different lag that was seen, and how many times in a row.
     other: u8,
@@ -61,7 +64,7 @@ pub struct EchoWatch {
 impl EchoWatch {
     /// Creates a watch that trips after `limit` samples without a new echo.
     pub const fn new(limit: NonZeroU16) -> Self {
-        Self { limit, updates: 0, last: None, lag: None, other: 0, seen: 0, sure: 0 }
+        Self { limit, updates: 0, last: None, unseen: 0, lag: None, other: 0, seen: 0, sure: 0 }
     }
 
     /// Takes a sample without knowing the counter sent; `None` if the update period brought no block from the drive, which
@@ -83,11 +86,18 @@ impl EchoWatch {
         learns: bool,
     ) -> Arrival {
         let arrival = match echo {
-            None => Arrival::Missing,
-            Some(echo) if self.last == Some(echo) => Arrival::Repeated,
+            None => {
+                self.unseen = self.unseen.saturating_add(1);
+                Arrival::Missing
+            }
             Some(echo) => {
-                self.last = Some(echo);
-                self.place(sent.get().wrapping_sub(echo.get()) & 3, missed, learns)
+                let is_proof = self.last != Some(echo) && self.unseen < TURN;
+                (self.last, self.unseen) = (Some(echo), 0);
+                if is_proof {
+                    self.place(sent.get().wrapping_sub(echo.get()) & 3, missed, learns)
+                } else {
+                    Arrival::Repeated
+                }
             }
         };
         self.count(arrival == Arrival::OnTime);
@@ -248,6 +258,25 @@ mod tests {
                 let arrival = watch.judge(counter(10), Some(counter(10 - found)), missed, false);
                 assert_eq!(arrival == Arrival::OnTime, lags.contains(&found), "{missed} {found}: {arrival}");
             }
+        }
+    }
+
+    /// By hand: a block that stands in the memory since echo 2 has the echo of a new one again after four periods in which it could not be
+    /// read, and after eight. After less than four its echo says that it is new.
+    #[test]
+    fn the_first_block_after_a_turn_without_one_proves_nothing() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        for unread in 1..12 {
+            let mut watch = EchoWatch::new(NonZeroU16::new(99).unwrap());
+            let mut at = |sent: u8, echo: Option<u8>| watch.judge(counter(sent), echo.map(counter), 0, false);
+            assert_eq!([0, 1, 2].map(|n: u8| at(n + 1, Some(n))), [Arrival::OnTime; 3]);
+            for n in 3..3 + unread {
+                assert_eq!(at(n + 1, None), Arrival::Missing);
+            }
+            let n = 3 + unread;
+            let first = if unread < 3 { Arrival::OnTime } else { Arrival::Repeated };
+            assert_eq!(at(n + 1, Some(n)), first, "{unread}");
+            assert_eq!(at(n + 2, Some(n + 1)), Arrival::OnTime, "{unread}");
         }
     }
 
