@@ -57,7 +57,7 @@ pub struct Axis {
     evidence: Evidence,
     watch: EchoWatch,
     arrival: Arrival,
-    /// Number of update periods without an exchange before the last one.
+    /// Number of update periods without an exchange before the last one, or since the last block if that brought none.
     missed: u8,
     /// The low half of the end of the last update period, ns.
     heard_ns: u32,
@@ -223,9 +223,9 @@ impl Axis {
     /// while invalid data are sent.
     pub fn hear(&mut self, sent: Turn, heard: &Heard, end_ns: u64) {
         let response = self.sound(heard);
-        self.missed = self.missed(end_ns);
+        let missed = self.missed(end_ns);
         let Turn::Valid(sent) = sent else {
-            self.arrival = Arrival::Missing;
+            (self.arrival, self.missed) = (Arrival::Missing, 0);
             if let Some(response) = response {
                 // The counter stands still in invalid data, so nothing says when this is from.
                 self.watch.note(response.update_counter_echo);
@@ -234,7 +234,9 @@ impl Axis {
             return self.rest();
         };
         let echo = response.map(|response| response.update_counter_echo);
-        self.arrival = self.watch.judge(sent, echo, self.missed, !self.state.is_servo_on());
+        let since = if self.arrival == Arrival::Missing { self.missed } else { 0 };
+        self.missed = missed.max(since);
+        self.arrival = self.watch.judge(sent, echo, missed, !self.state.is_servo_on());
         let on_time = response.filter(|_| self.arrival == Arrival::OnTime);
         self.supervise(response, on_time);
         self.serve(on_time);

@@ -204,6 +204,36 @@ fn a_block_after_a_gap_may_be_as_old_as_the_gap() {
     }
 }
 
+/// Where an answer takes one period more, the frames of a gap bring the echo that is due in the exchange after next. If the next one
+/// brings no block, the one after it cannot know from which of them its block is.
+#[test]
+fn a_gap_is_remembered_until_a_block_comes() {
+    let counter = |n: u64| Turn::Valid(UpdateCounter::truncate(n as u8));
+    let block = |echo: u64| -> Heard {
+        Response::parse(&[0x89 | (echo as u8 & 3) << 5, 0x20, 0x40, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]).into()
+    };
+    for unread in 1..3 {
+        let mut axis = Hand::new(ActiveCode::CyclicPosition).axis;
+        axis.hear(Turn::Invalid, &Heard::Nothing, 99 * PERIOD_NS);
+        let mut exchange = |at: u64, sent: u64, heard: Heard| {
+            axis.hear(counter(sent), &heard, at * PERIOD_NS);
+            let sampled_ns = axis.evidence().at(0, Policy::new(u64::MAX)).map(|sample| sample.sampled_ns() / PERIOD_NS);
+            (axis.arrival(), sampled_ns, axis.can_switch_on())
+        };
+        for n in 100..120 {
+            exchange(n, n - 1, block(n - 2));
+        }
+        // The exchange of 120 is left out, so the frame of 120 carries 119 once more, and those of `unread` are not read.
+        for n in 121..121 + unread {
+            assert_eq!(exchange(n, n - 2, Heard::Nothing).0, Arrival::Missing);
+        }
+        let n = 121 + unread;
+        let old = exchange(n, n - 2, block(n - 3));
+        assert_eq!(old, (Arrival::OnTime, Ok(120), Err(SwitchOnError::OldPosition)), "{unread}");
+        assert_eq!(exchange(n + 1, n - 1, block(n - 2)), (Arrival::OnTime, Ok(n + 1), Ok(())), "{unread}");
+    }
+}
+
 /// While nobody calls, the command position stands still on the wire. A stop afterwards does not move the axis again, but after one
 /// or two periods it goes on, as after frames that were lost.
 #[test]
