@@ -221,7 +221,7 @@ fn a_gap_is_remembered_until_a_block_comes() {
             (axis.arrival(), sampled_ns, axis.can_switch_on())
         };
         for n in 100..120 {
-            exchange(n, n - 1, block(n - 2));
+            _ = exchange(n, n - 1, block(n - 2));
         }
         // The exchange of 120 is left out, so the frame of 120 carries 119 once more, and those of `unread` are not read.
         for n in 121..121 + unread {
