@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use super::{Axes, Out, PUT_OFF, Stage};
+use super::{Axes, PUT_OFF, Stage};
 use crate::axes_timer::{TURN, TURNS};
 use crate::axis::Work;
 use crate::cutter::Demand;
@@ -96,7 +96,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     pub(super) fn publish(&mut self, end: u64) {
         let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
         if let Some(out) = self.outs.get_mut(self.block) {
-            *out = Out { valid: true, end, dirs: dirs(self.writers), ..*out };
+            (out.valid, out.end, out.dirs) = (true, end, dirs(self.writers));
         }
         for ((made, after), before) in self.made.iter_mut().zip(self.work.commanded()).zip(self.path.commanded()) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "modulo 2^32")]

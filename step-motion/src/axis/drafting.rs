@@ -396,7 +396,7 @@ impl<const N: usize> Axis<'_, N> {
         }
         let (position, rest) = stop.unwrap_or((self.work.commanded(), self.writer));
         if let Some(out) = self.out.get_mut(self.block) {
-            *out = Out { len, position, rest, brakes: stop.is_some(), ..*out };
+            (out.len, out.position, out.rest, out.brakes) = (len, position, rest, stop.is_some());
         }
         (self.stage, self.stop) = (Stage::Ready, None);
         Work::More

@@ -165,6 +165,21 @@ fn a_halt_is_confirmed_by_the_interrupt() {
     assert!(!bench.axes.is_halted());
 }
 
+/// All of the line is handed out, and half of it is made: the motor is moving.
+#[test]
+fn a_halt_behind_the_end_of_what_is_planned() {
+    let mut bench = Bench::new();
+    bench.axes.push([40, 0], 100_000).unwrap();
+    while bench.x() < 20 {
+        while bench.axes.poll() == Work::More {}
+        if let Some(next) = bench.machine.compare { bench.machine.until(next) } else { bench.machine.fire() }
+    }
+    assert!(bench.axes.poll() != Work::More);
+    bench.axes.halt();
+    bench.until(1_000_000, true);
+    assert!(bench.axes.is_halted() && bench.x() == 20);
+}
+
 /// Without a background the machine comes to rest, and goes on from there.
 #[test]
 fn a_background_that_is_late_costs_a_stop_and_no_step() {

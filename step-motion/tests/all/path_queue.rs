@@ -295,7 +295,8 @@ fn a_hold_and_an_override_act_within_twice_the_reach() {
 #[test]
 fn a_line_is_not_lost_whenever_it_comes() {
     let mut stops = 0;
-    for slices in 0..300 {
+    // Alone, and with the background until it waits for the interrupt.
+    for (slices, more) in (0..300).flat_map(|slices| [(slices, false), (slices, true)]) {
         let (mut axes, mut machine) = quick_axes();
         axes.push([300, 40, 0], 250_000).unwrap();
         for _ in 0..slices {
@@ -304,6 +305,7 @@ fn a_line_is_not_lost_whenever_it_comes() {
             }
         }
         axes.push([600, 0, 30], 250_000).unwrap();
+        while more && machine.slice(&mut axes) == Work::More {}
         machine.drain();
         stops += u32::from(machine.position != [300, 40, 0] && machine.position != [0; N]);
         run(&mut axes, &mut machine, 1000, u64::MAX);
@@ -312,16 +314,19 @@ fn a_line_is_not_lost_whenever_it_comes() {
     assert!(stops > 50, "{stops}");
 }
 
-/// Whether two lines are refused with `S` slots an axis. Refused or not, every step that the background knows of has been made.
-fn refused_with_slots<const S: usize>() -> bool {
+/// Whether two lines are refused with `S` slots an axis and a reach. Refused or not, every step that the background knows of has been
+/// made.
+fn refused_with_slots<const S: usize>(reach: u32, exact: bool) -> bool {
     let queue: &'static AxesQueue<N, S> = Box::leak(Box::default());
     let setup = AxisSetup::new(limits(20_000, 200_000, 4_000_000), 80_000);
-    let (mut axes, timer) = Axes::new(queue, path(1_000_000, [setup; N], 20));
+    let (axes, timer) = Axes::new(queue, path(1_000_000, [setup; N], 20));
+    let mut axes = if exact { axes.with_exact_stops() } else { axes }.with_reach(reach);
     let mut machine = machine::Machine::<_, N>::new(timer);
     axes.push([3000, 211, 7], 250_000).unwrap();
     axes.push([3000, 900, 7], 250_000).unwrap();
     let mut refused = false;
-    loop {
+    for slices in 0.. {
+        assert!(slices < 100_000, "it does not end");
         match machine.slice(&mut axes) {
             Work::More | Work::Start => {}
             Work::Later => machine.until(machine.compare.unwrap()),
@@ -336,8 +341,33 @@ fn refused_with_slots<const S: usize>() -> bool {
 
 #[test]
 fn few_slots_cost_exactness_and_never_a_step() {
-    assert!(refused_with_slots::<9>());
-    // Either is right between them.
-    let _ = [refused_with_slots::<15>(), refused_with_slots::<61>(), refused_with_slots::<129>()];
-    assert!(!refused_with_slots::<257>());
+    // Halved until it is less than 4 ticks: 6000 becomes 5 and 2, 10,000 becomes 4.
+    for reach in [6000, 10_000] {
+        assert!(refused_with_slots::<9>(reach, false));
+        assert!(refused_with_slots::<17>(reach, false));
+        // Either is right between them.
+        let _ = [refused_with_slots::<61>(reach, false), refused_with_slots::<129>(reach, false)];
+        assert!(!refused_with_slots::<257>(reach, false));
+        // Where an exact stop does not fit, a coarser one does.
+        assert!(!refused_with_slots::<129>(reach, true));
+    }
+    // A second is more than the slots hold: a shorter block is made.
+    assert!(!refused_with_slots::<129>(1_000_000, false));
+}
+
+/// A step in 100 ticks at constant speed, and blocks that end at any of these ticks: no step waits for the end of a block.
+#[test]
+fn the_end_of_a_block_moves_no_step() {
+    let setup = AxisSetup::new(limits(10_000, 1_000_000, 0), 80_000);
+    let queue: &'static AxesQueue<1, SLOTS> = Box::leak(Box::default());
+    let path = Path::<1, LINES>::new(Clock::new(1_000_000).unwrap(), [setup], 20).unwrap();
+    let (axes, timer) = Axes::new(queue, path);
+    let (mut axes, mut machine) = (axes.with_reach(1001), machine::Machine::<_, 1>::new(timer));
+    axes.push([3000], 125_000).unwrap();
+    machine.run(&mut axes, 300, u64::MAX);
+    assert_eq!(machine.position, [3000]);
+    // 50 steps of ramp at either end.
+    for pair in machine.steps[60..2940].windows(2) {
+        assert!((99..=101).contains(&(pair[1].0 - pair[0].0)), "{pair:?}");
+    }
 }
