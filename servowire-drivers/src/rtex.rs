@@ -24,7 +24,7 @@
 //! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
 //! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place
 //! is written whatever fails, so a servo-off reaches every drive that can be reached. A block that was not written is replaced
-//! in the next period.
+//! in the next period, and its axis goes on from the one before ([`Axis::not_sent`]).
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -303,7 +303,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         Ok(Heard::parse(size, words))
     }
 
-    /// Writes every place, whatever fails; returns the first fault.
+    /// Writes every place, whatever fails, and tells its axis of each that was not written; returns the first fault.
     fn write(&mut self, commands: &[Command32; N]) -> Result<(), P::Error> {
         let (size, mut result) = (self.master.config().size, Ok(()));
         for (place, command) in commands.iter().enumerate() {
@@ -311,7 +311,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             let words = words_of::<P>(size, &mut memory);
             // The sizes agree.
             pack::to_words(bytes.get(..size.bytes()).unwrap_or_default(), words).unwrap_or(());
-            result = result.and(twice(|| self.port.write(place, words)));
+            let written = twice(|| self.port.write(place, words));
+            if let (Err(_), Some(axis)) = (&written, self.master.ring_mut().axes_mut().get_mut(place)) {
+                axis.not_sent();
+            }
+            result = result.and(written);
         }
         result
     }

@@ -6,6 +6,8 @@ mod setpoint;
 mod stop;
 mod supervise;
 
+use core::mem;
+
 use asking::{Main, Sub};
 
 use super::config::{AxisConfig, StopCategory};
@@ -52,8 +54,9 @@ pub struct Axis {
     /// What the caller has requested: the mode, and the position, speed or torque in it.
     mode: ActiveCode,
     setpoint: i32,
-    /// The content of the last block.
+    /// The content of the last block, and of the one before.
     wire: Wire,
+    before: Wire,
     evidence: Evidence,
     watch: EchoWatch,
     arrival: Arrival,
@@ -92,6 +95,14 @@ struct Wire {
     step: i32,
     /// Servo_On.
     on: bool,
+    /// Number of later blocks that were not sent.
+    stands: u8,
+}
+
+impl Wire {
+    const fn new(mode: ActiveCode) -> Self {
+        Self { mode, value: 0, step: 0, on: false, stands: 0 }
+    }
 }
 
 /// Number of missed update periods after which a motor without a new command position is at rest; no more than these are
@@ -120,7 +131,8 @@ impl Axis {
             category: StopCategory::Zero,
             mode: config.mode,
             setpoint: 0,
-            wire: Wire { mode: config.mode, value: 0, step: 0, on: false },
+            wire: Wire::new(config.mode),
+            before: Wire::new(config.mode),
             evidence: Evidence::NEVER,
             watch: EchoWatch::new(config.limits.echo),
             arrival: Arrival::Missing,
@@ -282,12 +294,23 @@ impl Axis {
             AxisState::SwitchingOn => self.wire.on || self.is_current(),
             state => state.is_servo_on(),
         };
-        self.wire = Wire { mode: self.mode, value, step, on };
+        self.before = mem::replace(&mut self.wire, Wire { mode: self.mode, value, step, on, stands: 0 });
         let off = *ServoOff::new(mac_id, counter, self.mode).command();
         let [data3, sub2, sub3] = self.feed_forward;
         let control = if on { self.control.union(self.servo_bits()) } else { self.control };
         let main = Command { control, command_data1: value, noncyclic: self.noncyclic(data3), ..off };
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
+    }
+
+    /// Takes back that the last [`transmission`](Self::transmission) was sent: the drive still has the block before. The next step, a
+    /// stop, a change of the mode and Servo_On begin at that one. After three blocks in a row that were not sent the command position
+    /// has stopped.
+    pub const fn not_sent(&mut self) {
+        let stands = self.before.stands.saturating_add(1);
+        self.wire = Wire { stands, ..self.before };
+        if stands >= MANY && matches!(self.wire.mode, ActiveCode::CyclicPosition) {
+            self.wire.step = 0;
+        }
     }
 
     /// Returns when the first block after the last one on time can have come.

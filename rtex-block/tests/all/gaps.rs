@@ -276,6 +276,54 @@ fn a_stop_after_a_gap_does_not_start_the_axis() {
     }
 }
 
+/// Blocks of a stop that do not reach the ASIC: what is sent after them is a deceleration away from what was sent last, and after
+/// three of them the axis stands.
+#[test]
+fn a_stop_goes_on_from_what_was_sent() {
+    for category in [StopCategory::One, StopCategory::Two] {
+        for (unsent, want) in [(0, [60, 20, 0]), (1, [60, 20, 0]), (2, [60, 20, 0]), (3, [0; 3]), (6, [0; 3])] {
+            let mut hand = Hand::on(ActiveCode::CyclicPosition);
+            for k in 1..=10 {
+                hand.axis.set_position(5_000 + 100 * k).unwrap();
+                hand.update();
+            }
+            hand.axis.stop(category);
+            let last = hand.heard;
+            for _ in 0..unsent {
+                hand.update();
+                hand.axis.not_sent();
+                hand.heard = last;
+            }
+            let (mut steps, mut from) = (Vec::new(), 6_000);
+            for _ in 0..3 {
+                let (on, _, position) = hand.update();
+                if on {
+                    steps.push(position - from);
+                    from = position;
+                }
+            }
+            assert_eq!(steps, want[..steps.len()], "{category:?} {unsent}");
+            assert!(steps.len() >= if category == StopCategory::Two { 3 } else { 2 * usize::from(unsent < 3) });
+        }
+    }
+}
+
+/// Servo_On that did not reach the ASIC has not been asked for: it goes out with a position of its own period again.
+#[test]
+fn servo_on_that_was_not_sent_begins_once_more() {
+    let mut hand = Hand::new(ActiveCode::CyclicPosition);
+    hand.speed = 10;
+    hand.axis.switch_on().unwrap();
+    assert!(hand.update().0);
+    hand.axis.not_sent();
+    hand.heard = Heard::Nothing;
+    assert!(!hand.update().0, "no position came");
+    let at = hand.at;
+    let (on, _, position) = hand.update();
+    assert!(on);
+    assert_eq!(position, at);
+}
+
 /// A drive that shows its flags late reports the activity of before: that is no answer to this Servo_On.
 #[test]
 fn activity_of_before_is_not_that_of_now() {

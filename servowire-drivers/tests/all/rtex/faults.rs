@@ -51,6 +51,39 @@ fn a_dead_place_is_one_place() {
     }
 }
 
+/// A place that cannot be written for a while: its drive stands at the block before, so the next step begins there, and none is larger
+/// than the drive allows (Err27.4).
+#[test]
+fn a_step_that_was_not_written_is_not_added_to_the_next() {
+    for (dead, periods) in (0..AXES).flat_map(|dead| (1..4).map(move |periods| (dead, periods))) {
+        let ring = Ring::new(false, false);
+        let mut driver = on::<u16>(&ring);
+        let mut refused = 0;
+        let mut step = |driver: &mut Rtex<u16>| {
+            for axis in driver.ring_mut().axes_mut() {
+                // 400 M pulses a second are 200,000 in half a millisecond.
+                refused += usize::from(axis.set_position(axis.setpoint().wrapping_add(150_000)).is_err());
+            }
+        };
+        for _ in 0..10 {
+            step(&mut driver);
+            update(&ring, &mut driver).unwrap();
+        }
+        ring.borrow_mut().dead = Some(dead);
+        for _ in 0..periods {
+            step(&mut driver);
+            assert_eq!(update(&ring, &mut driver), Err(Error::Io(())));
+        }
+        ring.borrow_mut().dead = None;
+        for _ in 0..10 {
+            step(&mut driver);
+            update(&ring, &mut driver).unwrap();
+        }
+        assert_eq!(ring.borrow().drives.each_ref().map(Drive::alarm), [None; AXES], "{dead} {periods}");
+        assert_eq!((refused, driver.master().ring().failure()), (periods, None), "{dead} {periods}");
+    }
+}
+
 /// Frames that do not come: no position is given, and every servo is off within the limit.
 #[test]
 fn silence_switches_every_servo_off() {
