@@ -370,6 +370,8 @@ fn an_axis_is_held_where_it_is() {
             let (on, code, position) = hand.update();
             let bump = if code == CyclicCode::CyclicPosition { (at - position).abs() } else { position };
             assert!(!on || bump <= 300, "{between:?} {mode}: {bump}");
+            // At speed 0 it is held without a position, too.
+            assert!(on || mode == ActiveCode::CyclicTorque, "{between:?}");
         }
     }
 }

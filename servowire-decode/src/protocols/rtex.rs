@@ -211,7 +211,8 @@ impl Decoder {
             let flags = matches!(name, "Status_Flags" | "Control_Bits").then_some((2, 3));
             let known = || report.fields().find(|field| field.name == name).map(|field| (field.first, field.last));
             let (first, last) = flags.or_else(known)?;
-            Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
+            // All bits of a block are at one instant.
+            Some(Span { first: 8 * u32::from(first), last: 8 * u32::from(last) + 7, place })
         });
         let address = Some(header.mac_id.get().into());
         Some(Event { position: position(report), address, happened, counted, ..event })
@@ -319,11 +320,11 @@ impl LogDecoder for Decoder {
         }
         self.held.push(burst.clone());
         let nops = |burst: &Burst| burst.bytes.chunks(rtex_block::LEN).all(is_empty);
-        let told = self.held.iter().rev().take_while(|burst| !nops(burst)).count();
+        let first = self.held.iter().rposition(nops).map_or(0, |last| last + 1);
+        let told = self.held.get(first..).unwrap_or_default();
         // Nothing but NOPs, or too few blocks behind them to tell by.
-        let tells =
-            TELLING.contains(&told) && Blocks::tells(self.held.get(self.held.len() - told..).unwrap_or_default());
-        let waits = !tells && told < ENOUGH && self.held.len() < MOST_HELD;
+        let tells = TELLING.contains(&told.len()) && Blocks::tells(told);
+        let waits = !tells && told.len() < ENOUGH && self.held.len() < MOST_HELD;
         if waits { Ok(()) } else { self.let_go(out) }
     }
 

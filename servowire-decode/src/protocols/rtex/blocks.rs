@@ -28,7 +28,7 @@ pub(super) struct Blocks {
     flow: bool,
     /// Bytes still to be skipped before the first block.
     skip: usize,
-    /// The bytes read but not cut yet, from `at` onwards, and the beginning of the present block.
+    /// The bytes read but not cut yet, from `at` onwards, and the line in which the present block begins.
     rest: Vec<u8>,
     at: usize,
     began: Burst,
@@ -133,7 +133,7 @@ impl Blocks {
     /// Takes a line or record; a line of another length is returned as it is, and its block is lost.
     pub(super) fn feed(&mut self, burst: &Burst) -> Option<Piece> {
         if !self.flow {
-            (self.rest, self.at, self.began) = (burst.bytes.clone(), 0, Burst { bytes: Vec::new(), ..burst.clone() });
+            (self.rest, self.at, self.began) = (burst.bytes.clone(), 0, burst.clone());
             return None;
         }
         if burst.bytes.len() != self.line {
@@ -141,7 +141,7 @@ impl Blocks {
             return Some(burst.clone());
         }
         if self.at >= self.rest.len() {
-            self.began = Burst { bytes: Vec::new(), ..burst.clone() };
+            self.began = burst.clone();
         }
         self.rest.drain(..self.at);
         self.at = 0;
@@ -176,8 +176,7 @@ impl Blocks {
             let end = self.at + left.min(self.size);
             let bytes = self.rest.get(self.at..end).unwrap_or_default().to_vec();
             self.at = end;
-            let of = Burst { bytes: Vec::new(), ..line.clone() };
-            let piece = Piece { bytes, ..std::mem::replace(&mut self.began, of) };
+            let piece = Piece { bytes, ..std::mem::replace(&mut self.began, line.clone()) };
             if !std::mem::take(&mut self.lost) {
                 return Some(piece);
             }

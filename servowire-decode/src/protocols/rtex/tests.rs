@@ -81,6 +81,11 @@ fn a_log_of_which_nothing_tells_waits() {
     for word in [2, 4] {
         let log = bytes(word, run(1, 1_100, 0));
         assert_eq!(decoded(&log).1, Some(ENOUGH), "{word}");
+        // Whatever NOPs were before it.
+        for nops in [1, 40, 70, 200] {
+            let log = [bytes(word, core::iter::repeat_n(nop(), nops)), log.clone()].concat();
+            assert_eq!(decoded(&log).1, Some(nops + ENOUGH), "{word} {nops}");
+        }
     }
 }
 
@@ -180,5 +185,20 @@ fn a_fast_motor_is_not_misread() {
             let wrong = positions(&events).iter().filter(|position| is_wrong(position)).count();
             assert_eq!(wrong, 0, "{word} {from} {speed}: {:?}", events.first());
         }
+    }
+}
+
+/// A log that begins inside a block, and in which many blocks are no blocks later: it goes on as it was.
+#[test]
+fn unsound_blocks_are_no_other_shape() {
+    let unsound = |mut block: [u8; 16]| {
+        block[1] = if block[0] & 0x60 == 0 { 0x50 } else { block[1] };
+        block
+    };
+    for (word, from) in [(1, 5), (2, 6), (4, 4)] {
+        let log = bytes(word, run(1, 192, 1_001).chain(run(193, 400, 1_001).map(unsound)));
+        let (events, _) = decoded(&log[from..]);
+        let remarks: Vec<_> = events.iter().filter(|event| event.remark).map(|event| format!("{event:?}")).collect();
+        assert!(!remarks.iter().any(|remark| remark.contains("from here on")), "{word} {from}: {remarks:?}");
     }
 }

@@ -109,8 +109,13 @@ fn blocks_that_become_longer() {
 fn type_codes_and_indices() {
     let bench = Bench::new();
     // A parameter write of Pr7.20, and a monitor command of APOS.
-    let log = "25260000000000001100140705000000\n252a0000000000000700000000000000\n";
+    let log = "25260000000000001100140705000000\n252a0000000000000700000000000000\n45260000000000001100ff0005000000\n\
+               65260000000000001100000105000000\n";
     let run = bench.decode("log.txt", log, &["--protocol", "rtex", "--bytes"]);
     assert!(run.out.contains("Type_Code 11  Index 0714"), "{}", run.out);
     assert!(run.out.contains("Type_Code 07  Index 00 "), "{}", run.out);
+    assert!(run.out.contains("Index FF ") && run.out.contains("Index 0100"), "{}", run.out);
+    // The code comes first, then the control bits, then the data.
+    let places = ["Command_Code ", "Control_Bits ", "Type_Code 11"].map(|name| run.out.find(name).unwrap());
+    assert!(places.is_sorted(), "{}", run.out);
 }

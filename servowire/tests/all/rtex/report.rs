@@ -83,6 +83,7 @@ fn a_log_of_a_monitor() {
     let run = bench.decode("log.txt", text.replacen("TX", "RX", 1), &["--protocol", "rtex", "--json"]);
     assert_eq!((run.code, run.verdicts()[0].as_str()), (1, "direction"));
     assert_eq!(run.json()[0]["reason"], "the log has a response, C/R says command");
+    assert_eq!(run.json()[0]["at_field"], "byte 0");
 }
 
 /// Times that are counted by Update_Counter and --period say nothing of a jitter.
@@ -173,4 +174,23 @@ fn what_is_said_of_a_log_is_one_of_its_events() {
     let started = [[5_u8].into_iter().chain([0; 15]).cycle().take(16 * 300).collect(), bytes[5..].to_vec()].concat();
     let out = stats(&started, &[]).out;
     assert!(out.contains("\n    line         1  the log looks like blocks of 16 bytes, "), "{out}");
+}
+
+/// A change of the cyclic command is an event, once, and flags of every motion are none.
+#[test]
+fn what_is_an_event() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    // From position to speed, and IN_POSITION comes and goes.
+    for (k, (code, status)) in [(0x20, 0xc1), (0x20, 0xc0), (0x30, 0xc1), (0x30, 0xc0)].into_iter().enumerate() {
+        let counter = (k as u8 + 1) % 4 * 32 + 5;
+        writeln!(text, "{counter:02x}{code:02x}80{:026x}\n{:02x}{code:02x}{status:02x}{:026x}", 0, counter | 0x80, 0)
+            .unwrap();
+    }
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--stats", "--json"]);
+    let figures = run.json();
+    let said: Vec<_> =
+        figures[0]["events"].as_array().unwrap().iter().map(|event| event["what"].as_str().unwrap()).collect();
+    let begins = ["Command_Code CP normal (20h)", "SERVO_ON 1", "SERVO_ACTIVE 1", "SERVO_READY 1"];
+    assert_eq!(said, [&begins[..], &["Command_Code CV normal (30h)"]].concat());
 }
