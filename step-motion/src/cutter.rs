@@ -17,7 +17,7 @@ mod stretch;
 use near_rest::FromRest;
 pub(crate) use near_rest::Roots;
 use part::{LONGEST, Part, Slower, Spot};
-pub(crate) use stretch::Stretch;
+pub(crate) use stretch::{Cut, Stretch};
 
 use crate::curve::Curve;
 use crate::phases::Frame;
@@ -96,17 +96,6 @@ impl Cutter {
     /// Steps made, counted from the origin of the positions.
     pub(crate) const fn count(&self) -> u32 {
         self.count
-    }
-
-    /// Returns the next steps; `None` after the last one.
-    pub(crate) fn next(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Option<Stretch> {
-        loop {
-            match self.slice(curve, frame, demand) {
-                Slice::More => {}
-                Slice::Steps(stretch) => return Some(stretch),
-                Slice::End => return None,
-            }
-        }
     }
 
     /// Does a slice of the work for the next steps.
@@ -295,6 +284,19 @@ mod tests {
     use crate::planner::{Goal, Motion, plan};
     use proptest::prelude::*;
     use std::vec::Vec;
+
+    impl Cutter {
+        /// Returns the next steps; `None` after the last one.
+        pub(crate) fn next(&mut self, curve: &Curve, frame: &Frame, demand: &Demand) -> Option<Stretch> {
+            loop {
+                match self.slice(curve, frame, demand) {
+                    Slice::More => {}
+                    Slice::Steps(stretch) => return Some(stretch),
+                    Slice::End => return None,
+                }
+            }
+        }
+    }
 
     /// Returns the largest error of the segments' steps as a share of the permitted one, and how many steps a segment has.
     fn worst(curve: &Curve, frame: &Frame, off: Real) -> (f64, f64) {

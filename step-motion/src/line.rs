@@ -1,7 +1,7 @@
 //! A straight line of several axes, and its steps.
 
 use crate::curve::{Curve, Piece};
-use crate::cutter::{Demand, Stretch};
+use crate::cutter::{Demand, Slice};
 use crate::limits::{Bounds, Clock};
 use crate::phases::{self, Frame, P};
 use crate::planner::Motion;
@@ -31,9 +31,19 @@ pub(super) struct Line<const N: usize> {
     pub(super) cut: bool,
     /// The speed at which a stop that ends on a later line leaves this one.
     pub(super) leave: Option<Real>,
-    /// The speed at its start from which all lines from here on can slow down in time, worked out when the path had an edition.
-    pub(super) enter: Real,
+    /// What was found when the path had an edition.
+    pub(super) ahead: Ahead,
     pub(super) edition: u32,
+}
+
+/// What is known of the way from the start of a line on.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Ahead {
+    /// The run that begins there has this many lines after the first one.
+    Run(usize),
+    /// From this speed all lines from there on can slow down in time.
+    Speed(Real),
 }
 
 impl<const N: usize> Line<N> {
@@ -49,7 +59,7 @@ impl<const N: usize> Line<N> {
             corner,
             cut: false,
             leave: None,
-            enter: Real::ZERO,
+            ahead: Ahead::Run(0),
             edition: 0,
         }
     }
@@ -57,6 +67,19 @@ impl<const N: usize> Line<N> {
     /// Returns a fraction of the requested speed, never above the limits of the axes.
     pub(super) fn speed(&self, part: Real) -> Real {
         self.bounds.v.min(self.feed * part)
+    }
+
+    /// Returns what was found when the path had an edition.
+    pub(super) fn ahead(&self, edition: u32) -> Option<Ahead> {
+        Some(self.ahead).filter(|_| self.edition == edition)
+    }
+
+    /// Returns the speed at its start from which all lines from there on can slow down in time, if it is known.
+    pub(super) fn entry(&self, edition: u32) -> Option<Real> {
+        match self.ahead(edition)? {
+            Ahead::Run(_) => None,
+            Ahead::Speed(speed) => Some(speed),
+        }
     }
 
     /// Returns the steps that each axis has made at a place on the line; all steps at its end.
@@ -225,10 +248,10 @@ impl<const N: usize> LinePulses<N> {
         }
     }
 
-    /// Returns the next steps of an axis; `None` after the last one.
-    pub(super) fn stretch(&mut self, at: usize, demand: &Demand) -> Option<Stretch> {
-        let (frame, stepper) = self.axes.get_mut(at)?;
-        stepper.cutter.next(&self.curve, frame, demand)
+    /// Does a slice of the work for the next steps of an axis.
+    pub(super) fn slice(&mut self, at: usize, demand: &Demand) -> Slice {
+        let Some((frame, stepper)) = self.axes.get_mut(at) else { return Slice::End };
+        stepper.cutter.slice(&self.curve, frame, demand)
     }
 
     pub(super) fn set_due(&mut self, at: usize, tick: Option<u64>) {

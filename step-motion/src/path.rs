@@ -116,7 +116,7 @@ pub struct Path<const N: usize, const M: usize> {
     /// the queue into account.
     on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
-    /// Speeds at the start of lines are known for this fraction of the requested speeds, and since the lines last changed.
+    /// What is known of the lines ahead holds for this fraction of the requested speeds, and since the lines last changed.
     part: Real,
     edition: u32,
 }
@@ -243,8 +243,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
-    /// Forgets the speeds at the start of lines. A stop need not do so: it does not use them, and a line is added before
-    /// they are used again.
+    /// The fraction of the requested speeds that was last asked for.
+    pub(super) const fn part(&self) -> Real {
+        self.part
+    }
+
+    /// Forgets what was found about the lines.
     pub(super) const fn changed(&mut self) {
         self.edition = self.edition.wrapping_add(1);
     }
@@ -287,7 +291,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     fn anew(&mut self, (old, start, bounds): &(Course, Start<N>, Bounds)) -> Option<(Course, Start<N>, Bounds)> {
         let Piece { time, v, a, up, .. } = old.curve.after(start.before)?;
         let how = (Real::ONE, Some(*bounds));
-        let (course, bounds) = self.course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), how)?;
+        let (course, bounds) = self.better_course(0, Motion { v, a, up }, (Real::ZERO, Real::ZERO), how)?;
         let time = start.offset + (time - old.curve.skipped.0);
         let whole = self.whole(time);
         let offset = time - Real::new(whole);
@@ -313,6 +317,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again. Returns the lines
     /// as they were.
     pub(super) fn hurry(&mut self, limits: &[Limits; N]) -> [Option<Line<N>>; M] {
+        self.changed();
         let (own, lines) = (self.axes, self.lines);
         for (axis, limits) in self.axes.iter_mut().zip(limits) {
             axis.limits = axis.limits.or_higher(*limits);

@@ -2,7 +2,7 @@
 
 mod planning;
 
-use crate::cutter::{Demand, Stretch};
+use crate::cutter::{Cut, Demand, Slice, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::line::{AxisPulse, Line, LinePulses, Steps};
@@ -10,7 +10,6 @@ use crate::path::Path;
 use crate::plan::Setpoint;
 use crate::real::Real;
 use crate::stepper::tick;
-use servowire_core::Direction;
 
 /// Runs the lines of a [`Path`] and takes requests at any tick: feed hold, feed override, lines added while it moves, and a
 /// new target.
@@ -67,6 +66,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     /// Its steps are taken in stretches; this is the rest of each axis's stretch.
     steps: Steps,
     left: [Option<Stretch>; N],
+    /// The first line has no further steps in stretches: the next one is to begin.
+    ended: bool,
     percent: u16,
     held: bool,
     /// The present motion slows down to rest.
@@ -100,6 +101,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
             free,
             steps,
             left,
+            ended,
             percent,
             held,
             braking,
@@ -112,6 +114,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
         (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
         (self.free, self.steps, self.left, self.percent) = (*free, *steps, *left, *percent);
+        self.ended = *ended;
         (self.held, self.braking, self.stopping) = (*held, *braking, *stopping);
         (self.quick, self.halted) = (*quick, *halted);
     }
@@ -138,6 +141,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             free: [0; N],
             steps: Steps::Single,
             left: [None; N],
+            ended: false,
             percent: 100,
             held: false,
             braking: false,
@@ -336,16 +340,28 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Self { steps: Steps::Stretches, ..self }
     }
 
-    /// Returns the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse); `None` if this line
-    /// has none.
-    pub(super) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Option<(Stretch, Direction)> {
+    /// Does a slice of the work for the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse).
+    pub(super) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Cut {
+        if self.ended {
+            self.ended = self.go_over();
+            return Cut::More;
+        }
+        self.cut_line(at, demand, until).unwrap_or(Cut::Later)
+    }
+
+    /// Does the same on the present line; `None` if it has no further steps of the axis.
+    fn cut_line(&mut self, at: usize, demand: &Demand, until: u64) -> Option<Cut> {
         let line = self.line.as_mut()?;
         let due = line.due.get_mut(at)?;
         let left = self.left.get_mut(at)?;
         let soonest = (*due)?;
-        let Some(stretch) = left.take().or_else(|| line.stretch(at, demand)) else {
-            line.set_due(at, None);
-            return None;
+        let stretch = match left.take().map_or_else(|| line.slice(at, demand), Slice::Steps) {
+            Slice::Steps(stretch) => stretch,
+            Slice::More => return Some(Cut::More),
+            Slice::End => {
+                line.set_due(at, None);
+                return None;
+            }
         };
         let first = tick(stretch.first).max(soonest);
         if first >= until {
@@ -365,8 +381,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             let count = i64::from(stretch.count);
             *position = position.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
         }
-        self.settle();
-        Some((stretch, direction))
+        self.ended = line.first().is_none();
+        Some(Cut::Steps(stretch, direction))
     }
 
     /// The tick at which the present plan ends.
@@ -403,11 +419,21 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.set_deviation(deviation);
     }
 
+    /// Does a slice of the work for [`look_ahead`](Self::look_ahead), and for a stop on these lines. Returns whether there is more
+    /// of it.
+    pub(super) fn has_to_find(&mut self) -> bool {
+        let at = if self.line.is_some() { self.more } else { 0 };
+        let part = self.part().unwrap_or(self.path.part());
+        self.path.find_exit(at, part).is_none()
+    }
+
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
-        let part = self.part();
-        if self.line.is_none() || part.is_some_and(|part| self.path.exit(self.more, part) != self.wish) {
-            self.replan(now);
+        if self.line.is_none() {
+            return self.replan(now);
+        }
+        if let Some(part) = self.part().filter(|part| self.path.exit(self.more, *part) != self.wish) {
+            self.plan_better(now, part);
         }
     }
 

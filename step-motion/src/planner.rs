@@ -238,7 +238,7 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
         Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
         Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
     };
-    if from <= exit {
+    if from <= exit || n <= SLACK {
         return from;
     }
     match bounds.jerk {
@@ -327,5 +327,22 @@ mod tests {
                 }
             }
         });
+    }
+
+    /// From no speed does slowing down to more than 0.618 of it take more distance than coming to rest.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn which_speeds_take_more_distance_than_a_rest() {
+        let thousandths = |n: u64| Real::new(n) / Real::new(1000);
+        let all = (1..100_000_u64, 0..1000_u64, 1..10_000_u64, prop::option::of(1..10_000_u64));
+        let beyond = core::cell::Cell::new(0);
+        proptest!(ProptestConfig::with_cases(20_000), |((v, part, a, jerk) in all)| {
+            let bounds = Bounds::new(Real::HUGE, thousandths(a), jerk.map(thousandths));
+            let (v, part) = (thousandths(v), thousandths(part));
+            let [to, rest] = [v * part, Real::ZERO].map(|to| distance(v, to, &bounds));
+            prop_assert!(to <= rest + rest.scaled(-40) || part < Real::new(618_034) / Real::new(1_000_000));
+            beyond.set(beyond.get() + u32::from(to > rest));
+        });
+        assert!(beyond.get() > 1000, "{beyond:?}");
     }
 }

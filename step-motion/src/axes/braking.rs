@@ -2,7 +2,7 @@
 
 use super::{Axes, Stage};
 use crate::axis::{COARSEST, Work, coarser};
-use crate::cutter::Demand;
+use crate::cutter::{Cut, Demand};
 use crate::path_mover::PathMover;
 use crate::queue::{Joint, Queue};
 
@@ -34,29 +34,38 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             return Work::Later;
         };
         let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
-        if let Some((stretch, direction)) = stop.cut(self.axis, &demand, u64::MAX) {
-            writer.put_steps((queue, self.block), &stretch, direction);
-            self.quiet = 0;
-        } else if self.is_through() {
-            let over = self.stops.get(self.block).map_or(0, PathMover::over);
-            let end = self.put_joint(over, Joint::Rest);
-            if self.fits() {
-                self.publish(end);
-                return Work::More;
+        match stop.cut(self.axis, &demand, u64::MAX) {
+            Cut::Steps(stretch, direction) => {
+                writer.put_steps((queue, self.block), &stretch, direction);
+                self.quiet = 0;
             }
+            Cut::More => return Work::More,
+            Cut::Later | Cut::Rest => return if self.is_through() { self.end_stop() } else { Work::More },
         }
-        if self.fits() {
-            return Work::More;
-        }
-        if self.coarse > COARSEST {
-            // Once more with fewer segments.
-            (self.coarse, self.stage) = (coarser(self.coarse), Stage::Brake);
-            return Work::More;
-        }
-        self.give_up()
+        if self.fits() { Work::More } else { self.take_fewer_slots() }
     }
 
-    pub(super) fn fits(&self) -> bool {
+    /// Ends the block where all axes are at rest, and hands it out.
+    fn end_stop(&mut self) -> Work {
+        let over = self.stops.get(self.block).map_or(0, PathMover::over);
+        let end = self.put_joint(over, Joint::Rest);
+        if !self.fits() {
+            return self.take_fewer_slots();
+        }
+        self.publish(end);
+        Work::More
+    }
+
+    /// Cuts the stop once more with fewer segments, if that is allowed.
+    fn take_fewer_slots(&mut self) -> Work {
+        if self.coarse <= COARSEST {
+            return self.give_up();
+        }
+        (self.coarse, self.stage) = (coarser(self.coarse), Stage::Brake);
+        Work::More
+    }
+
+    fn fits(&self) -> bool {
         self.writers.iter().all(|writer| writer.len <= Queue::<S>::BLOCK)
     }
 

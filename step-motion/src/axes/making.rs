@@ -5,7 +5,7 @@ use core::sync::atomic::Ordering;
 use super::{Axes, PUT_OFF, Stage};
 use crate::axes_timer::{TURN, TURNS};
 use crate::axis::Work;
-use crate::cutter::Demand;
+use crate::cutter::{Cut, Demand};
 use crate::queue::{Joint, Queue, REST};
 use crate::writer::{Writer, tick};
 
@@ -28,8 +28,11 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Plans the block along the lines that were added.
+    /// Plans the block along the lines that were added; or finds out, from the last line back, how fast it may be.
     pub(super) fn look_ahead(&mut self) -> Work {
+        if self.work.has_to_find() {
+            return Work::More;
+        }
         self.work.look_ahead(self.end);
         self.stage = Stage::Block;
         Work::More
@@ -49,15 +52,21 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         };
         let time = self.until.saturating_sub(tick(writer.end)).saturating_mul(1 << 32);
         let demand = Demand { off: self.off, coarse: None, time };
-        if let Some((stretch, direction)) = self.work.cut(self.axis, &demand, self.until) {
-            writer.put_steps((queue, self.block), &stretch, direction);
-            self.quiet = 0;
-            if writer.len.saturating_add(4) > Queue::<S>::BLOCK / 3 {
-                self.shorter = self.shorter.saturating_add(1);
-                self.stage = Stage::Idle;
+        match self.work.cut(self.axis, &demand, self.until) {
+            Cut::Steps(stretch, direction) => {
+                writer.put_steps((queue, self.block), &stretch, direction);
+                self.quiet = 0;
+                if writer.len.saturating_add(4) > Queue::<S>::BLOCK / 3 {
+                    self.shorter = self.shorter.saturating_add(1);
+                    self.stage = Stage::Idle;
+                }
             }
-        } else if self.is_through() && !self.waits_for_a_step() {
-            self.join();
+            Cut::More => {}
+            Cut::Later | Cut::Rest => {
+                if self.is_through() && !self.waits_for_a_step() {
+                    self.join();
+                }
+            }
         }
         Work::More
     }

@@ -3,8 +3,8 @@
 
 use core::sync::atomic::Ordering;
 
-use crate::cutter::Demand;
-use crate::mover::cutting::{Cut, News};
+use crate::cutter::{Cut, Demand};
+use crate::mover::cutting::News;
 use crate::queue::{IDLE, Queue, TICKET};
 use crate::writer::{TICK, Writer, tick};
 

@@ -1,5 +1,7 @@
 //! Stretches of steps, which a cutter returns.
 
+use servowire_core::Direction;
+
 /// A stretch of steps. Times are in 2^-32 ticks, on the clock for the first step, and as differences after it.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -9,6 +11,19 @@ pub(crate) struct Stretch {
     pub(crate) first: i128,
     /// The interval from the first step to the second, and its first and second differences.
     pub(crate) differences: [i64; 3],
+}
+
+/// The result of a slice of the work of a mover for its next steps.
+#[derive(Debug)]
+pub(crate) enum Cut {
+    /// Steps, and their direction.
+    Steps(Stretch, Direction),
+    /// Only part of the work was done.
+    More,
+    /// The next step comes later.
+    Later,
+    /// No step is to come.
+    Rest,
 }
 
 /// Multiplying by this, modulo 2^64, divides a multiple of 3 by 3.

@@ -1,24 +1,11 @@
 //! Cuts the steps of an axis into stretches, for [`Axis`](crate::Axis), which decides when a request is planned.
 
-use crate::cutter::{Demand, Slice, Stretch};
+use crate::cutter::{Cut, Demand, Slice};
 use crate::phases::Phases;
 use crate::stepper::tick;
 use servowire_core::Direction;
 
 use super::Mover;
-
-/// The result of [`Mover::cut`].
-#[derive(Debug)]
-pub(crate) enum Cut {
-    /// Steps, and their direction.
-    Steps(Stretch, Direction),
-    /// Only part of the work was done.
-    More,
-    /// The next step comes later.
-    Later,
-    /// No step is to come.
-    Rest,
-}
 
 /// A request that is not planned yet; of two, the greater one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -61,6 +61,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Cuts the queue off at an end, if the first line begins at `from` and a stop leaves it as `first` says.
     pub(crate) fn cut(&mut self, to: &End<N>, from: [i64; N], made: [u32; N], first: Leaving) {
+        self.changed();
         self.target = self.place(to, from, made);
         let (at, place) = to.at;
         let Leaving { more: mut end, exit: mut speed, mut bounds } = first;

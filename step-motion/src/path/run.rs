@@ -6,7 +6,7 @@
 use super::{Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
-use crate::line::Line;
+use crate::line::{Ahead, Line};
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
 
@@ -105,14 +105,39 @@ impl<const N: usize, const M: usize> Path<N, M> {
         &mut self,
         at: usize,
         start: Motion,
+        from: (Real, Real),
+        how: (Real, Option<Bounds>),
+    ) -> Option<(Course, Bounds)> {
+        let (run, left, speeds) = self.goal(at, start, from, how)?;
+        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds)
+    }
+
+    /// Plans a motion again that has a course already, after lines have been added. `None` if they ask for a speed that it can
+    /// no longer reach: one curve over more lines keeps to the limits of all of them.
+    pub(crate) fn better_course(
+        &mut self,
+        at: usize,
+        start: Motion,
+        from: (Real, Real),
+        how: (Real, Option<Bounds>),
+    ) -> Option<(Course, Bounds)> {
+        let (run, left, speeds) = self.goal(at, start, from, how)?;
+        self.lead(at, start, left, (&run, run.bounds, run.bounds), speeds)
+    }
+
+    /// Returns the run that a course leads along, what is left of it, and the speed at its end: the one to plan for, and the
+    /// one that the later lines ask for.
+    fn goal(
+        &mut self,
+        at: usize,
+        start: Motion,
         (place, before): (Real, Real),
         (part, present): (Real, Option<Bounds>),
-    ) -> Option<(Course, Bounds)> {
+    ) -> Option<(Run, Real, (Real, Real))> {
         let run = self.run(at, Some(part), self.under_way(at, start, present)?, (M, false))?;
         let left = (run.length + before) - place;
-        let most = self.exit(at.saturating_add(run.more), part);
-        let wish = most.min(fastest_exit(start, left, &run.bounds));
-        self.leave(at, start, left, (&run, run.bounds, run.bounds), (wish, most))
+        let wish = self.exit(at.saturating_add(run.more), part);
+        Some((run, left, (wish.min(fastest_exit(start, left, &run.bounds)), wish)))
     }
 
     /// Returns the speed that a motion on line `at` reaches if it goes on as it is, and the acceleration and jerk under way.
@@ -174,23 +199,34 @@ impl<const N: usize, const M: usize> Path<N, M> {
         at: usize,
         start: Motion,
         left: Real,
+        limits: (&Run, Bounds, Bounds),
+        (speed, wish): (Real, Real),
+    ) -> Option<(Course, Bounds)> {
+        let to = |exit| self.lead(at, start, left, limits, (exit, wish));
+        to(speed).or_else(|| {
+            let (run, _, bounds) = &limits;
+            let last = at.saturating_add(run.more);
+            let slowest = slowest_exit(start, left, speed, bounds);
+            // Mostly it comes near a speed from which all lines are known to be slow enough in time.
+            self.known_exit(last).and_then(|known| to(slowest.min(known))).or_else(|| {
+                let most = self.most(last);
+                [slowest.min(most), most, Real::ZERO].into_iter().find_map(to)
+            })
+        })
+    }
+
+    /// Plans in the same way to this speed only; behind a run where a stop leaves a line, to the speed of that stop.
+    fn lead(
+        &self,
+        at: usize,
+        start: Motion,
+        left: Real,
         (run, own, bounds): (&Run, Bounds, Bounds),
         (speed, wish): (Real, Real),
     ) -> Option<(Course, Bounds)> {
-        let last = at.saturating_add(run.more);
-        let leave = self.line(last)?.leave;
-        let to = |exit| {
-            let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
-            Some((Course { curve, exit, wish, whole: true, more: run.more }, own))
-        };
-        if leave.is_some() {
-            return leave.and_then(to);
-        }
-        to(speed).or_else(|| {
-            let most = self.most(last);
-            let slowest = slowest_exit(start, left, speed, &bounds).min(most);
-            [slowest, most, Real::ZERO].into_iter().find_map(to)
-        })
+        let exit = self.line(at.saturating_add(run.more))?.leave.unwrap_or(speed);
+        let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
+        Some((Course { curve, exit, wish, whole: true, more: run.more }, own))
     }
 
     /// Returns the line that lies a distance beyond the start of line `at`, at most line `last`, and the place on it.
@@ -242,63 +278,106 @@ impl<const N: usize, const M: usize> Path<N, M> {
         ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
     }
 
-    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time; worked out from the
-    /// last line back, unless it is known since the lines last changed.
+    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time.
     pub(crate) fn exit(&mut self, at: usize, part: Real) -> Real {
+        let slices = M.saturating_mul(2).saturating_add(1);
+        (0..slices).find_map(|_| self.find_exit(at, part)).unwrap_or(Real::ZERO)
+    }
+
+    /// Does a slice of that: finds how far a run leads, or how fast the last run may begin for which this is not known yet.
+    /// Returns the speed at the end of line `at` once it is known; it is until the lines change.
+    pub(crate) fn find_exit(&mut self, at: usize, part: Real) -> Option<Real> {
         if part != self.part {
             self.part = part;
             self.changed();
         }
-        let (edition, mut found, mut count) = (self.edition, [(0, Real::ZERO); M], 0_usize);
-        let known = |line: &Line<N>| (line.edition == edition).then_some(line.enter);
-        let speed = self.slow_down(at, (part, greatest), known, |found_at, speed| {
-            if let Some(place) = found.get_mut(count) {
-                *place = (found_at, speed);
-                count = count.saturating_add(1);
-            }
-        });
-        for (at, enter) in found.into_iter().take(count) {
-            let place = self.first.wrapping_add(at).checked_rem(M).and_then(|at| self.lines.get_mut(at));
-            if let Some(Some(line)) = place {
-                (line.enter, line.edition) = (enter, edition);
+        let (mut next, mut speed, mut last) = (at.saturating_add(1), Real::ZERO, None);
+        while let Some(line) = self.line(next) {
+            match line.ahead(self.edition) {
+                Some(Ahead::Speed(known)) => {
+                    speed = known;
+                    break;
+                }
+                Some(Ahead::Run(more)) => {
+                    last = Some(next);
+                    next = next.saturating_add(more).saturating_add(1);
+                }
+                None => {
+                    let more = self.run_from(next, part)?.more;
+                    self.know(next, Ahead::Run(more));
+                    return None;
+                }
             }
         }
-        speed
+        let Some(first) = last else { return Some(speed) };
+        let entry = self.entry(first, &self.run_from(first, part)?, speed);
+        self.know(first, Ahead::Speed(entry));
+        None
+    }
+
+    /// Keeps what has been found for a line, until the lines change.
+    fn know(&mut self, at: usize, ahead: Ahead) {
+        let edition = self.edition;
+        let place = self.first.wrapping_add(at).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+        if let Some(Some(line)) = place {
+            (line.ahead, line.edition) = (ahead, edition);
+        }
+    }
+
+    /// Returns the speed at the end of line `at` if it is known, or follows from what is known.
+    fn known_exit(&self, at: usize) -> Option<Real> {
+        let next = at.saturating_add(1);
+        self.known(next).or_else(|| {
+            let run = self.run_from(next, self.part)?;
+            let speed = self.known(next.saturating_add(run.more).saturating_add(1))?;
+            Some(self.entry(next, &run, speed))
+        })
+    }
+
+    /// Returns the speed at the start of line `at`, or behind the last one, if it is known.
+    fn known(&self, at: usize) -> Option<Real> {
+        self.line(at).map_or(Some(Real::ZERO), |line| line.entry(self.edition))
+    }
+
+    /// Returns the greatest speed at which a run may begin that is to end at a speed.
+    fn entry(&self, at: usize, run: &Run, exit: Real) -> Real {
+        greatest(exit, run.length, &run.bounds).min(self.allowed(at, run, self.part))
     }
 
     /// Returns the greatest speed at which line `at` may end, whatever was requested: one from which each run that follows
     /// can be
     /// left at its corner's speed or, which takes less distance than some speeds between, come to rest at its end.
     fn most(&self, at: usize) -> Real {
-        let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
-        self.slow_down(at, (Real::HUGE, fastest), |_| None, |_, _| {})
-    }
-
-    /// `known` is the speed at the start of a line if that is known; `each` takes those that are worked out.
-    fn slow_down(
-        &self,
-        at: usize,
-        (part, fastest): (Real, impl Fn(Real, Real, &Bounds) -> Real),
-        known: impl Fn(&Line<N>) -> Option<Real>,
-        mut each: impl FnMut(usize, Real),
-    ) -> Real {
         let (mut runs, mut next, mut speed) = ([(0, Run::NONE); M], at.saturating_add(1), Real::ZERO);
         for place in &mut runs {
-            if let Some(known) = self.line(next).and_then(&known) {
-                speed = known;
+            let Some(run) = self.run_from(next, Real::HUGE) else { break };
+            let most = self.allowed(next, &run, Real::HUGE);
+            if self.known(next).is_some_and(|known| known >= most) {
+                speed = most;
                 break;
             }
-            let Some(run) = self.run(next, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false)) else { break };
             *place = (next, run);
             next = next.saturating_add(run.more).saturating_add(1);
         }
         for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
-            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(*at)) {
-                let most = line.corner.min(before.speed(part)).min(run.bounds.v);
-                speed = fastest(speed, run.length, &run.bounds).min(most);
-                each(*at, speed);
-            }
+            let (Run { length, bounds, .. }, most) = (run, self.allowed(*at, run, Real::HUGE));
+            let fastest = greatest(speed, *length, bounds);
+            // Only to a speed below 0.618 of it can slowing down take more distance than coming to rest.
+            let or_rest = fastest < most && speed + speed.half() < fastest;
+            speed = if or_rest { fastest.max(greatest(Real::ZERO, *length, bounds)) } else { fastest }.min(most);
         }
         speed
+    }
+
+    /// Returns the run that begins at line `at`, from the corner before it, at a fraction of the requested speeds.
+    fn run_from(&self, at: usize, part: Real) -> Option<Run> {
+        self.run(at, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false))
+    }
+
+    /// Returns the greatest speed at the start of a run that its corner and the lines on both sides allow.
+    fn allowed(&self, at: usize, run: &Run, part: Real) -> Real {
+        let before = self.line(at.wrapping_sub(1)).map_or(Real::ZERO, |before| before.speed(part));
+        let corner = self.line(at).map_or(Real::ZERO, |line| line.corner);
+        corner.min(before).min(run.bounds.v)
     }
 }

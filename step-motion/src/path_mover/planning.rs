@@ -172,6 +172,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
+    /// Plans the rest of the running line again after lines have been added, unless the present plan is better.
+    pub(super) fn plan_better(&mut self, now: u64, part: Real) {
+        let Some((motion, start)) = self.here(now) else { return };
+        let course = self.path.better_course(0, motion, (start.place, start.before), (part, self.bounds));
+        if let Some((course, bounds)) = course {
+            self.adopt(&course, start, bounds);
+        }
+        self.settle();
+    }
+
     /// Begins the first line.
     pub(super) fn begin(&mut self) {
         (self.made, self.exit, self.more) = ([0; N], Real::ZERO, 0);
@@ -237,25 +247,33 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Takes out lines that have ended, and begins the next one.
     pub(super) fn settle(&mut self) {
         for _ in 0..=M {
-            let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };
-            if line.first().is_some() {
+            if !self.go_over() {
                 return;
             }
-            if self.made != first.ends {
-                if self.braking && !self.brakes() {
-                    // It could not leave a brake that is no longer asked for: on from where that comes to rest.
-                    self.plan(self.over());
-                }
-                return;
+        }
+    }
+
+    /// Takes out the first line if it has ended, and begins the next one. Returns whether that may have ended as well.
+    pub(super) fn go_over(&mut self) -> bool {
+        let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return false };
+        if line.first().is_some() {
+            return false;
+        }
+        if self.made != first.ends {
+            if self.braking && !self.brakes() {
+                // It could not leave a brake that is no longer asked for: on from where that comes to rest.
+                self.plan(self.over());
             }
-            let cut = first.cut;
-            if self.more > 0 {
-                self.go_on();
-                continue;
-            }
+            return false;
+        }
+        let cut = first.cut;
+        if self.more > 0 {
+            self.go_on();
+        } else {
             self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
             self.stopping &= !cut;
             self.begin();
         }
+        true
     }
 }

@@ -193,6 +193,37 @@ proptest! {
         }
     }
 
+    /// What was found before lines came, ended or were asked for at another speed is not taken for what holds then.
+    #[test]
+    fn speeds_found_in_slices_are_those_found_at_once(
+        lines in lines(), asked in prop::collection::vec((0..8_usize, 0..3_usize, 0..20_usize), 1..9), ended in 0..3_usize,
+    ) {
+        let part = |at: usize| Real::new([100, 40, 250][at]) / Real::new(100);
+        let mut known = Lines::new(clock(), axes(0), 1000).unwrap();
+        let (mut at, mut asked) = ([0; N], asked.into_iter().cycle());
+        let mut find = |known: &mut Lines| {
+            let (line, speed, slices) = asked.next().unwrap();
+            let found = (0..slices).find_map(|_| known.find_exit(line, part(speed)));
+            let at_once = known.clone().exit(line, part(speed));
+            (found.is_none_or(|found| found == at_once), line, speed)
+        };
+        for (by, feed) in &lines {
+            at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
+            known.push(at, *feed).unwrap();
+            prop_assert!(find(&mut known).0);
+        }
+        for _ in 0..ended.min(lines.len() - 1) {
+            known.pass();
+            prop_assert!(find(&mut known).0);
+        }
+        let (_, line, speed) = find(&mut known);
+        let mut afresh = path(&lines);
+        for _ in 0..ended.min(lines.len() - 1) {
+            afresh.pass();
+        }
+        prop_assert_eq!(known.exit(line, part(speed)), afresh.exit(line, part(speed)));
+    }
+
     #[test]
     fn a_place_on_a_path(lines in lines(), first in 0..3_usize, way in 0.0..9000.0, last in 0..9_usize) {
         let (path, all) = (path(&lines), lines.iter().map(modelled).collect::<Vec<_>>());

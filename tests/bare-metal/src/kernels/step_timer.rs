@@ -352,7 +352,7 @@ kernels_on_states! {
         job.axes.poll()
     } as {
         let Some(mut job) = Job::new(&PATHS[1]) else { return 0 };
-        most_tenths(100_000 / PART, |clock| {
+        most_tenths(1_000_000 / PART, |clock| {
             while !job.axes.is_full() {
                 let Some((to, feed)) = job.next() else { break };
                 let _: Result<_, _> = job.axes.push(to, feed);
