@@ -25,7 +25,7 @@ mod slaves;
 mod state;
 mod sub_handshake;
 
-pub use axis::Axis;
+pub use axis::{Axis, Sent};
 pub use check::{Acknowledgement, Checked, Expected};
 pub use config::{AxisConfig, Limits, StopCategory};
 pub use counter::{CommandCounter, Turn};

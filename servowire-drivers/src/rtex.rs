@@ -33,7 +33,7 @@ mod port;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Arrival, Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
+use rtex_block::master::{Arrival, Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Sent, Slave};
 use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, pack};
 use servowire_core::{ClockCheck, ClockError};
@@ -165,8 +165,9 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
         if phase == ControlPhase::Prepare {
             let now_ns = self.now_ns()?;
+            let sent = self.master.ring().axes().each_ref().map(Axis::sent);
             let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
-            self.write(&commands).map_err(Error::Io)?;
+            self.write(&commands, &sent).map_err(Error::Io)?;
         }
         match self.master.error() {
             Some(fault) => Err(Error::Protocol(fault)),
@@ -209,8 +210,9 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.torn = self.torn.saturating_add(torn.into());
         // The frame before brought them: rather too old than too young.
         let end_ns = began_ns.saturating_sub(self.master.config().periods.com_ns.into());
+        let sent = self.master.ring().axes().each_ref().map(Axis::sent);
         let commands = self.master.exchange(&heard, end_ns);
-        let written = self.write(&commands);
+        let written = self.write(&commands, &sent);
         let frames_late = self.frames_since(began_ns);
         self.late = self.late.saturating_add(frames_late.is_ok_and(|frames| frames > 0).into());
         fault.map_or(Ok(()), Err)?;
@@ -304,16 +306,16 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// Writes every place, whatever fails, and tells its axis of each that was not written; returns the first fault.
-    fn write(&mut self, commands: &[Command32; N]) -> Result<(), P::Error> {
+    fn write(&mut self, commands: &[Command32; N], sent: &[Sent; N]) -> Result<(), P::Error> {
         let (size, mut result) = (self.master.config().size, Ok(()));
-        for (place, command) in commands.iter().enumerate() {
+        for (place, (command, sent)) in commands.iter().zip(sent).enumerate() {
             let (mut memory, bytes) = ([P::Word::default(); MOST_WORDS], command.emit());
             let words = words_of::<P>(size, &mut memory);
             // The sizes agree.
             pack::to_words(bytes.get(..size.bytes()).unwrap_or_default(), words).unwrap_or(());
             let written = twice(|| self.port.write(place, words));
             if let (Err(_), Some(axis)) = (&written, self.master.ring_mut().axes_mut().get_mut(place)) {
-                axis.not_sent();
+                axis.not_sent(*sent);
             }
             result = result.and(written);
         }

@@ -6,8 +6,6 @@ mod setpoint;
 mod stop;
 mod supervise;
 
-use core::mem;
-
 use asking::{Main, Sub};
 
 use super::config::{AxisConfig, StopCategory};
@@ -54,13 +52,12 @@ pub struct Axis {
     /// What the caller has requested: the mode, and the position, speed or torque in it.
     mode: ActiveCode,
     setpoint: i32,
-    /// The content of the last block, and of the one before.
+    /// The content of the last block.
     wire: Wire,
-    before: Wire,
     evidence: Evidence,
     watch: EchoWatch,
     arrival: Arrival,
-    /// Number of update periods without an exchange before the last one, or since the last block if that brought none.
+    /// Number of update periods without an exchange before the last one.
     missed: u8,
     /// The low half of the end of the last update period, ns.
     heard_ns: u32,
@@ -99,11 +96,10 @@ struct Wire {
     stands: u8,
 }
 
-impl Wire {
-    const fn new(mode: ActiveCode) -> Self {
-        Self { mode, value: 0, step: 0, on: false, stands: 0 }
-    }
-}
+/// What an axis has sent last, to go back to if its next block is not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sent(Wire);
 
 /// Number of missed update periods after which a motor without a new command position is at rest; no more than these are
 /// counted.
@@ -131,8 +127,7 @@ impl Axis {
             category: StopCategory::Zero,
             mode: config.mode,
             setpoint: 0,
-            wire: Wire::new(config.mode),
-            before: Wire::new(config.mode),
+            wire: Wire { mode: config.mode, value: 0, step: 0, on: false, stands: 0 },
             evidence: Evidence::NEVER,
             watch: EchoWatch::new(config.limits.echo),
             arrival: Arrival::Missing,
@@ -235,9 +230,9 @@ impl Axis {
     /// while invalid data are sent.
     pub fn hear(&mut self, sent: Turn, heard: &Heard, end_ns: u64) {
         let response = self.sound(heard);
-        let missed = self.missed(end_ns);
+        self.missed = self.missed(end_ns);
         let Turn::Valid(sent) = sent else {
-            (self.arrival, self.missed) = (Arrival::Missing, 0);
+            self.arrival = Arrival::Missing;
             if let Some(response) = response {
                 // The counter stands still in invalid data, so nothing says when this is from.
                 self.watch.note(response.update_counter_echo);
@@ -246,9 +241,7 @@ impl Axis {
             return self.rest();
         };
         let echo = response.map(|response| response.update_counter_echo);
-        let since = if self.arrival == Arrival::Missing { self.missed } else { 0 };
-        self.missed = missed.max(since);
-        self.arrival = self.watch.judge(sent, echo, missed, !self.state.is_servo_on());
+        self.arrival = self.watch.judge(sent, echo, self.missed, !self.state.is_servo_on());
         let on_time = response.filter(|_| self.arrival == Arrival::OnTime);
         self.supervise(response, on_time);
         self.serve(on_time);
@@ -294,7 +287,7 @@ impl Axis {
             AxisState::SwitchingOn => self.wire.on || self.is_current(),
             state => state.is_servo_on(),
         };
-        self.before = mem::replace(&mut self.wire, Wire { mode: self.mode, value, step, on, stands: 0 });
+        self.wire = Wire { mode: self.mode, value, step, on, stands: 0 };
         let off = *ServoOff::new(mac_id, counter, self.mode).command();
         let [data3, sub2, sub3] = self.feed_forward;
         let control = if on { self.control.union(self.servo_bits()) } else { self.control };
@@ -302,15 +295,19 @@ impl Axis {
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
     }
 
-    /// Takes back that the last [`transmission`](Self::transmission) was sent: the drive still has the block before. The next step, a
-    /// stop, a change of the mode and Servo_On begin at that one. After three blocks in a row that were not sent the command position
-    /// has stopped.
-    pub const fn not_sent(&mut self) {
-        let stands = self.before.stands.saturating_add(1);
-        self.wire = Wire { stands, ..self.before };
-        if stands >= MANY && matches!(self.wire.mode, ActiveCode::CyclicPosition) {
-            self.wire.step = 0;
-        }
+    /// Returns what was sent last, to be kept while the next block is written.
+    pub const fn sent(&self) -> Sent {
+        Sent(self.wire)
+    }
+
+    /// Takes back what was sent after `last`: it was not written, so the drive still has the block before. The next step, a
+    /// stop, a change of the mode and Servo_On begin at that one. After three blocks in a row that were not written the command
+    /// position has stopped.
+    pub const fn not_sent(&mut self, last: Sent) {
+        let Sent(wire) = last;
+        let stands = wire.stands.saturating_add(1);
+        let is_still = stands >= MANY && matches!(wire.mode, ActiveCode::CyclicPosition);
+        self.wire = Wire { stands, step: if is_still { 0 } else { wire.step }, ..wire };
     }
 
     /// Returns when the first block after the last one on time can have come.

@@ -13,7 +13,7 @@ pub enum Arrival {
     /// The block has the expected echo, which is as far behind the last counter sent as in every exchange of this system.
     OnTime,
     /// The block has the echo of the previous one: no frame came, or the drive has stopped. Also the first block after four
-    /// periods or more without one: it may be as old as they are.
+    /// periods without one, or after an exchange without one that came too late: it may be as old as that.
     Repeated,
     /// The block has the echo of another period: the answer is late or belongs to the next frame, or the wrong bank was read.
     OffTime {
@@ -30,6 +30,35 @@ servowire_core::one_line!(Arrival {
     Self::OffTime { lag } => "the echo of another period, {} counters behind", lag;
     Self::Missing => "no block";
 });
+
+/// The echoes that a block may have which has been in the memory all the time: a bit for each. The high half counts the samples
+/// without a block since the last one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Seen(u8);
+
+impl Seen {
+    const NONE: Self = Self(0);
+    const ANY: u8 = 0x0f;
+
+    /// After a block with this echo.
+    const fn new(echo: UpdateCounter) -> Self {
+        Self(1 << echo.get())
+    }
+
+    const fn contains(self, echo: UpdateCounter) -> bool {
+        self.0 >> echo.get() & 1 != 0
+    }
+
+    /// After a sample without a block. Any echo may have been there for a while after a turn of the counter, and after periods
+    /// without an exchange, in which the same echo came again.
+    #[cold]
+    #[inline(never)]
+    const fn and_nothing(self, missed: u8) -> Self {
+        let unseen = (self.0 >> 4).saturating_add(1);
+        if unseen < TURN && missed == 0 { Self(unseen << 4 | self.0 & Self::ANY) } else { Self(Self::ANY) }
+    }
+}
 
 /// Judges every block by its counter echo, and notices if no block comes on time.
 ///
@@ -50,9 +79,7 @@ pub struct EchoWatch {
     limit: NonZeroU16,
     /// Number of samples since the last one on time.
     updates: u16,
-    last: Option<UpdateCounter>,
-    /// Number of samples without a block since the last block.
-    unseen: u8,
+    seen_last: Seen,
     lag: Option<u8>,
     /// A different lag that was seen, and how many times in a row.
     other: u8,
@@ -64,14 +91,14 @@ pub struct EchoWatch {
 impl EchoWatch {
     /// Creates a watch that trips after `limit` samples without a new echo.
     pub const fn new(limit: NonZeroU16) -> Self {
-        Self { limit, updates: 0, last: None, unseen: 0, lag: None, other: 0, seen: 0, sure: 0 }
+        Self { limit, updates: 0, seen_last: Seen::NONE, lag: None, other: 0, seen: 0, sure: 0 }
     }
 
     /// Takes a sample without knowing the counter sent; `None` if the update period brought no block from the drive, which
     /// counts as unchanged. Returns whether the watch has tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
-        let is_new = echo.is_some() && echo != self.last;
-        self.last = echo.or(self.last);
+        let is_new = echo.is_some_and(|echo| !self.seen_last.contains(echo));
+        self.seen_last = echo.map_or(self.seen_last, Seen::new);
         self.count(is_new);
         self.is_tripped()
     }
@@ -87,17 +114,16 @@ impl EchoWatch {
     ) -> Arrival {
         let arrival = match echo {
             None => {
-                self.unseen = self.unseen.saturating_add(1);
+                self.seen_last = self.seen_last.and_nothing(missed);
                 Arrival::Missing
             }
+            Some(echo) if self.seen_last.contains(echo) => {
+                self.seen_last = Seen::new(echo);
+                Arrival::Repeated
+            }
             Some(echo) => {
-                let is_proof = self.last != Some(echo) && self.unseen < TURN;
-                (self.last, self.unseen) = (Some(echo), 0);
-                if is_proof {
-                    self.place(sent.get().wrapping_sub(echo.get()) & 3, missed, learns)
-                } else {
-                    Arrival::Repeated
-                }
+                self.seen_last = Seen::new(echo);
+                self.place(sent.get().wrapping_sub(echo.get()) & 3, missed, learns)
             }
         };
         self.count(arrival == Arrival::OnTime);
@@ -146,7 +172,7 @@ impl EchoWatch {
 
     /// Takes an echo while invalid data are sent: the next one must be different.
     pub(super) const fn note(&mut self, echo: UpdateCounter) {
-        self.last = Some(echo);
+        self.seen_last = Seen::new(echo);
     }
 
     /// Restarts the limit. A block that was already in the memory does not become new by this, and the lag of the system is
