@@ -5,7 +5,7 @@ use super::procedure::{Home, Procedure, Request};
 use super::profile_move::CommandEnded;
 use super::progress::{Failure, Progress};
 use super::ring::{Ring, RingFailure};
-use super::state::{AxisState, RingSwitchOnError, SetpointError};
+use super::state::{AxisState, RingSwitchOnError, SetpointError, SwitchOnError};
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::status::StatusFlags;
@@ -134,7 +134,8 @@ pub trait Run<const N: usize> {
         Ok(())
     }
 
-    /// Waits for the main power of all drives, without a limit, and switches all axes on.
+    /// Waits for the main power of all drives, without a limit, and switches all axes on. Those that are on stay on, but the axes of
+    /// a ring are switched on together: if only some are on, or one is held after a stop, that is an error.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Alarm`], [`Ended::SwitchOn`]
@@ -142,6 +143,9 @@ pub trait Run<const N: usize> {
         loop {
             step(self)?;
             let ring = self.ring_mut();
+            if ring.all_are(AxisState::On) {
+                return Ok(());
+            }
             if ring.axes().iter().all(|axis| axis.can_switch_on().is_ok()) {
                 ring.switch_on().map_err(Ended::SwitchOn)?;
                 // The axes have limits of their own.
@@ -150,6 +154,9 @@ pub trait Run<const N: usize> {
             let alarmed = |axis: &Axis| axis.status().contains(StatusFlags::ALARM);
             if let Some((_, place)) = ring.axes().iter().zip(0..).find(|(axis, _)| alarmed(axis)) {
                 return Err(Ended::Alarm { place });
+            }
+            if let Some(error) = stays(ring) {
+                return Err(Ended::SwitchOn(error));
             }
         }
     }
@@ -225,6 +232,18 @@ pub trait Run<const N: usize> {
             }
         }
     }
+}
+
+/// Returns an axis that stays energised and so is never off, one that is held before one that is on; `None` if all are on or on
+/// their way there.
+fn stays<const N: usize>(ring: &Ring<N>) -> Option<RingSwitchOnError> {
+    let states = ring.axes().iter().map(Axis::state).zip(0..);
+    if states.clone().all(|(state, _)| matches!(state, AxisState::SwitchingOn | AxisState::On)) {
+        return None;
+    }
+    let held = states.clone().find(|(state, _)| matches!(state, AxisState::Held(_)));
+    let (state, place) = held.or_else(|| states.clone().find(|(state, _)| *state == AxisState::On))?;
+    Some(RingSwitchOnError { place, error: SwitchOnError::State(state) })
 }
 
 /// Runs one update period; an axis that has stopped ends the job.

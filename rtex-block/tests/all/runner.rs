@@ -4,7 +4,8 @@ use crate::common::{CODES, limits, monitor};
 use rtex_block::device::{Drive, DriveConfig, Fault};
 use rtex_block::master::procedure::SetPosition;
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Ended, Failure, Heard, Ring, RingFailure, Run, SetpointError, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, Ended, Failure, Heard, Ring, RingFailure, RingSwitchOnError, Run,
+    SetpointError, StopCategory, StopReason, SwitchOnError,
 };
 use rtex_block::type_code::profile;
 use rtex_block::{Alarm, MacId, Response};
@@ -39,7 +40,8 @@ impl Run<2> for Bench {
 
 fn bench(mode: ActiveCode) -> Bench {
     let number = |n| MacId::new(n).unwrap();
-    let axis = |n| Axis::new(AxisConfig::new(number(n), mode, 500_000, limits().with_ready(None)));
+    let config = |n| AxisConfig::new(number(n), mode, 500_000, limits().with_ready(None)).with_deceleration(10);
+    let axis = |n| Axis::new(config(n));
     let drives = [4, 5].map(|n| Drive::new(DriveConfig::new(number(n), CODES)));
     let ring = Ring::new([axis(4), axis(5)], 2).unwrap();
     Bench { ring, drives, heard: [Heard::Nothing; 2], now_ns: 0, lasts: 100_000 }
@@ -87,6 +89,32 @@ fn a_day_of_a_ring() {
     let from = ring.now_ns;
     assert_eq!(ring.until(Some(5), |_| false), Err(Ended::Limit));
     assert_eq!((ring.now_ns - from) / 500_000, 5);
+}
+
+/// What is on is on; what is neither off nor on its way there is not waited for.
+#[test]
+fn switching_on_what_is_not_off_ends() {
+    let mut ring = bench(ActiveCode::CyclicPosition);
+    ring.switch_on().unwrap();
+    ring.lasts = 100;
+    assert_eq!(ring.switch_on(), Ok(()));
+    // One is held, and one is still on.
+    ring.ring.axes_mut()[1].stop(StopCategory::Two);
+    ring.run(2).unwrap();
+    let held = AxisState::Held(StopReason::Requested);
+    let error = SwitchOnError::State(held);
+    assert_eq!(ring.ring.axes()[1].state(), held);
+    assert_eq!(ring.switch_on(), Err(Ended::SwitchOn(RingSwitchOnError { place: 1, error })));
+    ring.ring.axes_mut()[1].clear();
+    assert_eq!(ring.switch_on(), Ok(()));
+    // One is off.
+    ring.ring.axes_mut()[0].switch_off();
+    let error = SwitchOnError::State(AxisState::On);
+    assert_eq!(ring.switch_on(), Err(Ended::SwitchOn(RingSwitchOnError { place: 1, error })));
+    ring.ring.switch_off();
+    ring.lasts = 1_000;
+    assert_eq!(ring.switch_on(), Ok(()));
+    assert!(ring.ring.all_are(AxisState::On));
 }
 
 #[test]
