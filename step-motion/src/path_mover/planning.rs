@@ -8,6 +8,9 @@ use crate::real::Real;
 
 use super::PathMover;
 
+#[cfg(test)]
+mod tests;
+
 /// How a stop runs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stop<const N: usize> {
@@ -24,12 +27,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
         let line = self.line.as_ref()?;
         let moment = self.clock().moment(self.tick(now));
-        let start = Start { made: self.made, ..line.start };
+        let mut start = Start { made: self.made, ..line.start };
         if moment >= line.over() {
             let place = (start.place + line.curve.way()) - start.before;
-            let (moment, before) = (self.clock().aligned(moment), Real::ZERO);
-            let rest = Start { place, before, moment, offset: Real::ZERO, ..start };
-            return (!line.start.whole).then(|| (Motion::steady(Real::ZERO), rest));
+            let (moment, before, offset) = (self.clock().aligned(moment), Real::ZERO, Real::ZERO);
+            (start.place, start.before, start.moment, start.offset) = (place, before, moment, offset);
+            return (!start.whole).then_some((Motion::steady(Real::ZERO), start));
         }
         let begin = line.start.moment;
         if moment <= begin {
@@ -71,11 +74,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         let from = (start.place, start.before);
         let how = (self.bounds, self.braking);
-        let planned = |(course, bounds): (Course, Bounds)| {
+        let planned = |(mut course, bounds): (Course, Bounds)| {
             let end = self.path.locate(0, (start.place + course.curve.way()) - start.before, course.more);
             let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
             // It is whole once the path has been cut off where it ends.
-            Stop { end, left, first: Some((Course { whole: true, ..course }, start, bounds)) }
+            course.whole = true;
+            Stop { end, left, first: Some((course, start, bounds)) }
         };
         let stop = match self.path.brake(0, motion, from, how) {
             Some(course) => planned(course),

@@ -258,6 +258,17 @@ fn an_acceleration_or_jerk_under_way_is_held() {
     assert_eq!(more(&mut path, 5000.25), 3, "rounding must not end a run");
 }
 
+/// A corner is slow enough for what a motion that still speeds up comes to: with 250 steps/s² and 5100 steps/s³, 6 steps/s more.
+#[test]
+fn a_stop_leads_over_no_corner_that_is_too_slow() {
+    let path = path(&[([1000, 10, 200], 1000), ([1000, 200, 200], 1000)]);
+    let corner = float(path.line(1).unwrap().corner) * second();
+    assert!((100.0..600.0).contains(&corner), "{corner}");
+    let stops =
+        |v: f64| path.stop(0, motion([v, 250.0]), (real(1000.0), Real::ZERO), (None, false), true).unwrap().is_ok();
+    assert_eq!([corner - 7.0, corner - 5.0].map(stops), [true, false]);
+}
+
 fn steady(v: f64) -> Motion {
     motion([v, 0.0])
 }

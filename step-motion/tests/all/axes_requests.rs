@@ -169,6 +169,7 @@ fn a_halt_is_confirmed_by_the_interrupt() {
 #[test]
 fn a_halt_behind_the_end_of_what_is_planned() {
     let mut bench = Bench::new();
+    bench.axes = bench.axes.with_reach(100_000);
     bench.axes.push([40, 0], 100_000).unwrap();
     while bench.x() < 20 {
         while bench.axes.poll() == Work::More {}

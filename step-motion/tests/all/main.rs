@@ -13,6 +13,7 @@ mod lines;
 mod machine;
 mod path_laws;
 mod path_queue;
+mod path_stops;
 mod paths;
 mod plans;
 mod queue;

@@ -1,0 +1,134 @@
+//! A stop of a path is the same one whenever, however often and in whichever way it is asked for; and what comes after it.
+
+use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
+
+type Machine = PathMover<2, 8>;
+
+/// 1000 steps/s, 5000 steps/s² and 50,000 steps/s³ along two lines in one direction, on one curve: full speed takes 150 steps.
+fn machine() -> Machine {
+    let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();
+    let mut machine = PathMover::new(path(limits));
+    machine.push([400, 0], 1000, 0).unwrap();
+    machine.push([1000, 0], 1000, 0).unwrap();
+    machine
+}
+
+fn path(limits: Limits) -> Path<2, 8> {
+    Path::new(Clock::MICROSECONDS, [AxisSetup::new(limits, 1_000_000); 2], 20).unwrap()
+}
+
+/// Takes steps until so many are made; gives the tick of the last one.
+fn take(machine: &mut Machine, until: i64) -> u64 {
+    let mut last = 0;
+    while machine.commanded()[0] < until {
+        last = machine.pulse().unwrap().tick;
+    }
+    last
+}
+
+fn rest(machine: &mut Machine) -> Vec<u64> {
+    core::iter::from_fn(|| machine.pulse()).map(|pulse| pulse.tick).collect()
+}
+
+#[test]
+fn a_hold_that_is_asked_for_again_is_the_same() {
+    for at in (30..500).step_by(37) {
+        let mut once = machine();
+        let now = take(&mut once, at);
+        once.hold(now);
+        let mut again = once.clone();
+        let mut ticks = Vec::new();
+        while let Some(pulse) = again.pulse() {
+            ticks.push(pulse.tick);
+            again.hold(pulse.tick);
+            again.set_override(0, pulse.tick);
+            again.set_override(100, pulse.tick);
+        }
+        assert_eq!(ticks, rest(&mut once), "{at}");
+    }
+}
+
+/// At any step, across the joint too, and also while a hold is under way: the path ends where the hold would.
+#[test]
+fn a_stop_ends_where_a_hold_does() {
+    for at in (20..560).step_by(9) {
+        let mut held = machine();
+        let now = take(&mut held, at);
+        let mut stopped = held.clone();
+        held.hold(now);
+        stopped.stop(now);
+        let aim = stopped.target();
+        rest(&mut stopped);
+        assert!(stopped.commanded() == aim && stopped.is_empty(), "{at}");
+        let mut alone = held.clone();
+        rest(&mut alone);
+        assert_eq!(alone.commanded(), aim, "{at}");
+        while let Some(pulse) = held.pulse() {
+            let mut stopped = held.clone();
+            stopped.stop(pulse.tick);
+            rest(&mut stopped);
+            assert!(stopped.commanded() == aim && stopped.is_empty(), "{at}: {:?}", stopped.commanded());
+            stopped.resume(pulse.tick);
+            stopped.push([aim[0] + 1, 0], 1000, pulse.tick).unwrap();
+            assert!(stopped.due().is_some(), "{at}: it goes on");
+        }
+    }
+}
+
+/// At rest on the second line, behind a brake that began on the first one: at 50,000 steps/s³ 4 to 5 steps take 78 to 85 ms.
+#[test]
+fn a_way_on_begins_at_rest() {
+    let mut machine = machine();
+    let now = take(&mut machine, 380);
+    machine.hold(now);
+    rest(&mut machine);
+    assert!(machine.commanded()[0] > 410);
+    machine.set_override(100, 2_000_000);
+    machine.resume(2_000_000);
+    let fifth = rest(&mut machine)[4];
+    assert!((2_077_000..2_086_000).contains(&fifth), "{fifth}");
+}
+
+/// 1000 steps/s, and no way to rest: after a stop right at a step a way back begins half an interval later, and takes as long to its
+/// first step.
+#[test]
+fn a_way_back_begins_behind_the_last_step() {
+    let mut machine = PathMover::new(path(Limits::new(1000, 2_000_000_000).unwrap()));
+    machine.push([10, 0], 1000, 0).unwrap();
+    let last = take(&mut machine, 5);
+    machine.stop(last);
+    machine.push([0, 0], 1000, last).unwrap();
+    let first = machine.due().unwrap();
+    assert!((last + 999..=last + 1002).contains(&first), "{last} {first}");
+}
+
+/// A line that is added while a curve is under way is planned from there: where it makes no difference, it makes none. What is left of a
+/// tick is not lost.
+#[test]
+fn a_curve_that_is_planned_again_goes_on_in_the_same_tick() {
+    let limits = Limits::new(997, 4703).unwrap().with_jerk(50_021).unwrap();
+    for length in 201..231 {
+        // Back: it comes to rest at the end of the second line in any case.
+        let lines = [[length, 0], [450, 0], [0, 0]];
+        let ticks = |known: usize| {
+            let (mut path, mut ticks) = (
+                Path::<2, 8>::new(Clock::new(10_000).unwrap(), [AxisSetup::new(limits, 1_000_000); 2], 20).unwrap(),
+                Vec::new(),
+            );
+            for to in &lines[..known] {
+                path.push(*to, 1000).unwrap();
+            }
+            ticks.extend(path.next_line().unwrap().map(|pulse| pulse.tick));
+            for to in &lines[known..] {
+                path.push(*to, 1000).unwrap();
+            }
+            while let Some(line) = path.next_line() {
+                ticks.extend(line.map(|pulse| pulse.tick));
+            }
+            ticks
+        };
+        let (all, late) = (ticks(3), ticks(2));
+        let other = all.iter().zip(&late).filter(|(all, late)| all != late).count();
+        assert!(all.len() == late.len() && other <= 4, "{length}: {other} of {}", all.len());
+    }
+}
