@@ -1,4 +1,5 @@
 use super::*;
+use crate::error_code::ErrorCode;
 use crate::header::{MacId, UpdateCounter};
 use proptest::prelude::*;
 use std::string::ToString;
@@ -151,6 +152,162 @@ fn every_layout_names_its_bytes() {
         let at = |name: &str| report.fields().find(|field| field.name == name).map(|field| field.first);
         assert_eq!(at(first), Some(2));
         assert!(second.is_empty() || at(second) == Some(3));
+    }
+}
+
+/// Each byte of this block is its own number, apart from the header, the nibbles of bytes 9 and 10, and byte 16: every value says where
+/// it stands.
+fn numbered(zero: u8, one: u8) -> Report {
+    let mut block = core::array::from_fn::<u8, 32, _>(|byte| byte as u8);
+    (block[0], block[1], block[9], block[10], block[16]) = (zero, one, 0x91, 0xba, 0xda);
+    inspect(&block)
+}
+
+/// Name, first and last byte, and value of what stands in bytes 0, 1 and from 4 on.
+fn placed(report: &Report) -> Vec<(&'static str, u8, u8, Value)> {
+    let fields = report.fields().filter(|field| !matches!(field.first, 2 | 3));
+    fields.map(|field| (field.name, field.first, field.last, field.value)).collect()
+}
+
+/// Bytes of a command, by the layouts of the document.
+#[test]
+fn every_field_of_a_command_stands_in_its_bytes() {
+    use Value::{Bit, Code, Hex, Number};
+    let sub = [
+        ("Sub_Chk", 16, 16, Bit(true)),
+        ("Sub_Command_Code", 16, 16, Hex(0x0a)),
+        ("Sub_Type_Code", 17, 17, Hex(0x11)),
+        ("Sub_Index", 18, 19, Hex(0x1312)),
+        ("Sub_Command_Data1", 20, 23, Number(0x1716_1514)),
+        ("Sub_Command_Data2", 24, 27, Number(0x1b1a_1918)),
+        ("Sub_Command_Data3", 28, 31, Number(0x1f1e_1d1c)),
+    ];
+    let generic =
+        |data| [("Type_Code", 8, 9, Hex(0x108)), ("Index", 10, 11, Hex(0x0bba)), (data, 12, 15, Number(0x0f0e_0d0c))];
+    let homing = [
+        ("Type_Code", 8, 8, Hex(8)),
+        ("Latch_Sel1", 10, 10, Hex(0x0a)),
+        ("Latch_Sel2", 10, 10, Hex(0x0b)),
+        ("Monitor_Sel", 11, 11, Hex(0x0b)),
+        ("Setting_Data", 12, 15, Number(0x0f0e_0d0c)),
+    ];
+    let profile = [homing[0], homing[1], homing[3], ("Target_Speed", 12, 15, Number(0x0f0e_0d0c))];
+    let normal = [("Command_Data2", 8, 11, Number(0x0bba_9108)), ("Command_Data3", 12, 15, Number(0x0f0e_0d0c))];
+    for (one, data1, own) in [
+        (0xa0, "Command_Position", &normal[..]),
+        (0xb0, "Command_Speed", &normal),
+        (0xc0, "Command_Torque", &normal),
+        (0x90, "Target_Position", &normal),
+        (0xa1, "Command_Position", &generic("Command_Data3")),
+        (0xa2, "Command_Position", &generic("Command_Data3")),
+        (0xa4, "Command_Position", &homing),
+        (0xa5, "Command_Position", &generic("Command_Data3")),
+        (0xa6, "Command_Position", &generic("Setting_Data")),
+        (0xaa, "Command_Position", &generic("Command_Data3")),
+        (0x97, "Target_Position", &profile),
+    ] {
+        let head = [
+            ("Update_Counter", 0, 0, Number(2)),
+            ("MAC-ID", 0, 0, Number(5)),
+            ("TMG_CNT", 1, 1, Bit(true)),
+            ("Command_Code", 1, 1, Code(crate::code::Code::truncate(one))),
+            (data1, 4, 7, Number(0x0706_0504)),
+        ];
+        assert_eq!(placed(&numbered(0x45, one)), [&head[..], own, &sub].concat(), "{one:x}");
+    }
+}
+
+/// Bytes of a response.
+#[test]
+fn every_field_of_a_response_stands_in_its_bytes() {
+    use Value::{AlarmData, Bit, Code, Hex, Number, Text};
+    let sub = [
+        ("Sub_CMD_Err", 16, 16, Bit(true)),
+        ("Sub_ERR", 16, 16, Bit(true)),
+        ("Sub_WNG", 16, 16, Bit(false)),
+        ("Sub_Busy", 16, 16, Bit(true)),
+        ("Sub_Command_Code_Echo", 16, 16, Hex(0x0a)),
+        ("Sub_Type_Code_Echo", 17, 17, Hex(0x11)),
+        ("Sub_Error_Code", 18, 19, Value::Error(ErrorCode(0x1312))),
+        ("Sub_Response_Data1", 20, 23, Number(0x1716_1514)),
+        ("Sub_Response_Data2", 24, 27, Number(0x1b1a_1918)),
+        ("Sub_Response_Data3", 28, 31, Number(0x1f1e_1d1c)),
+    ];
+    let executed = [("ERR", 9, 9, Bit(true)), ("WNG", 9, 9, Bit(false)), ("BUSY", 9, 9, Bit(true))];
+    let (code, index) = (("Type_Code_Echo", 8, 9, Hex(0x108)), ("Index_Echo", 10, 11, Hex(0x0bba)));
+    let results = |name, data| [&[code], &executed[..], &[index, (name, 12, 15, data)]].concat();
+    let echo = ("Type_Code_Echo", 8, 8, Hex(8));
+    let selected = [
+        ("Latch_Sel1_Echo", 10, 10, Hex(0x0a)),
+        ("Monitor_Sel_Echo", 11, 11, Hex(0x0b)),
+        ("Monitor_Data", 12, 15, Number(0x0f0e_0d0c)),
+    ];
+    let latches =
+        [("LATCH_COMP2", 9, 9, Bit(false)), ("LATCH_COMP1", 9, 9, Bit(true)), ("Latch_Sel2_Echo", 10, 10, Hex(0x0b))];
+    let limits = [
+        ("PSL", 9, 9, Bit(false)),
+        ("NSL", 9, 9, Bit(false)),
+        ("NEAR", 9, 9, Bit(false)),
+        ("LATCH_COMP1", 9, 9, Bit(true)),
+    ];
+    let normal = [("Response_Data2", 8, 11, Number(0x0bba_9108)), ("Response_Data3", 12, 15, Number(0x0f0e_0d0c))];
+    let monitored = results("Monitor_Data", Number(0x0f0e_0d0c));
+    for (one, own) in [
+        (0x20, normal.to_vec()),
+        (0x21, monitored.clone()),
+        (0x22, results("ASCII", Text([12, 13, 14, 15]))),
+        (0x24, [&[echo], &executed[..], &latches, &selected].concat()),
+        (0x25, results("Alarm_Data", AlarmData([12, 13, 14, 15]))),
+        (0x26, monitored.clone()),
+        (0x2a, monitored),
+        (0x17, [&[echo], &executed[..], &limits, &selected].concat()),
+        (0x23, [("bytes 8-11", 8, 11, normal[0].3), ("bytes 12-15", 12, 15, normal[1].3)].to_vec()),
+        (0xa6, [("Error_Code", 8, 9, Value::Error(ErrorCode(0x9108)))].to_vec()),
+    ] {
+        let head = [
+            ("Update_Counter_Echo", 0, 0, Number(2)),
+            ("Actual_MAC-ID", 0, 0, Number(5)),
+            ("CMD_Error", 1, 1, Bit(one > 0x7f)),
+            ("Command_Code_Echo", 1, 1, Code(crate::code::Code::truncate(one))),
+            ("Response_Data1", 4, 7, Number(0x0706_0504)),
+        ];
+        assert_eq!(placed(&numbered(0xc5, one)), [&head[..], &own, &sub].concat(), "{one:x}");
+    }
+    // Without an error of the sub-command, its index.
+    let mut block = [0; 32];
+    (block[0], block[1], block[16], block[18], block[19]) = (0xc5, 0x20, 0x2a, 0x12, 0x13);
+    let fields = placed(&inspect(&block));
+    let [error, _, warning, busy] = ["Sub_CMD_Err", "Sub_ERR", "Sub_WNG", "Sub_Busy"];
+    for (name, value) in [(error, Bit(false)), (warning, Bit(true)), (busy, Bit(false))] {
+        assert!(fields.contains(&(name, 16, 16, value)), "{name}");
+    }
+    assert!(fields.contains(&("Sub_Index_Echo", 18, 19, Hex(0x1312))));
+}
+
+/// Bytes 2 and 3, bit by bit.
+#[test]
+fn every_flag_stands_in_its_byte() {
+    let second = ["SERVO_ON", "GAIN_SW", "TL_SW", "HOMING_CTRL"];
+    let third = ["HARD_STOP", "SMOOTH_STOP", "PAUSE", "SL_SW", "EX_OUT2", "EX_OUT1"];
+    let status = [
+        [
+            "SERVO_ACTIVE",
+            "SERVO_READY",
+            "ALARM",
+            "WARNING",
+            "TORQUE_LIMITED",
+            "HOMING_COMPLETE",
+            "IN_PROGRESS",
+            "IN_POSITION",
+        ],
+        ["SI_MON5", "SI_MON4", "SI_MON3", "SI_MON2", "SI_MON1", "HOME", "POT", "NOT"],
+    ];
+    for (zero, want) in [(0x05, [&second[..], &third]), (0x85, [&status[0], &status[1]])] {
+        let report = numbered(zero, 0x20);
+        for (byte, want) in [2, 3].into_iter().zip(want) {
+            let at = report.fields().filter(|field| (field.first, field.last) == (byte, byte));
+            assert_eq!(at.map(|field| field.name).collect::<Vec<_>>(), want);
+        }
     }
 }
 
