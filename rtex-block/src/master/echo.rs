@@ -247,6 +247,9 @@ mod tests {
         assert!(!watch.sample(UpdateCounter::new(2)));
         // None after one that was there is no new one.
         assert_eq!([None; 3].map(|echo| watch.sample(echo)), [false, false, true]);
+        // Nor is one that stays.
+        watch.reset();
+        assert_eq!([UpdateCounter::new(3); 4].map(|echo| watch.sample(echo)), [false, false, false, true]);
     }
 
     /// By hand: the counter sent goes on by one, and the echo is as many behind.

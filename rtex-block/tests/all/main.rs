@@ -24,6 +24,7 @@ mod impolite;
 mod laws;
 mod log;
 mod master;
+mod one_block;
 mod places_in_time;
 mod procedures;
 mod refusals;

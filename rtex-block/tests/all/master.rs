@@ -6,7 +6,7 @@ use crate::common::{CODES, LIMIT, limits};
 use rtex_block::device::{Drive, DriveConfig, Fault};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Led, Master, MasterConfig, MoveStage,
-    Ring, RingFailure, SameMacId, SetupError, Slave, StopCategory, StopReason,
+    Ring, RingFailure, SameMacId, SetupError, Slave, SlaveInfo, StopCategory, StopReason, compare,
 };
 use rtex_block::pack::SizeMismatch;
 use rtex_block::timing::{A6N, Periods, TimerSystem};
@@ -166,6 +166,21 @@ fn slaves_that_are_not_in_the_table() {
     assert_eq!(bench.master.error(), fault);
     bench.master.clear();
     assert_eq!((bench.master.error(), bench.master.led(700)), (fault, Led::Red));
+    // Nor do the right ones change that.
+    assert_eq!(bench.master.control(Asic::Ready, Some(&table())), ControlPhase::Waiting);
+}
+
+/// MAC-ID 31 is the highest, and one like the others.
+#[test]
+fn the_highest_mac_id_is_there_once() {
+    let twice = [31, 31].map(|number| Axis::new(axis(number)));
+    assert_eq!(Ring::new(twice, 0).err(), Some(SameMacId { mac_id: mac_id(31) }));
+    assert!(Ring::new([0, 31].map(|number| Axis::new(axis(number))), 0).is_ok());
+    let slaves = [31, 31].map(|number| Slave { mac_id: mac_id(number), kind: 1 });
+    assert_eq!(compare(&slaves, &slaves), SlaveInfo::Mismatch);
+    // Servo-on is refused for the first axis that is not ready.
+    let mut ring = Ring::new([0, 31].map(|number| Axis::new(axis(number))), 0).unwrap();
+    assert_eq!(ring.switch_on().unwrap_err().place, 0);
 }
 
 #[test]

@@ -27,9 +27,7 @@ impl Quiet {
     /// Takes a block that is on time, with the normal code or another one.
     #[inline]
     pub(super) const fn hear(&mut self, is_normal: bool) {
-        if !self.is_kept() {
-            self.0 = if is_normal { self.0.saturating_add(1) } else { 0 };
-        }
+        self.0 = if is_normal { self.0.saturating_add(1) } else { 0 };
     }
 }
 

@@ -79,7 +79,6 @@ impl Axis {
             _ => {}
         }
         if self.state.is_servo_on() {
-            self.active_off = 0;
             return;
         }
         if !active {

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::convert::Infallible;
 
 use rtex_block::master::Asic;
-use servowire_drivers::rtex::{FrameCount, Port};
+use servowire_drivers::rtex::{Exchanged, FrameCount, Port};
 
 use super::*;
 
@@ -71,6 +71,26 @@ fn an_echo_that_stands_still_costs_the_others_nothing() {
     }
 }
 
+/// An exchange whose interrupt is noticed 60 us late and that goes over the next edge after so many words; returns also the frames that
+/// the words are of.
+fn noticed_late(ring: &Shared, driver: &mut Rtex<u16>, at: u32) -> (Exchanged, Vec<u32>) {
+    let began_ns = {
+        let mut ring = ring.borrow_mut();
+        let begins_ns = ring.next_frame_ns();
+        ring.pass(begins_ns + 60_000);
+        ring.in_exchange = true;
+        ring.read_of.clear();
+        ring.stall_in = Some((at, 441_000));
+        ring.now_ns
+    };
+    let exchanged = driver.exchange(began_ns).unwrap();
+    let mut ring = ring.borrow_mut();
+    ring.in_exchange = false;
+    ring.stall_in = None;
+    ring.let_in();
+    (exchanged, std::mem::take(&mut ring.read_of))
+}
+
 /// The interrupt is noticed 60 us late and the exchange goes over the next edge, so the clock sees nothing: what an axis takes is of
 /// the frame that is due, whichever access the bank was switched at.
 #[test]
@@ -81,23 +101,7 @@ fn a_late_interrupt_mixes_no_frames() {
     let words = (AXES + 1) * 8;
     let mut mixed = 0;
     for at in 0..200 {
-        let began_ns = {
-            let mut ring = ring.borrow_mut();
-            let begins_ns = ring.next_frame_ns();
-            ring.pass(begins_ns + 60_000);
-            ring.in_exchange = true;
-            ring.read_of.clear();
-            ring.stall_in = Some((at % words as u32, 441_000));
-            ring.now_ns
-        };
-        let exchanged = driver.exchange(began_ns).unwrap();
-        let read = {
-            let mut ring = ring.borrow_mut();
-            ring.in_exchange = false;
-            ring.stall_in = None;
-            ring.let_in();
-            std::mem::take(&mut ring.read_of)
-        };
+        let (exchanged, read) = noticed_late(&ring, &mut driver, at % words as u32);
         // The frame that was there when the interrupt came.
         let due = read[0];
         let taken = &read[read.len() - words..][..AXES * 8];
@@ -222,40 +226,48 @@ fn blocks_that_only_look_like_one_frame_are_not_taken() {
 #[test]
 fn no_position_is_made_of_two_halves() {
     let mut halves = 0;
-    for (external, still) in
-        [true, false].into_iter().flat_map(|external| (0..AXES).map(move |still| (external, still)))
+    // The receive interrupt switches the bank, or XSYNC, in time for the clock to tell or so late that the echoes alone do.
+    for ((external, late), still) in [(true, false), (false, false), (false, true)]
+        .into_iter()
+        .flat_map(|system| (0..AXES).map(move |still| (system, still)))
     {
         let ring = Ring::new(external, false);
         let mut driver = on::<u16>(&ring);
-        // Both words of a position change in each period.
-        let run = |driver: &mut Rtex<u16>, periods: u16| {
-            for _ in 0..periods {
-                for place in (0..AXES).filter(|place| *place != still) {
-                    let axis = &mut driver.ring_mut().axes_mut()[place];
-                    axis.set_position(axis.setpoint().wrapping_add(0x1_8001)).unwrap();
-                }
-                update(&ring, driver).unwrap();
-                for (place, axis) in driver.master().ring().axes().iter().enumerate() {
-                    let position = axis.evidence().at(0, Policy::new(u64::MAX)).unwrap().position();
-                    let ring = ring.borrow();
-                    let known = ring.positions.iter().map(|frame| frame[place]);
-                    assert!(known.clone().any(|it| it == position), "{position} of {:?}", known.collect::<Vec<_>>());
-                }
+        let period = |driver: &mut Rtex<u16>, late_at: Option<u32>| {
+            // Both words of a position change in each period.
+            for place in (0..AXES).filter(|place| *place != still) {
+                let axis = &mut driver.ring_mut().axes_mut()[place];
+                axis.set_position(axis.setpoint().wrapping_add(0x1_8001)).unwrap();
             }
+            let read = if let Some(at) = late_at {
+                noticed_late(&ring, driver, at).1
+            } else {
+                update(&ring, driver).unwrap();
+                ring.borrow().read_of.clone()
+            };
+            for (place, axis) in driver.master().ring().axes().iter().enumerate() {
+                let position = axis.evidence().at(0, Policy::new(u64::MAX)).unwrap().position();
+                let ring = ring.borrow();
+                let known = ring.positions.iter().map(|frame| frame[place]);
+                assert!(known.clone().any(|it| it == position), "{position} of {:?}", known.collect::<Vec<_>>());
+            }
+            usize::from(read.windows(2).any(|two| two[0] != two[1]))
         };
-        for (at, periods) in (0..100).flat_map(|at| (1..LIMIT - 1).map(move |periods| (at, periods))) {
+        for (at, periods) in (0..100).flat_map(|at| (1..LIMIT - 1 - u16::from(late)).map(move |periods| (at, periods)))
+        {
             ring.borrow_mut().drives[still].set_fault(Fault::StaleEcho);
-            run(&mut driver, periods);
-            ring.borrow_mut().stall_in = Some((at, if external { 29_000 } else { 499_000 }));
-            run(&mut driver, 1);
-            halves += usize::from(ring.borrow().read_of.windows(2).any(|two| two[0] != two[1]));
+            (0..periods).for_each(|_| _ = period(&mut driver, None));
+            if !late {
+                ring.borrow_mut().stall_in = Some((at, if external { 29_000 } else { 499_000 }));
+            }
+            halves += period(&mut driver, late.then_some(at));
             heal(&ring);
             ring.borrow_mut().drives[still].set_fault(Fault::None);
-            run(&mut driver, 6);
+            (0..6).for_each(|_| _ = period(&mut driver, None));
             assert_eq!(driver.master().ring().failure(), None, "{external} {still} {at} {periods}");
         }
     }
-    assert!(halves > 1_400, "{halves}");
+    assert!(halves > 2_000, "{halves}");
 }
 
 /// The port fails when the first block is read again at the end, which alone tells that the bank was switched in the middle of the
