@@ -475,7 +475,7 @@ mod tests {
                     let most = interval.unsigned_abs() >> coarse.unwrap_or(63);
                     let exact = cutter.exact(&curve, &frame, (count, time));
                     let off = (time - exact).unsigned_abs();
-                    assert!(off <= u128::from(most.max(20 << 32) / 100 * 102), "{off} for {most}, {count} {coarse:?}");
+                    assert!(off <= u128::from(most.max((1 << 32) / 50) / 100 * 102), "{off} for {most}, {count} {coarse:?}");
                     (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
                 }
                 segments += 1.0;
