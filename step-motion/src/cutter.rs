@@ -472,10 +472,10 @@ mod tests {
                 let first = cutter.count() - u32::from(stretch.count);
                 let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
                 for count in first..cutter.count() {
-                    let most = interval.unsigned_abs() >> coarse.unwrap_or(63);
+                    let most = (interval.unsigned_abs() >> coarse.unwrap_or(63)).max((1 << 32) / 50);
                     let exact = cutter.exact(&curve, &frame, (count, time));
                     let off = (time - exact).unsigned_abs();
-                    assert!(off <= u128::from(most.max((1 << 32) / 50) / 100 * 102), "{off} for {most}, {count} {coarse:?}");
+                    assert!(off <= u128::from(most / 100 * 102), "{off} for {most}, {count} {coarse:?}");
                     (time, interval, add) = (time + i128::from(interval), interval + add, add + bend);
                 }
                 segments += 1.0;
