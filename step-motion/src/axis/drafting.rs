@@ -19,7 +19,7 @@ const BEFORE: u64 = 2;
 
 impl<const N: usize> Axis<'_, N> {
     /// Maximum number of slots for the steps of a block, before those of its stop.
-    pub(super) const ROOM: usize = if Queue::<N>::BLOCK > 2 * LEAST_ROOM { Queue::<N>::BLOCK / 2 } else { LEAST_ROOM };
+    pub(super) const ROOM: usize = if Queue::<N>::BLOCK / 2 > LEAST_ROOM { Queue::<N>::BLOCK / 2 } else { LEAST_ROOM };
 
     /// Does a slice of the background's work: a segment, the plan of a stop, or a check of the interrupt. Call it until it
     /// returns anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often
