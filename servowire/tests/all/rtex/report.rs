@@ -84,6 +84,8 @@ fn a_log_of_a_monitor() {
     assert_eq!((run.code, run.verdicts()[0].as_str()), (1, "direction"));
     assert_eq!(run.json()[0]["reason"], "the log has a response, C/R says command");
     assert_eq!(run.json()[0]["at_field"], "byte 0");
+    let run = bench.decode("log.txt", text.replacen("RX", "TX", 1), &["--protocol", "rtex", "--json"]);
+    assert_eq!(run.json()[1]["reason"], "the log has a command, C/R says response");
 }
 
 /// Times that are counted by Update_Counter and --period say nothing of a jitter.
@@ -193,4 +195,22 @@ fn what_is_an_event() {
         figures[0]["events"].as_array().unwrap().iter().map(|event| event["what"].as_str().unwrap()).collect();
     let begins = ["Command_Code CP normal (20h)", "SERVO_ON 1", "SERVO_ACTIVE 1", "SERVO_READY 1"];
     assert_eq!(said, [&begins[..], &["Command_Code CV normal (30h)"]].concat());
+}
+
+/// What is seen between the blocks of a drive is one of its events, and a refused block is shown with its bytes.
+#[test]
+fn findings_are_events_and_refused_blocks_have_bytes() {
+    let bench = Bench::new();
+    // The echo of the counter stands still, and then come ones.
+    let still = [1, 2, 2, 2].map(|counter: u8| format!("{:02x}20c1{:026x}\n", 0x85 | counter << 5, 0)).concat();
+    let text = still + &"f".repeat(32) + "\n";
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes", "--stats", "--json"]);
+    let figures = run.json();
+    let drive = figures.iter().find(|own| own["address"] == 5).unwrap();
+    let events = drive["events"].as_array().unwrap();
+    let said = |what: &str| events.iter().filter(|event| event["what"] == what).count();
+    assert_eq!(said("the counter echo stands still for 3 responses"), 1, "{events:?}");
+    let run = bench.decode("log.txt", &text, &["--protocol", "rtex", "--bytes"]);
+    let shown = run.out.lines().find(|line| line.to_lowercase().replace(' ', "").contains(&"f".repeat(32)));
+    assert!(shown.is_some(), "{}", run.out);
 }
