@@ -202,3 +202,18 @@ fn unsound_blocks_are_no_other_shape() {
         assert!(!remarks.iter().any(|remark| remark.contains("from here on")), "{word} {from}: {remarks:?}");
     }
 }
+
+/// A line of another length among blocks that go on over the ends of lines costs the two blocks that it is part of; no block is put
+/// together from the lines around it.
+#[test]
+fn a_stray_line_costs_its_two_blocks() {
+    let log = &bytes(1, run(1, 200, 1_001))[5..];
+    let (mut decoder, mut kept) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default());
+    for (line, bytes) in log.chunks_exact(16).enumerate() {
+        let bytes = if line == 30 { &bytes[..9] } else { bytes };
+        decoder.burst(&Burst::new(line as u64 + 1, bytes.to_vec()), &mut kept).unwrap();
+    }
+    decoder.end(&mut kept).unwrap();
+    let want: Vec<i64> = (1..199).filter(|block| !matches!(block, 30 | 31)).map(|block| (block + 1) * 1_001).collect();
+    assert_eq!(positions(&kept.0), want);
+}
