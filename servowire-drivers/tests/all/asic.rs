@@ -49,6 +49,8 @@ pub struct Ring {
     back_ns: Option<u64>,
     frames: u32,
     reception: &'static FrameCount,
+    /// How late the NC interrupt is noticed.
+    pub late_ns: u64,
     /// An interrupt that waits for the exchange to end (internal timer).
     pub in_exchange: bool,
     pub interrupt_waits: bool,
@@ -94,6 +96,7 @@ impl Ring {
             back_ns: None,
             frames: 0,
             reception: Box::leak(Box::new(FrameCount::new())),
+            late_ns: 0,
             in_exchange: false,
             interrupt_waits: false,
             read_of: Vec::new(),

@@ -58,6 +58,8 @@ fn update<W: Drawn>(
             let begins_ns = ring.next_frame_ns();
             ring.pass(begins_ns);
         }
+        let noticed_ns = ring.now_ns + ring.late_ns;
+        ring.pass(noticed_ns);
         ring.in_exchange = true;
         ring.read_of.clear();
         ring.now_ns

@@ -117,6 +117,28 @@ fn silence_switches_every_servo_off() {
     }
 }
 
+/// XINTRX no longer comes, though the blocks are there and on time: the receive watchdog stops the ring after its limit.
+#[test]
+fn the_receive_watchdog_trips() {
+    let ring = Ring::new(false, false);
+    let mut driver = on::<u16>(&ring);
+    for period in 1..=LIMIT {
+        let began_ns = {
+            let mut ring = ring.borrow_mut();
+            // An interrupt of a lower priority waits while this one runs; here it waits for ever.
+            ring.in_exchange = true;
+            let begins_ns = ring.next_frame_ns();
+            ring.pass(begins_ns);
+            begins_ns
+        };
+        assert!(period >= LIMIT - 1 || driver.master().ring().failure().is_none(), "{period}");
+        driver.exchange(began_ns).unwrap();
+        assert!(driver.master().ring().axes().iter().all(|axis| axis.arrival() == Arrival::OnTime), "{period}");
+    }
+    let failure = Some(RingFailure { place: 0, reason: StopReason::ReceiveTimeout });
+    assert_eq!(driver.master().ring().failure(), failure);
+}
+
 /// Faults that the driver has to survive; the environment may want more.
 pub(super) const FAULTS: u64 = 100_000;
 
