@@ -48,8 +48,13 @@ impl Fault {
 pub enum Stop {
     /// The input is broken from here on, or nothing in it can be decoded.
     Fault(Fault),
-    /// Everything was decoded, and shows something that needs attention.
-    Trouble(Fault),
+    /// What was decoded shows something that needs attention.
+    Trouble {
+        /// All that is to be said.
+        fault: Fault,
+        /// Whether the input is broken too, or not as it should be.
+        broken: bool,
+    },
     /// The output accepts nothing more.
     Output(io::Error),
 }
@@ -71,7 +76,7 @@ impl std::error::Error for Stop {}
 impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fault(fault) | Self::Trouble(fault) => fault.fmt(f),
+            Self::Fault(fault) | Self::Trouble { fault, .. } => fault.fmt(f),
             Self::Output(error) => write!(f, "cannot write: {error}"),
         }
     }

@@ -63,14 +63,19 @@ pub(crate) fn decode(
         reader.take(&whole, out)?;
     }
     reader.end(out)?;
-    end?;
-    let Found { misread, trouble } = reader.found();
-    let fault = |what| Fault::new(file, At::File, what);
-    match (misread, trouble) {
-        (Some(what), None) => Err(Stop::Fault(fault(what))),
-        (Some(misread), Some(trouble)) => Err(Stop::Fault(fault(format!("{misread}; {trouble}")))),
-        (None, Some(what)) => Err(Stop::Trouble(fault(what))),
-        (None, None) => Ok(()),
+    finish(file, end.err(), reader.found())
+}
+
+/// What is wrong with the log where it breaks off and as a whole, and what needs attention all the same.
+fn finish(file: &str, end: Option<Fault>, Found { misread, trouble }: Found) -> Result<(), Stop> {
+    let (broken, needs_attention) = (end.is_some() || misread.is_some(), trouble.is_some());
+    let (at, cut) = end.map_or((At::File, None), |fault| (fault.at, Some(fault.what)));
+    let all: Vec<String> = [cut, misread, trouble].into_iter().flatten().collect();
+    let fault = Fault::new(file, at, all.join("; "));
+    match (broken, needs_attention) {
+        (false, false) => Ok(()),
+        (true, false) => Err(Stop::Fault(fault)),
+        (_, true) => Err(Stop::Trouble { fault, broken }),
     }
 }
 

@@ -272,10 +272,12 @@ fn one(
         }
         Ok(()) => return Ok(End { bad: refusals.is_some(), trouble: false }),
         // Where the user had enough, what he read was cut there by himself.
-        Err(Stop::Fault(_) | Stop::Trouble(_)) if done => return Ok(End { bad: refusals.is_some(), trouble: false }),
-        Err(Stop::Trouble(fault)) => {
+        Err(Stop::Fault(_) | Stop::Trouble { .. }) if done => {
+            return Ok(End { bad: refusals.is_some(), trouble: false });
+        }
+        Err(Stop::Trouble { fault, broken }) => {
             complain(&fault, bar);
-            return Ok(End { bad: refusals.is_some(), trouble: true });
+            return Ok(End { bad: broken || refusals.is_some(), trouble: true });
         }
         Err(Stop::Fault(fault)) => return Ok(complain(&fault, bar)),
         Err(Stop::Output(error)) => return Err(error),

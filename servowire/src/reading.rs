@@ -313,7 +313,7 @@ impl Reading {
         out.begin()?;
         let fault = match servowire_decode::decode(&name, capture, self.protocol.0, &self.settings(), &mut out) {
             Ok(()) => None,
-            Err(Stop::Fault(fault) | Stop::Trouble(fault)) => Some(fault.to_string()),
+            Err(Stop::Fault(fault) | Stop::Trouble { fault, .. }) => Some(fault.to_string()),
             Err(Stop::Output(error)) => return Err(error.into()),
         };
         out.end()?;

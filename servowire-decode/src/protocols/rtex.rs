@@ -69,6 +69,8 @@ struct Decoder {
     /// Why the log is not as written.
     misread: Option<String>,
     analysis: LogAnalysis,
+    /// The log goes on in another shape, so blocks were misread until then.
+    goes_on: bool,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
     /// For the same key, the last counter and the number of update periods so far.
@@ -87,6 +89,7 @@ impl Decoder {
             began: false,
             misread: None,
             analysis: LogAnalysis::new(settings.period_ns, settings.gear),
+            goes_on: false,
             last: HashMap::new(),
             updates: HashMap::new(),
             place: Place::Line(0),
@@ -151,6 +154,7 @@ impl Decoder {
         // A NOP is mostly zeros, whatever their order.
         let is_sound = report.error().is_none() && block.get(1).is_some_and(|code| code & 0x7f != 0);
         let Some(shape) = self.blocks.goes_on(&piece.bytes, is_sound) else { return Ok(()) };
+        self.goes_on = true;
         let note = format!("from here on the log looks like {}", said(shape));
         self.misread.get_or_insert_with(|| format!("{note} (line {})", piece.line));
         out.event(&remark(self.place, note))
@@ -310,7 +314,13 @@ impl LogDecoder for Decoder {
         let said = |it: DriveTrouble| format!("drive {} {}", it.mac_id, it.trouble.name());
         let troubles: Vec<String> = self.analysis.troubles().map(said).collect();
         let trouble = (!troubles.is_empty()).then(|| troubles.join("; "));
-        Found { misread: self.misread.clone(), trouble }
+        match (&self.misread, trouble) {
+            // What was misread may have been taken for drives that do not answer: it is said, and proves nothing.
+            (Some(misread), Some(trouble)) if self.goes_on => {
+                Found { misread: Some(format!("{misread}; {trouble}")), trouble: None }
+            }
+            (misread, trouble) => Found { misread: misread.clone(), trouble },
+        }
     }
 
     /// Takes a line or record of the log. NOPs from before the start are held back until something determines the shape.

@@ -60,6 +60,10 @@ fn steps_after_the_gear() {
     }
 }
 
+fn as_text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
 /// What no single block shows: each finding stands beside the block at which it is seen.
 #[test]
 fn findings_between_blocks() {
@@ -92,6 +96,20 @@ fn findings_between_blocks() {
     let alarm = [1, 2, 3].map(|counter| response(counter, 0x20, 0).replacen("20c1", "20e1", 1));
     let (code, said) = trouble(&alarm);
     assert!(code == 4 && said.ends_with("drive 5 reported an alarm"), "{said}");
+    // A log that is not as it was meant, or cut, does not hide it.
+    let turned = |line: &String| -> String {
+        line.as_bytes().chunks(4).flat_map(|word| [as_text(&word[2..]), as_text(&word[..2])]).collect()
+    };
+    let moving = |k: u8| response(k & 3, 0x20, 0).replacen("20c1", if k == 30 { "20e1" } else { "20c1" }, 1);
+    let long: Vec<String> = (0..40).map(|k| turned(&moving(k))).collect();
+    let (code, said) = trouble(&long);
+    assert!(code == 5 && said.ends_with("pack with shifts; drive 5 reported an alarm"), "{said}");
+    let bytes = |line: &String| (0..16).map(|k| u8::from_str_radix(&line[2 * k..2 * k + 2], 16).unwrap()).collect();
+    let mut cut: Vec<u8> = (0..40).flat_map(|k| -> Vec<u8> { bytes(&moving(k)) }).collect();
+    cut.truncate(39 * 16 + 9);
+    let run = bench.decode("log.bin", cut, &["--protocol", "rtex", "--record-size", "16"]);
+    let want = ", byte 624: the last record has 9 of 16 bytes: it was cut off; drive 5 reported an alarm\n";
+    assert!(run.code == 5 && run.err.ends_with(want), "{} {}", run.code, run.err);
     // The code comes back later than one command after the other.
     let late: Vec<_> =
         (1..=4).flat_map(|k| [command(k & 3, 0x20), response(k & 3, if k == 4 { 0x20 } else { 0x10 }, 0)]).collect();
