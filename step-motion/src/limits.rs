@@ -291,6 +291,11 @@ impl Bounds {
         Self::new(self.v.max(other.v), self.a.max(other.a), jerk)
     }
 
+    /// Returns whether the acceleration or the jerk may be higher.
+    pub(super) fn allows_more(&self, than: &Self) -> bool {
+        self.a > than.a || self.jerk.zip(than.jerk).is_some_and(|(own, than)| own.j > than.j)
+    }
+
     /// Returns the limits with a lower speed.
     pub(super) fn slower(self, v: Real) -> Self {
         Self { v: self.v.min(v), ..self }

@@ -34,6 +34,8 @@ pub(super) struct Line<const N: usize> {
     /// What was found when the path had an edition.
     pub(super) ahead: Ahead,
     pub(super) edition: u32,
+    /// The greatest speed found for its start in an era of the path, in which lines were only added.
+    pub(super) promise: (u32, Real),
 }
 
 /// What is known of the way from the start of a line on.
@@ -61,6 +63,7 @@ impl<const N: usize> Line<N> {
             leave: None,
             ahead: Ahead::Run(0),
             edition: 0,
+            promise: (0, Real::ZERO),
         }
     }
 
@@ -80,6 +83,12 @@ impl<const N: usize> Line<N> {
             Ahead::Run(_) => None,
             Ahead::Speed(speed) => Some(speed),
         }
+    }
+
+    /// Returns the greatest speed found for its start in an era of the path.
+    pub(super) fn promised(&self, era: u32) -> Real {
+        let (own, speed) = self.promise;
+        if own == era { speed } else { Real::ZERO }
     }
 
     /// Returns the steps that each axis has made at a place on the line; all steps at its end.

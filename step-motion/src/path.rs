@@ -119,6 +119,7 @@ pub struct Path<const N: usize, const M: usize> {
     /// What is known of the lines ahead holds for this fraction of the requested speeds, and since the lines last changed.
     part: Real,
     edition: u32,
+    era: u32,
 }
 
 /// By hand, because the derived `clone_from` copies it twice.
@@ -166,6 +167,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             knows_all: false,
             part: Real::ONE,
             edition: 1,
+            era: 0,
         };
         new.set_deviation(deviation);
         Ok(new)
@@ -238,7 +240,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             self.before = Some((line.steps, line.whole));
             self.target = target;
             self.knows_all = false;
-            self.changed();
+            self.edition = self.edition.wrapping_add(1);
             gone_along(&mut self.ways, &line.steps);
         }
     }
@@ -248,9 +250,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.part
     }
 
-    /// Forgets what was found about the lines.
-    pub(super) const fn changed(&mut self) {
-        self.edition = self.edition.wrapping_add(1);
+    /// Forgets what was found about the lines, and what was promised.
+    pub(super) const fn forget(&mut self) {
+        (self.edition, self.era) = (self.edition.wrapping_add(1), self.era.wrapping_add(1));
     }
 
     /// Returns whether another path of the same axes ends in the same way, so that the same line would be added to it.
@@ -317,7 +319,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again. Returns the lines
     /// as they were.
     pub(super) fn hurry(&mut self, limits: &[Limits; N]) -> [Option<Line<N>>; M] {
-        self.changed();
+        self.forget();
         let (own, lines) = (self.axes, self.lines);
         for (axis, limits) in self.axes.iter_mut().zip(limits) {
             axis.limits = axis.limits.or_higher(*limits);

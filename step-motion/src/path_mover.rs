@@ -349,7 +349,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.cut_line(at, demand, until).unwrap_or(Cut::Later)
     }
 
-    /// Does the same on the present line; `None` if it has no further steps of the axis.
+    /// Does the same on the present line; `None` if the axis has no step there before that tick.
     fn cut_line(&mut self, at: usize, demand: &Demand, until: u64) -> Option<Cut> {
         let line = self.line.as_mut()?;
         let due = line.due.get_mut(at)?;

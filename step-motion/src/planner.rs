@@ -238,6 +238,7 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
         Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
         Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
     };
+    // Within rounding of the end there is no time to slow down.
     if from <= exit || n <= SLACK {
         return from;
     }

@@ -61,7 +61,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Cuts the queue off at an end, if the first line begins at `from` and a stop leaves it as `first` says.
     pub(crate) fn cut(&mut self, to: &End<N>, from: [i64; N], made: [u32; N], first: Leaving) {
-        self.changed();
         self.target = self.place(to, from, made);
         let (at, place) = to.at;
         let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
@@ -92,6 +91,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
         }
         (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
+        self.forget();
         // Lines that were cut off turn no axis.
         let mut ways = self.gone;
         for line in (0..self.len).filter_map(|at| self.line(at)) {

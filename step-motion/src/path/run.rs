@@ -90,14 +90,25 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         how: (Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
-        // If it does not fit, as far as it can to the end of the run.
-        self.stop(at, start, (place, before), how, false)?.map_or_else(
-            |(run, own)| {
-                let left = (run.length + before) - place;
-                self.leave(at, start, left, (&run, own, own.slower(start.v)), (Real::ZERO, Real::ZERO))
-            },
-            Some,
-        )
+        let (run, own) = match self.stop(at, start, (place, before), how, false)? {
+            Ok(course) => return Some(course),
+            Err(run) => run,
+        };
+        // It does not fit: as far as it can to the end of the run.
+        let left = (run.length + before) - place;
+        let under_way = self.under_way(at, start, how.0)?;
+        let shorter = |most| {
+            let run = self.run(at, None, under_way, (most, false))?;
+            let own = Self::own(&run, how);
+            Some((run, own, own.slower(start.v)))
+        };
+        let limits = (&run, own, own.slower(start.v));
+        self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), shorter)
+    }
+
+    /// Returns the limits of a brake on a run: braking under way keeps its own if these are higher.
+    fn own(run: &Run, (present, brakes): (Option<Bounds>, bool)) -> Bounds {
+        present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least))
     }
 
     /// Plans in the same way, keeping to a fraction of the requested speeds.
@@ -109,11 +120,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
         how: (Real, Option<Bounds>),
     ) -> Option<(Course, Bounds)> {
         let (run, left, speeds) = self.goal(at, start, from, how)?;
-        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds)
+        let under_way = self.under_way(at, start, how.1)?;
+        let shorter = |most| {
+            let run = self.run(at, Some(how.0), under_way, (most, false))?;
+            Some((run, run.bounds, run.bounds))
+        };
+        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, shorter)
     }
 
-    /// Plans a motion again that has a course already, after lines have been added. `None` if they ask for a speed that it can
-    /// no longer reach: one curve over more lines keeps to the limits of all of them.
+    /// Plans a motion again that has a course already, after lines have been added. `None` if that would lead along more
+    /// lines, and within their limits it cannot slow down in time: the course that it has is still right.
     pub(crate) fn better_course(
         &mut self,
         at: usize,
@@ -163,15 +179,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
         at: usize,
         start: Motion,
         (place, before): (Real, Real),
-        (present, brakes): (Option<Bounds>, bool),
+        how: (Option<Bounds>, bool),
         any: bool,
     ) -> Option<Result<(Course, Bounds), (Run, Bounds)>> {
-        let under_way = self.under_way(at, start, present)?;
+        let under_way = self.under_way(at, start, how.0)?;
         // With the limits of no more lines than the stop takes.
         let mut run = self.run(at, None, under_way, (0, any))?;
         let mut own = run.bounds;
         for _ in 0..M {
-            own = present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least));
+            own = Self::own(&run, how);
             let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
             let way = (place + curve.way()) - before;
             if curve.way() <= ((run.length + before) - place) + SLACK {
@@ -193,7 +209,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is.
-    /// `own` and `wish` go into the course.
+    /// `own` and `wish` go into the course. `shorter` is the run with fewer lines, and its limits.
     fn leave(
         &self,
         at: usize,
@@ -201,14 +217,32 @@ impl<const N: usize, const M: usize> Path<N, M> {
         left: Real,
         limits: (&Run, Bounds, Bounds),
         (speed, wish): (Real, Real),
+        shorter: impl Fn(usize) -> Option<(Run, Bounds, Bounds)>,
     ) -> Option<(Course, Bounds)> {
         let to = |exit| self.lead(at, start, left, limits, (exit, wish));
+        let (full, _, bounds) = &limits;
+        let last = at.saturating_add(full.more);
+        if self.line(last)?.leave.is_some() {
+            return to(speed);
+        }
         to(speed).or_else(|| {
-            let (run, _, bounds) = &limits;
-            let last = at.saturating_add(run.more);
             let slowest = slowest_exit(start, left, speed, bounds);
             // Mostly it comes near a speed from which all lines are known to be slow enough in time.
-            self.known_exit(last).and_then(|known| to(slowest.min(known))).or_else(|| {
+            let known = self.known_exit(last).map(|known| known.max(self.promised(last)));
+            // A line that allows less may have come into the run: what was promised before, or a rest, can be kept without it.
+            let without = |most: usize| {
+                let (run, own, bounds) = shorter(most)?;
+                let promised = self.promised(at.saturating_add(run.more));
+                if promised.is_zero() && !own.allows_more(&limits.1) {
+                    return None;
+                }
+                let left = left - (full.length - run.length);
+                let exit =
+                    if promised.is_zero() { promised } else { slowest_exit(start, left, speed, &bounds).min(promised) };
+                self.lead(at, start, left, (&run, own, bounds), (exit, wish))
+            };
+            let keeps = known.and_then(|known| to(slowest.min(known)));
+            keeps.or_else(|| (0..full.more).rev().find_map(without)).or_else(|| {
                 let most = self.most(last);
                 [slowest.min(most), most, Real::ZERO].into_iter().find_map(to)
             })
@@ -278,19 +312,33 @@ impl<const N: usize, const M: usize> Path<N, M> {
         ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
     }
 
-    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time.
+    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time. Once it is known, it
+    /// stays known until the lines or the part change.
     pub(crate) fn exit(&mut self, at: usize, part: Real) -> Real {
-        let slices = M.saturating_mul(2).saturating_add(1);
-        (0..slices).find_map(|_| self.find_exit(at, part)).unwrap_or(Real::ZERO)
+        self.ask_for(part);
+        let (mut runs, mut next) = ([(0, Run::NONE); M], at.saturating_add(1));
+        let known = self.known(next);
+        for place in &mut runs {
+            if self.known(next).is_some() {
+                break;
+            }
+            let Some(run) = self.run_from(next, part) else { break };
+            *place = (next, run);
+            next = next.saturating_add(run.more).saturating_add(1);
+        }
+        known.unwrap_or_else(|| {
+            let mut speed = self.known(next).unwrap_or(Real::ZERO);
+            for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
+                speed = self.find_entry(*at, run, speed);
+            }
+            speed
+        })
     }
 
     /// Does a slice of that: finds how far a run leads, or how fast the last run may begin for which this is not known yet.
-    /// Returns the speed at the end of line `at` once it is known; it is until the lines change.
+    /// Returns the speed once it is known.
     pub(crate) fn find_exit(&mut self, at: usize, part: Real) -> Option<Real> {
-        if part != self.part {
-            self.part = part;
-            self.changed();
-        }
+        self.ask_for(part);
         let (mut next, mut speed, mut last) = (at.saturating_add(1), Real::ZERO, None);
         while let Some(line) = self.line(next) {
             match line.ahead(self.edition) {
@@ -310,17 +358,34 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
         }
         let Some(first) = last else { return Some(speed) };
-        let entry = self.entry(first, &self.run_from(first, part)?, speed);
-        self.know(first, Ahead::Speed(entry));
+        self.find_entry(first, &self.run_from(first, part)?, speed);
         None
     }
 
-    /// Keeps what has been found for a line, until the lines change.
+    /// Forgets what was found for another fraction of the requested speeds.
+    fn ask_for(&mut self, part: Real) {
+        if part != self.part {
+            self.part = part;
+            self.forget();
+        }
+    }
+
+    /// Finds how fast a run may begin that is to end at a speed.
+    fn find_entry(&mut self, at: usize, run: &Run, exit: Real) -> Real {
+        let entry = self.entry(at, run, exit);
+        self.know(at, Ahead::Speed(entry));
+        entry
+    }
+
+    /// Keeps what has been found for a line.
     fn know(&mut self, at: usize, ahead: Ahead) {
-        let edition = self.edition;
+        let (edition, era) = (self.edition, self.era);
         let place = self.first.wrapping_add(at).checked_rem(M).and_then(|at| self.lines.get_mut(at));
         if let Some(Some(line)) = place {
             (line.ahead, line.edition) = (ahead, edition);
+            if let Ahead::Speed(speed) = ahead {
+                line.promise = (era, speed.max(line.promised(era)));
+            }
         }
     }
 
@@ -334,6 +399,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
         })
     }
 
+    /// Returns the greatest speed at the end of line `at` that was found since lines have only been added.
+    fn promised(&self, at: usize) -> Real {
+        self.line(at.saturating_add(1)).map_or(Real::ZERO, |line| line.promised(self.era))
+    }
+
     /// Returns the speed at the start of line `at`, or behind the last one, if it is known.
     fn known(&self, at: usize) -> Option<Real> {
         self.line(at).map_or(Some(Real::ZERO), |line| line.entry(self.edition))
@@ -345,8 +415,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Returns the greatest speed at which line `at` may end, whatever was requested: one from which each run that follows
-    /// can be
-    /// left at its corner's speed or, which takes less distance than some speeds between, come to rest at its end.
+    /// can be left at its corner's speed or, which takes less distance than some speeds between, come to rest at its end.
     fn most(&self, at: usize) -> Real {
         let (mut runs, mut next, mut speed) = ([(0, Run::NONE); M], at.saturating_add(1), Real::ZERO);
         for place in &mut runs {

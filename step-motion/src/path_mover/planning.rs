@@ -176,8 +176,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
     }
 
-    /// Plans the rest of the running line again after lines have been added, unless the present plan is better.
+    /// Plans the rest of the running line again after lines have been added, which ask for another speed at its end. If it
+    /// cannot reach that any more, the present plan stays.
     pub(super) fn plan_better(&mut self, now: u64, part: Real) {
+        self.wish = self.path.exit(self.more, part);
         let Some((motion, start)) = self.here(now) else { return };
         let course = self.path.better_course(0, motion, (start.place, start.before), (part, self.bounds));
         if let Some((course, bounds)) = course {

@@ -459,3 +459,21 @@ fn movers_that_end_in_the_same_way() {
     moving.quick_stop(LIMITS.map(|(v, a, _)| Limits::new(v, a).unwrap()), 0);
     assert!(moving.due().is_some() && !moving.ends_as(&moving.clone()));
 }
+
+/// A short line whose third axis allows a fifth less jerk is pushed after a line has been planned to the joint before it. Until
+/// this was tested, the last two lines were one run, the machine was too fast for it, and stopped dead from 4500 steps/s.
+#[test]
+fn a_line_that_is_pushed_late_breaks_no_promise() {
+    let along_x = |line: crate::line::LinePulses<N>| line.filter(|pulse| pulse.axis == 0).map(|pulse| pulse.tick);
+    for [length, up] in [[72, 1], [68, 1], [143, 2]] {
+        let mut path = path(&[([20_000, 0, 80], 4500), ([1000, 0, 10], 4500)]);
+        let mut ticks: Vec<u64> = along_x(path.next_line().unwrap()).collect();
+        path.push([21_000 + length, 0, 90 + up], 4500).unwrap();
+        while let Some(line) = path.next_line() {
+            ticks.extend(along_x(line));
+        }
+        let last: Vec<u64> = ticks.windows(2).rev().take(3).map(|pair| pair[1] - pair[0]).collect();
+        assert!(last[0] > 10_000 && last[0] > last[1] && last[1] > last[2], "{last:?} before the rest");
+        assert_eq!(ticks.len(), usize::try_from(21_000 + length).unwrap());
+    }
+}

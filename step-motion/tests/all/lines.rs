@@ -353,3 +353,34 @@ fn lines_that_come_one_by_one_continue_each_other() {
     }
     assert!(ticks.len() == 60 * 97);
 }
+
+/// A line that allows less acceleration or jerk is pushed behind lines in its direction, at any time: the machine comes to its end
+/// as slowly as the acceleration of the first axis lets it come to rest.
+#[test]
+fn a_weak_line_that_is_pushed_late_is_slow_enough_in_time() {
+    const LIMITS: [(u32, u32, u64); 3] =
+        [(100_000, 200_000, 1 << 40), (100_000, 50, 1 << 40), (100_000, 1 << 30, 1000)];
+    let axes = LIMITS.map(|(v, a, j)| AxisSetup::new(Limits::new(v, a).unwrap().with_jerk(j).unwrap(), 1_000_000));
+    for [before, up] in [[1000, 10], [1000, 8], [800, 8], [2000, 20]] {
+        for [length, rise] in [[72, 1], [60, 1], [100, 1], [143, 2], [500, 6]] {
+            for late in [300, 100, 30, 3, 1] {
+                let [first, second] = [[20_000, 0, 80], [20_000 + before, 0, 80 + up]];
+                let end = [second[0] + length, 0, second[2] + rise];
+                let mut machine = PathMover::new(Path::<3, 8>::new(Clock::MICROSECONDS, axes, 1000).unwrap());
+                machine.push(first, 4500, 0).unwrap();
+                machine.push(second, 4500, 0).unwrap();
+                let (mut last, mut interval) = (0, 0);
+                while let Some(pulse) = machine.pulse().filter(|_| machine.commanded() != end || interval == 0) {
+                    if pulse.axis == 0 {
+                        (last, interval) = (pulse.tick, pulse.tick - last);
+                    }
+                    if machine.commanded()[0] == first[0] - late && machine.target() != end {
+                        machine.push(end, 4500, pulse.tick).unwrap();
+                    }
+                }
+                assert_eq!(machine.commanded(), end);
+                assert!(interval > 2000, "{interval} us before the rest: {before} {up}, {length} {rise}, {late}");
+            }
+        }
+    }
+}
