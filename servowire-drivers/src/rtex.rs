@@ -151,11 +151,14 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// Runs one turn of the main loop. Keep interrupts off until it returns [`ControlPhase::Running`]; it writes the first
-    /// transmit data itself.
+    /// transmit data itself, in the turn after [`ControlPhase::Prepare`], and stays in that phase until all are written.
     ///
     /// # Errors
     /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`]; [`Error::Clock`].
     pub fn control(&mut self) -> Result<ControlPhase, Failure<P>> {
+        if self.master.phase() == ControlPhase::Prepare {
+            self.prepare()?;
+        }
         let asic = self.port.state().map_err(Error::Io)?;
         let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
         let found = match (self.master.phase(), asic) {
@@ -163,12 +166,6 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             _ => None,
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
-        if phase == ControlPhase::Prepare {
-            let now_ns = self.now_ns()?;
-            let sent = self.master.ring().axes().each_ref().map(Axis::sent);
-            let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
-            self.write(&commands, &sent).map_err(Error::Io)?;
-        }
         match self.master.error() {
             Some(fault) => Err(Error::Protocol(fault)),
             None => Ok(phase),
@@ -224,6 +221,14 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// Leaves the stopped state after a time-out, an alarm or a stop by the caller; see [`Master::clear`].
     pub fn clear(&mut self) {
         self.master.clear();
+    }
+
+    /// Writes the first transmit data.
+    fn prepare(&mut self) -> Result<(), Failure<P>> {
+        let now_ns = self.now_ns()?;
+        let sent = self.master.ring().axes().each_ref().map(Axis::sent);
+        let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
+        self.write(&commands, &sent).map_err(Error::Io)
     }
 
     /// Reads the blocks of one frame, if possible; otherwise those that are surely not halves of two.

@@ -54,6 +54,10 @@ pub struct Ring {
     /// An interrupt that waits for the exchange to end (internal timer).
     pub in_exchange: bool,
     pub interrupt_waits: bool,
+    /// The receive interrupt does not come any more.
+    pub masked: bool,
+    /// Blocks that the host has written in full.
+    pub written: u32,
     /// Frames of which the host has read blocks since the exchange began.
     pub read_of: Vec<u32>,
     /// The positions in the blocks of the last frames.
@@ -99,6 +103,8 @@ impl Ring {
             late_ns: 0,
             in_exchange: false,
             interrupt_waits: false,
+            masked: false,
+            written: 0,
             read_of: Vec::new(),
             positions: VecDeque::new(),
             fail_in: None,
@@ -166,6 +172,9 @@ impl Ring {
         self.hidden = Answers { frame: self.frames, blocks };
         self.positions.truncate(15);
         self.positions.push_front(blocks.map(|block| i32::from_le_bytes([block[4], block[5], block[6], block[7]])));
+        if self.masked {
+            return;
+        }
         if self.external {
             // The receive interrupt has the highest priority.
             self.reception.add();
@@ -287,6 +296,7 @@ impl<W: Drawn> Port for Bus<W> {
             ring.access(1).inspect_err(|()| ring.writing = false)?;
             word.to(&mut ring.tx[place][width * k..width * (k + 1)]);
         }
+        ring.written += 1;
         ring.writing = place + 1 < AXES;
         ring.wrote |= !ring.writing;
         Ok(())

@@ -53,6 +53,40 @@ fn a_ring_that_does_not_close_is_waited_for_so_long() {
     assert_eq!(driver.start(100), Ok(ControlPhase::Waiting));
 }
 
+/// The first transmit data are written once, in the turn after the slaves are known; the main loop, which goes on for ever, writes nothing else, so
+/// the counter is that of the exchanges alone.
+#[test]
+fn the_main_loop_writes_the_first_transmit_data_alone() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = driver::<u16>(&ring);
+        let mut phases = Vec::new();
+        while phases.last() != Some(&(ControlPhase::Running, 0)) && phases.len() < 100 {
+            let phase = driver.control().unwrap();
+            let written = std::mem::take(&mut ring.borrow_mut().written);
+            phases.push((phase, written));
+        }
+        let prepared = phases.iter().position(|(phase, _)| *phase == ControlPhase::Prepare).unwrap();
+        assert!(prepared > 0, "{phases:?}");
+        for (turn, (phase, written)) in phases.iter().enumerate() {
+            assert_eq!(*written, if turn == prepared + 1 { AXES as u32 } else { 0 }, "{phase}: {phases:?}");
+        }
+
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        for _ in 0..2 * LIMIT {
+            ring.borrow_mut().written = 0;
+            for _ in 0..5 {
+                assert_eq!(driver.control(), Ok(ControlPhase::Running));
+            }
+            assert_eq!(ring.borrow().written, 0);
+            move_on(&mut driver);
+            update(&ring, &mut driver).unwrap();
+            assert!(driver.master().ring().axes().iter().all(|axis| axis.arrival() == Arrival::OnTime));
+        }
+    }
+}
+
 /// What `Evidence::at` refuses, of a place, of a time and of a drive, is refused of the driver's evidence.
 #[test]
 fn a_doubt_of_the_crate_is_one_of_the_driver() {

@@ -1,5 +1,7 @@
 //! Dead places, ports that fail, frames that do not come.
 
+use servowire_drivers::rtex::Exchanged;
+
 use super::*;
 
 /// The port fails at any one of its calls: the next exchange is good, and nothing stops.
@@ -15,6 +17,56 @@ fn a_fault_of_the_port_is_over_with_the_next_exchange() {
             assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
             assert_eq!(driver.master().ring().failure(), None, "{at}");
         }
+    }
+}
+
+/// The port fails twice at a block in a reading that is torn too: the next reading is good, so the exchange is.
+#[test]
+fn a_fault_in_a_torn_reading_is_over_with_the_next_reading() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        for at in 2..AXES as u32 * 8 {
+            {
+                let mut ring = ring.borrow_mut();
+                (ring.fail_in, ring.fail_again) = (Some(0), true);
+                ring.stall_in = Some((at, if external { 29_000 } else { 499_000 }));
+            }
+            let exchanged = update(&ring, &mut driver);
+            heal(&ring);
+            assert!(matches!(exchanged, Ok(Exchanged { torn: false, .. })), "{external} {at}: {exchanged:?}");
+            let [first, ..] = driver.master().ring().axes();
+            assert_ne!(first.arrival(), Arrival::Missing, "{external} {at}");
+            (0..3).for_each(|_| _ = update(&ring, &mut driver).unwrap());
+        }
+    }
+}
+
+/// The port fails at the first transmit data: all of them are written in the next turn of the main loop, and the ring starts.
+#[test]
+fn the_first_transmit_data_are_written_again_after_a_fault() {
+    for at in 0..AXES as u32 * 8 {
+        let ring = Ring::new(false, false);
+        let mut driver = driver::<u16>(&ring);
+        let mut failed = 0;
+        for _ in 0..100 {
+            if driver.master().phase() == ControlPhase::Waiting {
+                // After the state and the table of slaves.
+                let mut ring = ring.borrow_mut();
+                (ring.fail_in, ring.fail_again) = (Some(2 + at), true);
+            }
+            match driver.control() {
+                Ok(ControlPhase::Running) => break,
+                Ok(_) => {}
+                Err(error) => {
+                    assert_eq!(error, Error::Io(()));
+                    failed += 1;
+                    ring.borrow_mut().written = 0;
+                }
+            }
+        }
+        assert_eq!((failed, driver.master().phase()), (1, ControlPhase::Running), "{at}");
+        assert_eq!(ring.borrow().written, AXES as u32, "{at}");
     }
 }
 
