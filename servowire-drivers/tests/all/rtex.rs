@@ -6,6 +6,7 @@ mod bank;
 mod clock;
 mod exchange;
 mod faults;
+mod reception;
 
 use std::marker::PhantomData;
 use std::num::NonZeroU16;
