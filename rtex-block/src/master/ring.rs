@@ -207,10 +207,9 @@ impl<const N: usize> Ring<N> {
         self.share_failures();
     }
 
-    /// Reports that the communication has failed for this reason.
+    /// Reports that the communication has failed for this reason; the [`update`](Self::update) that follows notes the failure.
     pub(super) fn fail(&mut self, reason: StopReason) {
         self.axes.iter_mut().for_each(|axis| axis.fail(reason));
-        self.share_failures();
     }
 
     /// Leaves the stop: every axis waits for Servo_Ready again, or continues from [`Held`](AxisState::Held).

@@ -3,14 +3,15 @@
 use core::num::NonZeroU16;
 
 use crate::common::{Pair, actual, limits, set_position};
-use rtex_block::device::Behaviour;
+use rtex_block::device::{Behaviour, Fault};
 use rtex_block::master::procedure::Home;
 use rtex_block::master::{
-    ActiveCode, AskError, Axis, AxisConfig, AxisState, Heard, Limits, Progress, StopReason, SwitchOnError, Turn,
+    ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Limits, MoveStage, Progress, StopReason,
+    SwitchOnError, Turn,
 };
 use rtex_block::{
-    Arguments, Doubt, ErrorClass, ErrorCode, MacId, NonCyclicCommand, Policy, Pr, Response, Response32, StatusFlags,
-    SubCode, TypeCode, UpdateCounter,
+    Alarm, Arguments, Doubt, ErrorClass, ErrorCode, MacId, NonCyclicCommand, Policy, Pr, Response, Response32,
+    StatusFlags, SubCode, TypeCode, UpdateCounter,
 };
 
 fn mac_id() -> MacId {
@@ -327,5 +328,45 @@ fn blocks_of_a_turn_ago_do_not_end_a_motion() {
             let at = pair.drive.position();
             assert!((at - 20_000).abs() < 400, "{late} {old} {from}: at {at}");
         }
+    }
+}
+
+/// The servo goes off because the power fails: the axis is off for one period with a drive that is not ready, and says that rather than
+/// that it waits for the turn of the counter.
+#[test]
+fn a_drive_that_is_not_ready_is_not_switched_on() {
+    for fault in [Fault::NoMainPower, Fault::EmergencyStop] {
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+        pair.axis.switch_off();
+        pair.drive.set_fault(fault);
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::NotReady), "{fault}");
+        pair.update();
+        assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::State(AxisState::Starting)), "{fault}");
+    }
+}
+
+/// A motion is not done before the axis has stayed on for a turn of the counter after it, so an alarm in that time is its end.
+#[test]
+fn an_alarm_right_after_a_motion_is_its_end() {
+    let ended = || {
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
+        pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+        pair.until("ended", |pair| pair.axis.profile().is_some_and(|motion| motion.stage() == MoveStage::Ended));
+        pair
+    };
+    let mut pair = ended();
+    let mut waited = 0;
+    while pair.axis.take_move().unwrap().is_pending() {
+        waited += 1;
+        pair.update();
+    }
+    assert!((4..=6).contains(&waited), "{waited}");
+    for periods in 0..waited - 1 {
+        let mut pair = ended();
+        (0..periods).for_each(|_| pair.update());
+        pair.drive.set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
+        let failed = Progress::Failed { error: Failure::Stopped(StopReason::Alarm) };
+        assert_eq!(pair.end_of_move(), failed, "{periods}");
     }
 }

@@ -6,7 +6,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Fellows, Heard, Limits, Ring, StopCategory, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, Fellows, Heard, Limits, Ring, RingFailure, StopCategory, StopReason,
 };
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
@@ -279,4 +279,14 @@ fn a_fault_beside_a_stop_on_request_is_a_fault() {
         fellows.tell(&mut fellow.axis);
         assert_eq!(fellow.axis.state(), AxisState::Stopped(StopReason::Requested));
     }
+}
+
+/// The ring says at once, not with the next exchange, that it was stopped.
+#[test]
+fn a_stop_of_the_ring_is_a_failure_at_once() {
+    let mut bench = Bench::new(3);
+    bench.switch_on();
+    bench.ring.stop(StopCategory::Zero);
+    let failure = RingFailure { place: 0, reason: StopReason::Requested };
+    assert_eq!(bench.ring.failure(), Some(failure));
 }
