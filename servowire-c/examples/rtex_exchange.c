@@ -4,8 +4,8 @@
 enum { UPDATE_NS = 500000 };
 
 /* Of the firmware around it. */
-const uint8_t *asic_block(void); /* the 16 bytes of this period, NULL if none came */
-uint8_t *asic_room(void);        /* where the 16 bytes of the next one go */
+const uint8_t *asic_block(void);      /* the 16 bytes of this period, NULL if none came */
+int asic_write(const uint8_t *block); /* hands the 16 bytes of the next one to the ASIC; 0 if that failed */
 int32_t next_target(int32_t now);
 
 static sw_rtex_axis_t axis;
@@ -31,6 +31,7 @@ void axis_interrupt(uint64_t now)
 {
     sw_rtex_state_of_t state;
     sw_rtex_feedback_t feedback;
+    uint8_t block[16];
 
     (void)sw_rtex_axis_hear(&axis, asic_block(), 16, now);
     (void)sw_rtex_axis_state(&axis, &state);
@@ -42,5 +43,8 @@ void axis_interrupt(uint64_t now)
             (void)sw_rtex_axis_stop(&axis, 0);
         }
     }
-    (void)sw_rtex_axis_transmit(&axis, asic_room(), 16);
+    (void)sw_rtex_axis_transmit(&axis, block, 16);
+    if (!asic_write(block)) {
+        (void)sw_rtex_axis_not_sent(&axis);
+    }
 }

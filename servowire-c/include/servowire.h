@@ -3027,7 +3027,7 @@ typedef struct {
  * copied. Only one context at a time may use it.
  */
 typedef struct {
-    uint64_t _private[60];
+    uint64_t _private[62];
 } sw_rtex_axis_t;
 
 /**
@@ -4993,6 +4993,12 @@ sw_result_t sw_rtex_axis_hear(sw_rtex_axis_t *axis, const uint8_t *bytes, size_t
  * Writes the block of the next update period, 16 bytes, which counts as sent.
  */
 sw_result_t sw_rtex_axis_transmit(sw_rtex_axis_t *axis, uint8_t *bytes, size_t size);
+
+/**
+ * Takes back that the last block counts as sent, because it could not be written to the ASIC: the drive still has the one
+ * before, from which the next step, a stop and switching on go on. Once for each such block, before the next one.
+ */
+sw_result_t sw_rtex_axis_not_sent(sw_rtex_axis_t *axis);
 
 /**
  * Switches the servo on: SW_E_RTEX_NOT_NOW if the axis is not off, no new position has come, or the drive is not ready.

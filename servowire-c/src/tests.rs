@@ -354,3 +354,49 @@ fn encoders_of_blocks_write_all_or_nothing() {
         }
     }
 }
+
+/// A block that the ASIC did not get is taken back.
+#[test]
+fn a_block_that_was_not_written_was_not_sent() {
+    use crate::rtex::*;
+    let config = sw_rtex_config_t {
+        update_ns: 500_000,
+        invalid: 2,
+        wait: 10,
+        ready: 0,
+        inactive: 0,
+        gear_numerator: 1,
+        gear_denominator: 1,
+        echo: 3,
+        command_errors: 3,
+        mac_id: 9,
+        mode: 2,
+    };
+    for written in [true, false] {
+        let (mut place, mut block, mut now) = (MaybeUninit::zeroed(), [0_u8; 16], 0);
+        assert_eq!(sw_rtex_axis_start(Some(&mut place), Some(&config)), 0);
+        // SAFETY: it was started.
+        let mut axis: sw_rtex_axis_t = unsafe { place.assume_init() };
+        // The drive answers to the last block, if it answers: ready, and not active yet. Returns whether Servo_On goes out.
+        let mut exchange = |axis: &mut sw_rtex_axis_t, answers: bool| {
+            let answer = [0x80 | block[0] & 0x60 | 9, block[1], 0x40, 0, 0x88, 0x13, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+            now += 500_000;
+            // SAFETY: 16 bytes each.
+            unsafe {
+                let heard = if answers { answer.as_ptr() } else { null() };
+                assert_eq!(sw_rtex_axis_hear(Some(axis), heard, 16, now), 0);
+                assert_eq!(sw_rtex_axis_transmit(Some(axis), block.as_mut_ptr(), 16), 0);
+            }
+            block[2] & 0x80 != 0
+        };
+        (0..20).for_each(|_| _ = exchange(&mut axis, true));
+        assert_eq!(sw_rtex_axis_switch_on(Some(&mut axis)), 0);
+        assert!(exchange(&mut axis, true));
+        if !written {
+            assert_eq!(sw_rtex_axis_not_sent(Some(&mut axis)), 0);
+        }
+        // No position comes: Servo_On may go on, but not begin.
+        assert_eq!(exchange(&mut axis, false), written);
+    }
+    assert_eq!(sw_rtex_axis_not_sent(None), -1);
+}

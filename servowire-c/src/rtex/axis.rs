@@ -4,11 +4,11 @@ use core::mem::MaybeUninit;
 use core::num::NonZeroU16;
 
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, SetpointError, StopCategory, StopReason,
-    Turn,
+    ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, Sent, SetpointError, StopCategory,
+    StopReason, Turn,
 };
 use rtex_block::position::Gear;
-use rtex_block::{ControlBits, ErrorCode, MacId, Policy, Response, UpdateCounter};
+use rtex_block::{Command32, ControlBits, ErrorCode, MacId, Policy, Response, UpdateCounter};
 
 use super::names::{sw_rtex_axis_code_t, sw_rtex_error_t, sw_rtex_reason_t};
 use crate::border::{OK, block, border, in_range, read, state, there};
@@ -20,7 +20,7 @@ use crate::result::sw_result_t;
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sw_rtex_axis_t {
-    pub(crate) _private: [MaybeUninit<u64>; 60],
+    pub(crate) _private: [MaybeUninit<u64>; 62],
 }
 state!(sw_rtex_axis_t, Master, 0x41);
 
@@ -29,6 +29,16 @@ pub(crate) struct Master {
     pub(super) axis: Axis,
     counter: CommandCounter,
     pub(super) turn: Turn,
+    /// What was sent before the last block.
+    before: Sent,
+}
+
+impl Master {
+    /// Returns the commands of the next update period, which count as sent.
+    pub(super) fn send(&mut self, turn: Turn) -> Command32 {
+        self.before = self.axis.sent();
+        self.axis.transmission(turn)
+    }
 }
 
 /// The configuration of an axis. Limits are counted in update periods.
@@ -101,7 +111,9 @@ pub extern "C" fn sw_rtex_axis_start(
         in_range((it.update_ns > 0).then_some(()))?;
         let config = AxisConfig::new(mac_id, mode, it.update_ns, limits).with_gear(gear);
         let turn = if it.invalid > 0 { Turn::Invalid } else { Turn::Valid(UpdateCounter::ZERO) };
-        let state = Master { axis: Axis::new(config), counter: CommandCounter::new(it.invalid), turn };
+        let new = Axis::new(config);
+        let (before, counter) = (new.sent(), CommandCounter::new(it.invalid));
+        let state = Master { axis: new, counter, turn, before };
         sw_rtex_axis_t::start(axis, state)?;
         OK
     })
@@ -142,7 +154,18 @@ pub unsafe extern "C" fn sw_rtex_axis_transmit(
         // SAFETY: the caller of the C function vouches for his memory.
         let bytes = unsafe { block(bytes, size)? };
         it.turn = it.counter.next();
-        bytes.write(it.axis.transmission(it.turn).main.emit());
+        bytes.write(it.send(it.turn).main.emit());
+        OK
+    })
+}
+
+/// Takes back that the last block counts as sent, because it could not be written to the ASIC: the drive still has the one
+/// before, from which the next step, a stop and switching on go on. Once for each such block, before the next one.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_rtex_axis_not_sent(axis: Option<&mut sw_rtex_axis_t>) -> sw_result_t {
+    border(|| {
+        let it = sw_rtex_axis_t::get(axis)?;
+        it.axis.not_sent(it.before);
         OK
     })
 }

@@ -139,7 +139,7 @@ pub unsafe extern "C" fn sw_rtex_ring_update(
         for (axis, place) in axes.iter_mut().zip(tx.chunks_exact_mut(bytes)) {
             let axis = sw_rtex_axis_t::get(Some(axis))?;
             axis.turn = it.sent;
-            fill(place, axis.axis.transmission(it.sent).emit().get(..bytes).unwrap_or_default())?;
+            fill(place, axis.send(it.sent).emit().get(..bytes).unwrap_or_default())?;
         }
         OK
     })
