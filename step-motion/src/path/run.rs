@@ -103,7 +103,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             Some((run, own, own.slower(start.v)))
         };
         let limits = (&run, own, own.slower(start.v));
-        self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), shorter)
+        self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), &shorter)
     }
 
     /// Returns the limits of a brake on a run: braking under way keeps its own if these are higher.
@@ -125,7 +125,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let run = self.run(at, Some(how.0), under_way, (most, false))?;
             Some((run, run.bounds, run.bounds))
         };
-        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, shorter)
+        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, &shorter)
     }
 
     /// Plans a motion again that has a course already, after lines have been added. `None` if that would lead along more
@@ -217,7 +217,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         left: Real,
         limits: (&Run, Bounds, Bounds),
         (speed, wish): (Real, Real),
-        shorter: impl Fn(usize) -> Option<(Run, Bounds, Bounds)>,
+        shorter: &dyn Fn(usize) -> Option<(Run, Bounds, Bounds)>,
     ) -> Option<(Course, Bounds)> {
         let to = |exit| self.lead(at, start, left, limits, (exit, wish));
         let (full, _, bounds) = &limits;
