@@ -29,6 +29,15 @@ impl Run {
     };
 }
 
+/// How runs of fewer lines are found: at a fraction of the requested speeds or, to brake, without one; with the speed,
+/// acceleration and jerk under way; with the limits of a brake under way.
+#[derive(Debug, Clone, Copy)]
+struct Shorter {
+    part: Option<Real>,
+    under_way: (Real, [Real; 2]),
+    how: (Option<Bounds>, bool),
+}
+
 /// How much more acceleration or jerk a line may allow than another one of the same run.
 const ALIKE: Real = Real::fixed(3, 1);
 /// How much more speed it may allow.
@@ -96,14 +105,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         };
         // It does not fit: as far as it can to the end of the run.
         let left = (run.length + before) - place;
-        let under_way = self.under_way(at, start, how.0)?;
-        let shorter = |most| {
-            let run = self.run(at, None, under_way, (most, false))?;
-            let own = Self::own(&run, how);
-            Some((run, own, own.slower(start.v)))
-        };
+        let shorter = Shorter { part: None, under_way: self.under_way(at, start, how.0)?, how };
         let limits = (&run, own, own.slower(start.v));
-        self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), &shorter)
+        self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), shorter)
     }
 
     /// Returns the limits of a brake on a run: braking under way keeps its own if these are higher.
@@ -121,11 +125,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
     ) -> Option<(Course, Bounds)> {
         let (run, left, speeds) = self.goal(at, start, from, how)?;
         let under_way = self.under_way(at, start, how.1)?;
-        let shorter = |most| {
-            let run = self.run(at, Some(how.0), under_way, (most, false))?;
-            Some((run, run.bounds, run.bounds))
-        };
-        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, &shorter)
+        let shorter = Shorter { part: Some(how.0), under_way, how: (None, false) };
+        self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, shorter)
     }
 
     /// Plans a motion again that has a course already, after lines have been added. `None` if that would lead along more
@@ -209,7 +210,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is.
-    /// `own` and `wish` go into the course. `shorter` is the run with fewer lines, and its limits.
+    /// `own` and `wish` go into the course. `shorter` says how runs of fewer lines are found.
     fn leave(
         &self,
         at: usize,
@@ -217,7 +218,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         left: Real,
         limits: (&Run, Bounds, Bounds),
         (speed, wish): (Real, Real),
-        shorter: &dyn Fn(usize) -> Option<(Run, Bounds, Bounds)>,
+        shorter: Shorter,
     ) -> Option<(Course, Bounds)> {
         let to = |exit| self.lead(at, start, left, limits, (exit, wish));
         let (full, _, bounds) = &limits;
@@ -231,7 +232,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let known = self.known_exit(last).map(|known| known.max(self.promised(last)));
             // A line that allows less may have come into the run: what was promised before, or a rest, can be kept without it.
             let without = |most: usize| {
-                let (run, own, bounds) = shorter(most)?;
+                let run = self.run(at, shorter.part, shorter.under_way, (most, false))?;
+                let own = Self::own(&run, shorter.how);
+                let bounds = if shorter.part.is_none() { own.slower(start.v) } else { own };
                 let promised = self.promised(at.saturating_add(run.more));
                 if promised.is_zero() && !own.allows_more(&limits.1) {
                     return None;
