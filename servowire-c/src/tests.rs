@@ -236,6 +236,23 @@ fn decoders_of_all_protocols_take_every_length() {
     }
 }
 
+/// An axis in cyclic position mode, which sends two update periods of 0.5 ms of invalid data before its first commands.
+fn rtex_config(mac_id: u8) -> crate::rtex::sw_rtex_config_t {
+    crate::rtex::sw_rtex_config_t {
+        update_ns: 500_000,
+        invalid: 2,
+        wait: 10,
+        ready: 0,
+        inactive: 0,
+        gear_numerator: 1,
+        gear_denominator: 1,
+        echo: 3,
+        command_errors: 3,
+        mac_id,
+        mode: 2,
+    }
+}
+
 /// States of all protocols in memory that was not started, through a few calls, and copied.
 #[test]
 fn states_of_all_protocols_are_started_used_and_copied() {
@@ -252,19 +269,7 @@ fn states_of_all_protocols_are_started_used_and_copied() {
         assert_eq!(sw_hdsl_finished(Some(&m), Some(&mut MaybeUninit::uninit())), 0);
         m = *std::boxed::Box::new(m);
     }
-    let config = sw_rtex_config_t {
-        update_ns: 500_000,
-        invalid: 2,
-        wait: 10,
-        ready: 0,
-        inactive: 0,
-        gear_numerator: 1,
-        gear_denominator: 1,
-        echo: 3,
-        command_errors: 3,
-        mac_id: 5,
-        mode: 2,
-    };
+    let config = rtex_config(5);
     let mut place = MaybeUninit::zeroed();
     assert_eq!(sw_rtex_axis_start(Some(&mut place), Some(&config)), 0);
     // SAFETY: it was started.
@@ -359,19 +364,7 @@ fn encoders_of_blocks_write_all_or_nothing() {
 #[test]
 fn a_block_that_was_not_written_was_not_sent() {
     use crate::rtex::*;
-    let config = sw_rtex_config_t {
-        update_ns: 500_000,
-        invalid: 2,
-        wait: 10,
-        ready: 0,
-        inactive: 0,
-        gear_numerator: 1,
-        gear_denominator: 1,
-        echo: 3,
-        command_errors: 3,
-        mac_id: 9,
-        mode: 2,
-    };
+    let config = rtex_config(9);
     for written in [true, false] {
         let (mut place, mut block, mut now) = (MaybeUninit::zeroed(), [0_u8; 16], 0);
         assert_eq!(sw_rtex_axis_start(Some(&mut place), Some(&config)), 0);

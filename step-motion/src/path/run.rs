@@ -319,8 +319,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// stays known until the lines or the part change.
     pub(crate) fn exit(&mut self, at: usize, part: Real) -> Real {
         self.ask_for(part);
-        let (mut runs, mut next) = ([(0, Run::NONE); M], at.saturating_add(1));
-        let known = self.known(next);
+        let mut next = at.saturating_add(1);
+        if let Some(known) = self.known(next) {
+            return known;
+        }
+        let mut runs = [(0, Run::NONE); M];
         for place in &mut runs {
             if self.known(next).is_some() {
                 break;
@@ -329,13 +332,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
             *place = (next, run);
             next = next.saturating_add(run.more).saturating_add(1);
         }
-        known.unwrap_or_else(|| {
-            let mut speed = self.known(next).unwrap_or(Real::ZERO);
-            for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
-                speed = self.find_entry(*at, run, speed);
-            }
-            speed
-        })
+        let mut speed = self.known(next).unwrap_or(Real::ZERO);
+        for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
+            speed = self.find_entry(*at, run, speed);
+        }
+        speed
     }
 
     /// Does a slice of that: finds how far a run leads, or how fast the last run may begin for which this is not known yet.
