@@ -148,7 +148,7 @@ impl EchoWatch {
         self.seen = if self.other == lag { self.seen.saturating_add(1) } else { 1 };
         self.other = lag;
         if learns && self.seen >= TURN {
-            (self.lag, self.seen, self.sure) = (Some(lag), 0, TURN);
+            (self.lag, self.sure) = (Some(lag), TURN);
             return Arrival::OnTime;
         }
         Arrival::OffTime { lag }

@@ -1,7 +1,7 @@
 //! Procedures that are started again: the second time is as the first, after their end and in the middle.
 
 use crate::common::{CODES, Pair, limits, monitor};
-use rtex_block::device::{Behaviour, DriveConfig, Fault};
+use rtex_block::device::{Behaviour, DriveConfig, Fault, Quirks};
 use rtex_block::master::procedure::{
     AlarmAttributes, AlarmHistory, Backup, ClearAlarm, Home, Latch, ParameterValue, Procedure, RebaseWithServoOn,
     Request, Restore, SetPosition,
@@ -85,6 +85,9 @@ fn every_procedure_can_be_started_again() {
     let place = |number| Pr { class: 7, number };
     let list = [ParameterValue::new(place(25), 1), ParameterValue::new(place(26), 0)];
     the_same_again(pair(cyclic, false), Restore::new(CODES.parameter_read, &list), nothing);
+    // The initial value, 1,000, is another: it fails, and the next time it writes again.
+    let differs = [ParameterValue::new(Pr { class: 8, number: 1 }, 77)];
+    the_same_again(pair(cyclic, false), Restore::new(CODES.parameter_initial, &differs), nothing);
     let mut list = list;
     the_same_again(pair(cyclic, false), Backup::new(CODES.parameter_read, &mut list), nothing);
     let mut entries = [ALARM; 3];
@@ -109,4 +112,24 @@ fn homing_again() {
         (0..20).for_each(|_| pair.update());
     }
     pair.drive.set_behaviour(Behaviour::new());
+}
+
+/// Each change of the mode has the whole limit: one that had to wait for the axis to stand leaves it to the other.
+#[test]
+fn each_change_of_the_mode_has_its_limit() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new().with_quirks(Quirks::SETS_POSITION_WHILE_ON));
+    let mut rebase = RebaseWithServoOn::new(1_000, 8);
+    let from = pair.axis.setpoint();
+    let mut progress = Progress::Pending { left: 0 };
+    for k in 1..=6 {
+        pair.axis.set_position(from + 10 * k).unwrap();
+        pair.update();
+        progress = if k == 1 { rebase.start(&mut pair.axis) } else { rebase.receive(&mut pair.axis) };
+        assert!(progress.is_pending());
+    }
+    while progress.is_pending() {
+        pair.update();
+        progress = rebase.receive(&mut pair.axis);
+    }
+    assert!(matches!(progress, Progress::Done { value: 990..=1_010 }), "{progress:?}");
 }

@@ -145,6 +145,11 @@ fn a_motion_takes_its_own_answers_only() {
             answer(0x10, 0, 0x11, 0),
             answer(0x1a, 0, 0x11, 0),
             answer(0x17, 0, 0x10, 0),
+            // Latch_Sel1 and Monitor_Sel of another motion.
+            Response { response_data2: 0x0001_0011, ..answer(0x17, 0, 0x11, 0) },
+            Response { response_data2: 0x0100_0011, ..answer(0x17, 0, 0x11, 0) },
+            // A single command of the motion was damaged.
+            answer(0x97, 0, 0x31, 0),
             with_first_byte(answer(0x17, 0, 0x11, 0), 0x8a),
         ] {
             assert!(profile.receive(Some(&other)).is_pending(), "{other}");
@@ -352,6 +357,8 @@ fn negative_speeds_slow_down_towards_zero() {
     let mut two = Two::new(ActiveCode::CyclicVelocity, 40);
     two.axis().set_rate(-100).unwrap();
     assert_eq!(two.update(0xc1).1, -100);
+    // The speed that was asked for in the period of the failure was never sent: it plays no part.
+    two.axis().set_rate(-500).unwrap();
     let speeds = [two.fail().1, two.update(0xc1).1];
     assert_eq!(speeds, [-60, -20]);
     assert_eq!(two.update(0xc1), ([0, 0], 0));
@@ -359,7 +366,7 @@ fn negative_speeds_slow_down_towards_zero() {
     two.axis().set_position(-100).unwrap();
     two.update(0xc1);
     two.axis().set_position(-200).unwrap();
-    // The set-point that was asked for in the period of the failure was never sent: it plays no part.
+    // Nor does this set-point.
     assert_eq!([two.fail().1, two.update(0xc1).1], [-160, -180]);
     // A torque has no speed to be taken away: off at once.
     let mut two = Two::new(ActiveCode::CyclicTorque, 40);

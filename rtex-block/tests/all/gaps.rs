@@ -326,6 +326,20 @@ fn servo_on_that_was_not_sent_begins_once_more() {
     assert_eq!(position, at);
 }
 
+/// A change to CP that did not reach the ASIC has not been made: CP begins where the shaft is in the first block that does.
+#[test]
+fn positions_that_were_not_sent_begin_once_more() {
+    let mut hand = Hand::on(ActiveCode::CyclicVelocity);
+    hand.speed = 10;
+    (0..4).for_each(|_| _ = hand.update());
+    hand.axis.set_mode(ActiveCode::CyclicPosition).unwrap();
+    let sent = hand.axis.sent();
+    hand.update();
+    hand.axis.not_sent(sent);
+    let at = hand.at;
+    assert_eq!(hand.update(), (true, CyclicCode::CyclicPosition, at));
+}
+
 /// A drive that shows its flags late reports the activity of before: that is no answer to this Servo_On.
 #[test]
 fn activity_of_before_is_not_that_of_now() {

@@ -1,13 +1,13 @@
 //! What a single call or a single block changes, with responses that are made by hand.
 
-use crate::common::{CODES, LIMIT, Pair, limits};
+use crate::common::{CODES, LIMIT, Pair, limits, monitor};
 use rtex_block::device::{Behaviour, DriveConfig};
-use rtex_block::master::procedure::Home;
+use rtex_block::master::procedure::{ClearAlarm, Clearing, Home};
 use rtex_block::master::{
-    ActiveCode, Arrival, AxisConfig, AxisState, Failure, Heard, MoveStage, Progress, SetpointError, StopReason,
-    SwitchOnError, Turn,
+    ActiveCode, Arrival, AxisConfig, AxisState, Failure, Heard, MoveStage, Progress, SetpointError, StopCategory,
+    StopReason, SwitchOnError, Turn,
 };
-use rtex_block::{ErrorClass, ErrorCode, MacId, NonCyclicCommand, Response, StatusFlags};
+use rtex_block::{ErrorClass, ErrorCode, MacId, NonCyclicCommand, Response, StatusFlags, SubCode};
 
 /// An axis whose servo is off and could be switched on.
 fn off() -> Pair {
@@ -262,4 +262,94 @@ fn lost_blocks_do_not_end_a_homing() {
     };
     let without = periods(&[]);
     assert_eq!([periods(&[2]), periods(&[2, 4])], [without + 1, without + 2]);
+}
+
+/// Homing_Complete that is left from a homing is not the end of the next one, although both are made by the same procedure.
+#[test]
+fn a_second_homing_needs_an_end_of_its_own() {
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
+    let mut home = Home::new(CODES.homing, 300);
+    let _ = home.start(&mut pair.axis);
+    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Done { value: () });
+    // The drive says that the command is executed, and nothing changes.
+    let mut progress = home.start(&mut pair.axis);
+    while progress.is_pending() {
+        update(&mut pair, |response| {
+            response.status |= StatusFlags::HOMING_COMPLETE;
+            response.status &= !StatusFlags::IN_PROGRESS;
+            if response.code.noncyclic_bits() == 4 {
+                // Busy.
+                response.response_data2 &= !0x1000;
+            }
+        });
+        progress = home.receive(&mut pair.axis);
+    }
+    assert_eq!(progress, Progress::Failed { error: Failure::TimedOut });
+}
+
+/// Alarm = 0 in a block that comes again is what the drive said before.
+#[test]
+fn an_alarm_is_not_cleared_by_an_old_block() {
+    let mut pair = off();
+    let mut clear = ClearAlarm::new(CODES.alarm_clear, 50);
+    let old = pair.received;
+    pair.update();
+    assert!(clear.start(&mut pair.axis).is_pending());
+    pair.received = old;
+    pair.update();
+    assert_eq!(pair.axis.arrival(), Arrival::Repeated);
+    assert!(clear.receive(&mut pair.axis).is_pending());
+    pair.update();
+    assert_eq!(clear.receive(&mut pair.axis), Progress::Done { value: Clearing::Cleared });
+}
+
+/// A request to which the drive never reacted is withdrawn: its answer may come yet, so the next one waits for a turn of the counter.
+#[test]
+fn after_a_request_without_an_echo_a_turn_is_waited() {
+    let mut pair = off();
+    pair.axis.ask(monitor(0x07)).unwrap();
+    let code = pair.received.response().unwrap().code;
+    assert_eq!(code.get(), 0x20);
+    let without_echo = |pair: &mut Pair| {
+        update(pair, |response| response.code = code);
+        pair.axis.take_outcome()
+    };
+    let outcome = (0..100).find_map(|_| without_echo(&mut pair));
+    assert_eq!(outcome, Some(Progress::Failed { error: Failure::TimedOut }));
+    let can: Vec<_> = (0..5).map(|_| (pair.axis.can_ask(), without_echo(&mut pair)).0).collect();
+    assert_eq!(can, [false, false, false, false, true]);
+}
+
+/// The sub half of a block that is not on time is as old as the block.
+#[test]
+fn a_late_block_answers_no_sub_command() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
+    pair.axis.ask_sub(SubCode::SystemId, 0x01, 1).unwrap();
+    pair.until("answered", |pair| pair.received.sub().is_some_and(|sub| sub.code.get() == SubCode::SystemId.code()));
+    let answer = pair.received;
+    let Heard::Both(block) = &mut pair.received else { panic!() };
+    block.main.update_counter_echo = block.main.update_counter_echo.next().next();
+    pair.update();
+    assert!(matches!(pair.axis.arrival(), Arrival::OffTime { .. }));
+    assert_eq!(pair.axis.take_sub_outcome(), None);
+    pair.update();
+    let sub = *answer.sub().unwrap();
+    assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Done { value: sub }));
+}
+
+/// An axis that is held needs a drive that is ready, as one that moves does.
+#[test]
+fn an_axis_that_is_held_is_supervised() {
+    let mac_id = MacId::new(9).unwrap();
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits()).with_deceleration(10);
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES));
+    pair.switch_on();
+    pair.axis.stop(StopCategory::Two);
+    pair.update();
+    assert_eq!(pair.axis.state(), AxisState::Held(StopReason::Requested));
+    update(&mut pair, |response| response.status &= !StatusFlags::SERVO_READY);
+    pair.update();
+    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::NotReady));
 }

@@ -233,14 +233,21 @@ fn two_frames_in_one_exchange() {
 /// An alarm counts in whichever block it comes, late or repeated.
 #[test]
 fn an_alarm_is_never_too_late() {
-    let mut bench = Late::new(Pair::on(ActiveCode::CyclicPosition, Behaviour::new()));
-    (0..8).for_each(|_| bench.update(0));
-    let Heard::Main(mut response) = bench.line[2] else { panic!() };
-    response.status.insert(rtex_block::StatusFlags::ALARM);
-    bench.pair.received = Heard::Main(response);
-    bench.update(0);
-    assert_eq!(bench.pair.axis.state(), AxisState::Stopped(StopReason::Alarm));
-    assert!(bench.pair.axis.evidence().at(bench.pair.now_ns(), Policy::new(u64::MAX)).is_err());
+    for on in [false, true] {
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+        pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
+        if on {
+            pair.switch_on();
+        }
+        let mut bench = Late::new(pair);
+        (0..8).for_each(|_| bench.update(0));
+        let Heard::Main(mut response) = bench.line[2] else { panic!() };
+        response.status.insert(rtex_block::StatusFlags::ALARM);
+        bench.pair.received = Heard::Main(response);
+        bench.update(0);
+        assert_eq!(bench.pair.axis.state(), AxisState::Stopped(StopReason::Alarm), "{on}");
+        assert!(bench.pair.axis.evidence().at(bench.pair.now_ns(), Policy::new(u64::MAX)).is_err());
+    }
     // Everything else a late block says is of no account: servo off before it was switched on.
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.can_switch_on().is_ok());

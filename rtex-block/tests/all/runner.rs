@@ -8,7 +8,7 @@ use rtex_block::master::{
     SetpointError, StopCategory, StopReason, SwitchOnError,
 };
 use rtex_block::type_code::profile;
-use rtex_block::{Alarm, MacId, Response};
+use rtex_block::{Alarm, MacId, Response, StatusFlags};
 
 struct Bench {
     ring: Ring<2>,
@@ -147,4 +147,16 @@ fn every_end_of_a_job() {
     ring.lasts = 9;
     assert_eq!(ring.switch_on(), Err(Ended::Line("cut")));
     assert_eq!(Ended::Line("cut").to_string(), "the exchange failed: cut");
+}
+
+/// The drive at the place is homed, and no other.
+#[test]
+fn a_homing_is_that_of_its_place() {
+    for place in 0..2 {
+        let mut ring = bench(ActiveCode::ProfilePosition);
+        ring.switch_on().unwrap();
+        ring.home(place, 0xc8, 1_000).unwrap();
+        let homed = ring.ring.axes().each_ref().map(|axis| axis.status().contains(StatusFlags::HOMING_COMPLETE));
+        assert_eq!(homed, [place == 0, place == 1]);
+    }
 }
