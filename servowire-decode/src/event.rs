@@ -33,6 +33,8 @@ pub struct Event {
     pub counted: bool,
     /// Whether this is a remark about the recording instead of a frame; remarks are not counted.
     pub remark: bool,
+    /// For a remark with an address: whether everything before it with this address was misread, so that nobody may be there.
+    pub misread: bool,
 }
 
 impl Event {
@@ -56,6 +58,7 @@ impl Event {
             verdict,
             counted: false,
             remark: false,
+            misread: false,
         }
     }
 

@@ -143,6 +143,10 @@ impl Picture {
     }
 
     fn add(&mut self, speaker: Speaker, event: &Event) {
+        if event.misread {
+            self.encoders.remove(&speaker);
+            return;
+        }
         let Place::Time { start, end } = event.place else { return };
         let (first, last) = self.extent.unwrap_or((start, end));
         self.extent = Some((first.min(start), last.max(end)));

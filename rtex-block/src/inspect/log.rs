@@ -76,6 +76,13 @@ impl LogAnalysis {
         })
     }
 
+    /// Forgets a drive: the blocks in which it was seen were misread.
+    pub fn forget(&mut self, mac_id: MacId) {
+        if let Some(track) = self.track(mac_id) {
+            *track = Track::NEW;
+        }
+    }
+
     fn track(&mut self, mac_id: MacId) -> Option<&mut Track> {
         self.tracks.get_mut(usize::from(mac_id.get()))
     }

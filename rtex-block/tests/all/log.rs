@@ -232,6 +232,31 @@ fn attributes_are_no_alarm_codes() {
     assert_eq!(attributes.to_string(), "attributes 80000101h of the alarm with index 2601h");
 }
 
+/// The same request again, after the normal command, is another one, and its answer another answer.
+#[test]
+fn a_request_is_asked_again() {
+    let mut log = analysis();
+    let once = |counter| [command(counter, 0x2a, 0), response(counter, 0x2a, 0)];
+    let normal = |counter| [command(counter, 0x20, 0), response(counter, 0x20, 0)];
+    let blocks = [normal(1), once(2), normal(3), once(0), normal(1)].concat();
+    let answered = LogFinding::Answered { responses: 1, busy: 0 };
+    assert_eq!(findings(&mut log, &blocks), [(3, answered), (7, answered)]);
+}
+
+/// A drive that was forgotten has never been there.
+#[test]
+fn a_drive_that_is_forgotten_was_not_there() {
+    let mut log = analysis();
+    let mut other = response(1, 0x20, 0);
+    (other[0], other[2]) = (0xa7, 0xe1);
+    let number = MacId::new(7).unwrap();
+    findings(&mut log, &[command(1, 0x20, 0), response(1, 0x20, 0), other]);
+    assert_eq!(log.end().collect::<Vec<_>>(), [LogFinding::NeverAsked(number)]);
+    assert_eq!(log.troubles().collect::<Vec<_>>(), [DriveTrouble { mac_id: number, trouble: Trouble::Alarm }]);
+    log.forget(number);
+    assert_eq!((log.end().count(), log.troubles().count()), (0, 0));
+}
+
 /// What a person reads.
 #[test]
 fn findings_in_words() {

@@ -58,6 +58,8 @@ struct Figures {
     listed: Vec<Jump>,
     /// Times are counted, not measured, and say nothing about the cycle.
     counted: bool,
+    /// Nothing of it is trusted: it was misread.
+    misread: bool,
     /// Events with their places, and their number.
     happened: Vec<(Place, String)>,
     events: usize,
@@ -167,6 +169,13 @@ impl Figures {
         }
     }
 
+    /// Keeps only the numbers of frames: everything said so far was misread.
+    fn forget(&mut self) {
+        let Self { requests, answers, others, ok, ref mut refused, .. } = *self;
+        let refused = std::mem::take(refused);
+        *self = Self { misread: true, requests, answers, others, ok, refused, ..Self::default() };
+    }
+
     /// Lists what happened.
     fn list(&mut self, event: &Event) {
         self.events += event.happened.len();
@@ -221,7 +230,14 @@ impl Figures {
 
     /// Returns the figures by their names; a row that belongs to the one above has no name.
     fn rows(&self, limit: Option<u64>) -> Vec<(&'static str, String)> {
-        let mut rows = if self.has_frames() || self.events == 0 { self.rows_of_frames(limit) } else { Vec::new() };
+        let mut rows = if self.misread {
+            let frames = self.requests + self.answers + self.others;
+            vec![("misread", format!("{frames} frames, not trusted"))]
+        } else if self.has_frames() || self.events == 0 {
+            self.rows_of_frames(limit)
+        } else {
+            Vec::new()
+        };
         if self.events > 0 {
             rows.push(("events", self.events.to_string()));
             rows.extend(self.happened.iter().map(|(place, what)| match place {
@@ -329,6 +345,9 @@ impl Gathered {
             return;
         }
         let figures = self.by.entry(origin.speaker(event)).or_default();
+        if event.misread {
+            figures.forget();
+        }
         if event.remark { figures.list(event) } else { figures.add(event, self.limit) }
     }
 
@@ -413,6 +432,9 @@ impl Gathered {
             });
             if let Some(object) = object.as_object_mut().filter(|_| f.events > 0) {
                 object.insert("events".to_owned(), f.events_json().into());
+            }
+            if let Some(object) = object.as_object_mut().filter(|_| f.misread) {
+                object.insert("misread".to_owned(), true.into());
             }
             object
         };

@@ -6,13 +6,14 @@
 
 mod blocks;
 mod describe;
+mod seen;
 #[cfg(test)]
 mod tests;
 
 use std::collections::HashMap;
 use std::io;
 
-use rtex_block::inspect::{self, Cause, DriveTrouble, LogAnalysis, LogFinding, LogShape, Report, inspect};
+use rtex_block::inspect::{self, Cause, DriveTrouble, LogAnalysis, LogFinding, LogShape, Report, Trouble, inspect};
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
@@ -21,7 +22,8 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Span, Verd
 use crate::settings::{self, Settings};
 use crate::sink::Sink;
 use crate::time::Time;
-use blocks::{Blocks, Piece};
+use blocks::{Blocks, Check, Piece};
+use seen::Seen;
 
 /// The table row of RTEX.
 pub(super) struct Rtex;
@@ -71,6 +73,8 @@ struct Decoder {
     analysis: LogAnalysis,
     /// The log goes on in another shape, so blocks were misread until then.
     goes_on: bool,
+    /// The drives, and which of them are in misread blocks only.
+    seen: Seen,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
     /// For the same key, the last counter and the number of update periods so far.
@@ -90,6 +94,7 @@ impl Decoder {
             misread: None,
             analysis: LogAnalysis::new(settings.period_ns, settings.gear),
             goes_on: false,
+            seen: Seen::default(),
             last: HashMap::new(),
             updates: HashMap::new(),
             place: Place::Line(0),
@@ -153,11 +158,42 @@ impl Decoder {
         }
         // A NOP is mostly zeros, whatever their order.
         let is_sound = report.error().is_none() && block.get(1).is_some_and(|code| code & 0x7f != 0);
-        let Some(shape) = self.blocks.goes_on(&piece.bytes, is_sound) else { return Ok(()) };
+        match self.blocks.goes_on(&piece.bytes, is_sound) {
+            Check::Nothing => Ok(()),
+            Check::Holds => {
+                self.seen.holds();
+                Ok(())
+            }
+            Check::Changes(shape) => {
+                let note = format!("from here on the log looks like {}", said(shape));
+                self.changes(format!("{note} (line {})", piece.line));
+                out.event(&remark(self.place, note))
+            }
+        }
+    }
+
+    /// Takes note that the last blocks were misread.
+    fn changes(&mut self, why: String) {
         self.goes_on = true;
-        let note = format!("from here on the log looks like {}", said(shape));
-        self.misread.get_or_insert_with(|| format!("{note} (line {})", piece.line));
-        out.event(&remark(self.place, note))
+        self.seen.changes();
+        self.misread.get_or_insert(why);
+    }
+
+    /// Says which drives are in misread blocks only, and forgets them.
+    fn say_phantoms(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        for drive in self.seen.phantoms() {
+            let note = format!("drive {drive} is only in blocks that were misread, and is not trusted");
+            let address = Some(drive.get().into());
+            out.event(&Event { address, misread: true, ..remark(self.place, note) })?;
+            let alarmed = DriveTrouble { mac_id: drive, trouble: Trouble::Alarm };
+            if self.analysis.troubles().any(|trouble| trouble == alarmed) {
+                // It may have been a real one after all.
+                let misread = self.misread.take().unwrap_or_default();
+                self.misread = Some(format!("{misread}; drive {drive}, if there is one, reported an alarm"));
+            }
+            self.analysis.forget(drive);
+        }
+        Ok(())
     }
 
     /// Returns where a block is: at its time, if the log has times; in update periods, if the period is known; otherwise by
@@ -187,6 +223,7 @@ impl Decoder {
         }
         let (place, counted) = self.place(piece, header);
         self.place = place;
+        self.seen.see(header.mac_id);
         let (mut fields, mut happened) = (Vec::new(), Vec::new());
         if is_block(report) {
             let findings: Vec<LogFinding> = self.analysis.block(block).collect();
@@ -352,6 +389,12 @@ impl LogDecoder for Decoder {
         if !self.held.is_empty() {
             self.let_go(out)?;
         }
+        if let Some((count, shape)) = self.blocks.last() {
+            let note = format!("the last {count} blocks of the log look like {}", said(shape));
+            self.changes(note.clone());
+            out.event(&remark(self.place, note))?;
+        }
+        self.say_phantoms(out)?;
         for finding in self.analysis.end() {
             let address = match finding {
                 LogFinding::NeverAnswered(drive) | LogFinding::NeverAsked(drive) | LogFinding::AtEnd(drive, _) => {

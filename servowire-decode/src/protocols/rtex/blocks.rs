@@ -38,6 +38,19 @@ pub(super) struct Blocks {
     window: Vec<u8>,
     seen: usize,
     unsound: usize,
+    /// The first of them from which on they may have another shape.
+    from: Option<usize>,
+}
+
+/// What the last blocks say about the shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Check {
+    /// There are too few of them, or they say nothing.
+    Nothing,
+    /// It still holds.
+    Holds,
+    /// The log continues in another one.
+    Changes(LogShape),
 }
 
 /// A block as it is in the log, with the line in which it begins.
@@ -61,6 +74,7 @@ impl Blocks {
             window: Vec::new(),
             seen: 0,
             unsound: 0,
+            from: None,
         }
     }
 
@@ -191,34 +205,51 @@ impl Blocks {
 
     /// Checks whether the shape still holds after one more block as it was read; `sound`: an encoder may write it and it
     /// says something. If the last blocks have another shape, the log continues in that.
-    pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Option<LogShape> {
+    pub(super) fn goes_on(&mut self, read: &[u8], sound: bool) -> Check {
+        if !sound && self.from.is_none() {
+            self.from = Some(self.window.len());
+        }
         self.window.extend_from_slice(read);
         // A block that was cut short does not shift the following ones.
         self.window.resize(self.window.len().next_multiple_of(self.size), 0);
         self.seen += 1;
         self.unsound += usize::from(!sound);
         if self.seen < WINDOW {
-            return None;
+            return Check::Nothing;
         }
         let (window, unsound) = (std::mem::take(&mut self.window), std::mem::take(&mut self.unsound));
-        self.seen = 0;
-        let now = LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) };
+        (self.seen, self.from) = (0, None);
+        let now = self.now();
         let doubts = self.doubt.is_some();
-        if self.said.is_some() || unsound * 10 < WINDOW && !doubts && !self.leaning {
-            return None;
+        if self.said.is_some() || unsound == 0 && !doubts && !self.leaning {
+            return Check::Holds;
         }
         let sure = certain(&window);
         self.leaning &= sure != Some(now);
         // While the shape is not known, neither is whether the window begins with a block.
         let guess = if doubts { sure } else { LogShape::guess(&window).ok() };
-        let other = guess.filter(|other| *other != now || doubts)?;
+        let Some(other) = guess.filter(|other| *other != now || doubts) else {
+            return if guess == Some(now) { Check::Holds } else { Check::Nothing };
+        };
         self.doubt = None;
         self.leaning = leans(other) && sure != Some(other);
         let flow = self.flow;
         // The window begins with a block of the old shape, and its blocks fill it; the next bytes continue like its first ones.
         self.take(Some(other), other.skip);
         self.flow |= flow;
-        Some(other)
+        Check::Changes(other)
+    }
+
+    /// Returns how many blocks at the end of the log have another shape, and which, if too few came to change it.
+    pub(super) fn last(&self) -> Option<(usize, LogShape)> {
+        let last = self.window.get(self.from.filter(|_| self.said.is_none() && self.doubt.is_none())?..)?;
+        let other = LogShape::guess(last).ok().filter(|other| *other != self.now())?;
+        Some((last.len() / self.size, other))
+    }
+
+    /// The shape of the next bytes, which begin with a block.
+    fn now(&self) -> LogShape {
+        LogShape { skip: 0, ..self.shape.unwrap_or(LogShape { size: BlockSize::Bytes16, word: 1, skip: 0 }) }
     }
 }
 

@@ -217,3 +217,42 @@ fn a_stray_line_costs_its_two_blocks() {
     let want: Vec<i64> = (1..199).filter(|block| !matches!(block, 30 | 31)).map(|block| (block + 1) * 1_001).collect();
     assert_eq!(positions(&kept.0), want);
 }
+
+/// Commands and responses of drive 5 in turn.
+fn exchange(k: u32) -> [[u8; 16]; 2] {
+    let answer = response(k, 1_000 * k as i32, k % 5 == 0, 20_000);
+    let mut command = [0; 16];
+    (command[0], command[1], command[2]) = (answer[0] & 0x7f, 0x20, 0x80);
+    command[4..8].copy_from_slice(&answer[4..8]);
+    [command, answer]
+}
+
+/// Bytes are lost in the middle of a log or six blocks before its end, wherever a window of the shape begins: what is made of the blocks that
+/// were cut in the wrong places until that was noticed is no drive, and is said to be none.
+#[test]
+fn drives_of_misread_blocks_are_not_trusted() {
+    let log = bytes(1, (0..240).flat_map(exchange));
+    let mut phantoms = 0;
+    for (block, count) in (100..180).map(|block| (block, 480)).chain((6..90).map(|rest| (480 - rest, 480))) {
+        for lost in [1, 2, 4, 5, 11, 15] {
+            let at = 16 * block;
+            let log = [&log[..at], &log[at + lost..16 * count]].concat();
+            let (events, _) = decoded(&log);
+            let said: Vec<_> =
+                events.iter().filter(|event| event.remark).map(|event| event.happened.join(" ")).collect();
+            let from = |event: &&Event| event.address.is_some_and(|address| address != 5);
+            let mut others: Vec<_> =
+                events.iter().filter(|event| !event.remark).filter(from).filter_map(|it| it.address).collect();
+            others.sort_unstable();
+            others.dedup();
+            let retracted: Vec<_> =
+                events.iter().filter(|event| event.misread).filter_map(|event| event.address).collect();
+            assert_eq!(retracted, others, "{block} {lost}: {said:?}");
+            phantoms += others.len();
+            for what in ["never", "at the end"] {
+                assert!(!said.iter().any(|said| said.contains(what)), "{block} {lost}: {said:?}");
+            }
+        }
+    }
+    assert!(phantoms > 500, "{phantoms}");
+}

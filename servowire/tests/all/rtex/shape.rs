@@ -262,6 +262,20 @@ fn a_log_that_begins_or_goes_on_in_the_middle_of_a_block() {
     assert!(run.err.contains("from here on the log looks like blocks of 16 bytes"), "{}", run.err);
     // 100 blocks before it and what follows the blocks by which it was seen.
     assert!(of_5(&run) > 340, "{}", of_5(&run));
+    assert!(!run.err.contains("did not answer"), "{}", run.err);
+    // What was made of the 92 blocks from there to the end of the third window of 64 is no drive: its figures are not shown.
+    let run = bench.decode("log.bin", &hole, &["--protocol", "rtex", "--record-size", "16", "--stats"]);
+    for (drive, frames) in [(3, 52), (4, 40)] {
+        let want = format!(
+            "  address {drive}\n  misread       {frames} frames, not trusted\n  events        1\n    line       478  drive {drive} is only in \
+             blocks that were misread, and is not trusted\n"
+        );
+        assert!(run.out.contains(&want), "{}", run.out);
+    }
+    assert!(!run.out.contains("never"), "{}", run.out);
+    let run = bench.decode("log.bin", &hole, &["--protocol", "rtex", "--record-size", "16", "--stats", "--json"]);
+    let misread: Vec<_> = run.json().iter().map(|it| (it["address"].as_u64(), it["misread"].as_bool())).collect();
+    assert_eq!(misread, [(None, None), (Some(3), Some(true)), (Some(4), Some(true)), (Some(5), None)]);
 }
 
 /// The words of 32 bits are turned round, and the blocks are shown as they were meant.
