@@ -135,21 +135,28 @@ pub trait Run<const N: usize> {
     }
 
     /// Waits for the main power of all drives, without a limit, and switches all axes on. Those that are on stay on, but the axes of
-    /// a ring are switched on together: if only some are on, or one is held after a stop, that is an error.
+    /// a ring are switched on together: if only some are on, or one is held after a stop, that is an error. So is one that
+    /// is switched off again, in [`update`](Self::update), before all are on.
     ///
     /// # Errors
     /// [`Ended::Line`], [`Ended::Ring`], [`Ended::Alarm`], [`Ended::SwitchOn`]
     fn switch_on(&mut self) -> Result<(), Ended<Self::Error>> {
+        let mut commanded = false;
         loop {
             step(self)?;
             let ring = self.ring_mut();
             if ring.all_are(AxisState::On) {
                 return Ok(());
             }
+            if commanded {
+                // The axes have limits of their own.
+                off_again(ring).map_or(Ok(()), |error| Err(Ended::SwitchOn(error)))?;
+                continue;
+            }
             if ring.axes().iter().all(|axis| axis.can_switch_on().is_ok()) {
                 ring.switch_on().map_err(Ended::SwitchOn)?;
-                // The axes have limits of their own.
-                return self.until(None, |ring| ring.all_are(AxisState::On));
+                commanded = true;
+                continue;
             }
             let alarmed = |axis: &Axis| axis.status().contains(StatusFlags::ALARM);
             if let Some((_, place)) = ring.axes().iter().zip(0..).find(|(axis, _)| alarmed(axis)) {
@@ -232,6 +239,13 @@ pub trait Run<const N: usize> {
             }
         }
     }
+}
+
+/// Returns an axis that was switched on and is not on its way there any more.
+fn off_again<const N: usize>(ring: &Ring<N>) -> Option<RingSwitchOnError> {
+    let mut states = ring.axes().iter().map(Axis::state).zip(0..);
+    let (state, place) = states.find(|(state, _)| !matches!(state, AxisState::SwitchingOn | AxisState::On))?;
+    Some(RingSwitchOnError { place, error: SwitchOnError::State(state) })
 }
 
 /// Returns an axis that stays energised and so is never off, one that is held before one that is on; `None` if all are on or on

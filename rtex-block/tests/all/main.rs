@@ -29,6 +29,7 @@ mod places_in_time;
 mod procedures;
 mod refusals;
 mod ring;
+mod run_cut;
 mod runner;
 #[cfg(feature = "serde")]
 mod serde;

@@ -60,6 +60,20 @@ impl Ask {
     }
 }
 
+/// Reads back what a command has set, and compares it with `read`. If that fails, the end is that of the command, whose answer was `set`:
+/// it was sent, so a reading that was not sent leaves its effect unknown.
+pub(super) fn read_back<T: Copy>(
+    progress: Progress<NonCyclicResponse>,
+    set: Result<(), Failure>,
+    read: impl FnOnce(NonCyclicResponse) -> Progress<T>,
+) -> Progress<T> {
+    match (progress, set) {
+        (Progress::Failed { .. }, Err(error)) => Progress::Failed { error },
+        (Progress::Failed { error: Failure::NotSent(_) }, Ok(())) => Progress::Failed { error: Failure::TimedOut },
+        (progress, _) => progress.and_then(read),
+    }
+}
+
 /// Defines `start` and `receive` of a procedure from its `next`, which returns the progress of one update period, its
 /// `reset`, and its `end`.
 macro_rules! procedure {

@@ -1,6 +1,6 @@
 //! Position set and homing by the drive.
 
-use super::ask::{Ask, procedure};
+use super::ask::{Ask, procedure, read_back};
 use crate::master::axis::Axis;
 use crate::master::config::StopCategory;
 use crate::master::echo::{Arrival, TURN};
@@ -72,7 +72,7 @@ impl SetPosition {
             _ => monitor::IPOS,
         };
         let read = NonCyclicCommand::Monitor(Arguments { type_code, index: 0, data: 0 });
-        self.ask.receive(axis, read).and_then(|response| match (set, response.data()) {
+        read_back(self.ask.receive(axis, read), set, |response| match (set, response.data()) {
             (Ok(()), Some(value)) => Progress::Done { value },
             (Err(_), Some(value)) if value == self.position => Progress::Done { value },
             (Err(error), _) => Progress::Failed { error },

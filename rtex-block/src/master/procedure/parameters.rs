@@ -1,6 +1,6 @@
 //! Parameters of a drive: read all, write all and read back.
 
-use super::ask::{Ask, procedure};
+use super::ask::{Ask, procedure, read_back};
 use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
@@ -108,7 +108,7 @@ impl<'a> Restore<'a> {
             }
             return pending;
         };
-        self.ask.receive(axis, request(self.read, pr, 0)).and_then(|response| {
+        read_back(self.ask.receive(axis, request(self.read, pr, 0)), written, |response| {
             if response.data() != Some(value) {
                 return Progress::Failed { error: written.err().unwrap_or(Failure::Differs(pr)) };
             }
