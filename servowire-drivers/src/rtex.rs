@@ -19,7 +19,9 @@
 //! again, every block is read a third time, and one whose echo has changed is not taken, because it may be the halves of two; of
 //! the others, each axis takes its block only if it is on time ([`Arrival`]). If the receive
 //! interrupt came meanwhile, or XSYNC by the clock, none is taken: two frames have the same counter if there are two
-//! communications per update period, or if an exchange was late. System Design Guide for Master, chapters 1 and 2.
+//! communications per update period, or if an exchange was late. System Design Guide for Master, chapters 1 and 2. A drive whose echo
+//! stands still looks like that in every exchange: on a bus so slow that three readings last until the frame is back, no axis has a
+//! block then, and the ring stops for the first of them instead of for that drive.
 //!
 //! Every block that the port fails to read or write is tried again at once. If that fails too, a block that was not read counts
 //! as a period without an answer from that drive, as counted by the echo watch of its axis. All others are read, and every place

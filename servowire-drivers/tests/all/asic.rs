@@ -291,11 +291,13 @@ impl<W: Drawn> Port for Bus<W> {
         if !ring.writing {
             return Err(());
         }
-        let width = size_of::<W>();
+        let (width, mut block) = (size_of::<W>(), ring.tx[place]);
         for (k, word) in words.iter().enumerate() {
             ring.access(1).inspect_err(|()| ring.writing = false)?;
-            word.to(&mut ring.tx[place][width * k..width * (k + 1)]);
+            word.to(&mut block[width * k..width * (k + 1)]);
         }
+        // A block that was not written in full is the old one.
+        ring.tx[place] = block;
         ring.written += 1;
         ring.writing = place + 1 < AXES;
         ring.wrote |= !ring.writing;

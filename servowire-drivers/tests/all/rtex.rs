@@ -7,6 +7,7 @@ mod clock;
 mod exchange;
 mod faults;
 mod reception;
+mod stops;
 
 use std::marker::PhantomData;
 use std::num::NonZeroU16;
@@ -116,9 +117,9 @@ fn heal(ring: &Shared) {
 }
 
 /// Every position is there, and it is that of the last frames; nothing has stopped.
-fn is_well<C: servowire_drivers::Clock>(
+fn is_well<W: Drawn, C: servowire_drivers::Clock>(
     ring: &Shared,
-    driver: &Driver<'static, Bus<u32>, C, AXES>,
+    driver: &Driver<'static, Bus<W>, C, AXES>,
     what: &dyn std::fmt::Debug,
 ) {
     assert_eq!(driver.master().ring().failure(), None, "{what:?}");

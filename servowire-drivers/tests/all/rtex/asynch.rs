@@ -155,39 +155,78 @@ impl Timer for Steps {
     }
 }
 
-/// The faults of the blocking test, edges that are lost, and futures that are dropped: 100,000 of them, and after each all is well
-/// again.
+/// The faults of the blocking test, edges that are lost, and futures that are dropped: 100,000 of them, on buses of all widths, and
+/// after each all is well again.
 #[test]
 fn hostile_events_are_over_with_the_next_call() {
     let mut draw = Draw::default();
-    let (mut count, mut kinds) = (0, [0_u64; KINDS + 2]);
-    while count < wanted_events(FAULTS).max(FAULTS) {
-        let ring = Ring::new(false, draw.below(2) == 1);
-        let mut driver = waiting::<u32, _>(&ring, Steps);
-        let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
-        for _ in 0..2_000 {
-            let kind = draw.below(kinds.len() as u64) as usize;
-            kinds[kind] += 1;
-            count += 1;
-            move_on(&mut driver);
-            let polls = if kind == KINDS { draw.below(30) as usize } else { FOR_EVER };
-            pin.lost = kind == KINDS + 1;
-            if kind < KINDS {
-                hurt(&ring, &mut draw, kind);
-            }
-            let outcome = run(driver.next(&mut pin), polls);
-            // An edge that came while nobody waited has the same consequence as a late exchange.
-            let missed = outcome.map_or(1, |result| result.map_or(0, |period| period.exchanged.frames_late));
-            pin.lost = false;
-            heal(&ring);
-            // After a stall the first block may be of any of the frames that passed, and is taken for the oldest of them.
-            let stalled = u32::from(kind == KINDS - 1);
-            for _ in 0..2 + missed + stalled {
-                run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
-            }
-            is_well(&ring, &driver, &(count, kind));
+    let mut kinds = [0_u64; KINDS + 2];
+    while kinds.iter().sum::<u64>() < wanted_events(FAULTS).max(FAULTS) {
+        match draw.below(3) {
+            0 => hostile::<u8>(&mut draw, &mut kinds),
+            1 => hostile::<u16>(&mut draw, &mut kinds),
+            _ => hostile::<u32>(&mut draw, &mut kinds),
         }
     }
     println!("{kinds:?}");
-    assert!(count >= FAULTS && kinds.iter().all(|kind| *kind > count / 6));
+    let count: u64 = kinds.iter().sum();
+    assert!(kinds.iter().all(|kind| *kind > count / 6));
+}
+
+fn hostile<W: Drawn>(draw: &mut Draw, kinds: &mut [u64; KINDS + 2]) {
+    let ring = Ring::new(false, draw.below(2) == 1);
+    let mut driver = waiting::<W, _>(&ring, Steps);
+    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    for count in 0..2_000 {
+        let kind = draw.below(kinds.len() as u64) as usize;
+        kinds[kind] += 1;
+        move_on(&mut driver);
+        let polls = if kind == KINDS { draw.below(30) as usize } else { FOR_EVER };
+        pin.lost = kind == KINDS + 1;
+        if kind < KINDS {
+            hurt(&ring, draw, kind);
+        }
+        let outcome = run(driver.next(&mut pin), polls);
+        // An edge that came while nobody waited has the same consequence as a late exchange.
+        let missed = outcome.map_or(1, |result| result.map_or(0, |period| period.exchanged.frames_late));
+        pin.lost = false;
+        heal(&ring);
+        // After a stall the first block may be of any of the frames that passed, and is taken for the oldest of them.
+        let stalled = u32::from(kind == KINDS - 1);
+        for _ in 0..2 + missed + stalled {
+            run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+        }
+        is_well(&ring, &driver, &(count, kind, size_of::<W>()));
+    }
+}
+
+/// What has to stop the ring, with the driver as a future; among it are edges that do not come and futures that are dropped.
+#[test]
+fn hostile_stops_release_every_motor() {
+    let (mut draw, mut kinds) = (Draw::seeded(servowire_world::first_seed()), [0; stops::KINDS]);
+    while kinds.iter().sum::<u64>() < wanted_events(stops::EVENTS) {
+        match draw.below(3) {
+            0 => hostile_stops::<u8>(&mut draw, &mut kinds),
+            1 => hostile_stops::<u16>(&mut draw, &mut kinds),
+            _ => hostile_stops::<u32>(&mut draw, &mut kinds),
+        }
+    }
+    println!("{kinds:?}");
+    assert!(kinds.iter().all(|kind| *kind > 0), "{kinds:?}");
+}
+
+fn hostile_stops<W: Drawn>(draw: &mut Draw, kinds: &mut [u64; stops::KINDS]) {
+    let ring = Ring::new(false, draw.below(2) == 1);
+    let mut driver = waiting::<W, _>(&ring, Steps);
+    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    let mut of_the_pin = Draw::seeded(draw.below(1 << 31));
+    // The steps of the clock.
+    stops::hostile(&ring, &mut driver, draw, kinds, 20_000, |driver| {
+        ring.borrow_mut().let_in();
+        pin.lost = of_the_pin.below(20) == 0;
+        if of_the_pin.below(20) == 0 {
+            let _dropped = run(driver.next(&mut pin), of_the_pin.below(10) as usize);
+        }
+        let _ = run(driver.next(&mut pin), FOR_EVER).unwrap();
+    });
 }
