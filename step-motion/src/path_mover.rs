@@ -56,6 +56,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     whole: bool,
     /// The limits that its curve keeps.
     bounds: Option<Bounds>,
+    /// What was asked for last does not fit on the rest of the present line: it is planned on the next one.
+    late: bool,
     /// Steps of the first line that have been made.
     made: [u32; N],
     commanded: [i64; N],
@@ -95,6 +97,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
             more,
             whole,
             bounds,
+            late,
             made,
             commanded,
             origin,
@@ -112,6 +115,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
         self.path.clone_from(path);
         self.line.clone_from(line);
         (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
+        self.late = *late;
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
         (self.free, self.steps, self.left, self.percent) = (*free, *steps, *left, *percent);
         self.ended = *ended;
@@ -135,6 +139,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             more: 0,
             whole: true,
             bounds: None,
+            late: false,
             made: [0; N],
             commanded: position,
             origin: position,

@@ -8,6 +8,7 @@
 mod model;
 mod path;
 mod planner;
+mod promises;
 
 use crate::limits::Bounds;
 use crate::real::Real;

@@ -68,7 +68,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let most = allowed(line);
             let fastest = if part.is_some() { run.bounds.v.max(speed) } else { speed };
             let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
-            let fits = line.corner >= fastest && most >= speed;
+            // What is too fast slows down at once, however many lines that takes.
+            let open = most >= speed || speed > run.bounds.v && line.bounds.v >= speed;
+            let fits = line.corner >= fastest && open;
             let v = part.is_none() || alike(most, run.bounds.v, EQUAL);
             let same = any || alike(*own, run.bounds.a, ALIKE) && alike(other.j, jerk.j, ALIKE);
             if !fits || !v || !same {
@@ -279,25 +281,33 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, way)
     }
 
-    /// Plans from the start of line `at`, at a speed, keeping to a fraction of the requested speeds. If rounding leaves no
-    /// solution, it continues at that speed.
+    /// Plans from the start of line `at`, at a speed, keeping to a fraction of the requested speeds. If that leaves no
+    /// solution, it gets as slow as it can.
     pub(crate) fn begin(&mut self, at: usize, speed: Real, part: Real) -> Option<(Course, Bounds)> {
         let course = self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None));
-        course.or_else(|| self.steady(at, speed))
+        course.or_else(|| self.slow_down(at, speed))
     }
 
     /// Plans in the same way, braking at once.
     pub(crate) fn begin_to_brake(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
         let course = self.brake(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (None, false));
-        course.or_else(|| self.steady(at, speed))
+        course.or_else(|| self.slow_down(at, speed))
     }
 
-    /// Continues along line `at` at a speed.
-    fn steady(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
+    /// Slows down along line `at` from a speed as far as it can; if rounding leaves no solution, continues at that speed.
+    fn slow_down(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
         let line = self.line(at)?;
-        let mut curve = Curve::new();
-        curve.cruise(speed, line.length);
-        Some((Course { curve, exit: speed, wish: speed, whole: true, more: 0 }, line.bounds))
+        let (start, bounds) = (Motion::steady(speed), line.bounds.slower(speed));
+        let exit = line.leave.unwrap_or(slowest_exit(start, line.length, Real::ZERO, &bounds));
+        let (curve, exit) = plan(start, Goal::At(line.length, exit), &bounds).map_or_else(
+            |_| {
+                let mut curve = Curve::new();
+                curve.cruise(speed, line.length);
+                (curve, speed)
+            },
+            |curve| (curve, exit),
+        );
+        Some((Course { curve, exit, wish: exit, whole: true, more: 0 }, line.bounds))
     }
 
     /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`; and how long
@@ -366,11 +376,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
         None
     }
 
-    /// Forgets what was found for another fraction of the requested speeds.
+    /// Forgets what was found for another fraction of the requested speeds; what was promised, the motion may need still.
     fn ask_for(&mut self, part: Real) {
         if part != self.part {
             self.part = part;
-            self.forget();
+            self.edition = self.edition.wrapping_add(1);
         }
     }
 

@@ -167,6 +167,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
         let from = (start.place, start.before);
+        self.late = true;
         let course = match self.part() {
             Some(part) => self.path.course(0, motion, from, (part, self.bounds)),
             None => self.path.brake(0, motion, from, (self.bounds, self.braking)),
@@ -229,7 +230,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
-        self.braking = self.brakes();
+        (self.braking, self.late) = (self.brakes(), false);
         self.left = [None; N];
         true
     }
@@ -248,6 +249,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free));
         }
         (self.origin, self.made, self.left) = (self.commanded, [0; N], [None; N]);
+        if self.late && !self.stopping {
+            self.plan(0);
+        }
     }
 
     /// Takes out lines that have ended, and begins the next one.

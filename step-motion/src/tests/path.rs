@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use std::vec::Vec;
 
 const N: usize = 3;
-type Lines = Path<N, 8>;
+pub(super) type Lines = Path<N, 8>;
 
 /// The second axis limits the acceleration, and the third one the jerk; lines are nearly along the first one.
 const LIMITS: [(u32, u32, u64); N] = [(100_000, 1 << 30, 1 << 43), (100_000, 50, 1 << 43), (100_000, 1 << 30, 1000)];
@@ -21,7 +21,7 @@ fn clock() -> Clock {
 }
 
 /// Moments in a second.
-fn second() -> f64 {
+pub(super) fn second() -> f64 {
     f64::from(clock().moments())
 }
 
@@ -32,9 +32,9 @@ fn axes(pause: u32) -> [AxisSetup; N] {
 }
 
 /// A line in steps, and its speed in steps/s.
-type To = ([i64; N], u32);
+pub(super) type To = ([i64; N], u32);
 
-fn path(lines: &[To]) -> Lines {
+pub(super) fn path(lines: &[To]) -> Lines {
     let (mut path, mut at) = (Lines::new(clock(), axes(0), 1000).unwrap(), [0; N]);
     for (by, feed) in lines {
         at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
@@ -54,7 +54,7 @@ fn modelled((by, feed): &To) -> (f64, Most) {
     (length, Most { v, a: least(|(_, a, _)| a.into()), j: Some(least(|(.., j)| j as f64)) })
 }
 
-fn limits(bounds: &Bounds) -> Most {
+pub(super) fn limits(bounds: &Bounds) -> Most {
     let second = second();
     let jerk = bounds.jerk.map(|jerk| float(jerk.j) * second.powi(3));
     Most { v: float(bounds.v) * second, a: float(bounds.a) * second.powi(2), j: jerk }
@@ -70,11 +70,11 @@ fn outcome(course: &Course) -> (f64, f64, f64) {
     (float(curve.way()), float(curve.time - curve.skipped.0) / second(), float(course.exit) * second())
 }
 
-fn near(got: f64, want: f64) -> bool {
+pub(super) fn near(got: f64, want: f64) -> bool {
     (got - want).abs() <= want.abs() * 1e-6 + 1e-4
 }
 
-fn lines() -> impl Strategy<Value = Vec<To>> {
+pub(super) fn lines() -> impl Strategy<Value = Vec<To>> {
     let way = prop_oneof![
         Just([10, 10]),
         Just([13, 10]),
@@ -325,14 +325,17 @@ fn the_time_of_a_stop_over_lines_that_differ() {
     assert!(curves > 1 && near(float(time) / second(), want), "{time:?} for {want} in {curves}");
 }
 
-/// If rounding leaves nothing else: a line that is too short to slow down on is run at the speed that is.
+/// On a line that is too short to slow down on, a motion gets as slow as it can; without a plan it goes on at the speed that it has.
 #[test]
-fn a_line_without_a_plan_is_run_at_the_speed_that_is() {
-    let mut path = path(&[([10, 1, 1], 1000)]);
-    let (course, _) = path.begin(0, real(1000.0 / second()), Real::ONE).unwrap();
-    let (way, time, exit) = outcome(&course);
-    let length = 102_f64.sqrt();
-    assert!(near(way, length) && near(time, length / 1000.0) && near(exit, 1000.0), "{course:?}");
+fn a_line_that_is_too_short_to_slow_down_on() {
+    for (length, more) in [(10, 1.0), (60, 1.0), (10, 1e-9)] {
+        let mut path = path(&[([length, 1, 1], 1000)]);
+        let (course, _) = path.begin(0, real(1000.0 * more / second()), Real::ONE).unwrap();
+        let (way, _, exit) = outcome(&course);
+        let (length, most) = modelled(&([length, 1, 1], 1000));
+        let want = super::model::slowest_exit([1000.0 * more, 0.0], length, 0.0, most);
+        assert!(near(way, length) && (exit - want).abs() < 0.1 && course.whole, "{exit} for {want} {course:?}");
+    }
 }
 
 /// So that a line for one of two paths may be added to the other.

@@ -1,0 +1,76 @@
+//! A feed override acts wherever it is asked for.
+
+use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
+
+/// The second axis limits the acceleration, and the third one the jerk, of lines nearly along the first one.
+fn three() -> [AxisSetup; 3] {
+    [(1 << 30, 1 << 43), (50, 1 << 43), (1 << 30, 1000)].map(|(acceleration, jerk)| {
+        AxisSetup::new(Limits::new(100_000, acceleration).unwrap().with_jerk(jerk).unwrap(), 1_000_000)
+    })
+}
+
+/// Takes the steps of 100 steps and 3000 more in one direction, asks for another feed behind some of them, and returns how many
+/// ticks apart the steps 2000 and 2001 are.
+fn apart(feeds: [u32; 2], behind: i64, percent: u16) -> u64 {
+    let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();
+    let axis = AxisSetup::new(limits, 1_000_000);
+    let mut machine = PathMover::new(Path::<1, 8>::new(Clock::MICROSECONDS, [axis], 20).unwrap());
+    machine.push([100], feeds[0], 0).unwrap();
+    machine.push([3100], feeds[1], 0).unwrap();
+    let mut ticks = vec![0];
+    while let Some(pulse) = machine.pulse() {
+        ticks.push(pulse.tick);
+        if machine.commanded() == [behind] {
+            machine.set_override(percent, pulse.tick);
+        }
+    }
+    assert_eq!(machine.commanded(), [3100]);
+    ticks[2001] - ticks[2000]
+}
+
+/// Also where the acceleration cannot get to 0 on what is left of a line, and the next one is run at another speed from then on.
+#[test]
+fn a_lower_feed_is_kept_behind_a_joint() {
+    for feeds in [[1000, 1000], [2000, 1000], [1000, 2000]] {
+        for behind in 1..150 {
+            for percent in [10, 40, 80] {
+                let feed = (feeds[1] * u32::from(percent) / 100).min(1000);
+                let (got, want) = (apart(feeds, behind, percent), 1_000_000 / u64::from(feed));
+                assert!(got.abs_diff(want) <= want / 100 + 1, "{got} for {want}: {feeds:?} {behind} {percent}");
+            }
+        }
+    }
+}
+
+/// At the lower feed, lines that were one run are several, or the other way round, so the speed that was right for them is too high:
+/// until this was tested, some motions went on at it, and stopped dead at the end of the path from up to 2100 steps/s.
+#[test]
+fn the_end_of_the_path_is_a_rest_whatever_the_feed_was() {
+    let lines = [[297, 2, 2], [539, 5, 7], [232, 2, 2], [137, 1, 2], [154, 1, 2]];
+    for behind in (500..1100).step_by(3) {
+        for percent in [30, 100, 200] {
+            let mut machine = PathMover::new(Path::<3, 8>::new(Clock::MICROSECONDS, three(), 1000).unwrap());
+            machine.set_override(250, 0);
+            let mut end = [0; 3];
+            for by in lines {
+                end = [0, 1, 2].map(|axis: usize| end[axis] + by[axis]);
+                machine.push(end, 1000, 0).unwrap();
+            }
+            let mut ticks = Vec::new();
+            while let Some(pulse) = machine.pulse() {
+                if pulse.axis == 0 {
+                    ticks.push(pulse.tick);
+                    if ticks.len() == behind {
+                        machine.set_override(percent, pulse.tick);
+                    }
+                }
+            }
+            let last: Vec<u64> = ticks.windows(2).rev().take(3).map(|pair| pair[1] - pair[0]).collect();
+            assert!(
+                last[0] > 5000 && last[0] > last[1] && last[1] > last[2],
+                "{last:?} before the rest: {behind} {percent}"
+            );
+            assert_eq!(machine.commanded(), end);
+        }
+    }
+}
