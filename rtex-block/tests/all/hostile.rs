@@ -64,14 +64,14 @@ impl Line {
     }
 
     /// What the memory at the other end holds of this period: the block that came last.
-    fn carry(&mut self, block: &[u8], now: u64) -> Option<[u8; 32]> {
+    fn carry(&mut self, block: &[u8], now: u64) -> Option<Vec<u8>> {
         let arrivals = self.cable.carry(block, now * PERIOD_NS);
         self.late.extend(arrivals.into_iter().map(|arrival| (arrival.at_ns, arrival.bytes)));
         let end = (now + 1) * PERIOD_NS;
         self.late.sort_by_key(|(at, _)| *at);
         let here = self.late.iter().take_while(|(at, _)| *at < end).count();
         // The ASIC takes whole frames only.
-        self.late.drain(..here).rev().find_map(|(_, bytes)| bytes.try_into().ok())
+        self.late.drain(..here).rev().find_map(|(_, bytes)| (bytes.len() == block.len()).then_some(bytes))
     }
 
     fn faults(&self) -> u64 {
@@ -81,6 +81,8 @@ impl Line {
 
 struct Bench {
     master: Master<AXES>,
+    /// Words of a block: of 16 bytes or of 32.
+    words: usize,
     drives: [Drive; AXES],
     down: [Line; AXES],
     up: [Line; AXES],
@@ -123,8 +125,16 @@ fn gear(place: usize) -> Gear {
     Gear::new(numerator, denominator).unwrap()
 }
 
+/// What the drive answers to a block of either size.
+fn hear(drive: &mut Drive, command: &[u8]) -> Vec<u8> {
+    match command.first_chunk::<32>() {
+        Some(command) => drive.hear(command).unwrap().to_vec(),
+        None => drive.hear(command.first_chunk::<16>().unwrap()).unwrap().to_vec(),
+    }
+}
+
 impl Bench {
-    fn new(draw: &mut Draw) -> Self {
+    fn new(draw: &mut Draw, size: BlockSize) -> Self {
         let limit = NonZeroU16::new(LIMIT).unwrap();
         let limits = Limits::new(limit, 80).with_ready(Some(200)).with_stop(20);
         let policies = [StopCategory::Zero, StopCategory::One];
@@ -134,12 +144,13 @@ impl Bench {
         };
         let table: [Slave; AXES] = core::array::from_fn(|place| Slave { mac_id: mac_id(place), kind: 3 });
         let periods = Periods::from_a6n(3, 1, None).unwrap();
-        let config = MasterConfig::new(BlockSize::Bytes32, periods, TimerSystem::Internal).with_watchdog(Some(limit));
+        let config = MasterConfig::new(size, periods, TimerSystem::Internal).with_watchdog(Some(limit));
         let mut master = Master::new(config, table, core::array::from_fn(axis)).unwrap();
         master.control(Asic::RingConfig, None);
         assert_eq!(master.control(Asic::Ready, Some(&table)), ControlPhase::Prepare);
         let mut bench = Self {
             master,
+            words: size.bytes() / 4,
             drives: core::array::from_fn(|place| {
                 let config = DriveConfig::new(mac_id(place), CODES).with_gear(gear(place));
                 let mut drive = Drive::new(config);
@@ -174,8 +185,14 @@ impl Bench {
         bench
     }
 
+    /// The words of a place.
+    fn of(&self, place: usize) -> core::ops::Range<usize> {
+        place * self.words..(place + 1) * self.words
+    }
+
     fn update(&mut self) {
-        self.master.exchange_words(&self.seen, &mut self.tx, self.now * PERIOD_NS).unwrap();
+        let all = ..AXES * self.words;
+        self.master.exchange_words(&self.seen[all], &mut self.tx[all], self.now * PERIOD_NS).unwrap();
         self.judge();
         self.frame();
     }
@@ -185,7 +202,7 @@ impl Bench {
         let fault = self.master.error();
         for place in 0..AXES {
             let mut block = [0; 32];
-            pack::from_words(&self.tx[place * 8..place * 8 + 8], &mut block).unwrap();
+            pack::from_words(&self.tx[self.of(place)], &mut block[..4 * self.words]).unwrap();
             let main = *block.first_chunk().unwrap();
             let view = CommandBlock::of(&main).unwrap();
             self.started |= view.obeys_control();
@@ -248,13 +265,13 @@ impl Bench {
         let before: u64 = self.down.iter().chain(&self.up).map(Line::faults).sum();
         let mut any = false;
         for place in 0..AXES {
-            let words = place * 8..place * 8 + 8;
-            let mut block = [0; 32];
+            let words = self.of(place);
+            let mut block = vec![0; 4 * self.words];
             pack::from_words(&self.tx[words.clone()], &mut block).unwrap();
             let from = self.drives[place].position();
             let command = if self.cut[place] { None } else { self.down[place].carry(&block, self.now) };
             if let Some(command) = command {
-                let mut response = self.drives[place].hear(&command).unwrap();
+                let mut response = hear(&mut self.drives[place], &command);
                 // Before and after each exchange: the drive counts its lateness by them.
                 if self.stuck != Some(place) {
                     self.truth[place].insert(0, from);
@@ -396,7 +413,7 @@ fn hurt(bench: &mut Bench, kind: usize, place: usize, draw: &mut Draw) -> bool {
         15 => {
             let old = bench.held[(1 + draw.below(7) as usize).min(bench.held.len() - 1)];
             let all = draw.below(2) == 0;
-            let words = if all { 0..AXES * 8 } else { place * 8..place * 8 + 8 };
+            let words = if all { 0..AXES * bench.words } else { bench.of(place) };
             bench.seen[words.clone()].copy_from_slice(&old[words]);
             (bench.hurt, bench.old) = (bench.now, bench.now);
             return false;
@@ -413,9 +430,18 @@ const KINDS: usize = 17;
 
 #[test]
 fn hostile_every_servo_is_off_in_time() {
+    every_servo_is_off_in_time(BlockSize::Bytes32);
+}
+
+#[test]
+fn hostile_every_servo_is_off_in_time_with_short_blocks() {
+    every_servo_is_off_in_time(BlockSize::Bytes16);
+}
+
+fn every_servo_is_off_in_time(size: BlockSize) {
     let (wanted, seed) = (wanted_events(1_000), first_seed());
     let (_said, mut draw) = (Seed(seed), Draw::seeded(seed));
-    let mut bench = Bench::new(&mut draw);
+    let mut bench = Bench::new(&mut draw, size);
     let mut faults = [0_u64; KINDS];
     let mut spurious = 0_u32;
     bench.recover(&mut draw);
