@@ -122,7 +122,7 @@ impl ProfileMove {
     }
 
     /// Returns whether In_Progress or Busy was 1 and the motion has not ended.
-    pub const fn is_moving(&self) -> bool {
+    pub(super) const fn is_moving(&self) -> bool {
         matches!(self.stage, MoveStage::Moving)
     }
 

@@ -139,7 +139,7 @@ fn a_motion_takes_its_own_answers_only() {
     for (status, nine) in [(0x02, 0), (0, 0x10), (0x02, 0x10)] {
         let mut profile = moving();
         assert!(profile.receive(Some(&answer(0x17, status, 0x11, nine))).is_pending());
-        assert!(profile.is_moving(), "{status:x} {nine:x}");
+        assert_eq!(profile.stage(), MoveStage::Moving, "{status:x} {nine:x}");
         // The end has to come with 17h, of this drive, for this type.
         for other in [
             answer(0x10, 0, 0x11, 0),
@@ -298,7 +298,7 @@ fn what_is_left_of_a_limit() {
 fn what_a_motion_sends() {
     let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move_with_latch(0x11, 3_000_000, 1_000, Nibble::new(3).unwrap(), 0x09).unwrap();
-    pair.until("moving", |pair| pair.axis.profile().unwrap().is_moving());
+    pair.until("moving", |pair| pair.axis.profile().unwrap().stage() == MoveStage::Moving);
     let block = |pair: &Pair| pair.axis.clone().transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert_eq!(block(&pair)[1..4], [0x17, 0x80, 0]);
     assert_eq!(block(&pair)[4..8], 3_000_000_i32.to_le_bytes());

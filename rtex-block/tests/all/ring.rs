@@ -6,7 +6,8 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Fellows, Heard, Limits, Ring, RingFailure, StopCategory, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, Fellows, Heard, Limits, Master, Ring, RingFailure, StopCategory,
+    StopReason,
 };
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
@@ -289,4 +290,10 @@ fn a_stop_of_the_ring_is_a_failure_at_once() {
     bench.ring.stop(StopCategory::Zero);
     let failure = RingFailure { place: 0, reason: StopReason::Requested };
     assert_eq!(bench.ring.failure(), Some(failure));
+}
+
+/// What the README says of the memory that an axis and a master take.
+#[test]
+fn a_master_of_32_axes_takes_so_much() {
+    assert!(size_of::<Axis>() <= 320 && size_of::<Master<32>>() <= 10_450, "{}", size_of::<Master<32>>());
 }
