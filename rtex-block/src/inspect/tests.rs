@@ -28,6 +28,35 @@ fn causes() {
     }
 }
 
+/// A block that makes sense, but for a stray bit, keeps its order though it would make sense in another one; so does a sound NOP.
+#[test]
+fn no_cause_where_none_is_needed() {
+    let mut stray = [0; 16];
+    stray[..4].copy_from_slice(&[0x12, 0x20, 0x01, 0]);
+    assert_eq!(inspect(&swapped(&stray, 2)).error(), None);
+    assert_eq!(inspect(&stray).error(), Some(Error::Reserved { byte: 2, bits: 0x01 }));
+    assert_eq!(inspect(&stray).cause(), None);
+    let mut nop = [0; 16];
+    nop[0] = 1;
+    assert_eq!((inspect(&nop).error(), inspect(&swapped(&nop, 4)).error()), (None, None));
+    assert_eq!(inspect(&nop).cause(), None);
+}
+
+/// What is repaired to look further brings no finding of its own, and hides none.
+#[test]
+fn a_finding_brings_no_other() {
+    let found = |changes: &[(usize, u8)], size: usize| {
+        let mut block = [0; 32];
+        (block[0], block[1], block[16]) = (5, 0x20, 0x80);
+        changes.iter().for_each(|(at, byte)| block[*at] = *byte);
+        inspect(&block[..size]).errors().collect::<Vec<_>>()
+    };
+    let (cyclic, noncyclic) = (Error::CyclicCode { code: 5 }, Error::NonCyclicCode { code: 3 });
+    assert_eq!(found(&[(1, 0x53)], 16), [cyclic, noncyclic]);
+    assert_eq!(found(&[(1, 0x23), (9, 0xf0)], 16), [noncyclic]);
+    assert_eq!(found(&[(16, 0)], 32), [Error::SubChk { byte16: 0 }]);
+}
+
 #[test]
 fn every_finding_is_listed() {
     let mut block = [0; 32];

@@ -224,6 +224,10 @@ fn attributes_are_no_alarm_codes() {
     assert_eq!(about(ask(0, 7), alarm(answer, 1, 7)), [(3, answered), (3, attributes)]);
     assert_eq!(about(ask(0, 7), alarm(answer, 0, 7)), [(3, answered)]);
     assert_eq!(about(ask(1, 7), alarm(answer, 1, 7)), [(3, answered)]);
+    // The smallest alarm number.
+    let mut first = alarm(answer, 0, 7);
+    first[10] = 1;
+    assert_eq!(about(ask(0, 7), first), [(3, answered), (3, LogFinding::Attributes { alarm: 1, bits: 0x8000_0101 })]);
     // An answer to another type is an older one, and one that is busy has no data yet.
     assert_eq!(about(ask(0, 7), alarm(answer, 1, 8)), []);
     assert_eq!(about(ask(0, 7), alarm(response(2, 0x25, 0x10), 1, 7)), []);
@@ -241,6 +245,22 @@ fn a_request_is_asked_again() {
     let blocks = [normal(1), once(2), normal(3), once(0), normal(1)].concat();
     let answered = LogFinding::Answered { responses: 1, busy: 0 };
     assert_eq!(findings(&mut log, &blocks), [(3, answered), (7, answered)]);
+}
+
+/// A code that came back late is said once, and a drive that answered once and again once.
+#[test]
+fn what_is_over_is_said_once() {
+    let mut log = analysis();
+    let echoes = (0..5_u8).map(|k| response(k % 4, 0, 0)).chain((5..9).map(|k| response(k % 4, 0x20, 0)));
+    let blocks: Vec<_> = core::iter::once(command(1, 0x20, 0)).chain(echoes).collect();
+    assert_eq!(findings(&mut log, &blocks), [(6, LogFinding::CodeLate { responses: 6 })]);
+    assert_eq!(log.end().count(), 0);
+    let mut log = analysis();
+    let commands = (1..5_u8).map(|k| command(k % 4, 0, 0));
+    let blocks: Vec<_> =
+        core::iter::once(response(0, 0, 0)).chain(commands).chain(core::iter::once(response(1, 0, 0))).collect();
+    let want = [(3, LogFinding::NoAnswer { commands: 3 }), (5, LogFinding::AnswersAgain { commands: 4 })];
+    assert_eq!(findings(&mut log, &blocks), want);
 }
 
 /// A drive that was forgotten has never been there.

@@ -238,6 +238,7 @@ fn the_receive_watchdog() {
     assert_eq!(bench.master.error(), Some(ControlError::Timeout));
     for place in 0..2 {
         assert_eq!(bench.state(place), AxisState::Stopped(StopReason::ReceiveTimeout));
+        assert!(bench.master.ring().is_timed_out());
         assert!(CommandBlock::of(&bench.block(place)).unwrap().is_servo_off());
     }
     // Receptions again, and clearing: the ring can be switched on.

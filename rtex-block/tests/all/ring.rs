@@ -282,6 +282,19 @@ fn a_fault_beside_a_stop_on_request_is_a_fault() {
     }
 }
 
+/// Without a fault each axis stops in its own time, whatever it would do if another one failed.
+#[test]
+fn a_stop_on_request_takes_its_own_time() {
+    let mut stopped = stopping();
+    stopped.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Requested));
+    let (mut fellow, mut fellows) = (stopping(), Fellows::new());
+    assert_eq!(fellow.axis.config().stop, Some(StopCategory::Zero));
+    fellows.begin();
+    fellows.look(0, &stopped.axis);
+    fellows.tell(&mut fellow.axis);
+    assert_eq!(fellow.axis.state(), AxisState::Stopping(StopReason::Requested));
+}
+
 /// The ring says at once, not with the next exchange, that it was stopped.
 #[test]
 fn a_stop_of_the_ring_is_a_failure_at_once() {
