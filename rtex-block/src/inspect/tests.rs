@@ -48,7 +48,9 @@ fn a_finding_brings_no_other() {
     let found = |changes: &[(usize, u8)], size: usize| {
         let mut block = [0; 32];
         (block[0], block[1], block[16]) = (5, 0x20, 0x80);
-        changes.iter().for_each(|(at, byte)| block[*at] = *byte);
+        for (at, byte) in changes {
+            block[*at] = *byte;
+        }
         inspect(&block[..size]).errors().collect::<Vec<_>>()
     };
     let (cyclic, noncyclic) = (Error::CyclicCode { code: 5 }, Error::NonCyclicCode { code: 3 });
