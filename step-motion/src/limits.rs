@@ -386,4 +386,23 @@ mod tests {
         let free = Bounds::new(Real::new(100), Real::new(10), None).holding(Real::new(1), (Real::new(15), false));
         assert!(near(free.a, 10.0) && free.jerk.is_none());
     }
+
+    /// Of acceleration or jerk, whatever the speed; no limit of jerk is not compared.
+    #[test]
+    fn which_limits_allow_more() {
+        let bounds = |v: u64, a: u64, j: Option<u64>| Bounds::new(Real::new(v), Real::new(a), j.map(Real::new));
+        let own = bounds(100, 10, Some(20));
+        for (than, more) in [
+            ((100, 10, Some(20)), false),
+            ((1, 10, Some(20)), false),
+            ((100, 9, Some(20)), true),
+            ((100, 9, Some(21)), true),
+            ((100, 10, Some(19)), true),
+            ((100, 11, Some(19)), true),
+            ((100, 11, Some(21)), false),
+            ((100, 10, None), false),
+        ] {
+            assert_eq!(own.allows_more(&bounds(than.0, than.1, than.2)), more, "{than:?}");
+        }
+    }
 }

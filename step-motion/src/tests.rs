@@ -5,8 +5,8 @@
     reason = "numbers of random cases, compared within a part of them"
 )]
 
-mod model;
-mod path;
+pub(crate) mod model;
+pub(crate) mod path;
 mod planner;
 mod promises;
 
@@ -20,12 +20,12 @@ fn spread(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low.ln()..high.ln()).prop_map(f64::exp)
 }
 
-fn real(x: f64) -> Real {
+pub(crate) fn real(x: f64) -> Real {
     let bits = if x > 0.0 { 52 - x.log2().floor() as i32 } else { 0 };
     Real::fixed((x * f64::from(bits).exp2()) as u64, bits)
 }
 
-fn float(x: Real) -> f64 {
+pub(crate) fn float(x: Real) -> f64 {
     let bits = 52_i32.saturating_sub(x.exponent()).clamp(-1000, 1000);
     if x.is_zero() { 0.0 } else { x.to_fixed(bits) as f64 * f64::from(-bits).exp2() }
 }

@@ -10,6 +10,9 @@ use crate::line::{Ahead, Line};
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
 
+#[cfg(test)]
+mod tests;
+
 /// Consecutive lines of the queue.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Run {

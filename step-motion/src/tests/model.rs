@@ -2,17 +2,17 @@
 
 /// Limits of speed, acceleration and jerk.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Most {
-    pub(super) v: f64,
-    pub(super) a: f64,
-    pub(super) j: Option<f64>,
+pub(crate) struct Most {
+    pub(crate) v: f64,
+    pub(crate) a: f64,
+    pub(crate) j: Option<f64>,
 }
 
 /// Speed and acceleration, below 0 to slow down.
-pub(super) type State = [f64; 2];
+pub(crate) type State = [f64; 2];
 
 /// Time and distance from a state to a speed at acceleration 0, as fast as the limits allow.
-pub(super) fn change([v, a]: State, to: f64, most: Most) -> (f64, f64) {
+pub(crate) fn change([v, a]: State, to: f64, most: Most) -> (f64, f64) {
     let Some(j) = most.j else {
         let time = (to - v).abs() / most.a;
         return (time, f64::midpoint(v, to) * time);
@@ -55,7 +55,7 @@ fn last(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// The time over a distance to a speed at its end, by way of the greatest speed that fits; `None` if none does.
-pub(super) fn fastest(state: State, n: f64, exit: f64, most: Most) -> Option<f64> {
+pub(crate) fn fastest(state: State, n: f64, exit: f64, most: Most) -> Option<f64> {
     let fits = |top: f64| over(state, top, exit, most).1 <= n;
     if fits(most.v) {
         let (time, way) = over(state, most.v, exit, most);
@@ -71,12 +71,12 @@ pub(super) fn fastest(state: State, n: f64, exit: f64, most: Most) -> Option<f64
 }
 
 /// The greatest speed at the end of a distance.
-pub(super) fn fastest_exit(state: State, n: f64, most: Most) -> f64 {
+pub(crate) fn fastest_exit(state: State, n: f64, most: Most) -> f64 {
     last(coasted(state, most), most.v, |exit| change(state, exit, most).1 <= n)
 }
 
 /// The lowest speed at the end of a distance: the one that is asked for, or the one down to which all from the present one can be had.
-pub(super) fn slowest_exit(state: State, n: f64, exit: f64, most: Most) -> f64 {
+pub(crate) fn slowest_exit(state: State, n: f64, exit: f64, most: Most) -> f64 {
     if change(state, exit, most).1 <= n {
         return exit;
     }
@@ -84,6 +84,6 @@ pub(super) fn slowest_exit(state: State, n: f64, exit: f64, most: Most) -> f64 {
 }
 
 /// The speed when the acceleration is back at 0.
-pub(super) fn coasted([v, a]: State, most: Most) -> f64 {
+pub(crate) fn coasted([v, a]: State, most: Most) -> f64 {
     v + most.j.map_or(0.0, |j| a * a.abs() / (2.0 * j))
 }

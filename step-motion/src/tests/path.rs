@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use std::vec::Vec;
 
 const N: usize = 3;
-pub(super) type Lines = Path<N, 8>;
+pub(crate) type Lines = Path<N, 8>;
 
 /// The second axis limits the acceleration, and the third one the jerk; lines are nearly along the first one.
 const LIMITS: [(u32, u32, u64); N] = [(100_000, 1 << 30, 1 << 43), (100_000, 50, 1 << 43), (100_000, 1 << 30, 1000)];
@@ -21,7 +21,7 @@ fn clock() -> Clock {
 }
 
 /// Moments in a second.
-pub(super) fn second() -> f64 {
+pub(crate) fn second() -> f64 {
     f64::from(clock().moments())
 }
 
@@ -32,9 +32,9 @@ fn axes(pause: u32) -> [AxisSetup; N] {
 }
 
 /// A line in steps, and its speed in steps/s.
-pub(super) type To = ([i64; N], u32);
+pub(crate) type To = ([i64; N], u32);
 
-pub(super) fn path(lines: &[To]) -> Lines {
+pub(crate) fn path(lines: &[To]) -> Lines {
     let (mut path, mut at) = (Lines::new(clock(), axes(0), 1000).unwrap(), [0; N]);
     for (by, feed) in lines {
         at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
@@ -54,7 +54,7 @@ fn modelled((by, feed): &To) -> (f64, Most) {
     (length, Most { v, a: least(|(_, a, _)| a.into()), j: Some(least(|(.., j)| j as f64)) })
 }
 
-pub(super) fn limits(bounds: &Bounds) -> Most {
+pub(crate) fn limits(bounds: &Bounds) -> Most {
     let second = second();
     let jerk = bounds.jerk.map(|jerk| float(jerk.j) * second.powi(3));
     Most { v: float(bounds.v) * second, a: float(bounds.a) * second.powi(2), j: jerk }
@@ -65,16 +65,16 @@ fn motion([v, a]: [f64; 2]) -> Motion {
 }
 
 /// The distance of a curve, its time in seconds and the speed at its end.
-fn outcome(course: &Course) -> (f64, f64, f64) {
+pub(crate) fn outcome(course: &Course) -> (f64, f64, f64) {
     let curve = &course.curve;
     (float(curve.way()), float(curve.time - curve.skipped.0) / second(), float(course.exit) * second())
 }
 
-pub(super) fn near(got: f64, want: f64) -> bool {
+pub(crate) fn near(got: f64, want: f64) -> bool {
     (got - want).abs() <= want.abs() * 1e-6 + 1e-4
 }
 
-pub(super) fn lines() -> impl Strategy<Value = Vec<To>> {
+pub(crate) fn lines() -> impl Strategy<Value = Vec<To>> {
     let way = prop_oneof![
         Just([10, 10]),
         Just([13, 10]),

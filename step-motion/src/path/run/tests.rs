@@ -1,0 +1,98 @@
+//! What is found of the lines ahead, and what is kept where a curve does not fit.
+
+use super::*;
+use crate::tests::model::change;
+use crate::tests::path::{Lines, To, limits, near, outcome, path, second};
+use crate::tests::{float, real};
+
+fn steady(v: f64) -> Motion {
+    Motion::steady(real(v / second()))
+}
+
+const HERE: (Real, Real) = (Real::ZERO, Real::ZERO);
+
+/// A line that is requested a little slower belongs to the run of a motion that is no faster, or so fast that it slows down at once.
+#[test]
+fn which_motions_lead_on_to_a_slower_line() {
+    let mut path = path(&[([1000, 1, 1], 1010), ([1000, 1, 1], 1005)]);
+    let requested = Motion::steady(path.line(0).unwrap().speed(Real::ONE));
+    let starts = [steady(1000.0), steady(1008.0), requested, steady(1200.0)];
+    let more = starts.map(|start| path.course(0, start, HERE, (Real::ONE, None)).unwrap().0.more);
+    assert_eq!(more, [1, 0, 0, 1]);
+}
+
+/// But never to one whose axes do not allow its speed.
+#[test]
+fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
+    let mut path = path(&[([1000, 0, 1], 1000), ([1000, 1000, 1000], 1000)]);
+    // 173,205 steps/s at most along the second line, where all axes have 100,000; the corner does not count here.
+    path.lines[1].as_mut().unwrap().corner = Real::HUGE;
+    let more = |path: &Lines, v: f64| {
+        path.run(0, Some(Real::ONE), (real(v / second()), [Real::ZERO; 2]), (8, true)).unwrap().more
+    };
+    assert_eq!([2000.0, 173_000.0, 174_000.0].map(|v| more(&path, v)), [1, 1, 0]);
+}
+
+/// Lines of which no two are one run.
+fn apart() -> [To; 4] {
+    [([200, 0, 2], 1000), ([60, 0, 1], 1000), ([70, 0, 3], 1000), ([80, 0, 1], 1000)]
+}
+
+/// From what is known of the last lines, as from their end.
+#[test]
+fn what_is_known_is_gone_on_from() {
+    let (mut known, mut afresh) = (path(&apart()), path(&apart()));
+    let last = known.exit(2, Real::ONE);
+    let all = known.exit(0, Real::ONE);
+    assert!(!last.is_zero() && all == afresh.exit(0, Real::ONE), "{all:?}");
+    assert_eq!(all, known.exit(0, Real::ONE));
+}
+
+/// The greatest speed from which a corner's speed or a rest can be had: of speeds below 0.618 of it the rest takes less distance.
+#[test]
+fn the_most_before_a_line_that_ends_at_a_corner() {
+    let greatest = |way: &dyn Fn(f64) -> f64, from: f64, length: f64| {
+        (0..100_000).map(|tenths| from + f64::from(tenths) / 10.0).take_while(|v| way(*v) <= length).last().unwrap()
+    };
+    let lines = [([300, 0, 2], 1000), ([100, 0, 3], 1000), ([400, 0, 3], 1000), ([400, 0, 0], 1000)];
+    let mut rests = 0;
+    for corner in [50.0, 150.0, 250.0, 400.0, 500.0, 600.0, 700.0] {
+        for known in [false, true] {
+            let mut path = path(&lines);
+            path.lines[2].as_mut().unwrap().corner = real(corner / second());
+            if known {
+                assert!(near(float(path.exit(1, Real::ONE)) * second(), corner));
+            }
+            let line = path.line(1).unwrap();
+            let (length, most) = (float(line.length), limits(&line.bounds));
+            let [rest, leaves] = [0.0, corner].map(|to| greatest(&|v| change([v, 0.0], to, most).1, to, length));
+            let got = float(path.most(0)) * second();
+            assert!((got - rest.max(leaves)).abs() < 0.2, "{got} for {rest} or {leaves}, {corner} {known}");
+            rests += usize::from(rest > leaves + 10.0);
+        }
+    }
+    assert!((4..12).contains(&rests), "{rests}");
+}
+
+/// A line that allows less jerk comes when the motion has just as much room left as it needs to come to rest before it.
+#[test]
+fn a_rest_that_fits_is_kept_before_a_line_that_allows_less() {
+    let mut path = path(&[([2000, 0, 20], 4500)]);
+    let line = path.line(0).unwrap();
+    let (length, most) = (float(line.length), limits(&line.bounds));
+    let way = change([4500.0, 0.0], 0.0, most).1 + 1e-3;
+    path.push([2072, 0, 21], 4500).unwrap();
+    assert_eq!(path.run_from(0, Real::ONE).unwrap().more, 1);
+    let from = (real(length - way), Real::ZERO);
+    for braking in [false, true] {
+        let planned = if braking {
+            path.brake(0, steady(4500.0), from, (None, false))
+        } else {
+            path.course(0, steady(4500.0), from, (Real::ONE, None))
+        };
+        let (course, bounds) = planned.unwrap();
+        let (got, _, exit) = outcome(&course);
+        assert!(near(got, way) && exit == 0.0 && course.more == 0, "{got} for {way}, {exit}");
+        assert!(near(limits(&bounds).j.unwrap() / most.j.unwrap(), 1.0));
+    }
+}
