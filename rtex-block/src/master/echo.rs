@@ -240,6 +240,8 @@ mod tests {
     fn a_drive_that_never_answers_trips_too() {
         let mut watch = EchoWatch::new(NonZeroU16::new(3).unwrap());
         assert_eq!([None; 4].map(|echo| watch.sample(echo)), [false, false, true, true]);
+        // An echo that comes too late changes nothing.
+        assert!(watch.sample(UpdateCounter::new(3)));
         watch.reset();
         assert!(!watch.sample(UpdateCounter::new(1)));
         assert!(!watch.sample(None));
@@ -272,6 +274,19 @@ mod tests {
                 [11, 12, 13, 14, 15].map(|sent: u8| watch.judge(counter(sent), Some(counter(sent - 3)), 0, learns));
             assert_eq!(seen[..3], [Arrival::OffTime { lag: 3 }; 3]);
             assert_eq!(seen[3..], [last; 2]);
+        }
+    }
+
+    /// A line on which every block is off time, each by something else, has no lag that could be learned.
+    #[test]
+    fn no_lag_is_learned_from_different_ones() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        let mut watch = EchoWatch::new(NonZeroU16::new(99).unwrap());
+        let mut at = |sent: u8, echo: u8| watch.judge(counter(sent), Some(counter(echo)), 0, true);
+        assert_eq!(at(4, 3), Arrival::OnTime);
+        for sent in (6..20).step_by(2) {
+            assert_eq!(at(sent, sent - 2), Arrival::OffTime { lag: 2 });
+            assert_eq!(at(sent + 1, sent + 1), Arrival::OffTime { lag: 0 });
         }
     }
 

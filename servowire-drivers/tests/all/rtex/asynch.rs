@@ -133,6 +133,50 @@ fn a_future_may_be_dropped_at_any_point() {
     }
 }
 
+/// A pin that reports a fault at once.
+struct Broken;
+
+impl embedded_hal::digital::ErrorType for Broken {
+    type Error = embedded_hal::digital::ErrorKind;
+}
+
+impl embedded_hal_async::digital::Wait for Broken {
+    async fn wait_for_high(&mut self) -> Result<(), Self::Error> {
+        unreachable!()
+    }
+
+    async fn wait_for_low(&mut self) -> Result<(), Self::Error> {
+        unreachable!()
+    }
+
+    async fn wait_for_rising_edge(&mut self) -> Result<(), Self::Error> {
+        unreachable!()
+    }
+
+    async fn wait_for_falling_edge(&mut self) -> Result<(), Self::Error> {
+        Err(embedded_hal::digital::ErrorKind::Other)
+    }
+
+    async fn wait_for_any_edge(&mut self) -> Result<(), Self::Error> {
+        unreachable!()
+    }
+}
+
+/// A pin that fails is a lost edge: the exchange comes one and a half periods later, and not at once.
+#[test]
+fn a_pin_that_fails_is_a_lost_edge() {
+    let ring = Ring::new(false, false);
+    let mut driver = waiting::<u16, _>(&ring, Steps);
+    for _ in 0..4 {
+        ring.borrow_mut().let_in();
+        let from_ns = ring.borrow().now_ns;
+        let Period { began, .. } = run(driver.next(&mut Broken), FOR_EVER).unwrap().unwrap();
+        assert_eq!(began, Began::Clock);
+        assert!(ring.borrow().now_ns - from_ns >= COM_NS * 3 / 2);
+    }
+    assert_eq!(driver.master().ring().failure(), None);
+}
+
 /// A clock that steps on by 20 us with every poll that waits for it.
 struct Steps(Watch);
 
