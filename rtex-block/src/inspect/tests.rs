@@ -37,8 +37,8 @@ fn no_cause_where_none_is_needed() {
     assert_eq!(inspect(&stray).error(), Some(Error::Reserved { byte: 2, bits: 0x01 }));
     assert_eq!(inspect(&stray).cause(), None);
     let mut nop = [0; 16];
-    nop[0] = 1;
-    assert_eq!((inspect(&nop).error(), inspect(&swapped(&nop, 4)).error()), (None, None));
+    nop[0] = 0x10;
+    assert_eq!((inspect(&nop).error(), inspect(&swapped(&nop, 2)).error()), (None, None));
     assert_eq!(inspect(&nop).cause(), None);
 }
 
