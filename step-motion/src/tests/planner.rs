@@ -118,3 +118,15 @@ proptest! {
         prop_assert!(near(got, want, 1e-4), "greatest {got} for {want}: {case}");
     }
 }
+
+/// A speed at the end that is higher than the present one is not reached by slowing down, however much room there is.
+#[test]
+fn a_motion_does_not_slow_down_to_a_higher_speed() {
+    for jerk in [None, Some(50.0)] {
+        let bounds = bounds(Most { v: 100.0, a: 10.0, j: jerk });
+        for n in [1.0, 1000.0] {
+            let to = |exit: f64| slowest_exit(Motion::steady(real(5.0)), real(n), real(exit), &bounds);
+            assert!(to(7.0) == real(5.0) && to(5.0) == real(5.0) && to(4.99) < real(5.0), "{jerk:?} {n}");
+        }
+    }
+}

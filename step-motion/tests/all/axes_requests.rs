@@ -263,3 +263,26 @@ fn the_deviation_counts_for_the_lines_that_follow() {
     let [none, some, much] = [0, 100, 2000].map(over);
     assert!(none > some && some > much && none - much > 50_000, "{none} {some} {much}");
 }
+
+/// Also of what is being made when it is set, and after a rest that nobody has asked for: 5500 steps/s in place of 550 at the corner.
+#[test]
+fn the_deviation_counts_from_then_on() {
+    for (polls, starves) in (0..30).map(|polls| (polls, false)).chain([(0, true), (7, true)]) {
+        let mut bench = Bench::running();
+        bench.machine.until(305_000);
+        for _ in 0..polls {
+            bench.axes.poll();
+        }
+        bench.axes.set_deviation(2000);
+        bench.until(if starves { 800_000 } else { 310_000 }, !starves);
+        bench.until(bench.machine.now + 100_000, true);
+        assert!(bench.x() < 7000, "{}", bench.x());
+        bench.axes.push([8000, 4000], 100_000).unwrap();
+        bench.machine.run(&mut bench.axes, 500, u64::MAX);
+        assert_eq!(bench.machine.position, [8000, 4000]);
+        let x: Vec<u64> =
+            bench.machine.steps.iter().filter(|(_, axis, _)| *axis == 0).map(|(tick, ..)| *tick).collect();
+        let apart = x[x.len() - 1] - x[x.len() - 2];
+        assert!(apart < 300, "{apart}: {polls} {starves}");
+    }
+}
