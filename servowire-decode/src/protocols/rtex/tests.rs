@@ -256,3 +256,28 @@ fn drives_of_misread_blocks_are_not_trusted() {
     }
     assert!(phantoms > 500, "{phantoms}");
 }
+
+/// Lines that have no shape are shown once there are enough of them, and each later one at once.
+#[test]
+fn what_has_no_shape_is_not_held_twice() {
+    let mut noise = 1_u32;
+    let mut line = || -> Vec<u8> {
+        (0..16)
+            .map(|_| {
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (noise >> 24) as u8
+            })
+            .collect()
+    };
+    let (mut decoder, mut kept) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default());
+    let mut at = |number: usize| {
+        decoder.burst(&Burst::new(number as u64, line()), &mut kept).unwrap();
+        kept.0.iter().filter(|event| !event.remark).count()
+    };
+    for number in 1..ENOUGH {
+        assert_eq!(at(number), 0, "{number}");
+    }
+    for number in ENOUGH..ENOUGH + 20 {
+        assert_eq!(at(number), number);
+    }
+}
