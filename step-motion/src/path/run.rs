@@ -284,14 +284,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (last, way)
     }
 
-    /// Plans from the start of line `at`, at a speed, keeping to a fraction of the requested speeds. If that leaves no
-    /// solution, it gets as slow as it can.
+    /// Plans from the start of line `at`, at a speed, keeping to a fraction of the requested speeds. If it can only come to rest,
+    /// over more lines than those that allow this fraction of the speed, it brakes.
     pub(crate) fn begin(&mut self, at: usize, speed: Real, part: Real) -> Option<(Course, Bounds)> {
         let course = self.course(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (part, None));
-        course.or_else(|| self.slow_down(at, speed))
+        course.or_else(|| self.begin_to_brake(at, speed))
     }
 
-    /// Plans in the same way, braking at once.
+    /// Plans from the start of line `at`, at a speed, braking at once. If that leaves no solution, it gets as slow as it can.
     pub(crate) fn begin_to_brake(&self, at: usize, speed: Real) -> Option<(Course, Bounds)> {
         let course = self.brake(at, Motion::steady(speed), (Real::ZERO, Real::ZERO), (None, false));
         course.or_else(|| self.slow_down(at, speed))

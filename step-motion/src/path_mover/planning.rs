@@ -143,6 +143,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
                 self.adopt(course, *start, *bounds);
             }
         }
+        if stop.end.0 < self.more {
+            // A stop at a joint, but for rounding: on the line before it.
+            (self.more, self.whole) = (stop.end.0, true);
+        }
         self.settle();
     }
 
@@ -230,7 +234,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
-        (self.braking, self.late) = (self.brakes(), false);
+        // A curve that ends before its lines is one to rest.
+        (self.braking, self.late) = (self.brakes() || !course.whole, false);
         self.left = [None; N];
         true
     }

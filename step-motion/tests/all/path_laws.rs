@@ -11,6 +11,8 @@ type Machine = PathMover<N, 5>;
 #[derive(Debug, Clone, Copy)]
 enum Request {
     Push([i64; N], u32),
+    /// On from the target, by so many steps.
+    On([i64; N], u32),
     MoveTo([i64; N], u32),
     Override(u16),
     Hold,
@@ -28,6 +30,8 @@ fn request() -> impl Strategy<Value = Request> {
     let feed = || spread(10.0, 3e5).prop_map(|feed| feed as u32);
     prop_oneof![
         6 => (place(), feed()).prop_map(|(to, feed)| Request::Push(to, feed)),
+        6 => (20..300_i64, prop_oneof![Just(0), -9..9_i64], prop_oneof![3 => Just(300_000), 1 => feed()])
+            .prop_map(|(x, y, feed)| Request::On([x, y], feed)),
         2 => (place(), feed()).prop_map(|(to, feed)| Request::MoveTo(to, feed)),
         3 => (0..250_u16).prop_map(Request::Override),
         3 => Just(Request::Hold),
@@ -99,6 +103,12 @@ struct Watched {
     rounding: u64,
     now: u64,
     last: [Option<(u64, Direction)>; N],
+    /// Ticks between the last two steps of each axis since a rest, in one direction.
+    gaps: [Option<u64>; N],
+    /// A quick stop was asked for since then.
+    harder: bool,
+    /// In µm.
+    deviation: u32,
     position: [i64; N],
     stop: Option<Ending>,
     /// It is held: lines that come do not move it.
@@ -116,7 +126,24 @@ impl Watched {
         self.now = self.now.max(time);
         if self.machine.is_at_rest(self.now) {
             (self.stop, self.hurried) = (None, false);
+            for (i, gap) in self.gaps.into_iter().enumerate() {
+                if let Some(gap) = gap.filter(|_| !self.harder) {
+                    self.came_to_rest(i, gap)?;
+                }
+            }
+            (self.gaps, self.harder) = ([None; N], false);
         }
+        Ok(())
+    }
+
+    /// The last step is half a step before the rest, the one before it no more than twice that farther off; and at a corner an axis's
+    /// speed changes at once by no more than the deviation allows: (8 a d)^(1/2).
+    fn came_to_rest(&self, i: usize, gap: u64) -> Result<(), TestCaseError> {
+        let axis = &self.axes[i];
+        let a = f64::from(axis.limits.acceleration());
+        let deviation = f64::from(self.deviation) * 1e-6 * f64::from(axis.steps_per_m);
+        let (fastest, speed) = ((3.0 * a).sqrt() + (8.0 * a * deviation).sqrt(), f64::from(self.hz) / (gap + 1) as f64);
+        prop_assert!(speed <= fastest * 1.01, "axis {i} at rest from {speed} steps/s, {fastest} at most");
         Ok(())
     }
 
@@ -127,7 +154,9 @@ impl Watched {
         prop_assert_eq!(self.machine.commanded(), self.position);
         prop_assert!(pulse.tick >= self.now || self.last.iter().flatten().all(|(last, _)| pulse.tick >= *last));
         prop_assert!(self.position[i].abs() <= SOFT, "axis {i} at {}", self.position[i]);
+        self.gaps[i] = None;
         if let Some((last, before)) = self.last[i] {
+            self.gaps[i] = (before == pulse.direction).then(|| pulse.tick - last);
             prop_assert!(pulse.tick > last, "two steps in a tick");
             let least = u64::from(self.hz) / u64::from(self.axes[i].limits.speed());
             let gap = pulse.tick - last;
@@ -158,6 +187,10 @@ impl Watched {
         let (mut stops, mut goes_on) = (false, false);
         match request {
             Request::Push(to, feed) => goes_on = self.machine.push(to, feed, now).is_ok(),
+            Request::On(by, feed) => {
+                let target = self.machine.target();
+                goes_on = self.machine.push([target[0] + by[0], target[1] + by[1]], feed, now).is_ok();
+            }
             Request::MoveTo(to, feed) => {
                 // A stop, and on from there.
                 let under_way = self.machine.due().is_some();
@@ -200,6 +233,7 @@ impl Watched {
                     if j == 0 { limits } else { limits.with_jerk(j).unwrap() }
                 });
                 self.machine.quick_stop(limits, now);
+                self.harder = true;
                 let end = ending(&self.machine, self.now);
                 prop_assert!(
                     rest || end.is_within(plain, 1, self.rounding),
@@ -216,7 +250,7 @@ impl Watched {
                 self.machine.halt(now);
                 prop_assert!(self.machine.due().is_none() && self.machine.is_empty());
                 prop_assert_eq!(self.machine.target(), self.position);
-                (self.stop, self.held) = (None, false);
+                (self.stop, self.held, self.gaps) = (None, false, [None; N]);
             }
         }
         let goes_on = goes_on && !self.held && !self.slowed;
@@ -263,7 +297,7 @@ proptest! {
         let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, deviation).unwrap());
         let slowest = axes.iter().map(|axis| axis.limits.acceleration()).min().map_or(1.0, f64::from);
         let rounding = 2 + ((2.0 / 65536.0 / slowest).sqrt() * f64::from(hz)) as u64;
-        let mut watched = Watched { machine, hz, axes, rounding, now: 0, last: [None; N], position: [0; N], stop: None, held: false, slowed: false, hurried: false };
+        let mut watched = Watched { machine, hz, axes, rounding, now: 0, last: [None; N], gaps: [None; N], harder: false, deviation, position: [0; N], stop: None, held: false, slowed: false, hurried: false };
         for (request, wait_us, skew) in requests {
             watched.tell(request, skew)?;
             // 20 s at most, else a slow path takes for ever.
