@@ -4,7 +4,7 @@
 //!
 //! The crates do not compute the same: `ramp-maker` and `stepgen` give a delay a step of a trapezoid, this crate
 //! gives cycle and sync_time of a sin² ramp, and absolute ticks of trapezoids and S-curves. All make moves of the same length, with ramps of the same length, to
-//! the same speed of 100 kHz, step by step through their iterators.
+//! the same speed of 100 kHz, through their iterators: all steps in one go (`for_each`), and the trapezoid also step by step (`next`).
 #![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_precision_loss)]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 #![allow(clippy::std_instead_of_core, clippy::unwrap_used)]
@@ -32,9 +32,10 @@ const CASES: [Case; 3] = [
 
 type Move = fn(&Case) -> u64;
 
-const MOVES: [(&str, Move); 7] = [
+const MOVES: [(&str, Move); 8] = [
     ("step-profile, steps", corrected),
     ("step-motion, trapezoid", trapezoid),
+    ("step-motion, trapezoid, step by step", stepwise),
     ("step-motion, S-curve", s_curve),
     ("step-profile, one axis by the cycle", axis),
     ("ramp-maker, f32", ramp_maker_f32),
@@ -77,10 +78,10 @@ fn profile(case: &Case) -> Profile<'static> {
 
 fn corrected(case: &Case) -> u64 {
     let mut steps = 0;
-    for step in profile(case).steps(black_box(case.steps)) {
+    profile(case).steps(black_box(case.steps)).for_each(|step| {
         black_box((step.cycle, step.sync_time));
         steps += 1;
-    }
+    });
     steps
 }
 
@@ -88,8 +89,25 @@ fn limits(case: &Case) -> Limits {
     Limits::new(100_000, (acceleration(case) * 1e6) as u32).unwrap()
 }
 
-fn ticks(limits: Limits, case: &Case) -> u64 {
-    let plan = Plan::new(Clock::new(10_000_000).unwrap(), black_box(limits), black_box(case.steps)).unwrap();
+fn plan(limits: Limits, case: &Case) -> Plan {
+    Plan::new(Clock::new(10_000_000).unwrap(), black_box(limits), black_box(case.steps)).unwrap()
+}
+
+fn ticks(plan: &Plan) -> u64 {
+    let mut steps = 0;
+    plan.pulses().for_each(|tick| {
+        black_box(tick);
+        steps += 1;
+    });
+    steps
+}
+
+fn trapezoid(case: &Case) -> u64 {
+    ticks(&plan(limits(case), case))
+}
+
+fn stepwise(case: &Case) -> u64 {
+    let plan = plan(limits(case), case);
     let mut steps = 0;
     for tick in plan.pulses() {
         black_box(tick);
@@ -98,15 +116,11 @@ fn ticks(limits: Limits, case: &Case) -> u64 {
     steps
 }
 
-fn trapezoid(case: &Case) -> u64 {
-    ticks(limits(case), case)
-}
-
 /// A jerk that reaches the acceleration in a tenth of the ramp's time.
 fn s_curve(case: &Case) -> u64 {
     let acceleration = acceleration(case) * 1e6;
     let jerk = acceleration * acceleration / 100_000.0 * 10.0;
-    ticks(limits(case).with_jerk((jerk as u64).min(Limits::MAX_JERK)).unwrap(), case)
+    ticks(&plan(limits(case).with_jerk((jerk as u64).min(Limits::MAX_JERK)).unwrap(), case))
 }
 
 /// Ten cycles a step at full speed, more on the ramps.
@@ -158,9 +172,9 @@ fn stepgen(case: &Case) -> u64 {
     profile.set_target_speed(black_box(100_000) << 8).unwrap();
     profile.set_target_step(black_box(case.steps)).unwrap();
     let mut steps = 0;
-    for delay in profile {
+    profile.for_each(|delay| {
         black_box(delay);
         steps += 1;
-    }
+    });
     steps
 }

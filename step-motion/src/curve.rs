@@ -99,12 +99,12 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns time and place at the end of piece `at`.
-    pub(super) fn end(&self, at: usize) -> (Real, Real) {
-        match self.pieces().get(at.saturating_add(1)) {
-            Some(next) => (next.time, next.p),
-            None => (self.time, self.p),
-        }
+    /// Returns a piece by its number, with time and place at its end.
+    #[inline]
+    pub(super) fn piece(&self, at: usize) -> Option<(&Piece, (Real, Real))> {
+        let mut left = self.pieces().get(at..)?.iter();
+        let piece = left.next()?;
+        Some((piece, left.next().map_or((self.time, self.p), |next| (next.time, next.p))))
     }
 
     /// Returns the state at a time of the curve, even before its start or after its end; `None` without pieces.
@@ -207,7 +207,7 @@ mod tests {
             curve.push((Real::new(time), Real::new(64)), [Real::new(v), Real::ZERO, Real::ZERO], true, Bend::Flat);
         }
         let (middle, end) = ((Real::new(32), Real::new(64)), (Real::new(48), Real::new(128)));
-        assert_eq!([0, 1, 2].map(|at| curve.end(at)), [middle, end, end]);
+        assert_eq!([0, 1, 2, 3].map(|at| curve.piece(at).map(|(_, end)| end)), [Some(middle), Some(end), None, None]);
         for way in [1, 63, 65, 100] {
             let there = curve.after(Real::new(way)).unwrap();
             assert!(there.p.distance(Real::new(way)) <= Real::ONE.scaled(-40), "{there:?} for {way}");

@@ -144,7 +144,8 @@ impl Cutter {
             let Some(until) = frame.until(curve, at) else { return false };
             self.next = at.saturating_add(1);
             if until > self.count {
-                let Some(slower) = Slower::new(curve, frame, at) else { return false };
+                let Some(piece) = curve.piece(at.into()) else { return false };
+                let slower = Slower::new(curve, frame, piece);
                 (self.until, self.last) = (until, Last::Entry);
                 self.rest = FromRest::new(&slower, frame, self.rest.as_ref());
                 self.piece = if self.rest.is_none() { Some(Part::new(&slower, frame, demand.off)) } else { None };
@@ -155,7 +156,7 @@ impl Cutter {
 
     /// Scales the present piece, for what its table does not say.
     fn scaled(&self, curve: &Curve, frame: &Frame, off: Real) -> Option<Part> {
-        let slower = Slower::new(curve, frame, self.next.saturating_sub(1))?;
+        let slower = Slower::new(curve, frame, curve.piece(self.next.saturating_sub(1).into())?);
         Some(Part::new(&slower, frame, off))
     }
 
@@ -209,7 +210,7 @@ impl Cutter {
         }
         let rest = self.rest.as_ref()?;
         let (begin, roots) = rest.steps(self.count, self.left())?;
-        let count = self.count.saturating_add(u32::try_from(roots.left()).ok()?);
+        let count = self.count.saturating_add(roots.left());
         (self.last, self.count) = (Last::Tick(rest.time(count.saturating_sub(1))?), count);
         Some((begin, roots))
     }

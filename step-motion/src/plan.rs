@@ -123,6 +123,12 @@ impl Iterator for Pulses<'_> {
         self.stepper.next(&self.plan.phases.curve, &self.plan.phases.frame)
     }
 
+    #[inline]
+    fn fold<B, F: FnMut(B, u64) -> B>(self, first: B, f: F) -> B {
+        let Phases { curve, frame } = &self.plan.phases;
+        self.stepper.fold((curve, frame), first, f)
+    }
+
     fn size_hint(&self) -> (usize, Option<usize>) {
         let left = self.plan.steps().saturating_sub(self.stepper.count());
         let left = usize::try_from(left).ok();

@@ -158,7 +158,8 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
 
 /// Adds a slope, a cruise over the rest of the distance if there is one, and a slope.
 fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Option<Real>, bounds: &Bounds) {
-    let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
+    let up = Slope::new(from, top, bounds);
+    let down = if from == exit { up.reversed() } else { Slope::new(top, exit, bounds) };
     curve.slope(&up);
     if let Some(n) = n {
         curve.cruise(top, n - (up.distance + down.distance));
@@ -188,7 +189,7 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
         Goal::At(n, exit) => (n, exit),
         Goal::Speed(v) => return Ok(v),
     };
-    if most_distance(from, exit, bounds) > n {
+    if from != exit && most_distance(from, exit, bounds) > n {
         let least = distance(from, exit, bounds);
         if least > n + SLACK {
             return Err(least);

@@ -10,11 +10,13 @@ use core::ops::{Add, Div, Mul, Sub};
 /// can overflow or panic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-// Fits into two 64-bit registers on machines that have them.
-#[cfg_attr(target_pointer_width = "64", repr(align(8)))]
 pub(super) struct Real {
+    #[cfg(target_pointer_width = "64")]
+    m: u64,
     /// Upper and lower half of `m`, so that the number takes three words without padding.
+    #[cfg(not(target_pointer_width = "64"))]
     high: u32,
+    #[cfg(not(target_pointer_width = "64"))]
     low: u32,
     e: i32,
 }
@@ -23,12 +25,18 @@ pub(super) struct Real {
 const BIAS: i32 = 1 << 29;
 
 impl Real {
-    pub(super) const ZERO: Self = Self { high: 0, low: 0, e: 0 };
+    pub(super) const ZERO: Self = Self::raw(0, 0);
     pub(super) const ONE: Self = Self::new(1);
     /// Larger than any value in a plan.
     pub(super) const HUGE: Self = Self::from_parts(1 << 63, 937);
 
     /// Creates the number from its stored exponent.
+    #[cfg(target_pointer_width = "64")]
+    const fn raw(m: u64, e: i32) -> Self {
+        Self { m, e }
+    }
+
+    #[cfg(not(target_pointer_width = "64"))]
     #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
     const fn raw(m: u64, e: i32) -> Self {
         Self { high: (m >> 32) as u32, low: m as u32, e }
@@ -45,6 +53,12 @@ impl Real {
         Self::raw(m << (zeros & 63), e.wrapping_sub_unsigned(zeros))
     }
 
+    #[cfg(target_pointer_width = "64")]
+    const fn m(self) -> u64 {
+        self.m
+    }
+
+    #[cfg(not(target_pointer_width = "64"))]
     const fn m(self) -> u64 {
         (self.high as u64) << 32 | self.low as u64
     }
@@ -144,7 +158,7 @@ impl Real {
     }
 
     pub(super) const fn is_zero(self) -> bool {
-        self.high == 0
+        self.e == 0
     }
 
     /// Multiplies by 2^`by`.
@@ -168,32 +182,53 @@ impl Real {
         if other > self { other } else { self }
     }
 
-    /// Takes the root of the upper 32 bits, then two Heron steps, s + (m - s²) / 2s, with a reciprocal of s that is refined
-    /// along with it.
+    /// Returns the digits g, from 1/4 to 1, with an even exponent, and in 2^-30 the reciprocal of their root, exact to 30 bits: from a
+    /// table, made better by two steps y + y (1 - g y²) / 2.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        reason = "differences in two's complement"
+    )]
+    fn per_root(self) -> (u64, i32, u32) {
+        let (m, e) = (self.m(), self.e());
+        let (m, e) = if e & 1 == 0 { (m, e) } else { (m >> 1, e.wrapping_add(1)) };
+        let upper = (m >> 32) as u32;
+        let at = (upper >> 24).wrapping_sub(64) as usize;
+        let mut y = u32::from(ROOTS.get(at).copied().unwrap_or(0)) << 15;
+        for _ in 0..2 {
+            let rest = (1_u32 << 30).wrapping_sub(shifted(upper, shifted(y, y, 30), 32)) as i32;
+            y = y.wrapping_add((i64::from(y).wrapping_mul(rest.into()) >> 31) as u32);
+        }
+        (m, e, y)
+    }
+
+    /// The root: s = g y, then s + y (g - s²) / 2.
     #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "differences in two's complement")]
     pub(super) fn sqrt(self) -> Self {
         if self.is_zero() {
             return self;
         }
-        let (m, e) = (self.m(), self.e());
-        let (m, e) = if e & 1 == 0 { (m, e) } else { (m >> 1, e.wrapping_add(1)) };
-        // The root is 2^15 to 2^16; below it is 2^32 divided by the root.
-        let coarse = ((m >> 32) as u32).isqrt();
-        let per = u64::from(u32::MAX.checked_div(coarse).unwrap_or(u32::MAX));
-        let s = u64::from(coarse) << 16;
-        // Less than 2^50 is left of m. 15 bits below the point are enough for the next step.
-        let off = m.wrapping_sub(s.wrapping_mul(s)) as i64;
-        let more = (off >> 4).wrapping_mul(per as i64) >> 30;
-        let s = (s << 15).wrapping_add(more as u64).min((1 << 47) - 1);
-        // 2^63 / s to 28 bits: x (2 - s x).
-        let rest = (1_u64 << 48).wrapping_sub((s >> 15).wrapping_mul(per)) as i64;
-        let per = (per << 15).wrapping_add((rest.wrapping_mul(per as i64) >> 33) as u64);
-        // With 32 bits below the point, the upper half of the square equals m except for 36 bits.
-        let s = s << 17;
-        let (square, _) = product(s, s);
-        let off = m.wrapping_sub(square) as i64;
-        let s = s.saturating_add_signed((off >> 3).wrapping_mul((per >> 1) as i64) >> 28);
-        Self::fixed(s, 32).scaled(e >> 1)
+        let (m, e, y) = self.per_root();
+        // In 2^-63.
+        let s = high(m, u64::from(y) << 33);
+        let off = (m >> 2).wrapping_sub(high(s, s)) as i64;
+        let s = s.wrapping_add(((off >> 1).wrapping_mul(y.into()) >> 29) as u64);
+        Self::fixed(s, 31).scaled(e >> 1)
+    }
+
+    /// The reciprocal of the root, with one step more.
+    #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "differences in two's complement")]
+    pub(super) fn per_sqrt(self) -> Self {
+        if self.is_zero() {
+            return Self::HUGE;
+        }
+        let (m, e, y) = self.per_root();
+        // In 2^-62.
+        let fine = u64::from(y) << 32;
+        let rest = (1_u64 << 60).wrapping_sub(high(m, high(fine, fine))) as i64;
+        let fine = fine.wrapping_add((rest.wrapping_mul(y.into()) >> 29) as u64);
+        Self::fixed(fine, 94).scaled((e >> 1).wrapping_neg())
     }
 
     /// The cube root, exact to at least 55 bits: of the digits g, from 1/2 to 1, the reciprocal of the root by steps
@@ -212,11 +247,12 @@ impl Real {
             return self;
         }
         let (m, e) = (self.m(), self.e().wrapping_add(64));
+        let upper = (m >> 32) as u32;
         // A line within 1.5 per cent of it, in 2^-30.
-        let mut y = 1_618_128_371_u32.wrapping_sub(shifted(self.high, 558_345_748, 32));
+        let mut y = 1_618_128_371_u32.wrapping_sub(shifted(upper, 558_345_748, 32));
         for _ in 0..3 {
             let cube = shifted(shifted(y, y, 30), y, 30);
-            let rest = (1_u32 << 30).wrapping_sub(shifted(self.high, cube, 32)) as i32;
+            let rest = (1_u32 << 30).wrapping_sub(shifted(upper, cube, 32)) as i32;
             let more = i64::from(shifted(y, THIRD_OF_A_WORD, 32)).wrapping_mul(rest.into()) >> 30;
             y = y.wrapping_add(more as u32);
         }
@@ -242,6 +278,19 @@ impl Real {
         if self > other { self - other } else { other - self }
     }
 }
+
+/// The reciprocals of the roots of numbers from 1/4 to 1, in 2^-15: each for the middle of a 256th.
+#[expect(clippy::indexing_slicing, clippy::cast_possible_truncation, reason = "the compiler evaluates it")]
+static ROOTS: [u16; 192] = {
+    let mut all = [0; 192];
+    let mut at = 0;
+    while at < all.len() {
+        // 2^39 / (2 at + 129) is 2^30 / g.
+        all[at] = ((1_u64 << 39) / (2 * at as u64 + 129)).isqrt() as u16;
+        at += 1;
+    }
+    all
+};
 
 /// 1/3, as a number and in 2^-32.
 pub(super) const THIRD: Real = Real::from_parts(0xaaaa_aaaa_aaaa_aaab, -65);

@@ -38,6 +38,11 @@ impl Slope {
         let time = edge.scaled(1) + flat;
         Self { from, to, edge, flat, j, a, distance: (from + to).half() * time }
     }
+
+    /// The same change, the other way round.
+    pub(super) const fn reversed(&self) -> Self {
+        Self { from: self.to, to: self.from, ..*self }
+    }
 }
 
 /// Returns the least distance of a change of speed.

@@ -96,7 +96,7 @@ impl FromRest {
         } else {
             // Half a step is half of a t², or a sixth of j t³.
             let per = per * frame.scale;
-            let first = if cubic { (Real::new(3) / per).cbrt() } else { (Real::ONE / per).sqrt() };
+            let first = if cubic { (Real::new(3) / per).cbrt() } else { per.per_sqrt() };
             NonZeroU64::new(first.to_fixed(bits))?
         };
         let lasts = lasts.to_fixed(bits);
@@ -130,7 +130,7 @@ impl FromRest {
         let roots = table(self.cubic).get(usize::try_from(from).ok()?..=usize::try_from(to).ok()?)?;
         let base = if self.back { longest } else { 0 };
         let begin = self.begin.wrapping_sub(base.into());
-        Some((begin, Roots { left: roots, base, first: self.first.get(), back: self.back }))
+        Some((begin, Roots { left: roots, base, first: shifted(self.first.get())?, back: self.back }))
     }
 
     /// How far a step is from the rest, in steps; `None` if that is too far, or on the other side.
@@ -142,7 +142,7 @@ impl FromRest {
     /// Returns the time between the rest and a step; `None` if that is not within the piece.
     fn since(&self, far: u32) -> Option<u64> {
         let root = table(self.cubic).get(usize::try_from(far).ok()?)?;
-        scaled(self.first.get(), *root).filter(|since| *since <= self.lasts)
+        Some(high(shifted(self.first.get())?, *root)).filter(|since| *since <= self.lasts)
     }
 }
 
@@ -154,6 +154,7 @@ pub(crate) struct Roots {
     left: &'static [u64],
     /// The time from which they count, in 2^-32 ticks, and how far from it the rest is.
     pub(crate) base: u64,
+    /// In 2^-36 ticks.
     first: u64,
     back: bool,
 }
@@ -161,14 +162,16 @@ pub(crate) struct Roots {
 impl Roots {
     pub(crate) const NONE: Self = Self { left: &[], base: 0, first: 0, back: false };
 
-    pub(crate) const fn left(&self) -> usize {
-        self.left.len()
+    pub(crate) const fn left(&self) -> u32 {
+        #[expect(clippy::cast_possible_truncation, reason = "as many as in a table")]
+        let left = self.left.len() as u32;
+        left
     }
 
     /// Returns the time of the next step.
     #[inline]
     pub(crate) fn next(&mut self) -> Option<u64> {
-        let since = |root: &u64| high(self.first, *root) << 4;
+        let since = |root: &u64| high(self.first, *root);
         if self.back {
             let (root, left) = self.left.split_last()?;
             self.left = left;
@@ -185,10 +188,9 @@ fn table(cubic: bool) -> &'static Table {
     if cubic { &CUBE } else { &SQUARE }
 }
 
-/// Multiplies a time by a root, which is below 2^4: that of 127 is 11.3.
-fn scaled(time: u64, root: u64) -> Option<u64> {
-    let time = high(time, root);
-    (time.leading_zeros() > 4).then_some(time << 4)
+/// Returns a time in 2^-36 ticks, to be multiplied by a root, which is below 2^4: that of 127 is 11.3.
+fn shifted(time: u64) -> Option<u64> {
+    (time.leading_zeros() >= 4).then_some(time << 4)
 }
 
 /// Returns how many steps next to a rest are better found one by one: a segment that begins with step k and has five is

@@ -57,14 +57,12 @@ pub(super) struct Slower {
 }
 
 impl Slower {
-    /// Finds it for a piece by its number; `None` if there is no such piece.
-    pub(super) fn new(curve: &Curve, frame: &Frame, at: u8) -> Option<Self> {
-        let piece = curve.pieces().get(usize::from(at))?;
+    /// Finds it for a piece that ends at a time and a place.
+    pub(super) fn new(curve: &Curve, frame: &Frame, (piece, (end, p_end)): (&Piece, (Real, Real))) -> Self {
         let &Piece { time, p, v, a, j, up, bend } = piece;
         let (joined, skipped) = curve.skipped;
         let even = a.is_zero() && j.is_zero();
         let back = !up && !even;
-        let (end, p_end) = curve.end(at.into());
         let begin = time.max(joined);
         let lasts = end - begin;
         let (time, p, (v, a)) = if back {
@@ -81,7 +79,7 @@ impl Slower {
         let begin = (i128::from(frame.begin) << (bits.unsigned_abs() & 63)).wrapping_add(since);
         let steps = |p: Real| (p * frame.scale).to_wide(P2);
         let origin = (i128::from(frame.from) << P).wrapping_add(steps(p).wrapping_sub(steps(skipped)));
-        Some(Self { v, a, j, back, even, grows: (bend != Bend::Fading) != back, lasts, begin, origin })
+        Self { v, a, j, back, even, grows: (bend != Bend::Fading) != back, lasts, begin, origin }
     }
 }
 

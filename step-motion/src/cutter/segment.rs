@@ -246,7 +246,7 @@ mod tests {
         let state = [v, Real::ONE.scaled(-64), Real::ZERO];
         curve.push((Real::new(1 << 40), Real::new(1 << 16)), state, !back, Bend::Flat);
         let frame = Frame { to: None, ..Frame::rest(10, 0, 0) };
-        Part::new(&Slower::new(&curve, &frame, 0).unwrap(), &frame, off)
+        Part::new(&Slower::new(&curve, &frame, curve.piece(0).unwrap()), &frame, off)
     }
 
     /// The first estimate is off by about as much as may be.

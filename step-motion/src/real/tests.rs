@@ -24,6 +24,7 @@ proptest! {
         near(a + b, x + y);
         near(a * b, x * y);
         near(a.sqrt(), x.sqrt());
+        near(a.per_sqrt() * a.sqrt(), if a.is_zero() { 0.0 } else { 1.0 });
         let third = float(a.cbrt());
         prop_assert!((third.powi(3) - x).abs() <= x * 3.0 / 2.0_f64.powi(50), "{third} of {x}");
         prop_assert!(a.cmp(&b) == b.cmp(&a).reverse() && (x - y).abs() <= x * 1e-15 || (a < b) == (x < y));
@@ -56,6 +57,9 @@ fn roots_of_squares() {
         {
             let (n, root) = (Real::new(n), Real::new(n * n).sqrt());
             assert!(root.distance(n) <= n.scaled(-58), "{root:?} for {n:?}");
+            let per = Real::new(n.to_fixed(0) * n.to_fixed(0)).per_sqrt();
+            let want = Real::ONE / n;
+            assert!(per.distance(want) <= want.scaled(-57), "{per:?} for {want:?}");
             let root = Real::new(n.to_fixed(0) * n.to_fixed(0)).scaled(-63).sqrt();
             let want = n.scaled(-32) * Real::new(2).sqrt();
             assert!(root.distance(want) <= want.scaled(-57), "{root:?} for {want:?}");
@@ -64,6 +68,24 @@ fn roots_of_squares() {
     for m in [u64::MAX, u64::MAX - 1, 1 << 63, (1 << 63) + 1, u64::MAX >> 1, 1 << 62, u64::MAX << 32, u64::MAX << 31] {
         let root = Real::new(m).sqrt();
         assert!(root.squared().distance(Real::new(m)) <= Real::new(m).scaled(-57), "{root:?} of {m}");
+        let per = Real::new(m).per_sqrt();
+        assert!((per * root).distance(Real::ONE) <= Real::ONE.scaled(-56), "{per:?} of {m}");
+    }
+}
+
+/// At both ends of each entry of the table, and at both parities of the exponent.
+#[test]
+fn roots_from_each_entry_of_the_table() {
+    for at in 64..256_u64 {
+        for m in [at << 56, (at << 56) | (u64::MAX >> 8), (at << 56) | (1 << 32)] {
+            for e in [0, 7] {
+                let x = Real::fixed(m, e);
+                let root = x.sqrt();
+                assert!(root.squared().distance(x) <= x.scaled(-57), "{root:?} of {x:?}");
+                let per = x.per_sqrt();
+                assert!((per * root).distance(Real::ONE) <= Real::ONE.scaled(-56), "{per:?} of {x:?}");
+            }
+        }
     }
 }
 
@@ -86,6 +108,7 @@ fn roots_of_cubes() {
 fn the_edges() {
     let (zero, one) = (Real::ZERO, Real::new(1));
     assert_eq!((zero + one, one - one, zero * one, zero / one, zero.sqrt()), (one, zero, zero, zero, zero));
+    assert_eq!(zero.per_sqrt(), Real::HUGE);
     assert_eq!((one / zero, zero - one, one + zero, one - zero), (Real::HUGE, zero, one, one));
     assert_eq!((Real::HUGE.to_fixed(0), Real::HUGE.to_fixed(-2000)), (u64::MAX, 0));
     near(Real::new(9).sqrt(), 3.0);

@@ -85,7 +85,7 @@ impl Case {
 
     fn rest(self) -> Option<FromRest> {
         let (curve, frame) = self.curve();
-        FromRest::new(&Slower::new(&curve, &frame, 0).unwrap(), &frame, None)
+        FromRest::new(&Slower::new(&curve, &frame, curve.piece(0).unwrap()), &frame, None)
     }
 }
 
@@ -163,7 +163,7 @@ fn a_rest_is_at_a_step() {
         // Rounding leaves less than 2^-56 of the greatest value.
         let (curve, frame) = Case { cut: 0, ..case }.curve();
         let slower = |v: i32, a: i32| {
-            let mut slower = Slower::new(&curve, &frame, 0).unwrap();
+            let mut slower = Slower::new(&curve, &frame, curve.piece(0).unwrap());
             let most = if cubic { slower.j * slower.lasts } else { slower.a };
             slower.v = (most * slower.lasts).scaled(v);
             slower.a = if cubic { most.scaled(a) } else { slower.a };
@@ -181,7 +181,7 @@ fn what_is_known_of_an_earlier_piece() {
     let cubic = Case { cubic: true, lasts: 10, steps: 500, ..square };
     let slower = |case: Case| {
         let (curve, frame) = case.curve();
-        (Slower::new(&curve, &frame, 0).unwrap(), frame)
+        (Slower::new(&curve, &frame, curve.piece(0).unwrap()), frame)
     };
     for case in [square, cubic] {
         let (own, frame) = slower(case);
@@ -207,7 +207,7 @@ fn the_longest_piece_beside_a_rest() {
     let case = Case { cubic: false, back: false, first: 41_000, lasts: 20, steps: 200, cut: 0, off: 0 };
     let (curve, frame) = case.curve();
     let is_some = |lasts| {
-        let mut slower = Slower::new(&curve, &frame, 0).unwrap();
+        let mut slower = Slower::new(&curve, &frame, curve.piece(0).unwrap());
         slower.lasts = lasts;
         FromRest::new(&slower, &frame, None).is_some()
     };
@@ -239,7 +239,7 @@ fn what_is_near_a_rest() {
         }
     }
     // Below 2^63.
-    assert_eq!([1, 2].map(|by| scaled(u64::MAX >> by, 2 << 60)), [None, Some((1 << 63) - 16)]);
+    assert_eq!([3, 4].map(|by| shifted(u64::MAX >> by)), [None, Some(u64::MAX - 15)]);
 }
 
 /// The same times in runs, from each step on, and up to a number.
@@ -256,11 +256,11 @@ fn runs_of_steps_beside_a_rest() {
                 let ends = case.back || end <= count || rest.time(end - 1).is_some();
                 assert_eq!(run.is_some(), rest.time(count).is_some() && ends, "{left} from {count} of {case:?}");
                 let Some((begin, mut roots)) = run else { continue };
-                assert_eq!(roots.left(), (end - count) as usize, "{left} from {count} of {case:?}");
+                assert_eq!(roots.left(), end - count, "{left} from {count} of {case:?}");
                 for step in count..end {
                     let time = begin + i128::from(roots.next().unwrap());
                     assert_eq!(Some(time), rest.time(step), "{step} from {count} of {case:?}");
-                    assert_eq!(roots.left(), (end - step - 1) as usize);
+                    assert_eq!(roots.left(), end - step - 1);
                 }
                 assert!(roots.next().is_none());
             }
@@ -332,7 +332,7 @@ fn a_run_is_as_long_as_the_table() {
         let want = if case.back { 20 } else { case.steps.min(64) as u32 };
         let within = case.time(cutter.count().into()).is_some();
         let run = cutter.roots();
-        assert_eq!(run.map(|(_, roots)| roots.left()), within.then_some(want as usize), "{case:?}");
+        assert_eq!(run.map(|(_, roots)| roots.left()), within.then_some(want), "{case:?}");
     }
 }
 
