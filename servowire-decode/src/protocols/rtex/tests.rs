@@ -203,19 +203,84 @@ fn unsound_blocks_are_no_other_shape() {
     }
 }
 
-/// A line of another length among blocks that go on over the ends of lines costs the two blocks that it is part of; no block is put
-/// together from the lines around it.
+/// A line of another length among blocks that go on over the ends of lines costs the two blocks that it is part of, wherever it is; no
+/// block is put together from the lines around it.
 #[test]
 fn a_stray_line_costs_its_two_blocks() {
     let log = &bytes(1, run(1, 200, 1_001))[5..];
-    let (mut decoder, mut kept) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default());
-    for (line, bytes) in log.chunks_exact(16).enumerate() {
-        let bytes = if line == 30 { &bytes[..9] } else { bytes };
-        decoder.burst(&Burst::new(line as u64 + 1, bytes.to_vec()), &mut kept).unwrap();
+    for stray in [1, 2, 30] {
+        let (mut decoder, mut kept) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default());
+        for (line, bytes) in log.chunks_exact(16).enumerate() {
+            let bytes = if line == stray { &bytes[..9] } else { bytes };
+            decoder.burst(&Burst::new(line as u64 + 1, bytes.to_vec()), &mut kept).unwrap();
+        }
+        decoder.end(&mut kept).unwrap();
+        let lost = [stray as i64, stray as i64 + 1];
+        let want: Vec<i64> = (1..199).filter(|block| !lost.contains(block)).map(|block| (block + 1) * 1_001).collect();
+        assert_eq!(positions(&kept.0), want, "{stray}");
     }
-    decoder.end(&mut kept).unwrap();
-    let want: Vec<i64> = (1..199).filter(|block| !matches!(block, 30 | 31)).map(|block| (block + 1) * 1_001).collect();
-    assert_eq!(positions(&kept.0), want);
+}
+
+/// A line that is no bytes costs nothing else where every line begins with a block, even if the lines are longer than one.
+#[test]
+fn a_spoilt_line_costs_no_other() {
+    let (mut decoder, mut kept) = (Decoder::new(settings::Rtex::default(), &[]), Kept::default());
+    let line = |number: u64| Burst::new(number, vec![0x55; 20]);
+    for number in 1..=ENOUGH as u64 {
+        decoder.burst(&line(number), &mut kept).unwrap();
+    }
+    let before = kept.0.len();
+    decoder.spoilt(&mut kept).unwrap();
+    decoder.burst(&line(ENOUGH as u64 + 2), &mut kept).unwrap();
+    let shown: Vec<_> = kept.0[before..].iter().map(|event| event.place).collect();
+    assert_eq!(shown, [Place::Line(ENOUGH as u64 + 2); 2]);
+}
+
+/// The order of the bytes changes in a log that begins inside a block: blocks still go on over the ends of lines.
+#[test]
+fn another_order_begins_no_line() {
+    for (before, after) in [(1, 4), (1, 2), (4, 1)] {
+        let log = [bytes(before, run(1, 192, 1_001)), bytes(after, run(193, 400, 1_001))].concat();
+        let (events, _) = decoded(&log[4..]);
+        let shown = positions(&events);
+        // The next window of 64 blocks tells.
+        let want: Vec<i64> = (260..=591).map(|k| k * 1_001).collect();
+        assert_eq!(shown[shown.len() - want.len()..], want, "{before} {after}");
+    }
+}
+
+/// A motor that stands for longer than a piece of the log, and then turns, in a log that may seem to begin with a block: all is shown in
+/// the shape that is told only then.
+#[test]
+fn what_stands_gives_way_to_what_turns() {
+    let place = |k: u32| 70_000 + 1_001 * k.saturating_sub(140) as i32;
+    let speed = |k: u32| if k <= 140 { 0 } else { [-7, 9, 9][k as usize % 3] };
+    for (word, from) in [(2, 14), (4, 2)] {
+        let log = bytes(word, (1..=400).map(|k| response(k, place(k), k <= 140 || k / 2 % 2 == 0, speed(k))));
+        let (events, _) = decoded(&log[from..]);
+        let want: Vec<i64> = (2..400).map(|k| place(k).into()).collect();
+        let shown = positions(&events);
+        assert_eq!(shown[..want.len()], want, "{word} {from}");
+        assert!(!events.iter().any(|event| format!("{event:?}").contains("from here on")), "{word} {from}");
+    }
+}
+
+/// Where either of two shapes may be the right one, what is wrong at the end of the log is said of the block that it ends with.
+#[test]
+fn an_unknown_shape_ends_at_its_last_block() {
+    let log = bytes(2, run(1, 60, 0));
+    let (events, _) = decoded(&log[5..]);
+    // The last of 59 lines holds the end of the 58th whole block, which begins in the line before, and part of the next one.
+    let blocks: Vec<_> = events.iter().filter(|event| !event.remark).map(|event| event.place).collect();
+    assert_eq!(blocks, (1..=58).map(Place::Line).collect::<Vec<_>>());
+    let last = events.last().unwrap();
+    assert!(last.remark && format!("{last:?}").contains("the log ends in the middle of a block"), "{last:?}");
+    assert_eq!(last.place, Place::Line(58));
+    // Bytes have two digits each.
+    for event in events.iter().filter(|event| !event.remark) {
+        let crate::event::Value::Text(bytes) = &event.fields[0].value else { panic!("{event:?}") };
+        assert!(bytes.split(' ').count() == 16 && bytes.split(' ').all(|byte| byte.len() == 2), "{bytes}");
+    }
 }
 
 /// Commands and responses of drive 5 in turn.
@@ -280,4 +345,45 @@ fn what_has_no_shape_is_not_held_twice() {
     for number in ENOUGH..ENOUGH + 20 {
         assert_eq!(at(number), number);
     }
+    // They are read as blocks of 16 bytes in order, and it is nothing new if they are that.
+    for (number, block) in (2_000..).zip(run(1, 300, 1_001)) {
+        decoder.burst(&Burst::new(number, block.to_vec()), &mut kept).unwrap();
+    }
+    let remarks: Vec<_> = kept.0.iter().filter(|event| event.remark).collect();
+    assert!(remarks.is_empty(), "{remarks:?}");
+    assert_eq!(kept.0.last().and_then(|event| event.position.as_ref()).map(|it| it.counts), Some(300 * 1_001));
+}
+
+/// Blocks of a size that is given are read without a line before them.
+#[test]
+fn a_size_that_is_given_needs_no_sample() {
+    let settings = settings::Rtex { block_size: Some(32), ..settings::Rtex::default() };
+    let (mut decoder, mut kept) = (Decoder::new(settings, &[]), Kept::default());
+    for (number, block) in (1..).zip(run(1, 20, 1_001)) {
+        decoder.burst(&Burst::new(number, [block, [0; 16]].concat()), &mut kept).unwrap();
+    }
+    assert_eq!(positions(&kept.0), (1..=20).map(|k| k * 1_001).collect::<Vec<_>>());
+}
+
+/// Bytes 2 and 3 are one field of four digits.
+#[test]
+fn flags_are_one_field() {
+    let mut command = response(2, 1_001, true, 9);
+    command[0] &= 0x7f;
+    for (block, name, raw) in [(response(1, 1_001, true, 9), "Status_Flags", 0xc1), (command, "Control_Bits", 0xc1)] {
+        let (events, _) = decoded(&block);
+        let flags = events[0].fields.iter().find(|field| field.name == name).unwrap();
+        let place = Place::Line(1);
+        assert_eq!(flags.span, Some(Span { first: 16, last: 31, place }));
+        let crate::event::Value::Flags { raw: read, digits, .. } = flags.value else { panic!("{flags:?}") };
+        assert_eq!((read, digits), (raw, 4));
+    }
+}
+
+/// Where the blocks begin is said, even if it is the second byte.
+#[test]
+fn where_blocks_begin() {
+    let shape = |skip| LogShape { size: rtex_block::BlockSize::Bytes16, word: 1, skip };
+    assert_eq!(said(shape(0)), "blocks of 16 bytes");
+    assert_eq!(said(shape(1)), "blocks of 16 bytes, the first of which begins at byte 1");
 }
