@@ -11,6 +11,7 @@ mod changes;
 mod laws;
 mod lines;
 mod machine;
+mod nearly;
 mod overrides;
 mod path_laws;
 mod path_queue;
