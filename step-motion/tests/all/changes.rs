@@ -362,6 +362,16 @@ fn velocity_is_what_was_asked_for() {
     }
 }
 
+/// The speed is reached at the first step; then there is one in each millisecond, for as long as it runs.
+#[test]
+fn a_run_does_not_drift() {
+    let mut mover = Mover::new(Clock::NANOSECONDS, Limits::new(1000, 1_000_000).unwrap()).unwrap();
+    mover.run(Direction::Forward, 1000, 0).unwrap();
+    for step in 1..20_000 {
+        assert_eq!(mover.pulse().map(|pulse| pulse.tick), Some(step * 1_000_000));
+    }
+}
+
 #[test]
 fn limits_are_changed_at_rest_only() {
     let mut mover = mover();

@@ -214,6 +214,52 @@ fn a_new_reference_forgets_the_aim() {
     assert_eq!(mover.due(), None);
 }
 
+/// A halt ends a hold and a quick stop, even in the tick of a step.
+#[test]
+fn a_halt_leaves_nothing_of_a_hold_or_a_quick_stop() {
+    for quick in [false, true] {
+        let mut mover = fast();
+        mover.move_to(5000, 0).unwrap();
+        take(&mut mover, 60_000);
+        if quick {
+            mover.quick_stop(limits(20_000, 300_000, 0), 60_000);
+        } else {
+            mover.hold(60_000);
+        }
+        let tick = mover.pulse().unwrap().tick;
+        mover.halt(tick);
+        assert!(mover.is_halted() && mover.due().is_none());
+        mover.move_to(5000, tick).unwrap();
+        take(&mut mover, u64::MAX);
+        assert_eq!(mover.commanded(), 5000);
+    }
+}
+
+/// DIR at rest is that of the last step, while nothing is to come: the axis is held, its override is 0, or it is there.
+#[test]
+fn a_rest_keeps_its_direction() {
+    let mut mover = fast();
+    mover.move_to(-500, 0).unwrap();
+    take(&mut mover, u64::MAX);
+    let now = 9_000_000;
+    let rests = |mover: &Mover| {
+        assert_eq!((mover.due(), mover.turn(), mover.direction()), (None, None, Direction::Reverse));
+    };
+    rests(&mover);
+    mover.stop(now);
+    rests(&mover);
+    mover.hold(now);
+    mover.move_to(500, now).unwrap();
+    rests(&mover);
+    mover.set_override(0, now);
+    mover.resume(now);
+    rests(&mover);
+    mover.set_override(100, now);
+    assert_eq!(mover.direction(), Direction::Forward);
+    take(&mut mover, u64::MAX);
+    assert_eq!(mover.commanded(), 500);
+}
+
 /// Told the same again while it brakes: the brake goes on, down to the speed that was asked for and no lower.
 #[test]
 fn an_axis_above_its_speed_comes_down_at_once() {

@@ -259,6 +259,20 @@ fn a_speed_from_which_only_a_stop_is_possible() {
     }
 }
 
+/// A line that comes while such a stop runs: it stays one, and the path goes on behind it.
+#[test]
+fn a_line_behind_a_stop_that_nobody_asked_for() {
+    use Request::{Override, Push};
+    let requests = [
+        (Push(226, 30_079), 8_610_351),
+        (Push(20, 50_000), 0),
+        (Push(23, 9367), 16_789_480),
+        (Override(191), 5_159_296),
+        (Push(31, 50_000), 25_848_195),
+    ];
+    ask(&mut machine(MOST), &requests);
+}
+
 /// A hold that comes to rest at a joint but for rounding, and another aim when the line before that joint has begun.
 #[test]
 fn a_stop_at_a_joint_is_one_on_the_line_before() {

@@ -287,6 +287,23 @@ fn ticks_beside_a_rest() {
     }
 }
 
+/// The step next to a rest is at 40 1/2 ticks from it, half a tick and 7.5e-6 of one early or late because of where the rest is. A root
+/// says that it is at the edge of the tick.
+#[test]
+fn a_step_beside_a_rest_at_the_edge_of_a_tick() {
+    let after = Case { cubic: false, back: false, first: 41_472, lasts: 8, steps: 32, cut: 0, off: 0 };
+    for (back, edge) in [(false, 77 + 40), (true, 77 + 7 * 40 + 3)] {
+        for (off, want) in [(-800, edge + 1), (800, edge)] {
+            let case = Case { back, off, ..after };
+            let (curve, frame) = case.curve();
+            let frame = Frame { offset: Real::ZERO, ..frame };
+            let mut stepper = Stepper::new();
+            stepper.cutter.count = if back { REST as u32 - 1 } else { REST as u32 };
+            assert_eq!(stepper.next(&curve, &frame), Some(want), "{case:?}");
+        }
+    }
+}
+
 /// Segments of a piece begin with few steps, for which nothing is scaled, and have all of its steps.
 #[test]
 fn segments_beside_a_rest() {
