@@ -252,6 +252,22 @@ mod tests {
         // Nor is one that stays.
         watch.reset();
         assert_eq!([UpdateCounter::new(3); 4].map(|echo| watch.sample(echo)), [false, false, false, true]);
+        // Each time the limit is a whole one.
+        watch.reset();
+        assert_eq!([None; 3].map(|echo| watch.sample(echo)), [false, false, true]);
+    }
+
+    /// After a period without a block the first one may be late: the lag is that of the system if it stays for a turn of the counter.
+    #[test]
+    fn a_late_first_block_is_sure_after_a_turn() {
+        let counter = |n: u8| UpdateCounter::new(n & 3).unwrap();
+        let mut watch = EchoWatch::new(NonZeroU16::new(9).unwrap());
+        assert_eq!(watch.judge(counter(0), None, 0, true), Arrival::Missing);
+        let sure = [1, 2, 3, 4, 5].map(|sent: u8| {
+            assert_eq!(watch.judge(counter(sent), Some(counter(sent - 1)), 0, true), Arrival::OnTime);
+            watch.is_sure()
+        });
+        assert_eq!(sure, [false, false, false, true, true]);
     }
 
     /// By hand: the counter sent goes on by one, and the echo is as many behind.

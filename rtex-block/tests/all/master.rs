@@ -121,6 +121,7 @@ fn what_cannot_be_set_up() {
     assert_eq!(new(good, axes(axis(4), slow)), Some(SetupError::UpdatePeriod { mac_id: mac_id(17) }));
     let half = MasterConfig::new(BlockSize::Bytes16, A6N[6], TimerSystem::Internal);
     assert_eq!(new(half, axes(axis(4), axis(17))), Some(SetupError::Timer));
+    assert_eq!((half.invalid, half.watchdog), (4, None));
     assert_eq!(Ring::new(axes(axis(9), axis(9)), 0).err(), Some(SameMacId { mac_id: mac_id(9) }));
 }
 

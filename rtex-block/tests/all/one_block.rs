@@ -4,10 +4,10 @@ use crate::common::{CODES, LIMIT, Pair, limits, monitor};
 use rtex_block::device::{Behaviour, DriveConfig};
 use rtex_block::master::procedure::{ClearAlarm, Clearing, Home};
 use rtex_block::master::{
-    ActiveCode, Arrival, AxisConfig, AxisState, Failure, Heard, MoveStage, Progress, SetpointError, StopCategory,
-    StopReason, SwitchOnError, Turn,
+    ActiveCode, Arrival, AxisConfig, AxisState, Failure, Heard, MoveStage, ProfileMove, Progress, SetpointError,
+    StopCategory, StopReason, SwitchOnError, Turn,
 };
-use rtex_block::{ErrorClass, ErrorCode, MacId, NonCyclicCommand, Response, StatusFlags, SubCode};
+use rtex_block::{ErrorClass, ErrorCode, MacId, Nibble, NonCyclicCommand, Policy, Response, StatusFlags, SubCode};
 
 /// An axis whose servo is off and could be switched on.
 fn off() -> Pair {
@@ -101,7 +101,45 @@ fn invalid_data_bring_a_position_and_no_time() {
     let response = Response { response_data1: 777, ..*pair.received.response().unwrap() };
     pair.axis.hear(Turn::Invalid, &Heard::Main(response), pair.now_ns());
     assert_eq!((pair.axis.arrival(), pair.axis.setpoint()), (Arrival::Missing, 777));
+    // As old as can be.
+    let known = [0, 1].map(|now_ns| pair.axis.evidence().at(now_ns, Policy::new(0)).is_ok());
+    assert_eq!(known, [true, false]);
     assert_eq!(pair.axis.can_switch_on(), Err(SwitchOnError::OldPosition));
+}
+
+/// A new axis sends nothing but zeros, and has counted nothing: refusals and activity stop it only when there were enough of them.
+#[test]
+fn a_new_axis_begins_with_nothing() {
+    let new = || Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+    let mut axis = new().axis;
+    assert_eq!(axis.setpoint(), 0);
+    assert_eq!(axis.transmission(Turn::Invalid).emit(), [&[9; 1][..], &[0; 15], &[0x80], &[0; 15]].concat()[..]);
+    assert_eq!(axis.transmission(Turn::Valid(new().counter.last().next())).main.command_data1, 0);
+    let refused = StopReason::CommandError(ErrorCode(0x21));
+    for (change, want, most) in
+        [(refuse as fn(&mut Response), refused, LIMIT), (is_active, StopReason::InactiveTimeout, 13)]
+    {
+        let (mut pair, mut blocks) = (new(), 0);
+        while pair.axis.state() == AxisState::Starting {
+            update(&mut pair, change);
+            blocks += u16::from(pair.axis.arrival() == Arrival::OnTime);
+        }
+        assert_eq!((pair.axis.state(), blocks), (AxisState::Stopped(want), most));
+    }
+}
+
+/// A motion for which nothing is said of latch and monitor has neither.
+#[test]
+fn a_plain_motion_has_no_latch() {
+    let mut axis = Pair::on(ActiveCode::ProfilePosition, Behaviour::new()).axis;
+    axis.start_move(0x11, 500, 1_000).unwrap();
+    let plain = ProfileMove::new(axis.config().mac_id, 0x11, 500, 1_000, axis.config().limits.answer);
+    assert_eq!(plain, plain.with_latch(Nibble::ZERO, 0));
+    // There is no answer yet.
+    assert_eq!(plain.monitor_data(), 0);
+    let mut other = Pair::on(ActiveCode::ProfilePosition, Behaviour::new()).axis;
+    other.start_move_with_latch(0x11, 500, 1_000, Nibble::ZERO, 0).unwrap();
+    assert_eq!(axis.profile(), other.profile());
 }
 
 /// The smaller of the limits by gear and by speed.

@@ -47,6 +47,16 @@ fn bench(mode: ActiveCode) -> Bench {
     Bench { ring, drives, heard: [Heard::Nothing; 2], now_ns: 0, lasts: 100_000 }
 }
 
+/// As many update periods as are asked for.
+#[test]
+fn a_run_has_its_length() {
+    for updates in [0, 1, 7] {
+        let mut ring = bench(ActiveCode::CyclicPosition);
+        ring.run(updates).unwrap();
+        assert_eq!(ring.lasts, 100_000 - updates);
+    }
+}
+
 #[test]
 fn a_day_of_a_ring() {
     let mut ring = bench(ActiveCode::ProfilePosition);

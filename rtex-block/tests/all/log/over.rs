@@ -29,6 +29,17 @@ fn what_is_over_is_said_once() {
     assert_eq!(findings(&mut log, &blocks), want);
 }
 
+/// A drive that answered once, and then no more, is silent at the end.
+#[test]
+fn a_drive_that_answered_once_is_silent() {
+    let mut log = analysis();
+    let commands = (1..6_u8).map(|k| command(k % 4, 0, 0));
+    let blocks: Vec<_> = core::iter::once(response(0, 0, 0)).chain(commands).collect();
+    assert_eq!(findings(&mut log, &blocks), [(3, LogFinding::NoAnswer { commands: 3 })]);
+    let silence = |finding| matches!(finding, LogFinding::AtEnd(_, Unfinished::Silence { commands: 5 }));
+    assert!(log.end().any(silence), "{:?}", log.end().collect::<Vec<_>>());
+}
+
 /// A drive that was forgotten has never been there.
 #[test]
 fn a_drive_that_is_forgotten_was_not_there() {
