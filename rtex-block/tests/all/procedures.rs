@@ -263,6 +263,41 @@ fn a_latch_without_a_state_before() {
     panic!("not latched");
 }
 
+/// The answer to arming is about what was there before, even if it says that a position was caught.
+#[test]
+fn arming_catches_nothing() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+    let mut latch = Latch::first(0xc7, Nibble::new(1).unwrap(), 60);
+    let mut armed = 0;
+    loop {
+        pair.update();
+        let response = *pair.received.response().unwrap();
+        if let NonCyclicResponse::Homing { execution, type_code: 0xc7, latch_sel1, latch_sel2, monitor_sel, .. } =
+            response.noncyclic()
+        {
+            let (type_code, latch, monitor_data) = (0xc7, LatchFlags::LATCH_COMP1, 12_345);
+            let caught = NonCyclicResponse::Homing {
+                execution,
+                type_code,
+                latch,
+                latch_sel1,
+                latch_sel2,
+                monitor_sel,
+                monitor_data,
+            };
+            pair.received = Heard::Main(response.with_noncyclic(&caught));
+            armed += 1;
+        }
+        let progress = latch.receive(&mut pair.axis);
+        if !progress.is_pending() {
+            assert_eq!(progress, Progress::Failed { error: Failure::TimedOut });
+            break;
+        }
+    }
+    assert!(armed > 0);
+    assert_eq!(latch.caught(), Caught::default());
+}
+
 #[test]
 fn a_motion_with_a_latch_shows_it() {
     let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
