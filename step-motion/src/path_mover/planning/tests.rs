@@ -85,6 +85,32 @@ fn the_steps_of_a_stop_under_way() {
     }
 }
 
+/// A hold at 250 steps takes 150, and ends at a joint. Rounding may say that it is on the line behind it, and later that its place is on
+/// the one before. A stop ends there then, and a new line is not the one behind it.
+#[test]
+fn a_stop_at_a_joint_but_for_rounding() {
+    for (first, steps) in [(100, 1), (300, 1), (300, 100), (390, 1), (390, 149)] {
+        let mut mover = mover([(5000, 50_000); 2], 1000, &[[first, 0], [400 - first, 0], [500, 0]]);
+        let mut now = take(&mut mover, 250);
+        mover.held = true;
+        let (motion, start) = mover.here(400_000).unwrap();
+        let how = (mover.bounds, false);
+        let (course, bounds) = mover.path.brake(0, motion, (start.place, start.before), how).unwrap();
+        let (end, more) = (course.more, course.more + 1);
+        assert!(mover.adopt(&Course { more, whole: false, ..course }, start, bounds));
+        mover.settle();
+        now = now.max(take(&mut mover, steps));
+        let stop = mover.stop_from(now).unwrap().end;
+        assert!(stop.0 <= end && stop.0 + 1 == mover.more, "{stop:?} {end}");
+        mover.move_to([0, 0], 1000, now).unwrap();
+        mover.resume(now);
+        take(&mut mover, 150 - steps);
+        assert_eq!(mover.commanded(), [400, 0]);
+        while mover.pulse().is_some() {}
+        assert_eq!((mover.commanded(), mover.is_empty()), ([0, 0], true));
+    }
+}
+
 #[test]
 fn a_curve_without_the_steps_that_remain_is_not_begun() {
     let mut mover = mover([(5000, 50_000); 2], 1000, &[[100, 0]]);
