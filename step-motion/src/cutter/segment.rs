@@ -239,12 +239,13 @@ mod tests {
         );
     }
 
-    /// A piece of 2^16 steps and 2^30 ticks whose slower end has half the mean speed; how far off they may be, in moments.
-    fn part(back: bool, off: Real) -> Part {
-        let (mut curve, slow) = (Curve::new(), Real::ONE.scaled(-25));
+    /// A piece of so many steps, as a power of 2, and 2^30 ticks, whose slower end has half the mean speed; how far off they may be, in
+    /// moments.
+    fn part(steps: i32, back: bool, off: Real) -> Part {
+        let (mut curve, slow) = (Curve::new(), Real::ONE.scaled(steps - 41));
         let v = if back { slow + slow.scaled(1) } else { slow };
-        let state = [v, Real::ONE.scaled(-64), Real::ZERO];
-        curve.push((Real::new(1 << 40), Real::new(1 << 16)), state, !back, Bend::Flat);
+        let state = [v, Real::ONE.scaled(steps - 80), Real::ZERO];
+        curve.push((Real::new(1 << 40), Real::new(1 << steps)), state, !back, Bend::Flat);
         let frame = Frame { to: None, ..Frame::rest(10, 0, 0) };
         Part::new(&Slower::new(&curve, &frame, curve.piece(0).unwrap()), &frame, off)
     }
@@ -253,7 +254,7 @@ mod tests {
     #[test]
     fn a_first_estimate() {
         for back in [false, true] {
-            let part = part(back, Real::ZERO);
+            let part = part(16, back, Real::ZERO);
             for time in [1 << 61, 3 << 62, 5 << 61, 15 << 60] {
                 let begin = part.spot(time).unwrap();
                 for most in (16..40).map(|by| 1 << by) {
@@ -270,14 +271,16 @@ mod tests {
     /// A segment begins at the next step: if that is more than a step ahead, there is none.
     #[test]
     fn a_segment_begins_at_a_step() {
-        for back in [false, true] {
-            let part = part(back, Real::ONE);
+        for (steps, back) in [(16, false), (16, true), (22, false), (22, true)] {
+            let part = part(steps, back, Real::ONE);
+            // As long as 32 steps.
+            let about = Some(1 << (69 - steps));
             let demand = Demand { off: Real::ZERO, coarse: None, time: u64::MAX };
             let begin = part.spot(1 << 63).unwrap();
-            let next = (0..1 << 16).find(|count| part.ahead(begin.way, part.place(*count)).is_some()).unwrap();
+            let next = (0..1 << steps).find(|count| part.ahead(begin.way, part.place(*count)).is_some()).unwrap();
             for (more, some) in [(-1, false), (0, true), (1, false), (9, false)] {
-                let got = part.many((next.wrapping_add_signed(more), 1000), &begin, None, &demand);
-                assert_eq!(got.is_some(), some, "{more} {back}");
+                let got = part.many((next.wrapping_add_signed(more), 1000), &begin, about, &demand);
+                assert_eq!(got.is_some(), some, "{more} {steps} {back}");
             }
         }
     }
