@@ -6,7 +6,7 @@ use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ParameterValue,
 use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Progress};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
-    Response32, SubCode, TypeCode,
+    Response32, StatusFlags, SubCode, TypeCode,
 };
 
 /// Homing in the drive: Homing_Complete of an earlier homing is not the end of this one.
@@ -33,6 +33,28 @@ fn homing_ends_when_this_homing_ends() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let mut home = Home::new(0xc8, 5);
     assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Failed { error: Failure::Mode });
+}
+
+/// A drive that homes where it is and is done when it answers: that is believed after a turn of the counter and a block more.
+#[test]
+fn homing_without_a_motion_takes_five_blocks() {
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
+    let mut home = Home::new(0xc8, 1_000);
+    let (mut answered, mut blocks) = (false, 0);
+    let mut response = *pair.received.response().unwrap();
+    for _ in 0..100 {
+        pair.update();
+        blocks += u32::from(answered);
+        answered |= response.code.get() == 0x14;
+        response = *pair.received.response().unwrap();
+        response.status.set(StatusFlags::IN_PROGRESS, false);
+        response.status.set(StatusFlags::HOMING_COMPLETE, answered || response.code.get() == 0x14);
+        pair.received = Response::parse(&response.emit()).into();
+        if !home.receive(&mut pair.axis).is_pending() {
+            break;
+        }
+    }
+    assert_eq!((home.receive(&mut pair.axis), blocks), (Progress::Done { value: () }, 5));
 }
 
 /// Type 21h sets the actual position, 22h the command position; both are sent once and read back.
