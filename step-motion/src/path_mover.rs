@@ -56,7 +56,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     whole: bool,
     /// The limits that its curve keeps.
     bounds: Option<Bounds>,
-    /// What was asked for last does not fit on the rest of the present line: it is planned on the next one.
+    /// The speed that was asked for last does not fit on the rest of the present line: it is planned on the next one. A brake that does
+    /// not fit is not, or a hold would be shorter than a stop.
     late: bool,
     /// Steps of the first line that have been made.
     made: [u32; N],

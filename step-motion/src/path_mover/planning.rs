@@ -171,7 +171,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
         let from = (start.place, start.before);
-        self.late = true;
+        self.late = self.part().is_some();
         let course = match self.part() {
             Some(part) => self.path.course(0, motion, from, (part, self.bounds)),
             None => self.path.brake(0, motion, from, (self.bounds, self.braking)),

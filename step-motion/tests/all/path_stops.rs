@@ -132,3 +132,27 @@ fn a_curve_that_is_planned_again_goes_on_in_the_same_tick() {
         assert!(all.len() == late.len() && other <= 4, "{length}: {other} of {}", all.len());
     }
 }
+
+/// A brake that does not fit on what is left of a line, because the line behind it may have more jerk, begins at the joint; a hold does
+/// so no sooner than a stop.
+#[test]
+fn a_stop_that_does_not_fit_is_no_longer_than_a_hold() {
+    let limits = Limits::new(1232, 335_629).unwrap().with_jerk(373_964).unwrap();
+    let setup = AxisSetup::new(limits, 478_936);
+    for at in (0..160_000).step_by(500) {
+        let mut machine = Machine::new(Path::new(Clock::MICROSECONDS, [setup; 2], 0).unwrap());
+        machine.hold(0);
+        machine.push([43, 0], 300_000, 1).unwrap();
+        machine.push([148, 0], 300_000, 2).unwrap();
+        machine.resume(3);
+        while machine.due().is_some_and(|due| due <= at) {
+            machine.pulse();
+        }
+        let left = |mut machine: Machine| core::iter::from_fn(|| machine.pulse()).count();
+        let (mut held, mut stopped) = (machine.clone(), machine);
+        held.hold(at);
+        stopped.stop(at);
+        let (held, stopped) = (left(held), left(stopped));
+        assert!(stopped <= held, "at {at}: {stopped} steps of a stop, {held} of a hold");
+    }
+}
