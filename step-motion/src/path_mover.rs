@@ -1,15 +1,15 @@
 //! A path that can be held, slowed down and abandoned at any time.
 
+mod cutting;
 mod planning;
 
-use crate::cutter::{Cut, Demand, Slice, Stretch};
+use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::line::{AxisPulse, Line, LinePulses, Steps};
+use crate::line::{AxisPulse, LinePulses, Steps};
 use crate::path::Path;
 use crate::plan::Setpoint;
 use crate::real::Real;
-use crate::stepper::tick;
 
 /// Runs the lines of a [`Path`] and takes requests at any tick: feed hold, feed override, lines added while it moves, and a
 /// new target.
@@ -116,17 +116,13 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
         self.path.clone_from(path);
         self.line.clone_from(line);
         (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
-        self.late = *late;
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
         (self.free, self.steps, self.left, self.percent) = (*free, *steps, *left, *percent);
-        self.ended = *ended;
+        (self.ended, self.late) = (*ended, *late);
         (self.held, self.braking, self.stopping) = (*held, *braking, *stopping);
         (self.quick, self.halted) = (*quick, *halted);
     }
 }
-
-/// Half a tick, in times.
-const HALF: i128 = 1 << 31;
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Creates a mover at rest at the present end of `path`. The lines in it begin with the first request.
@@ -341,98 +337,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.clock()
     }
 
-    /// Prepares the mover for [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
-    pub(super) const fn cutting(self) -> Self {
-        Self { steps: Steps::Stretches, ..self }
-    }
-
-    /// Does a slice of the work for the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse).
-    pub(super) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Cut {
-        if self.ended {
-            self.ended = self.go_over();
-            return Cut::More;
-        }
-        self.cut_line(at, demand, until).unwrap_or(Cut::Later)
-    }
-
-    /// Does the same on the present line; `None` if the axis has no step there before that tick.
-    fn cut_line(&mut self, at: usize, demand: &Demand, until: u64) -> Option<Cut> {
-        let line = self.line.as_mut()?;
-        let due = line.due.get_mut(at)?;
-        let left = self.left.get_mut(at)?;
-        let soonest = (*due)?;
-        let stretch = match left.take().map_or_else(|| line.slice(at, demand), Slice::Steps) {
-            Slice::Steps(stretch) => stretch,
-            Slice::More => return Some(Cut::More),
-            Slice::End => {
-                line.set_due(at, None);
-                return None;
-            }
-        };
-        let first = tick(stretch.first).max(soonest);
-        if first >= until {
-            *left = Some(stretch);
-            line.set_due(at, Some(first));
-            return None;
-        }
-        let (stretch, later) = stretch.split((i128::from(until) << 32).saturating_sub(HALF));
-        *left = later;
-        let free = tick(stretch.last()).max(first).saturating_add(1);
-        line.set_due(at, (later.is_some() || line.has_more(at)).then_some(free));
-        let direction = line.directions.get(at).copied()?;
-        if let (Some(made), Some(own), Some(position)) =
-            (self.made.get_mut(at), self.free.get_mut(at), self.commanded.get_mut(at))
-        {
-            (*made, *own) = (made.saturating_add(stretch.count.into()), free);
-            let count = i64::from(stretch.count);
-            *position = position.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
-        }
-        self.ended = line.first().is_none();
-        Some(Cut::Steps(stretch, direction))
-    }
-
-    /// The tick at which the present plan ends.
-    pub(super) fn over(&self) -> u64 {
-        let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
-        over.div_ceil(self.clock().moment(1))
-    }
-
-    /// Returns the line that a push would add.
-    pub(super) fn line_to(&mut self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
-        self.ready()?;
-        self.path.line_to(target, feed)
-    }
-
-    /// Does the same as [`push`](Self::push) with a line that [`line_to`](Self::line_to) has returned, but the present motion
-    /// ignores the line until [`look_ahead`](Self::look_ahead) is called.
-    pub(super) fn append(&mut self, line: Option<Line<N>>, target: [i64; N], now: u64) {
-        if let Some(line) = line {
-            self.path.add(line, target);
-        }
-        self.halted = false;
-        if self.line.is_none() {
-            self.replan(now);
-        }
-    }
-
-    /// Returns whether a line of another mover would be the same here.
-    pub(super) fn ends_as(&self, other: &Self) -> bool {
-        !self.quick && self.path.ends_as(&other.path)
-    }
-
-    /// Sets the deviation at corners, for lines appended from now on.
-    pub(super) fn set_deviation(&mut self, deviation: u32) {
-        self.path.set_deviation(deviation);
-    }
-
-    /// Does a slice of the work for [`look_ahead`](Self::look_ahead), and for a stop on these lines. Returns whether there is more
-    /// of it.
-    pub(super) fn has_to_find(&mut self) -> bool {
-        let at = if self.line.is_some() { self.more } else { 0 };
-        let part = self.part().unwrap_or(self.path.part());
-        self.path.find_exit(at, part).is_none()
-    }
-
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
         if self.line.is_none() {
@@ -441,19 +345,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if let Some(part) = self.part().filter(|part| self.path.exit(self.more, *part) != self.wish) {
             self.plan_better(now, part);
         }
-    }
-
-    /// Continues as another mover would, from a rest after a stop that was not requested.
-    pub(super) fn go_on_as(&mut self, other: &Self, now: u64) {
-        (self.held, self.percent) = (other.held, other.percent);
-        self.replan(now);
-    }
-
-    /// Records a halt at a position.
-    pub(super) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
-        self.halt(now);
-        (self.commanded, self.halted) = (commanded, was_moving);
-        self.leave(now);
     }
 
     /// Refuses lines during a quick stop, which ends when no step is to come.

@@ -159,7 +159,7 @@ impl Mover {
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
         }
         self.direction = direction;
-        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
+        let frame = Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0);
         if self.plan(direction, Motion::steady(Real::ZERO), frame, bounds) {
             self.adopt();
         } else {

@@ -4,47 +4,16 @@
 use proptest::prelude::*;
 use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
 
+use crate::straight::{cases, request};
+
 const HZ: u32 = 100_000_000;
 /// In µm, at 100 steps/mm.
 const DEVIATION: u32 = 10;
 
 type Machine = PathMover<2, 6>;
 
-#[derive(Debug, Clone, Copy)]
-enum Request {
-    Push([i64; 2], u32),
-    MoveTo(i64),
-    Override(u16),
-    Hold,
-    Resume,
-    Stop,
-}
-
-impl Request {
-    fn tell(self, machine: &mut Machine, now: u64) {
-        let (target, at) = (machine.target(), machine.commanded());
-        match self {
-            Self::Push([x, y], feed) => drop(machine.push([target[0] + x, target[1] + y], feed, now)),
-            Self::MoveTo(by) => drop(machine.move_to([at[0] + by, at[1]], 50_000, now)),
-            Self::Override(percent) => machine.set_override(percent, now),
-            Self::Hold => machine.hold(now),
-            Self::Resume => machine.resume(now),
-            Self::Stop => machine.stop(now),
-        }
-    }
-}
-
-fn request() -> impl Strategy<Value = Request> {
-    let feed = prop_oneof![4 => Just(50_000_u32), 1 => 5000..50_000_u32];
-    let across = prop_oneof![6 => Just(0), 1 => -3..3_i64];
-    prop_oneof![
-        12 => (20..300_i64, across, feed).prop_map(|(x, y, feed)| Request::Push([x, y], feed)),
-        1 => (-200..600_i64).prop_map(Request::MoveTo),
-        2 => (20..200_u16).prop_map(Request::Override),
-        3 => Just(Request::Hold),
-        4 => Just(Request::Resume),
-        2 => Just(Request::Stop),
-    ]
+fn way() -> impl Strategy<Value = [i64; 2]> {
+    (20..300_i64, prop_oneof![6 => Just(0), 1 => -3..3_i64]).prop_map(|(x, y)| [x, y])
 }
 
 /// The ticks of the last two steps of the first axis.
@@ -66,18 +35,13 @@ fn until(machine: &mut Machine, last: &mut [Option<u64>; 2], a: f64, time: u64) 
     Ok(())
 }
 
-/// How many sequences, and how many in the nightly run.
-fn cases() -> u32 {
-    std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases()))]
 
     #[test]
     fn a_path_nearly_along_an_axis_comes_to_rest(
         (v, a, j) in (1000..5000_u32, 10_000..100_000_u32, 200_000..50_000_000_u64), less in [30..200_u32, 30..200_u32],
-        requests in prop::collection::vec((request(), 0..4_000_000_u64), 4..24),
+        requests in prop::collection::vec((request(way()), 0..4_000_000_u64), 4..24),
     ) {
         let limits = Limits::new(v, a).unwrap().with_jerk(j).unwrap();
         let across = Limits::new(v, a * less[0] / 1000 + 1).unwrap().with_jerk(j * u64::from(less[1]) / 1000 + 1).unwrap();

@@ -76,9 +76,11 @@ impl Track {
     }
 }
 
+/// What is asked of a path of `N` axes that leads along the first one.
 #[derive(Debug, Clone, Copy)]
-enum Request {
-    Push(i64, u32),
+pub(crate) enum Request<const N: usize> {
+    /// On from the target, by so many steps.
+    Push([i64; N], u32),
     MoveTo(i64),
     Override(u16),
     Hold,
@@ -86,11 +88,21 @@ enum Request {
     Stop,
 }
 
-impl Request {
-    fn tell(self, machine: &mut PathMover<1, 6>, now: u64) {
+/// `at`, and so many steps on along the first axis.
+fn along<const N: usize>(mut at: [i64; N], by: i64) -> [i64; N] {
+    at[0] += by;
+    at
+}
+
+fn on<const N: usize>(from: [i64; N], by: [i64; N]) -> [i64; N] {
+    core::array::from_fn(|axis| from[axis] + by[axis])
+}
+
+impl<const N: usize> Request<N> {
+    pub(crate) fn tell(self, machine: &mut PathMover<N, 6>, now: u64) {
         match self {
-            Self::Push(by, feed) => drop(machine.push([machine.target()[0] + by], feed, now)),
-            Self::MoveTo(by) => drop(machine.move_to([machine.commanded()[0] + by], 50_000, now)),
+            Self::Push(by, feed) => drop(machine.push(on(machine.target(), by), feed, now)),
+            Self::MoveTo(by) => drop(machine.move_to(along(machine.commanded(), by), 50_000, now)),
             Self::Override(percent) => machine.set_override(percent, now),
             Self::Hold => machine.hold(now),
             Self::Resume => machine.resume(now),
@@ -99,10 +111,11 @@ impl Request {
     }
 }
 
-fn request() -> impl Strategy<Value = Request> {
+/// Mostly lines, by the given ways.
+pub(crate) fn request<const N: usize>(way: impl Strategy<Value = [i64; N]>) -> impl Strategy<Value = Request<N>> {
     let feed = prop_oneof![4 => Just(50_000_u32), 1 => 5000..50_000_u32];
     prop_oneof![
-        12 => (20..300_i64, feed).prop_map(|(by, feed)| Request::Push(by, feed)),
+        12 => (way, feed).prop_map(|(by, feed)| Request::Push(by, feed)),
         1 => (-200..600_i64).prop_map(Request::MoveTo),
         2 => (20..200_u16).prop_map(Request::Override),
         3 => Just(Request::Hold),
@@ -150,11 +163,11 @@ impl Halves {
         Self { axes, machine: Machine::new(timer), track: Track { exact: false, ..Track::of(most) }, looked_at: 0 }
     }
 
-    fn tell(&mut self, request: Request) {
+    fn tell(&mut self, request: Request<1>) {
         let axes = &mut self.axes;
         match request {
-            Request::Push(by, feed) => drop(axes.push([axes.target()[0] + by], feed)),
-            Request::MoveTo(by) => drop(axes.move_to([axes.commanded()[0] + by], 50_000)),
+            Request::Push(by, feed) => drop(axes.push(on(axes.target(), by), feed)),
+            Request::MoveTo(by) => drop(axes.move_to(along(axes.commanded(), by), 50_000)),
             Request::Override(percent) => axes.set_override(percent),
             Request::Hold => axes.hold(),
             Request::Resume => axes.resume(),
@@ -180,7 +193,7 @@ impl Halves {
 }
 
 /// How many sequences, and how many in the nightly run.
-fn cases() -> u32 {
+pub(crate) fn cases() -> u32 {
     std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
 }
 
@@ -190,7 +203,7 @@ proptest! {
     #[test]
     fn a_straight_path_keeps_its_limits(
         most in prop_oneof![Just(MOST), (500..5000_u32, 5000..200_000_u32, 200_000..50_000_000_u64)],
-        requests in prop::collection::vec((request(), 0..40_000_000_u64), 4..24),
+        requests in prop::collection::vec((request([20..300_i64]), 0..40_000_000_u64), 4..24),
     ) {
         let (mut machine, mut track, mut now) = (machine(most), Track::of(most), 0);
         for (request, wait) in requests {
@@ -210,7 +223,7 @@ proptest! {
     #[test]
     fn a_straight_path_in_two_halves(
         most in prop_oneof![Just(MOST), (500..5000_u32, 5000..200_000_u32, 200_000..50_000_000_u64)],
-        requests in prop::collection::vec((request(), 0..40_000_000_u64, 0..6_u8), 4..24),
+        requests in prop::collection::vec((request([20..300_i64]), 0..40_000_000_u64, 0..6_u8), 4..24),
     ) {
         let mut halves = Halves::of(most);
         for (request, wait, here) in requests {
@@ -226,7 +239,7 @@ proptest! {
 }
 
 /// What is asked of a machine, with the wait after each request in ns.
-fn ask(machine: &mut PathMover<1, 6>, requests: &[(Request, u64)]) {
+fn ask(machine: &mut PathMover<1, 6>, requests: &[(Request<1>, u64)]) {
     let (mut track, mut now) = (Track::of(MOST), 0);
     for &(request, wait) in requests {
         request.tell(machine, now);
@@ -244,7 +257,7 @@ fn ask(machine: &mut PathMover<1, 6>, requests: &[(Request, u64)]) {
 #[test]
 fn a_speed_from_which_only_a_stop_is_possible() {
     use Request::{Override, Push};
-    let push = |by, wait| (Push(by, 50_000), wait);
+    let push = |by, wait| (Push([by], 50_000), wait);
     let lines =
         [(199, 39_299_024), (49, 13_545_461), (203, 9_237_832), (195, 57_804_610), (139, 5_037_632), (79, 32_383_257)];
     for wait in (0..40).map(|step| step * 1_000_000) {
@@ -264,11 +277,11 @@ fn a_speed_from_which_only_a_stop_is_possible() {
 fn a_line_behind_a_stop_that_nobody_asked_for() {
     use Request::{Override, Push};
     let requests = [
-        (Push(226, 30_079), 8_610_351),
-        (Push(20, 50_000), 0),
-        (Push(23, 9367), 16_789_480),
+        (Push([226], 30_079), 8_610_351),
+        (Push([20], 50_000), 0),
+        (Push([23], 9367), 16_789_480),
         (Override(191), 5_159_296),
-        (Push(31, 50_000), 25_848_195),
+        (Push([31], 50_000), 25_848_195),
     ];
     ask(&mut machine(MOST), &requests);
 }
@@ -277,7 +290,7 @@ fn a_line_behind_a_stop_that_nobody_asked_for() {
 #[test]
 fn a_stop_at_a_joint_is_one_on_the_line_before() {
     use Request::{Hold, MoveTo, Override, Push, Resume};
-    let push = |by, wait| (Push(by, 50_000), wait);
+    let push = |by, wait| (Push([by], 50_000), wait);
     let requests = [
         push(76, 1_750_533),
         push(256, 5_167_294),

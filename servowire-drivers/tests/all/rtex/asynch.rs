@@ -21,12 +21,20 @@ fn waiting<W: Drawn, T: Timer>(ring: &Shared, timer: impl Fn(Watch) -> T) -> Dri
 struct Pin {
     ring: Shared,
     lost: bool,
+    /// It reports a fault at once.
+    broken: bool,
     /// From the edge to the poll that sees it.
     late_ns: u64,
 }
 
+impl Pin {
+    fn of(ring: &Shared) -> Self {
+        Self { ring: ring.clone(), lost: false, broken: false, late_ns: 0 }
+    }
+}
+
 impl embedded_hal::digital::ErrorType for Pin {
-    type Error = std::convert::Infallible;
+    type Error = embedded_hal::digital::ErrorKind;
 }
 
 impl embedded_hal_async::digital::Wait for Pin {
@@ -43,6 +51,9 @@ impl embedded_hal_async::digital::Wait for Pin {
     }
 
     async fn wait_for_falling_edge(&mut self) -> Result<(), Self::Error> {
+        if self.broken {
+            return Err(Self::Error::Other);
+        }
         let edge_ns = self.ring.borrow().next_frame_ns() + self.late_ns;
         poll_fn(|_| {
             let past = self.ring.borrow().now_ns >= edge_ns;
@@ -60,7 +71,7 @@ impl embedded_hal_async::digital::Wait for Pin {
 fn a_lost_edge_is_healed_by_the_clock() {
     let ring = Ring::new(false, false);
     let mut driver = waiting::<u16, _>(&ring, Looks);
-    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    let mut pin = Pin::of(&ring);
     for k in 0..20 {
         pin.lost = k % 5 == 4;
         ring.borrow_mut().let_in();
@@ -78,7 +89,7 @@ fn an_edge_that_is_noticed_late_tears_no_exchange() {
     for lost in [false, true] {
         let ring = Ring::new(false, false);
         let mut driver = waiting::<u16, _>(&ring, Looks);
-        let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+        let mut pin = Pin::of(&ring);
         run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
         let words = (AXES + 1) * 8;
         for at in 0..words {
@@ -110,7 +121,7 @@ fn an_edge_that_is_noticed_late_tears_no_exchange() {
 fn a_future_may_be_dropped_at_any_point() {
     let ring = Ring::new(false, false);
     let mut driver = waiting::<u32, _>(&ring, Looks);
-    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    let mut pin = Pin::of(&ring);
     for polls in 0.. {
         move_on(&mut driver);
         let edge_ns = ring.borrow().next_frame_ns();
@@ -133,44 +144,16 @@ fn a_future_may_be_dropped_at_any_point() {
     }
 }
 
-/// A pin that reports a fault at once.
-struct Broken;
-
-impl embedded_hal::digital::ErrorType for Broken {
-    type Error = embedded_hal::digital::ErrorKind;
-}
-
-impl embedded_hal_async::digital::Wait for Broken {
-    async fn wait_for_high(&mut self) -> Result<(), Self::Error> {
-        unreachable!()
-    }
-
-    async fn wait_for_low(&mut self) -> Result<(), Self::Error> {
-        unreachable!()
-    }
-
-    async fn wait_for_rising_edge(&mut self) -> Result<(), Self::Error> {
-        unreachable!()
-    }
-
-    async fn wait_for_falling_edge(&mut self) -> Result<(), Self::Error> {
-        Err(embedded_hal::digital::ErrorKind::Other)
-    }
-
-    async fn wait_for_any_edge(&mut self) -> Result<(), Self::Error> {
-        unreachable!()
-    }
-}
-
 /// A pin that fails is a lost edge: the exchange comes one and a half periods later, and not at once.
 #[test]
 fn a_pin_that_fails_is_a_lost_edge() {
     let ring = Ring::new(false, false);
     let mut driver = waiting::<u16, _>(&ring, Steps);
+    let mut pin = Pin { broken: true, ..Pin::of(&ring) };
     for _ in 0..4 {
         ring.borrow_mut().let_in();
         let from_ns = ring.borrow().now_ns;
-        let Period { began, .. } = run(driver.next(&mut Broken), FOR_EVER).unwrap().unwrap();
+        let Period { began, .. } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
         assert_eq!(began, Began::Clock);
         assert!(ring.borrow().now_ns - from_ns >= COM_NS * 3 / 2);
     }
@@ -220,7 +203,7 @@ fn hostile_events_are_over_with_the_next_call() {
 fn hostile<W: Drawn>(draw: &mut Draw, kinds: &mut [u64; KINDS + 2]) {
     let ring = Ring::new(false, draw.below(2) == 1);
     let mut driver = waiting::<W, _>(&ring, Steps);
-    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    let mut pin = Pin::of(&ring);
     for count in 0..2_000 {
         let kind = draw.below(kinds.len() as u64) as usize;
         kinds[kind] += 1;
@@ -262,7 +245,7 @@ fn hostile_stops_release_every_motor() {
 fn hostile_stops<W: Drawn>(draw: &mut Draw, kinds: &mut [u64; stops::KINDS]) {
     let ring = Ring::new(false, draw.below(2) == 1);
     let mut driver = waiting::<W, _>(&ring, Steps);
-    let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+    let mut pin = Pin::of(&ring);
     let mut of_the_pin = Draw::seeded(draw.below(1 << 31));
     // The steps of the clock.
     stops::hostile(&ring, &mut driver, draw, kinds, 20_000, |driver| {
