@@ -254,7 +254,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free));
         }
         (self.origin, self.made, self.left) = (self.commanded, [0; N], [None; N]);
-        if self.late && !self.stopping {
+        if self.late && !self.brakes() {
             self.plan(0);
         }
     }

@@ -335,3 +335,36 @@ fn a_stop_during_a_hold_is_that_hold() {
     let after = ending(&machine, 52_105);
     assert_eq!((after.steps, after.rest), (before.steps, before.rest));
 }
+
+/// A hold that cannot be left before the next line, and is asked for again: it stays what it was, as a stop does.
+#[test]
+fn a_hold_that_could_not_be_left_is_the_same_hold() {
+    let limits = |v, a, j| Limits::new(v, a).unwrap().with_jerk(j).unwrap();
+    let axes = [
+        AxisSetup::new(limits(31_449, 4342, 557_960), 42_475),
+        AxisSetup::new(limits(2026, 8000, 1_545_779_475), 40_029),
+    ];
+    let mut machine = Machine::new(Path::new(Clock::MICROSECONDS, axes, 558).unwrap());
+    for (to, feed, at) in
+        [([178, 6], 151_546, 0), ([293, 13], 114_387, 291), ([581, 9], 300_000, 265_107), ([805, 9], 300_000, 265_107)]
+    {
+        while machine.due().is_some_and(|due| due <= at) {
+            machine.pulse();
+        }
+        machine.push(to, feed, at).unwrap();
+    }
+    while machine.due().is_some_and(|due| due <= 277_505) {
+        machine.pulse();
+    }
+    machine.hold(277_505);
+    while machine.due().is_some_and(|due| due <= 290_454) {
+        machine.pulse();
+    }
+    let before = ending(&machine, 290_454);
+    machine.resume(290_454);
+    machine.hold(290_454);
+    let again = ending(&machine, 290_454);
+    machine.stop(290_454);
+    let stop = ending(&machine, 290_454);
+    assert_eq!([again, stop].map(|end| (end.steps, end.rest)), [(before.steps, before.rest); 2]);
+}
