@@ -10,10 +10,11 @@ use servowire_core::Direction;
 use crate::axes_timer::{AxesQueue, AxesTimer};
 use crate::axis::{COARSE, EXACT, Work};
 use crate::error::Error;
+use crate::halts::Halts;
 use crate::limits::Limits;
 use crate::path::Path;
 use crate::path_mover::PathMover;
-use crate::queue::{IDLE, Queue, TICKET};
+use crate::queue::{IDLE, Queue};
 use crate::real::Real;
 use crate::writer::{LONGEST, Writer};
 
@@ -95,9 +96,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     /// The plan cannot be run.
     lost: bool,
     turn: u32,
-    /// The halt that the interrupt has not confirmed.
-    halt: Option<u32>,
-    ticket: u32,
+    halts: Halts,
 }
 
 /// The present work of the background.
@@ -163,8 +162,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             pending: false,
             lost: false,
             turn: 0,
-            halt: None,
-            ticket: 0,
+            halts: Halts::NONE,
         };
         (axes, AxesTimer::new(queue))
     }
@@ -205,7 +203,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Returns whether the interrupt is stopped and no motion is pending (or it is on hold).
     pub fn is_at_rest(&self) -> bool {
-        self.halt.is_none() && self.standing && !self.pending && self.path.due().is_none()
+        !self.halts.is_pending() && self.standing && !self.pending && self.path.due().is_none()
     }
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
@@ -250,8 +248,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
-        self.begin_anew();
         self.path.move_to(target, feed, self.end)?;
+        self.begin_anew();
         self.tell_stops(|_, stop, end| stop.move_to(target, feed, end));
         Ok(())
     }
@@ -304,22 +302,20 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Makes no further step from now on: the interrupt sees this without the queue. Lines are refused until the interrupt
-    /// has been called once more, which [`poll`](Self::poll) asks for.
+    /// has been called once more, which [`poll`](Self::poll) asks for; other requests count from then on.
     pub fn halt(&mut self) {
-        self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
-        self.ticket = self.ticket.max(1);
         if let Some(queue) = self.queue.axes.first() {
-            queue.halt.store(self.ticket, Ordering::Release);
+            self.halts.ask(&queue.halt);
         }
-        self.halt = Some(self.ticket);
+        self.path.ask_halt();
         self.begin_anew();
     }
 
     /// Does a slice of the background's work: a segment, a plan, or a check of the interrupt. Call it until it returns
     /// anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach).
     pub fn poll(&mut self) -> Work {
-        if let Some(ticket) = self.halt {
-            return self.confirm(ticket);
+        if let Some(report) = self.halts.report() {
+            return self.confirm(report);
         }
         if self.pending && self.is_in(1_usize.wrapping_sub(self.block)) {
             (self.pending, self.standing) = (false, false);
@@ -395,8 +391,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
     }
 
+    /// Refuses motion until a halt has been seen, and during a quick stop.
     fn ready(&self) -> Result<(), Error> {
-        if self.halt.is_some() { Err(Error::Moving) } else { Ok(()) }
+        self.halts.ready()?;
+        self.path.ready(self.is_at_rest())
     }
 
     /// Forgets what has been cut but not handed out.
@@ -405,9 +403,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self, ticket: u32) -> Work {
-        let parked = IDLE | ticket << TICKET;
-        if self.queue.axes.iter().any(|queue| queue.current.load(Ordering::Acquire) != parked) {
+    fn confirm(&mut self, report: u32) -> Work {
+        if self.queue.axes.iter().any(|queue| queue.current.load(Ordering::Acquire) != report) {
             return Work::Start;
         }
         let commanded = self.commanded();
@@ -415,9 +412,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.path.halt_at(commanded, self.end, was_moving);
         self.stand([None; N]);
         if let Some(queue) = self.queue.axes.first() {
-            queue.halt.store(0, Ordering::Release);
+            self.halts.confirmed(&queue.halt);
         }
-        self.halt = None;
         Work::More
     }
 

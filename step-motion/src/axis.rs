@@ -9,10 +9,11 @@ use servowire_core::Direction;
 use self::drafting::UNSEEN;
 use crate::cutter::Demand;
 use crate::error::Error;
+use crate::halts::Halts;
 use crate::limits::{Clock, Limits};
 use crate::mover::Mover;
 use crate::mover::cutting::News;
-use crate::queue::{IDLE, NONE, Queue, TICKET};
+use crate::queue::{NONE, Queue};
 use crate::real::Real;
 use crate::step_timer::StepTimer;
 use crate::writer::{LONGEST, Writer, tick};
@@ -106,9 +107,7 @@ pub struct Axis<'q, const N: usize> {
     marks: [Mark; N],
     /// The plan cannot be run; nothing is made until the interrupt is stopped.
     lost: bool,
-    /// The halt that the interrupt has not confirmed.
-    halt: Option<u32>,
-    ticket: u32,
+    halts: Halts,
 }
 
 /// The present work of the background.
@@ -212,8 +211,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             out: [Out::NONE; 2],
             marks: [Mark::default(); N],
             lost: false,
-            halt: None,
-            ticket: 0,
+            halts: Halts::NONE,
         };
         Ok((axis.with_reach(clock.hz() / 100), timer))
     }
@@ -256,7 +254,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             Stage::Linked if self.is_in(slot) => (&self.work, &self.writer),
             _ => return false,
         };
-        let new = self.halt.is_some() || self.news != News::None;
+        let new = self.halts.is_pending() || self.news != News::None;
         !new && running.is_none() && mover.is_at_rest(tick(end.end))
     }
 
@@ -295,13 +293,13 @@ impl<'q, const N: usize> Axis<'q, N> {
 
     /// Does the same as [`Mover::hold`].
     pub fn hold(&mut self) {
-        self.mover.ask_hold(true);
+        self.mover.ask_hold();
         self.asked(News::Change);
     }
 
     /// Does the same as [`Mover::resume`].
     pub fn resume(&mut self) {
-        self.mover.ask_hold(false);
+        self.mover.ask_resume();
         self.asked(News::Change);
     }
 
@@ -318,16 +316,14 @@ impl<'q, const N: usize> Axis<'q, N> {
     }
 
     /// Makes no further step from now on: the interrupt sees this without the queue. Moves are refused until the interrupt
-    /// has been called once more, which [`poll`](Self::poll) asks for.
+    /// has been called once more, which [`poll`](Self::poll) asks for; other requests count from then on.
     pub fn halt(&mut self) {
         self.look();
-        self.ticket = self.ticket.wrapping_add(1) & (IDLE >> TICKET).wrapping_sub(1);
-        self.ticket = self.ticket.max(1);
         if let Some(slot) = self.queue.slots.first() {
             slot.next.store(NONE, Ordering::Relaxed);
         }
-        self.queue.halt.store(self.ticket, Ordering::Release);
-        self.halt = Some(self.ticket);
+        self.halts.ask(&self.queue.halt);
+        self.mover.ask_halt();
         self.seen = UNSEEN;
         (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
@@ -359,9 +355,7 @@ impl<'q, const N: usize> Axis<'q, N> {
 
     /// Refuses moves until a halt has been seen, and during a quick stop.
     fn ready(&mut self) -> Result<(), Error> {
-        if self.halt.is_some() {
-            return Err(Error::Moving);
-        }
+        self.halts.ready()?;
         self.look();
         self.mover.ready(self.is_at_rest())
     }

@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::phases::Phases;
 use crate::plan::{Setpoint, checked, clamp};
+use crate::requests::Requests;
 use crate::stepper::Stepper;
 use servowire_core::Direction;
 
@@ -26,23 +27,12 @@ pub struct Pulse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Aim {
-    /// Come to rest.
+    /// None: to rest.
     Rest,
     /// Be at a position.
     At(i64),
     /// Keep a speed, in steps/s.
     Run(Direction, u32),
-}
-
-/// All requests in force.
-#[derive(Debug, Clone, Copy)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Wish {
-    aim: Aim,
-    held: bool,
-    percent: u16,
-    /// The limits of a quick stop in progress, until the axis is at rest.
-    quick: Option<Bounds>,
 }
 
 /// An axis whose target, speed and override may change at any tick.
@@ -88,7 +78,10 @@ pub struct Mover {
     due: Option<u64>,
     /// Earliest tick at which it may come.
     free: u64,
-    wish: Wish,
+    aim: Aim,
+    requests: Requests,
+    /// The limits of a quick stop in progress.
+    quick: Bounds,
     soft: Option<(i64, i64)>,
     /// Ticks of rest before the direction changes.
     pause: u32,
@@ -99,7 +92,6 @@ pub struct Mover {
     dir: Option<Direction>,
     /// The present plan is a stop.
     braking: bool,
-    halted: bool,
 }
 
 /// By hand, because the derived `clone_from` copies it twice.
@@ -119,10 +111,11 @@ impl Mover {
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock.
     pub fn new(clock: Clock, limits: Limits) -> Result<Self, Error> {
+        let bounds = checked(clock, limits)?;
         Ok(Self {
             clock,
             limits,
-            bounds: checked(clock, limits)?,
+            bounds,
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
             cuts: false,
@@ -133,14 +126,15 @@ impl Mover {
             commanded: 0,
             due: None,
             free: 0,
-            wish: Wish { aim: Aim::Rest, held: false, percent: 100, quick: None },
+            aim: Aim::Rest,
+            requests: Requests::NONE,
+            quick: bounds,
             soft: None,
             pause: 0,
             turn: None,
             idle: 0,
             dir: Some(Direction::Forward),
             braking: false,
-            halted: false,
         })
     }
 
@@ -208,7 +202,7 @@ impl Mover {
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.
     pub const fn is_halted(&self) -> bool {
-        self.halted
+        self.requests.is_halted()
     }
 
     /// Moves to a position, from rest or from any motion.
@@ -244,13 +238,13 @@ impl Mover {
 
     /// Slows down to rest and keeps the target (feed hold).
     pub fn hold(&mut self, now: u64) {
-        self.ask_hold(true);
+        self.ask_hold();
         self.change(now);
     }
 
     /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
-        self.ask_hold(false);
+        self.ask_resume();
         self.change(now);
     }
 
@@ -270,11 +264,9 @@ impl Mover {
 
     /// Makes no further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
-        let moment = self.clock.moment(self.clock.within_reach(now).max(self.free));
-        self.halted = !self.is_at_rest(now);
-        self.wish = Wish { aim: Aim::Rest, held: false, quick: None, ..self.wish };
-        (self.due, self.turn) = (None, None);
-        self.rest(moment);
+        let was_moving = !self.is_at_rest(now);
+        self.ask_halt();
+        self.stand(now, was_moving);
     }
 
     /// Sets, at rest, the step count of the present position, for instance 0 at a reference.
@@ -286,7 +278,7 @@ impl Mover {
             return Err(Error::Moving);
         }
         self.commanded = steps;
-        self.wish.aim = Aim::Rest;
+        self.aim = Aim::Rest;
         self.rest(self.phases.end());
         Ok(())
     }
@@ -312,12 +304,8 @@ impl Mover {
     // Requests are recorded first and planned afterwards.
 
     /// Refuses moves during a quick stop, which ends at rest.
-    pub(super) fn ready(&mut self, at_rest: bool) -> Result<(), Error> {
-        if self.wish.quick.is_some() && !at_rest {
-            return Err(Error::Moving);
-        }
-        self.wish.quick = None;
-        Ok(())
+    pub(super) const fn ready(&self, at_rest: bool) -> Result<(), Error> {
+        self.requests.ready(at_rest)
     }
 
     pub(super) fn ask_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
@@ -330,30 +318,45 @@ impl Mover {
         if away > u64::from(u32::MAX / 2) {
             return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
         }
-        (self.wish.aim, self.halted) = (Aim::At(target), false);
+        self.aim = Aim::At(target);
+        self.requests.go();
         Ok(())
     }
 
     pub(super) const fn ask_run(&mut self, direction: Direction, speed: u32) {
-        self.wish.aim = if speed == 0 { Aim::Rest } else { Aim::Run(direction, speed) };
-        self.halted = false;
+        if speed == 0 {
+            return self.ask_stop();
+        }
+        self.aim = Aim::Run(direction, speed);
+        self.requests.go();
     }
 
     pub(super) fn ask_override(&mut self, percent: u16) {
-        self.wish.percent = percent.min(100);
+        self.requests.set_override(percent.min(100));
     }
 
-    pub(super) const fn ask_hold(&mut self, held: bool) {
-        self.wish.held = held;
+    pub(super) const fn ask_hold(&mut self) {
+        self.requests.hold();
+    }
+
+    pub(super) const fn ask_resume(&mut self) {
+        self.requests.resume();
     }
 
     pub(super) const fn ask_stop(&mut self) {
-        self.wish.aim = Aim::Rest;
+        self.aim = Aim::Rest;
+        self.requests.stop();
     }
 
     pub(super) fn ask_quick_stop(&mut self, limits: Limits) {
-        self.ask_stop();
-        let bounds = limits.bounds(self.clock).or_higher(self.wish.quick.as_ref().unwrap_or(&self.bounds));
-        self.wish.quick = Some(bounds);
+        self.aim = Aim::Rest;
+        let least = if self.requests.is_quick() { &self.quick } else { &self.bounds };
+        self.quick = limits.bounds(self.clock).or_higher(least);
+        self.requests.quick_stop();
+    }
+
+    pub(super) const fn ask_halt(&mut self) {
+        self.aim = Aim::Rest;
+        self.requests.halt();
     }
 }

@@ -3,6 +3,7 @@
 mod cutting;
 mod planning;
 
+use self::planning::Stop;
 use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
@@ -10,6 +11,7 @@ use crate::line::{AxisPulse, LinePulses, Steps};
 use crate::path::Path;
 use crate::plan::Setpoint;
 use crate::real::Real;
+use crate::requests::Requests;
 
 /// Runs the lines of a [`Path`] and takes requests at any tick: feed hold, feed override, lines added while it moves, and a
 /// new target.
@@ -71,15 +73,10 @@ pub struct PathMover<const N: usize, const M: usize> {
     left: [Option<Stretch>; N],
     /// The first line has no further steps in stretches: the next one is to begin.
     ended: bool,
-    percent: u16,
-    held: bool,
+    /// During a stop, the path is cut off where that ends.
+    requests: Requests,
     /// The present motion slows down to rest.
     braking: bool,
-    /// A stop is under way: the path has been cut off.
-    stopping: bool,
-    /// The stop is a quick one: until its last step, lines are refused.
-    quick: bool,
-    halted: bool,
 }
 
 /// By hand, because the derived `clone_from` copies much of it twice.
@@ -106,21 +103,16 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
             steps,
             left,
             ended,
-            percent,
-            held,
+            requests,
             braking,
-            stopping,
-            quick,
-            halted,
         } = source;
         self.path.clone_from(path);
         self.line.clone_from(line);
         (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
-        (self.free, self.steps, self.left, self.percent) = (*free, *steps, *left, *percent);
+        (self.free, self.steps, self.left) = (*free, *steps, *left);
         (self.ended, self.late) = (*ended, *late);
-        (self.held, self.braking, self.stopping) = (*held, *braking, *stopping);
-        (self.quick, self.halted) = (*quick, *halted);
+        (self.requests, self.braking) = (*requests, *braking);
     }
 }
 
@@ -144,12 +136,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             steps: Steps::Single,
             left: [None; N],
             ended: false,
-            percent: 100,
-            held: false,
+            requests: Requests::NONE,
             braking: false,
-            stopping: false,
-            quick: false,
-            halted: false,
         }
     }
 
@@ -233,7 +221,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
     pub const fn is_halted(&self) -> bool {
-        self.halted
+        self.requests.is_halted()
     }
 
     /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A running line then slows down for its end only
@@ -242,9 +230,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// # Errors
     /// Those of [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
-        self.ready()?;
+        self.ready(self.is_at_rest(now))?;
         self.path.push(target, feed)?;
-        self.halted = false;
+        self.requests.go_later();
         self.look_ahead(now);
         Ok(())
     }
@@ -252,51 +240,44 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Sets the feed override, in percent of the speeds with which the lines were pushed. The axes' limits and the speeds
     /// at corners stay unchanged, so more than 100 is faster only if those allow it. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
-        self.percent = percent;
+        self.requests.set_override(percent);
         self.replan(now);
     }
 
     /// Slows down to rest along the path, and keeps the remaining path (feed hold).
     pub fn hold(&mut self, now: u64) {
-        self.held = true;
+        self.requests.hold();
         self.replan(now);
     }
 
     /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
-        self.held = false;
+        self.requests.resume();
         self.replan(now);
     }
 
     /// Slows down to rest along the path and forgets the remaining path. Lines pushed from now on begin where it comes to
     /// rest.
     pub fn stop(&mut self, now: u64) {
-        match self.stop_from(now) {
-            Some(stop) => self.leave_at(&stop),
-            None => self.leave(self.tick(now)),
-        }
+        let stop = self.stop_from(now);
+        self.stop_as(stop.as_ref(), now);
     }
 
-    /// Slows down to rest along the path within other limits of the axes, higher ones for a limit switch, and forgets the rest of it. Until
-    /// its last step, lines are refused. Where an axis's own limits are higher, those are used: a quick stop is never
-    /// longer than a [`stop`](Self::stop), even one that is already under way.
+    /// Slows down to rest along the path within other limits of the axes, higher ones for a limit switch, and forgets the
+    /// remaining path. Lines are refused until it is at rest. Where an axis's own limits are higher, those are used: a quick
+    /// stop is never longer than a [`stop`](Self::stop), even one that is already under way.
     pub fn quick_stop(&mut self, limits: [Limits; N], now: u64) {
-        if self.line.is_none() {
-            return self.stop(now);
-        }
-        let plain = self.stop_from(now).map(|stop| (self.rest_of(&stop), stop));
-        let (stopping, lines) = (self.stopping, self.path.hurry(&limits));
-        (self.stopping, self.quick) = (false, true);
-        let Some(stop) = self.stop_from(now) else { return self.leave(self.tick(now)) };
+        let Some(plain) = self.stop_from(now) else { return self.leave(self.tick(now)) };
+        let (rest, lines) = (self.rest_of(&plain), self.path.hurry(&limits));
+        let Some(stop) = self.stop_anew(now, true) else { return self.leave(self.tick(now)) };
+        self.requests.quick_stop();
         // Who brakes harder before a corner comes to the line behind it later, which may allow more.
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
-        match plain.filter(|(rest, plain)| *rest < latest || plain.end < stop.end) {
-            Some((_, plain)) => {
-                self.path.calm(lines);
-                self.stopping = stopping;
-                self.leave_at(&plain);
-            }
-            None => self.leave_at(&stop),
+        if rest < latest || plain.end < stop.end {
+            self.path.calm(lines);
+            self.leave_at(&plain);
+        } else {
+            self.leave_at(&stop);
         }
     }
 
@@ -309,7 +290,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// [`Error::TooManySteps`] more than 2^31 - 1 steps from there; [`Error::Moving`] during a
     /// [`quick_stop`](Self::quick_stop). All of them leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
-        self.ready()?;
+        self.ready(self.is_at_rest(now))?;
         self.path.check(&target)?;
         let stop = self.stop_from(now);
         let from = stop.map_or(self.commanded, |stop| self.path.place(&self.end_of(&stop), self.begun(), self.made));
@@ -317,20 +298,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if stop.is_some_and(|stop| stop.end.0.saturating_add(1) >= M) || M == 0 {
             return Err(Error::QueueFull);
         }
-        match stop {
-            Some(stop) => self.leave_at(&stop),
-            None => self.leave(self.tick(now)),
-        }
+        self.stop_as(stop.as_ref(), now);
         self.push(target, feed, now)
     }
 
     /// Makes no further step and forgets the path. The positions are those of the steps made; motors at speed run on and
     /// lose them.
     pub fn halt(&mut self, now: u64) {
-        self.halted = !self.is_at_rest(now);
-        let free = self.free.iter().copied().max().unwrap_or(0);
-        (self.held, self.stopping, self.quick) = (false, false, false);
-        self.leave(self.clock().within_reach(now).max(free));
+        let was_moving = !self.is_at_rest(now);
+        self.ask_halt();
+        self.stand(now, was_moving);
     }
 
     pub(super) const fn clock(&self) -> Clock {
@@ -342,28 +319,32 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if self.line.is_none() {
             return self.replan(now);
         }
-        if let Some(part) = self.part().filter(|part| self.path.exit(self.more, *part) != self.wish) {
+        if let Some(part) = self.requests.part().filter(|part| self.path.exit(self.more, *part) != self.wish) {
             self.plan_better(now, part);
         }
     }
 
-    /// Refuses lines during a quick stop, which ends when no step is to come.
-    fn ready(&mut self) -> Result<(), Error> {
-        if self.quick && self.due().is_some() {
-            return Err(Error::Moving);
-        }
-        self.quick = false;
-        Ok(())
+    /// Refuses lines during a quick stop, which ends at rest.
+    pub(super) const fn ready(&self, at_rest: bool) -> Result<(), Error> {
+        self.requests.ready(at_rest)
     }
 
-    /// Fraction of the requested speeds; `None` to brake.
-    fn part(&self) -> Option<Real> {
-        (!self.brakes()).then(|| Real::new(self.percent.into()) / Real::new(100))
+    pub(super) const fn ask_halt(&mut self) {
+        self.requests.halt();
     }
 
-    /// Returns whether it is to come to rest.
-    const fn brakes(&self) -> bool {
-        self.held || self.stopping || self.percent == 0
+    /// Comes to rest as a stop does, or stays there.
+    fn stop_as(&mut self, stop: Option<&Stop<N>>, now: u64) {
+        let Some(stop) = stop else { return self.leave(self.tick(now)) };
+        self.requests.stop();
+        self.leave_at(stop);
+    }
+
+    /// Makes no further step, because of a halt.
+    fn stand(&mut self, now: u64, was_moving: bool) {
+        let free = self.free.iter().copied().max().unwrap_or(0);
+        self.requests.halted(was_moving);
+        self.leave(self.clock().within_reach(now).max(free));
     }
 
     /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the
@@ -389,6 +370,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Empties the queue, at rest from a tick onwards.
     fn leave(&mut self, now: u64) {
         let moment = self.clock().moment(now).max(self.path.start().moment);
+        self.requests.stopped();
         self.path.clear(self.commanded, moment);
         (self.line, self.made, self.exit, self.more) = (None, [0; N], Real::ZERO, 0);
     }

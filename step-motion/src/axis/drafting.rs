@@ -5,7 +5,7 @@ use core::sync::atomic::Ordering;
 
 use crate::cutter::{Cut, Demand};
 use crate::mover::cutting::News;
-use crate::queue::{IDLE, Queue, TICKET};
+use crate::queue::{IDLE, Queue};
 use crate::writer::{TICK, Writer, tick};
 
 use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work, coarser};
@@ -25,8 +25,8 @@ impl<const N: usize> Axis<'_, N> {
     /// returns anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often
     /// if the slots of a block hold less than that.
     pub fn poll(&mut self) -> Work {
-        if let Some(ticket) = self.halt {
-            return self.confirm(ticket);
+        if let Some(report) = self.halts.report() {
+            return self.confirm(report);
         }
         let current = self.queue.current.load(Ordering::Acquire);
         if current == self.seen {
@@ -75,7 +75,7 @@ impl<const N: usize> Axis<'_, N> {
     pub(super) fn asked(&mut self, news: News) {
         self.news = self.news.max(news);
         self.seen = UNSEEN;
-        if self.halt.is_none() && !self.look() && self.stage != Stage::Linked && !self.lost {
+        if !self.halts.is_pending() && !self.look() && self.stage != Stage::Linked && !self.lost {
             self.begin();
         }
     }
@@ -149,8 +149,8 @@ impl<const N: usize> Axis<'_, N> {
     }
 
     /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self, ticket: u32) -> Work {
-        if self.queue.current.load(Ordering::Acquire) != IDLE | ticket << TICKET {
+    fn confirm(&mut self, report: u32) -> Work {
+        if self.queue.current.load(Ordering::Acquire) != report {
             return Work::Start;
         }
         self.look();
@@ -159,8 +159,8 @@ impl<const N: usize> Axis<'_, N> {
         self.mover.halt_at(self.position, now, was_moving);
         (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
         self.end = Writer::new(i128::from(now) << 32, None);
-        self.queue.halt.store(0, Ordering::Release);
-        (self.halt, self.lost) = (None, false);
+        self.halts.confirmed(&self.queue.halt);
+        self.lost = false;
         Work::More
     }
 

@@ -108,21 +108,21 @@ impl Mover {
 
     /// Takes over the requests made to another mover.
     pub(crate) const fn wish_as(&mut self, other: &Self) {
-        (self.wish, self.halted) = (other.wish, other.halted);
+        (self.aim, self.requests, self.quick) = (other.aim, other.requests, other.quick);
     }
 
     /// Records that the axis has been at rest at a position since a tick, after a stop that was not requested.
     pub(crate) fn rest_at(&mut self, position: i64, now: u64) {
-        (self.commanded, self.due, self.wish.quick) = (position, None, None);
+        (self.commanded, self.due) = (position, None);
+        self.requests.stopped();
         self.free = now.saturating_add(1);
         self.rest(self.clock.moment(now));
     }
 
     /// Records a halt at a position; DIR is unknown then.
     pub(crate) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
-        self.halt(now);
-        (self.commanded, self.halted, self.dir) = (position, was_moving, None);
-        self.rest(self.phases.end());
+        (self.commanded, self.dir) = (position, None);
+        self.stand(now, was_moving);
     }
 }
 

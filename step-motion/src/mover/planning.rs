@@ -24,17 +24,24 @@ impl Mover {
         let moment = self.moment(now);
         // A stop under way stays the same, whichever request causes it.
         let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
-        let other = !self.is_moving(moment) || self.wish.quick.is_none() && !same;
+        let other = !self.is_moving(moment) || !self.requests.is_quick() && !same;
         if other {
             self.replan(moment);
+            return true;
         }
-        other
+        // Behind the last step of the stop nothing else would begin what follows it.
+        let goes_on = self.due.is_none() && self.has_work();
+        if goes_on {
+            self.go_on();
+        }
+        goes_on
     }
 
     /// Plans a quick stop.
     pub(super) fn stop_quickly(&mut self, now: u64) {
         let moment = self.moment(now);
-        if let Some(bounds) = self.wish.quick.filter(|_| self.is_moving(moment)) {
+        if self.requests.is_quick() && self.is_moving(moment) {
+            let bounds = self.quick;
             self.replan_within(moment, &bounds);
         } else {
             // To the caller the motion has ended: the caller's clock may be ahead.
@@ -53,6 +60,13 @@ impl Mover {
         (self.stepper, self.left) = (Stepper::new(), None);
     }
 
+    /// Makes no further step, because of a halt.
+    pub(super) fn stand(&mut self, now: u64, was_moving: bool) {
+        self.requests.halted(was_moving);
+        (self.due, self.turn) = (None, None);
+        self.rest(self.clock.moment(self.clock.within_reach(now).max(self.free)));
+    }
+
     /// Ends a plan, and continues to the aim if the axis is not there.
     pub(super) fn go_on(&mut self) {
         let end = self.phases.end();
@@ -62,9 +76,8 @@ impl Mover {
     }
 
     pub(super) fn has_work(&self) -> bool {
-        !self.wish.held
-            && self.wish.percent > 0
-            && match self.wish.aim {
+        !self.requests.brakes()
+            && match self.aim {
                 Aim::Rest => false,
                 Aim::At(target) => target != self.commanded,
                 Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.commanded),
@@ -150,7 +163,7 @@ impl Mover {
             return;
         }
         self.idle = begin.div_ceil(self.clock.moment(1));
-        let direction = match self.wish.aim {
+        let direction = match self.aim {
             Aim::At(target) if target < self.commanded => Direction::Reverse,
             Aim::Run(direction, _) => direction,
             _ => Direction::Forward,
@@ -189,11 +202,8 @@ impl Mover {
 
     /// Returns what to do in this direction; `None` for a stop.
     fn goal(&self, direction: Direction, bounds: &Bounds) -> Option<(Want, Bounds)> {
-        if self.wish.held || self.wish.percent == 0 {
-            return None;
-        }
-        let part = Real::new(self.wish.percent.into()) / Real::new(100);
-        match self.wish.aim {
+        let part = self.requests.part()?;
+        match self.aim {
             Aim::Rest => None,
             Aim::At(target) => Some((Want::At(target), bounds.slower(bounds.v * part))),
             Aim::Run(way, _) if way != direction => None,

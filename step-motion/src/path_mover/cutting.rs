@@ -67,9 +67,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         over.div_ceil(self.clock().moment(1))
     }
 
-    /// Returns the line that a push would add.
-    pub(crate) fn line_to(&mut self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
-        self.ready()?;
+    /// Returns the line that a push would add, if the mover is [ready](Self::ready) for it.
+    pub(crate) fn line_to(&self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
         self.path.line_to(target, feed)
     }
 
@@ -79,7 +78,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if let Some(line) = line {
             self.path.add(line, target);
         }
-        self.halted = false;
+        self.requests.go_later();
         if self.line.is_none() {
             self.replan(now);
         }
@@ -87,7 +86,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Returns whether a line of another mover would be the same here.
     pub(crate) fn ends_as(&self, other: &Self) -> bool {
-        !self.quick && self.path.ends_as(&other.path)
+        self.path.ends_as(&other.path)
     }
 
     /// Sets the deviation at corners, for lines appended from now on.
@@ -99,20 +98,19 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// of it.
     pub(crate) fn has_to_find(&mut self) -> bool {
         let at = if self.line.is_some() { self.more } else { 0 };
-        let part = self.part().unwrap_or(self.path.part());
+        let part = self.requests.part().unwrap_or(self.path.part());
         self.path.find_exit(at, part).is_none()
     }
 
     /// Continues as another mover would, from a rest after a stop that was not requested.
     pub(crate) fn go_on_as(&mut self, other: &Self, now: u64) {
-        (self.held, self.percent) = (other.held, other.percent);
+        self.requests.hold_as(other.requests);
         self.replan(now);
     }
 
     /// Records a halt at a position.
     pub(crate) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
-        self.halt(now);
-        (self.commanded, self.halted) = (commanded, was_moving);
-        self.leave(now);
+        self.commanded = commanded;
+        self.stand(now, was_moving);
     }
 }

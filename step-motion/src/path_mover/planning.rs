@@ -18,6 +18,8 @@ pub(super) struct Stop<const N: usize> {
     pub(super) end: (usize, Real),
     /// How it leaves the lines of its first curve.
     pub(super) left: Leaving,
+    /// The path has been cut off there already.
+    pub(super) cut: bool,
     /// Its first curve, if it is not the present one.
     pub(super) first: Option<(Course, Start<N>, Bounds)>,
 }
@@ -50,10 +52,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns how a stop runs; `None` at rest.
     pub(super) fn stop_from(&self, now: u64) -> Option<Stop<N>> {
         self.line.as_ref()?;
-        let present = |end| Stop { end, left: self.leaving(), first: None };
-        if self.stopping {
-            return self.path.end_of_cut().map(present);
+        if self.requests.is_stopping() {
+            let end = self.path.end_of_cut()?;
+            return Some(Stop { end, left: self.leaving(), cut: true, first: None });
         }
+        self.stop_anew(now, false)
+    }
+
+    /// Returns how a stop runs that begins now, plain or quick, whatever stop is under way; `None` at rest.
+    pub(super) fn stop_anew(&self, now: u64, quick: bool) -> Option<Stop<N>> {
+        let present = |end| Stop { end, left: self.leaving(), cut: false, first: None };
         let here = self.here(now);
         // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
         if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
@@ -62,7 +70,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let Some((motion, start)) = here else {
             return Some(present((self.more, self.path.line(self.more)?.length)));
         };
-        if self.braking && !self.quick {
+        if self.braking && !quick {
             // A stop under way stays the same.
             let line = self.line.as_ref()?;
             let end = if self.exit.is_zero() {
@@ -79,7 +87,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
             // It is whole once the path has been cut off where it ends.
             course.whole = true;
-            Stop { end, left, first: Some((course, start, bounds)) }
+            Stop { end, left, cut: false, first: Some((course, start, bounds)) }
         };
         let stop = match self.path.brake(0, motion, from, how) {
             Some(course) => planned(course),
@@ -92,12 +100,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit).0, ..stop };
         // At each joint it would have acceleration 0; on one curve it may be shorter.
         let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
-        once.filter(|once| self.quick && once.end < stop.end).or(Some(stop))
+        once.filter(|once| quick && once.end < stop.end).or(Some(stop))
     }
 
     /// Returns where a stop ends: with the steps of a stop under way, or no more than these.
     pub(super) fn end_of(&self, stop: &Stop<N>) -> End<N> {
-        let (at, under_way) = (stop.end, self.braking && !self.stopping && self.exit.is_zero());
+        let (at, under_way) = (stop.end, self.braking && !stop.cut && self.exit.is_zero());
         let most = if under_way && at.0 == self.more { self.steps_at_end() } else { None };
         let least = most.filter(|_| stop.first.is_none()).unwrap_or([0; N]);
         End { at, least, most: most.unwrap_or([u32::MAX; N]) }
@@ -137,11 +145,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// the shorter path may differ by its rounding, and leave a line at a speed that it had not.
     pub(super) fn leave_at(&mut self, stop: &Stop<N>) {
         self.path.cut(&self.end_of(stop), self.begun(), self.made, stop.left);
-        if !self.stopping {
-            self.stopping = true;
-            if let Some((course, start, bounds)) = &stop.first {
-                self.adopt(course, *start, *bounds);
-            }
+        if let Some((course, start, bounds)) = &stop.first {
+            self.adopt(course, *start, *bounds);
         }
         if stop.end.0 < self.more {
             // A stop at a joint, but for rounding: on the line before it.
@@ -153,11 +158,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Plans the rest of the motion after a request.
     pub(super) fn replan(&mut self, now: u64) {
         // A stop that is under way is the same one whoever asks for it.
-        if self.stopping || self.line.is_some() && self.braking && self.brakes() {
+        let brakes = self.requests.brakes();
+        if self.requests.is_stopping() || self.line.is_some() && self.braking && brakes {
             return;
         }
         if self.line.is_none() {
-            if !self.brakes() {
+            if !brakes {
                 self.path.not_before(now);
             }
             self.begin();
@@ -171,8 +177,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn plan(&mut self, now: u64) {
         let Some((motion, start)) = self.here(now) else { return };
         let from = (start.place, start.before);
-        self.late = self.part().is_some();
-        let course = match self.part() {
+        let part = self.requests.part();
+        self.late = part.is_some();
+        let course = match part {
             Some(part) => self.path.course(0, motion, from, (part, self.bounds)),
             None => self.path.brake(0, motion, from, (self.bounds, self.braking)),
         };
@@ -203,7 +210,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Begins the first line in place of the one before, if it can be begun; returns whether it has.
     fn begins(&mut self) -> bool {
-        let part = self.part();
+        let part = self.requests.part();
         if self.path.is_empty() || self.path.speed().is_zero() && part.is_none() {
             return false;
         }
@@ -235,7 +242,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
         // A curve that ends before its lines is one to rest.
-        (self.braking, self.late) = (self.brakes() || !course.whole, false);
+        (self.braking, self.late) = (self.requests.brakes() || !course.whole, false);
         self.left = [None; N];
         true
     }
@@ -254,7 +261,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free));
         }
         (self.origin, self.made, self.left) = (self.commanded, [0; N], [None; N]);
-        if self.late && !self.brakes() {
+        if self.late && !self.requests.brakes() {
             self.plan(0);
         }
     }
@@ -275,7 +282,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return false;
         }
         if self.made != first.ends {
-            if self.braking && !self.brakes() {
+            if self.braking && !self.requests.brakes() {
                 // It could not leave a brake that is no longer asked for: on from where that comes to rest.
                 self.plan(self.over());
             }
@@ -286,7 +293,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             self.go_on();
         } else {
             self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
-            self.stopping &= !cut;
+            if cut {
+                self.requests.stopped();
+            }
             self.begin();
         }
         true

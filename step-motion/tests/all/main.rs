@@ -20,6 +20,7 @@ mod paths;
 mod plans;
 mod queue;
 mod replans;
+mod requests;
 #[cfg(feature = "serde")]
 mod serde;
 mod stops;

@@ -92,7 +92,7 @@ fn a_stop_at_a_joint_but_for_rounding() {
     for (first, steps) in [(100, 1), (300, 1), (300, 100), (390, 1), (390, 149)] {
         let mut mover = mover([(5000, 50_000); 2], 1000, &[[first, 0], [400 - first, 0], [500, 0]]);
         let mut now = take(&mut mover, 250);
-        mover.held = true;
+        mover.requests.hold();
         let (motion, start) = mover.here(400_000).unwrap();
         let how = (mover.bounds, false);
         let (course, bounds) = mover.path.brake(0, motion, (start.place, start.before), how).unwrap();
@@ -131,7 +131,6 @@ fn a_quick_stop_is_the_shorter_of_two() {
         for steps in 150..300 {
             let mut mover = mover(limits, 300, &lines);
             let now = take(&mut mover, steps);
-            mover.quick = true;
             let (Some((motion, start)), how) = (mover.here(now), (mover.bounds, false)) else { continue };
             let from = (start.place, start.before);
             let Some((course, _)) = mover.path.brake(0, motion, from, how) else { continue };
@@ -139,7 +138,7 @@ fn a_quick_stop_is_the_shorter_of_two() {
             let (Some((once, _)), false) = (once, course.exit.is_zero()) else { continue };
             let joints = mover.path.end_of_stop(course.more + 1, course.exit).0;
             let once = mover.path.locate(0, (from.0 + once.curve.way()) - from.1, once.more);
-            let stop = mover.stop_from(now).unwrap().end;
+            let stop = mover.stop_anew(now, true).unwrap().end;
             assert!(stop == if once < joints { once } else { joints }, "{steps}: {stop:?} of {once:?} and {joints:?}");
             shorter[usize::from(once < joints)] += 1;
         }

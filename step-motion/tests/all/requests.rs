@@ -1,0 +1,122 @@
+//! Which request is taken or refused when, and what it does to the others: one table for an axis and for a path, one by one and in two
+//! halves.
+
+mod machines;
+mod sequences;
+
+use step_motion::{Clock, Direction, Error, Limits, Mover};
+
+use machines::{Ask, AxesMachine, AxisMachine, Driven, MoverMachine, PathMachine};
+
+const MS: u64 = 1000;
+
+/// The same test of all four.
+fn all(test: impl Fn(&mut dyn Driven, &str)) {
+    test(&mut MoverMachine::new(), "Mover");
+    test(&mut PathMachine::new(), "PathMover");
+    AxisMachine::with(|machine| test(machine, "Axis"));
+    AxesMachine::with(|machine| test(machine, "Axes"));
+}
+
+fn under_way(machine: &mut dyn Driven) {
+    machine.ask(Ask::To(100)).unwrap();
+    machine.wait(20 * MS);
+    assert!(!machine.is_at_rest() && machine.at() > 5);
+}
+
+/// The second one comes at rest: the motor may still have lost steps by the first one. Neither a stop nor a hold nor another position
+/// makes that good, a motion is what its caller does about it.
+#[test]
+fn an_axis_is_halted_until_it_is_moved() {
+    all(|machine, name| {
+        machine.ask(Ask::Halt).unwrap();
+        machine.wait(10 * MS);
+        assert!(!machine.is_halted(), "{name}: at rest");
+        under_way(machine);
+        for ask in
+            [Ask::Halt, Ask::Halt, Ask::Stop, Ask::Hold, Ask::Override(50), Ask::Quick, Ask::Halt, Ask::Standstill]
+        {
+            machine.ask(ask).unwrap();
+            machine.wait(10 * MS);
+            assert!(machine.is_halted(), "{name}: {ask:?}");
+        }
+        machine.ask(Ask::To(0)).unwrap();
+        assert!(!machine.is_halted(), "{name}");
+    });
+}
+
+/// Also if the interrupt has not seen the halt.
+#[test]
+fn a_hold_before_a_halt_is_over_and_one_after_it_counts() {
+    for (before, moves) in [(true, true), (false, false)] {
+        all(|machine, name| {
+            under_way(machine);
+            let asks = if before { [Ask::Hold, Ask::Halt] } else { [Ask::Halt, Ask::Hold] };
+            for ask in asks {
+                machine.ask(ask).unwrap();
+            }
+            machine.wait(30 * MS);
+            let at = machine.at();
+            machine.ask(Ask::To(0)).unwrap();
+            machine.wait(500 * MS);
+            assert_eq!(machine.at(), if moves { 0 } else { at }, "{name} {before}");
+            machine.ask(Ask::Resume).unwrap();
+            machine.wait(500 * MS);
+            assert_eq!(machine.at(), 0, "{name} {before}");
+        });
+    }
+}
+
+/// Whoever asks in vain again and again does not keep the machine from its work.
+#[test]
+fn a_refused_request_costs_nothing() {
+    all(|machine, name| {
+        machine.ask(Ask::To(60)).unwrap();
+        for _ in 0..10_000 {
+            assert!(matches!(machine.ask(Ask::To(20_000)), Err(Error::SoftLimit { .. })), "{name}");
+            machine.work(MS / 50);
+        }
+        assert_eq!(machine.at(), 60, "{name}");
+    });
+}
+
+/// To a clock that is ahead the quick stop is over; what is asked for with it is refused, and the stop is as it was.
+#[test]
+fn a_refused_request_does_not_end_a_quick_stop() {
+    let limits = Limits::new(2000, 20_000).unwrap();
+    let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap().with_soft_limits(-900, 900);
+    mover.move_to(900, 0).unwrap();
+    let mut last = 0;
+    while mover.commanded() < 300 {
+        last = mover.pulse().unwrap().tick;
+    }
+    mover.quick_stop(Limits::new(2000, 200_000).unwrap(), last);
+    while let Some(pulse) = mover.pulse() {
+        last = pulse.tick;
+    }
+    assert!(!mover.is_at_rest(last));
+    assert!(matches!(mover.move_to(901, last + 100_000), Err(Error::SoftLimit { .. })));
+    assert_eq!(mover.move_to(900, last), Err(Error::Moving));
+    assert_eq!(mover.run(Direction::Forward, 1, last), Err(Error::Moving));
+}
+
+/// A path takes lines again when an axis takes moves: at rest, half a step behind its last step.
+#[test]
+fn a_quick_stop_lasts_until_rest() {
+    all(|machine, name| {
+        under_way(machine);
+        machine.ask(Ask::Quick).unwrap();
+        let mut refused = 0;
+        while !machine.is_at_rest() {
+            for ask in [Ask::To(0), Ask::Along(0)] {
+                assert_eq!(machine.ask(ask), Err(Error::Moving), "{name}");
+            }
+            refused += 1;
+            machine.wait(MS / 4);
+        }
+        assert!(refused > 2, "{name}");
+        machine.ask(Ask::To(0)).unwrap();
+        machine.wait(500 * MS);
+        assert_eq!(machine.at(), 0, "{name}");
+    });
+}
