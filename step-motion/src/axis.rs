@@ -15,6 +15,7 @@ use crate::mover::Mover;
 use crate::mover::cutting::News;
 use crate::queue::{NONE, Queue};
 use crate::real::Real;
+use crate::requests::Requests;
 use crate::step_timer::StepTimer;
 use crate::writer::{LONGEST, Writer, tick};
 
@@ -351,6 +352,10 @@ impl<'q, const N: usize> Axis<'q, N> {
             return Err(Error::Moving);
         }
         self.mover.set_limits(limits, tick(self.end.end))
+    }
+
+    pub(super) const fn requests(&self) -> Requests {
+        self.mover.requests()
     }
 
     /// Refuses moves until a halt has been seen, and during a quick stop.

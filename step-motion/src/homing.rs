@@ -1,5 +1,9 @@
 //! Finding the reference switch.
 
+mod homed;
+
+use self::homed::{Homed, OneByOne};
+use crate::axis::Axis;
 use crate::error::Error;
 use crate::limits::Limits;
 use crate::mover::Mover;
@@ -64,7 +68,8 @@ pub enum HomingState {
     Settling,
     /// At rest; position 0 is the place where the switch closed.
     Done,
-    /// No switch was found within the range, or it stays closed. The axis is stopped and its position is not a reference.
+    /// No switch was found within the range, or it stays closed: the axis is stopped. Or somebody else has asked it for
+    /// something, and it does that. Its position is not a reference.
     Failed,
 }
 
@@ -72,7 +77,10 @@ pub enum HomingState {
 /// the second time.
 ///
 /// Call [`poll`](Self::poll) with the level of the switch often, at least once per step of the approach; take the steps
-/// from the [`Mover`] as usual.
+/// from the [`Mover`] as usual, or have them made by the interrupt of an [`Axis`].
+///
+/// A hold and an override act on it as on any motion: it waits, and goes on. A move, a stop or a halt that somebody else
+/// asks for ends it.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_copy_implementations, reason = "a copy would go on from a state that is over")]
@@ -81,6 +89,8 @@ pub struct Homing {
     state: HomingState,
     /// Position at the start of the state, or of the switch.
     mark: i64,
+    /// The number of the axis's last request, which was of this homing.
+    asked: u32,
 }
 
 impl Homing {
@@ -89,16 +99,19 @@ impl Homing {
     /// # Errors
     /// [`Error::Moving`] if the axis is not at rest.
     pub fn start(config: HomingConfig, mover: &mut Mover, switch: Switch, now: u64) -> Result<Self, Error> {
-        if !mover.is_at_rest(now) {
-            return Err(Error::Moving);
-        }
-        let mut new = Self { config, state: HomingState::Seeking, mark: mover.commanded() };
-        if switch == Switch::Closed {
-            new.back_off(mover, now)?;
-        } else {
-            mover.run(config.direction, config.seek, now)?;
-        }
-        Ok(new)
+        Self::begin(config, &mut OneByOne { mover, now }, switch)
+    }
+
+    /// Does the same as [`start`](Self::start), of an axis in two halves.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn start_axis<const N: usize>(
+        config: HomingConfig,
+        axis: &mut Axis<'_, N>,
+        switch: Switch,
+    ) -> Result<Self, Error> {
+        Self::begin(config, axis, switch)
     }
 
     /// The present state.
@@ -111,12 +124,50 @@ impl Homing {
     /// # Errors
     /// Those of the requests to the axis; the homing then stays in its state.
     pub fn poll(&mut self, mover: &mut Mover, switch: Switch, now: u64) -> Result<HomingState, Error> {
-        let closed = switch == Switch::Closed;
-        let position = mover.commanded();
-        let rest = mover.is_at_rest(now);
+        self.go_on(&mut OneByOne { mover, now }, switch)
+    }
+
+    /// Does the same as [`poll`](Self::poll), of an axis in two halves. Its steps go on for up to twice its reach after the
+    /// switch has closed, and are counted.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn poll_axis<const N: usize>(&mut self, axis: &mut Axis<'_, N>, switch: Switch) -> Result<HomingState, Error> {
+        self.go_on(axis, switch)
+    }
+
+    fn begin(config: HomingConfig, axis: &mut impl Homed, switch: Switch) -> Result<Self, Error> {
+        if !axis.is_at_rest() {
+            return Err(Error::Moving);
+        }
+        let mut new = Self { config, state: HomingState::Seeking, mark: axis.position(), asked: 0 };
+        if switch == Switch::Closed {
+            new.back_off(axis)?;
+        } else {
+            axis.run(config.direction, config.seek)?;
+        }
+        new.asked = axis.requests().number();
+        Ok(new)
+    }
+
+    fn go_on(&mut self, axis: &mut impl Homed, switch: Switch) -> Result<HomingState, Error> {
+        let over = matches!(self.state, HomingState::Done | HomingState::Failed);
+        if !over && axis.requests().number() != self.asked {
+            self.state = HomingState::Failed;
+        } else if !over {
+            self.ask(axis, switch == Switch::Closed)?;
+            self.asked = axis.requests().number();
+        }
+        Ok(self.state)
+    }
+
+    /// Makes the next request, if it is time for it.
+    fn ask(&mut self, axis: &mut impl Homed, closed: bool) -> Result<(), Error> {
+        let position = axis.position();
+        let rest = axis.is_at_rest() && !axis.requests().holds();
         match self.state {
             HomingState::Seeking | HomingState::Approaching if closed => {
-                mover.quick_stop(self.config.stop, now);
+                axis.quick_stop(self.config.stop);
                 let again = self.state == HomingState::Approaching;
                 self.state = if again { HomingState::Settling } else { HomingState::Stopping };
                 self.mark = position;
@@ -124,35 +175,35 @@ impl Homing {
             HomingState::Seeking | HomingState::Approaching
                 if rest || position.abs_diff(self.mark) > u64::from(self.config.range) =>
             {
-                mover.stop(now);
+                axis.stop();
                 self.state = HomingState::Failed;
             }
-            HomingState::Stopping if rest => self.back_off(mover, now)?,
+            HomingState::Stopping if rest => self.back_off(axis)?,
             HomingState::BackingOff if rest => {
                 if closed {
                     self.state = HomingState::Failed;
                 } else {
-                    mover.run(self.config.direction, self.config.approach, now)?;
+                    axis.run(self.config.direction, self.config.approach)?;
                     (self.state, self.mark) = (HomingState::Approaching, position);
                 }
             }
             HomingState::Settling if rest => {
-                mover.set_commanded(position.saturating_sub(self.mark), now)?;
+                axis.set_commanded(position.saturating_sub(self.mark))?;
                 self.state = HomingState::Done;
             }
             _ => {}
         }
-        Ok(self.state)
+        Ok(())
     }
 
-    fn back_off(&mut self, mover: &mut Mover, now: u64) -> Result<(), Error> {
+    fn back_off(&mut self, axis: &mut impl Homed) -> Result<(), Error> {
         let by = i64::from(self.config.back_off);
-        let position = mover.commanded();
+        let position = axis.position();
         let target = match self.config.direction {
             Direction::Forward => position.saturating_sub(by),
             Direction::Reverse => position.saturating_add(by),
         };
-        mover.move_to(target, now)?;
+        axis.move_to(target)?;
         self.state = HomingState::BackingOff;
         Ok(())
     }

@@ -278,7 +278,7 @@ impl Mover {
             return Err(Error::Moving);
         }
         self.commanded = steps;
-        self.aim = Aim::Rest;
+        self.ask_stop();
         self.rest(self.phases.end());
         Ok(())
     }
@@ -306,6 +306,10 @@ impl Mover {
     /// Refuses moves during a quick stop, which ends at rest.
     pub(super) const fn ready(&self, at_rest: bool) -> Result<(), Error> {
         self.requests.ready(at_rest)
+    }
+
+    pub(super) const fn requests(&self) -> Requests {
+        self.requests
     }
 
     pub(super) fn ask_move(&mut self, target: i64, from: i64) -> Result<(), Error> {

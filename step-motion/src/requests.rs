@@ -23,6 +23,8 @@ pub(crate) struct Requests {
     held: bool,
     stop: Stop,
     halted: bool,
+    /// Of the last motion, stop or halt.
+    number: u32,
 }
 
 /// The stop that is under way, if it was asked for as such.
@@ -36,7 +38,7 @@ enum Stop {
 
 impl Requests {
     /// None yet.
-    pub(crate) const NONE: Self = Self { percent: 100, held: false, stop: Stop::None, halted: false };
+    pub(crate) const NONE: Self = Self { percent: 100, held: false, stop: Stop::None, halted: false, number: 0 };
 
     /// Refuses a motion during a quick stop.
     pub(crate) const fn ready(self, at_rest: bool) -> Result<(), Error> {
@@ -46,6 +48,7 @@ impl Requests {
     /// Takes a motion that leaves a stop under way.
     pub(crate) const fn go(&mut self) {
         (self.stop, self.halted) = (Stop::None, false);
+        self.count();
     }
 
     /// Takes a motion that begins where a stop under way ends.
@@ -55,6 +58,7 @@ impl Requests {
             self.stop = Stop::None;
         }
         self.halted = false;
+        self.count();
     }
 
     pub(crate) const fn set_override(&mut self, percent: u16) {
@@ -74,10 +78,12 @@ impl Requests {
         if !self.is_quick() {
             self.stop = Stop::Plain;
         }
+        self.count();
     }
 
     pub(crate) const fn quick_stop(&mut self) {
         self.stop = Stop::Quick;
+        self.count();
     }
 
     /// A stop has come to its end. After a quick one motion is taken again once all is at rest.
@@ -90,6 +96,11 @@ impl Requests {
     /// A halt: a hold before it is over, one after it counts.
     pub(crate) const fn halt(&mut self) {
         self.held = false;
+        self.count();
+    }
+
+    const fn count(&mut self) {
+        self.number = self.number.wrapping_add(1);
     }
 
     /// No further step is made because of a halt, which has stopped a motion or has come at rest.
@@ -100,6 +111,11 @@ impl Requests {
     /// Holds, or goes on, as others do.
     pub(crate) const fn hold_as(&mut self, other: Self) {
         (self.held, self.percent) = (other.held, other.percent);
+    }
+
+    /// A number that changes with each motion, stop and halt, so that whoever asked for the last one knows whether it still counts.
+    pub(crate) const fn number(self) -> u32 {
+        self.number
     }
 
     pub(crate) const fn is_halted(self) -> bool {
@@ -115,9 +131,14 @@ impl Requests {
         matches!(self.stop, Stop::Quick)
     }
 
+    /// Returns whether what was asked for is to wait.
+    pub(crate) const fn holds(self) -> bool {
+        self.held || self.percent == 0
+    }
+
     /// Returns whether the motion is to come to rest, or to stay there.
     pub(crate) const fn brakes(self) -> bool {
-        self.held || self.percent == 0 || self.is_stopping()
+        self.holds() || self.is_stopping()
     }
 
     /// Fraction of the speeds that were asked for; `None` to brake.

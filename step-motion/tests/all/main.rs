@@ -8,6 +8,7 @@ mod axis_requests;
 mod bounds;
 mod brakes;
 mod changes;
+mod homing;
 mod laws;
 mod lines;
 mod machine;
