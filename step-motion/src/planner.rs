@@ -243,12 +243,36 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
     if from <= exit || n <= SLACK {
         return from;
     }
-    match bounds.jerk {
+    let most = (from - exit).max(least);
+    match &bounds.jerk {
         None => (from.squared() - (bounds.a * n).scaled(1)).sqrt().max(exit),
-        Some(_) => {
-            from - crossing(least, (from - exit).max(least), n, n.scaled(-14), |by| distance(from, from - by, bounds))
-        }
+        Some(_) if distance(from, from - most, bounds) <= n => from - most,
+        Some(jerk) => from - least_change(from, n, bounds, jerk).max(least).min(most),
     }
+}
+
+/// Returns the least change of speed, downwards, that takes a distance. There has to be one.
+///
+/// The distance grows with the change of speed dv up to a maximum, at 2/3 of the speed if the greatest acceleration is not
+/// reached. It is (2 v - j x²) x in the time x of either jerk or, from the knee on, (v - dv / 2) (dv / a + a / j).
+fn least_change(v: Real, n: Real, bounds: &Bounds, jerk: &Jerk) -> Real {
+    let (twice, knee) = (v.scaled(1), jerk.knee);
+    if knee * Real::new(3) < twice && (twice - knee) * jerk.edge < n {
+        let (b, c) = (v - knee.half(), (bounds.a * (n - v * jerk.edge)).scaled(1));
+        return c / (b + (b.squared() - c).sqrt());
+    }
+    // By Newton's method from below, where it never goes too far.
+    let (mut x, mut dv) = (n / twice, Real::ZERO);
+    for _ in 0..16 {
+        dv = jerk.j * x.squared();
+        let left = n - (twice - dv) * x;
+        let slope = twice - dv * Real::new(3);
+        if left <= n.scaled(-20) || slope.is_zero() {
+            break;
+        }
+        x = x + left / slope;
+    }
+    dv
 }
 
 /// Returns the largest speed between `low` and `high` for which `need` is not above `n`, but for what `enough` of `n` is
@@ -265,14 +289,19 @@ fn crossing(low: Real, high: Real, n: Real, enough: Real, need: impl Fn(Real) ->
     let (base, mut best) = (low, low);
     let (mut low, mut high) = (Real::ZERO, (high - low).sqrt());
     let mut left = n - need(base);
+    // A little less than all is enough.
+    let aim = enough.half();
     let (mut below, mut above, mut rose) = (left, top - n, None);
     for round in 0..40_u8 {
         let width = high - low;
         if left <= enough || width.scaled(40) <= high {
             break;
         }
-        let part =
-            if round % 16 > 8 { width.half() } else { (width * (below / (below + above))).max(width.scaled(-4)) };
+        let part = if round % 16 > 8 {
+            width.half()
+        } else {
+            (width * ((below - aim) / (below + above))).max(width.scaled(-4))
+        };
         let middle = low + part;
         let speed = base + middle.squared();
         let got = need(speed);

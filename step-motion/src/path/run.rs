@@ -3,93 +3,51 @@
 //! A jerk-limited curve has acceleration 0 at both ends. So that it need not be 0 at every joint, lines with nearly the
 //! same limits, whose corners need no lower speed, form a run: one curve leads along all of them.
 
+mod alike;
+
 use super::{Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
-use crate::line::{Ahead, Line};
+use crate::line::Ahead;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
+
+pub(crate) use alike::Run;
+use alike::{Kind, allowed};
 
 #[cfg(test)]
 mod tests;
 
-/// Consecutive lines of the queue.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Run {
-    /// Lines after the first one.
-    more: usize,
-    length: Real,
-    /// The limits that hold on all of them.
-    bounds: Bounds,
-}
-
-impl Run {
-    /// All bytes are zero, so an array of it is cleared rather than copied.
-    const NONE: Self = Self {
-        more: 0,
-        length: Real::ZERO,
-        bounds: Bounds { v: Real::ZERO, a: Real::ZERO, per_a: Real::ZERO, jerk: None },
-    };
-}
-
-/// How runs of fewer lines are found: at a fraction of the requested speeds or, to brake, without one; with the speed,
-/// acceleration and jerk under way; with the limits of a brake under way.
+/// How runs of fewer lines are found, and the limits of a brake under way.
 #[derive(Debug, Clone, Copy)]
 struct Shorter {
-    part: Option<Real>,
-    under_way: (Real, [Real; 2]),
+    kind: Kind,
     how: (Option<Bounds>, bool),
 }
 
-/// How much more acceleration or jerk a line may allow than another one of the same run.
-const ALIKE: Real = Real::fixed(3, 1);
-/// How much more speed it may allow.
-const EQUAL: Real = Real::fixed(129, 7);
-
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// Returns the run that begins at line `at`, with a speed of at most `speed` and of what its lines allow, and with an
-    /// acceleration and jerk under way: limits below these would make them jump. It has at most `most` lines after the
-    /// first one; with `any`, also such as allow other accelerations.
-    fn run(
-        &self,
-        at: usize,
-        part: Option<Real>,
-        (speed, held): (Real, [Real; 2]),
-        (most, any): (usize, bool),
-    ) -> Option<Run> {
-        let mut last = self.line(at)?;
-        // A fraction of the requested speed; without one, all that the axes allow.
-        let allowed = |line: &Line<N>| part.map_or(line.bounds.v, |part| line.speed(part));
-        let mut run = Run { more: 0, length: last.length, bounds: Bounds { v: allowed(last), ..last.bounds } };
-        while let Some(jerk) = run.bounds.jerk.filter(|_| !last.cut && last.leave.is_none()) {
-            if run.more >= most {
-                break;
-            }
+    /// Returns the run that begins at line `at`; it has at most `most` lines after the first one.
+    fn run(&self, at: usize, kind: Kind, most: usize) -> Option<Run> {
+        let mut run = self.single(at, kind.part)?;
+        self.lengthen(at, &mut run, kind, most);
+        Some(run)
+    }
+
+    /// Returns a run of one line.
+    fn single(&self, at: usize, part: Option<Real>) -> Option<Run> {
+        let line = self.line(at)?;
+        let bounds = Bounds { v: allowed(line, part), ..line.bounds };
+        Some(Run { more: 0, length: line.length, bounds })
+    }
+
+    /// Adds lines to a run that begins at line `at`, up to `most` after the first one.
+    fn lengthen(&self, at: usize, run: &mut Run, kind: Kind, most: usize) {
+        let Some(mut last) = self.line(at.saturating_add(run.more)) else { return };
+        while run.more < most && !last.cut && last.leave.is_none() {
             let next = at.saturating_add(run.more).saturating_add(1);
-            let Some(line) = self.line(next) else { break };
-            let Bounds { a: own, jerk: Some(other), .. } = &line.bounds else { break };
-            let most = allowed(line);
-            let fastest = if part.is_some() { run.bounds.v.max(speed) } else { speed };
-            let alike = |a: Real, b: Real, by: Real| a <= b * by && b <= a * by;
-            // What is too fast slows down at once, however many lines that takes.
-            let open = most >= speed || speed > run.bounds.v && line.bounds.v >= speed;
-            let fits = line.corner >= fastest && open;
-            let v = part.is_none() || alike(most, run.bounds.v, EQUAL);
-            let same = any || alike(*own, run.bounds.a, ALIKE) && alike(other.j, jerk.j, ALIKE);
-            if !fits || !v || !same {
-                break;
-            }
-            let (a, j) = (run.bounds.a.min(*own), jerk.j.min(other.j));
-            if a < held[0] || j < held[1] {
-                break;
-            }
-            let v = run.bounds.v.min(most);
-            let same = a == run.bounds.a && j == jerk.j;
-            run.bounds = if same { Bounds { v, ..run.bounds } } else { Bounds::new(v, a, Some(j)) };
-            (run.more, run.length) = (run.more.saturating_add(1), run.length + line.length);
+            let Some(line) = self.line(next).filter(|line| run.add(line, kind)) else { break };
             last = line;
         }
-        Some(run)
     }
 
     /// Plans from a motion at a place on line `at`, or a distance before it: it brakes at once, and may come to rest before
@@ -110,7 +68,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         };
         // It does not fit: as far as it can to the end of the run.
         let left = (run.length + before) - place;
-        let shorter = Shorter { part: None, under_way: self.under_way(at, start, how.0)?, how };
+        let shorter = Shorter { kind: self.under_way(at, start, (None, how.0))?, how };
         let limits = (&run, own, own.slower(start.v));
         self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), shorter)
     }
@@ -129,8 +87,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
         how: (Real, Option<Bounds>),
     ) -> Option<(Course, Bounds)> {
         let (run, left, speeds) = self.goal(at, start, from, how)?;
-        let under_way = self.under_way(at, start, how.1)?;
-        let shorter = Shorter { part: Some(how.0), under_way, how: (None, false) };
+        let kind = self.under_way(at, start, (Some(how.0), how.1))?;
+        let shorter = Shorter { kind, how: (None, false) };
         self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, shorter)
     }
 
@@ -156,25 +114,26 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         (part, present): (Real, Option<Bounds>),
     ) -> Option<(Run, Real, (Real, Real))> {
-        let run = self.run(at, Some(part), self.under_way(at, start, present)?, (M, false))?;
+        let run = self.run(at, self.under_way(at, start, (Some(part), present))?, M)?;
         let left = (run.length + before) - place;
         let wish = self.exit(at.saturating_add(run.more), part);
         Some((run, left, (wish.min(fastest_exit(start, left, &run.bounds)), wish)))
     }
 
-    /// Returns the speed that a motion on line `at` reaches if it goes on as it is, and the acceleration and jerk under way.
-    fn under_way(&self, at: usize, start: Motion, present: Option<Bounds>) -> Option<(Real, [Real; 2])> {
+    /// Returns the runs for a motion on line `at`: with the speed that it reaches if it goes on as it is, and its acceleration
+    /// and jerk.
+    fn under_way(&self, at: usize, start: Motion, (part, present): (Option<Real>, Option<Bounds>)) -> Option<Kind> {
         let first = self.line(at)?;
-        let (mut fastest, mut held) = (start.v, [Real::ZERO; 2]);
+        let (mut speed, mut held) = (start.v, [Real::ZERO; 2]);
         if let Some(jerk) = first.bounds.jerk.filter(|_| !start.a.is_zero()) {
             let j = present.and_then(|bounds| bounds.jerk).map_or(jerk.j, |own| own.j.min(jerk.j));
             held = [start.a - start.a.scaled(-20), j - j.scaled(-20)];
             if start.up {
                 // When the acceleration is back at 0.
-                fastest = start.v + (start.a.squared() / j).half();
+                speed = start.v + (start.a.squared() / j).half();
             }
         }
-        Some((fastest, held))
+        Some(Kind { part, speed, held, any: false })
     }
 
     /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with `any`, lines that may
@@ -188,9 +147,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         how: (Option<Bounds>, bool),
         any: bool,
     ) -> Option<Result<(Course, Bounds), (Run, Bounds)>> {
-        let under_way = self.under_way(at, start, how.0)?;
+        let kind = Kind { any, ..self.under_way(at, start, (None, how.0))? };
         // With the limits of no more lines than the stop takes.
-        let mut run = self.run(at, None, under_way, (0, any))?;
+        let mut run = self.single(at, None)?;
         let mut own = run.bounds;
         for _ in 0..M {
             own = Self::own(&run, how);
@@ -205,11 +164,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
             let (end, _) = self.locate(at, way, self.len);
             let most = end.saturating_sub(at).max(run.more.saturating_add(1));
-            let more = self.run(at, None, under_way, (most, any))?;
-            if more.more == run.more {
+            let before = run.more;
+            self.lengthen(at, &mut run, kind, most);
+            if run.more == before {
                 break;
             }
-            run = more;
         }
         Some(Err((run, own)))
     }
@@ -236,10 +195,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
             // Mostly it comes near a speed from which all lines are known to be slow enough in time.
             let known = self.known_exit(last).map(|known| known.max(self.promised(last)));
             // A line that allows less may have come into the run: what was promised before, or a rest, can be kept without it.
-            let without = |most: usize| {
-                let run = self.run(at, shorter.part, shorter.under_way, (most, false))?;
-                let own = Self::own(&run, shorter.how);
-                let bounds = if shorter.part.is_none() { own.slower(start.v) } else { own };
+            let without = |run: &Run| {
+                let own = Self::own(run, shorter.how);
+                let bounds = if shorter.kind.part.is_none() { own.slower(start.v) } else { own };
                 let promised = self.promised(at.saturating_add(run.more));
                 if promised.is_zero() && !own.allows_more(&limits.1) {
                     return None;
@@ -247,14 +205,28 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 let left = left - (full.length - run.length);
                 let exit =
                     if promised.is_zero() { promised } else { slowest_exit(start, left, speed, &bounds).min(promised) };
-                self.lead(at, start, left, (&run, own, bounds), (exit, wish))
+                self.lead(at, start, left, (run, own, bounds), (exit, wish))
             };
             let keeps = known.and_then(|known| to(slowest.min(known)));
-            keeps.or_else(|| (0..full.more).rev().find_map(without)).or_else(|| {
+            let shorter = || self.shorter(at, shorter.kind, full.more);
+            keeps.or_else(|| shorter().iter().rev().flatten().find_map(without)).or_else(|| {
                 let most = self.most(last);
                 [slowest.min(most), most, Real::ZERO].into_iter().find_map(to)
             })
         })
+    }
+
+    /// Returns the runs of fewer lines, the shortest first.
+    fn shorter(&self, at: usize, kind: Kind, than: usize) -> [Option<Run>; M] {
+        let mut runs = [None; M];
+        let mut run = self.single(at, kind.part);
+        for (more, place) in runs.iter_mut().take(than).enumerate() {
+            if let Some(run) = &mut run {
+                self.lengthen(at, run, kind, more);
+            }
+            *place = run;
+        }
+        runs
     }
 
     /// Plans in the same way to this speed only; behind a run where a stop leaves a line, to the speed of that stop.
@@ -457,7 +429,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Returns the run that begins at line `at`, from the corner before it, at a fraction of the requested speeds.
     fn run_from(&self, at: usize, part: Real) -> Option<Run> {
-        self.run(at, Some(part), (Real::ZERO, [Real::ZERO; 2]), (M, false))
+        self.run(at, Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false }, M)
     }
 
     /// Returns the greatest speed at the start of a run that its corner and the lines on both sides allow.

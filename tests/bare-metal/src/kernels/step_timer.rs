@@ -22,7 +22,7 @@ static ASKED: Queue<9> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
 static MOVES: [Queue<129>; 3] = [const { Queue::new() }; 3];
 static RAMPS: [Queue<129>; 6] = [const { Queue::new() }; 6];
-static PATHS: [AxesQueue<3, 257>; 3] = [const { AxesQueue::new() }; 3];
+static PATHS: [AxesQueue<3, 257>; 4] = [const { AxesQueue::new() }; 4];
 
 mod toolpaths {
     include!(concat!(env!("OUT_DIR"), "/toolpaths.rs"));
@@ -129,6 +129,8 @@ struct Job {
     line: usize,
     /// Steps that have been made and not counted yet.
     ahead: u32,
+    /// Requests made.
+    asked: usize,
 }
 
 impl Job {
@@ -139,7 +141,7 @@ impl Job {
         });
         let path = Path::new(Clock::new(168_000_000)?, [x?, y?, z?], DEVIATION).ok()?;
         let (axes, timer) = Axes::new(queue, path);
-        Some(Self { axes, timer, path: 0, line: 0, ahead: 0 })
+        Some(Self { axes, timer, path: 0, line: 0, ahead: 0, asked: 0 })
     }
 
     fn path(at: usize) -> Option<impl Iterator<Item = &'static ([i32; 3], u32)>> {
@@ -179,6 +181,25 @@ impl Job {
         let made = self.ahead > 0;
         self.ahead = self.ahead.saturating_sub(1);
         made
+    }
+
+    /// The next request: a hold and back, another override and back, a stop of either kind, and a move.
+    fn ask(&mut self) -> bool {
+        self.asked += 1;
+        let own = &mut self.axes;
+        match self.asked % 7 {
+            0 => own.hold(),
+            1 => own.resume(),
+            2 => own.set_override(60),
+            3 => own.set_override(100),
+            4 => own.stop(),
+            5 => {
+                let Some(hard) = limits() else { return false };
+                own.quick_stop([hard; 3]);
+            },
+            _ => return own.move_to(own.target().map(|at| at + 500), 100_000).is_ok(),
+        }
+        true
     }
 
     /// Steps of all axes on all paths.
@@ -376,6 +397,19 @@ kernels_on_states! {
                 job.timer.fire();
             }
             clock(&mut || step_motion_axes_push(&mut job, &0));
+        })
+    }
+
+    /// The worst request to these axes: each of them in turn, some way into the lines.
+    fn step_motion_axes_request(job: &mut Job, _input: &u32) -> bool {
+        job.ask()
+    } as {
+        let Some(mut job) = Job::new(&PATHS[3]) else { return 0 };
+        most_tenths(8000 / PART, |clock| {
+            for _ in 0..40 {
+                job.event();
+            }
+            clock(&mut || step_motion_axes_request(&mut job, &0));
         })
     }
 
