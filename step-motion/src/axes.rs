@@ -97,6 +97,8 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     lost: bool,
     turn: u32,
     halts: Halts,
+    /// The limits of the last quick stop.
+    hard: Option<[Limits; N]>,
 }
 
 /// The present work of the background.
@@ -163,6 +165,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             lost: false,
             turn: 0,
             halts: Halts::NONE,
+            hard: None,
         };
         (axes, AxesTimer::new(queue))
     }
@@ -265,26 +268,22 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Does the same as [`PathMover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
-        self.begin_anew();
-        self.path.set_override(percent, self.end);
+        self.change(|path, end| path.set_override(percent, end));
     }
 
     /// Does the same as [`PathMover::hold`].
     pub fn hold(&mut self) {
-        self.begin_anew();
-        self.path.hold(self.end);
+        self.change(PathMover::hold);
     }
 
     /// Does the same as [`PathMover::resume`].
     pub fn resume(&mut self) {
-        self.begin_anew();
-        self.path.resume(self.end);
+        self.change(PathMover::resume);
     }
 
     /// Does the same as [`PathMover::stop`].
     pub fn stop(&mut self) {
-        self.begin_anew();
-        self.path.stop(self.end);
+        self.change(PathMover::stop);
         self.tell_stops(|_, stop, end| {
             stop.stop(end);
             Ok(())
@@ -293,6 +292,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Does the same as [`PathMover::quick_stop`].
     pub fn quick_stop(&mut self, limits: [Limits; N]) {
+        if self.path.requests().is_quick() && self.hard == Some(limits) {
+            return;
+        }
+        self.hard = Some(limits);
         self.begin_anew();
         self.path.quick_stop(limits, self.end);
         self.tell_stops(|_, stop, end| {
@@ -395,6 +398,15 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     fn ready(&self) -> Result<(), Error> {
         self.halts.ready()?;
         self.path.ready(self.is_at_rest())
+    }
+
+    /// Takes a request. One for what is so already does not disturb the work on a block.
+    fn change(&mut self, ask: impl FnOnce(&mut PathMover<N, M>, u64)) {
+        let before = self.path.requests();
+        ask(&mut self.path, self.end);
+        if self.stage == Stage::Idle || !self.path.requests().are_as(before) {
+            self.begin_anew();
+        }
     }
 
     /// Forgets what has been cut but not handed out.

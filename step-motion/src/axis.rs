@@ -109,6 +109,8 @@ pub struct Axis<'q, const N: usize> {
     /// The plan cannot be run; nothing is made until the interrupt is stopped.
     lost: bool,
     halts: Halts,
+    /// The limits of the last quick stop.
+    hard: Limits,
 }
 
 /// The present work of the background.
@@ -213,6 +215,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             marks: [Mark::default(); N],
             lost: false,
             halts: Halts::NONE,
+            hard: limits,
         };
         Ok((axis.with_reach(clock.hz() / 100), timer))
     }
@@ -288,32 +291,32 @@ impl<'q, const N: usize> Axis<'q, N> {
 
     /// Does the same as [`Mover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
-        self.mover.ask_override(percent);
-        self.asked(News::Change);
+        self.change(|mover| mover.ask_override(percent));
     }
 
     /// Does the same as [`Mover::hold`].
     pub fn hold(&mut self) {
-        self.mover.ask_hold();
-        self.asked(News::Change);
+        self.change(Mover::ask_hold);
     }
 
     /// Does the same as [`Mover::resume`].
     pub fn resume(&mut self) {
-        self.mover.ask_resume();
-        self.asked(News::Change);
+        self.change(Mover::ask_resume);
     }
 
     /// Does the same as [`Mover::stop`].
     pub fn stop(&mut self) {
-        self.mover.ask_stop();
-        self.asked(News::Change);
+        self.change(Mover::ask_stop);
     }
 
     /// Does the same as [`Mover::quick_stop`].
     pub fn quick_stop(&mut self, limits: Limits) {
-        self.mover.ask_quick_stop(limits);
-        self.asked(News::Quick);
+        let again = self.requests().is_quick() && limits == self.hard;
+        if !again {
+            self.hard = limits;
+            self.mover.ask_quick_stop(limits);
+            self.asked(News::Quick);
+        }
     }
 
     /// Makes no further step from now on: the interrupt sees this without the queue. Moves are refused until the interrupt
@@ -352,6 +355,15 @@ impl<'q, const N: usize> Axis<'q, N> {
             return Err(Error::Moving);
         }
         self.mover.set_limits(limits, tick(self.end.end))
+    }
+
+    /// Takes a request, unless it is for what is so already.
+    fn change(&mut self, ask: impl FnOnce(&mut Mover)) {
+        let before = self.requests();
+        ask(&mut self.mover);
+        if !self.requests().are_as(before) {
+            self.asked(News::Change);
+        }
     }
 
     pub(super) const fn requests(&self) -> Requests {

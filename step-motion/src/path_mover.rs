@@ -329,6 +329,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.requests.ready(at_rest)
     }
 
+    pub(super) const fn requests(&self) -> Requests {
+        self.requests
+    }
+
     pub(super) const fn ask_halt(&mut self) {
         self.requests.halt();
     }

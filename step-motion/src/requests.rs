@@ -118,6 +118,11 @@ impl Requests {
         self.number
     }
 
+    /// Returns whether another request has changed nothing.
+    pub(crate) fn are_as(self, other: Self) -> bool {
+        Self { number: other.number, ..self } == other
+    }
+
     pub(crate) const fn is_halted(self) -> bool {
         self.halted
     }

@@ -80,6 +80,41 @@ fn a_refused_request_costs_nothing() {
     });
 }
 
+/// A control loop that sets the override in each cycle, from a slice of the background's work to the next.
+#[test]
+fn a_request_for_what_is_so_costs_nothing() {
+    all(|machine, name| {
+        for (percent, to) in [(100, 60), (50, 20)] {
+            machine.ask(Ask::Override(percent)).unwrap();
+            machine.ask(Ask::To(to)).unwrap();
+            for _ in 0..10_000 {
+                machine.ask(Ask::Override(percent)).unwrap();
+                machine.ask(Ask::Resume).unwrap();
+                machine.work(MS / 50);
+            }
+            assert_eq!(machine.at(), to, "{name}");
+        }
+    });
+}
+
+/// A loop that asks again as long as a button is pressed, from slice to slice.
+#[test]
+fn a_stop_that_is_asked_for_again_comes_as_soon() {
+    for (ask, brake) in [(Ask::Hold, 10), (Ask::Override(0), 10), (Ask::Stop, 10), (Ask::Quick, 2)] {
+        all(|machine, name| {
+            under_way(machine);
+            let at = machine.at();
+            for _ in 0..5000 {
+                machine.ask(ask).unwrap();
+                machine.work(MS / 50);
+            }
+            let steps = machine.at() - at;
+            let most = brake + if machine.has_halves() { 4 } else { 0 };
+            assert!(machine.is_at_rest() && steps <= most + 1, "{name}: {steps} steps after {ask:?}");
+        });
+    }
+}
+
 /// To a clock that is ahead the quick stop is over; what is asked for with it is refused, and the stop is as it was.
 #[test]
 fn a_refused_request_does_not_end_a_quick_stop() {
