@@ -3,6 +3,7 @@
 use crate::curve::{Curve, Piece};
 use crate::cutter::{Demand, Slice};
 use crate::limits::{Bounds, Clock};
+use crate::path::Ahead;
 use crate::phases::{self, Frame, P};
 use crate::planner::Motion;
 use crate::real::Real;
@@ -31,64 +32,18 @@ pub(super) struct Line<const N: usize> {
     pub(super) cut: bool,
     /// The speed at which a stop that ends on a later line leaves this one.
     pub(super) leave: Option<Real>,
-    /// What was found when the path had an edition.
     pub(super) ahead: Ahead,
-    pub(super) edition: u32,
-    /// The greatest speed found for its start in an era of the path, in which lines were only added.
-    pub(super) promise: (u32, Real),
-}
-
-/// What is known of the way from the start of a line on.
-#[derive(Debug, Clone, Copy)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) enum Ahead {
-    /// The run that begins there has this many lines after the first one.
-    Run(usize),
-    /// From this speed all lines from there on can slow down in time.
-    Speed(Real),
 }
 
 impl<const N: usize> Line<N> {
     pub(super) fn new(steps: [i32; N], whole: Real, bounds: Bounds, (feed, corner): (Real, Real)) -> Self {
         let ends = steps.map(i32::unsigned_abs);
-        Self {
-            steps,
-            whole,
-            length: whole,
-            ends,
-            bounds,
-            feed,
-            corner,
-            cut: false,
-            leave: None,
-            ahead: Ahead::Run(0),
-            edition: 0,
-            promise: (0, Real::ZERO),
-        }
+        Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None, ahead: Ahead::NONE }
     }
 
     /// Returns a fraction of the requested speed, never above the limits of the axes.
     pub(super) fn speed(&self, part: Real) -> Real {
         self.bounds.v.min(self.feed * part)
-    }
-
-    /// Returns what was found when the path had an edition.
-    pub(super) fn ahead(&self, edition: u32) -> Option<Ahead> {
-        Some(self.ahead).filter(|_| self.edition == edition)
-    }
-
-    /// Returns the speed at its start from which all lines from there on can slow down in time, if it is known.
-    pub(super) fn entry(&self, edition: u32) -> Option<Real> {
-        match self.ahead(edition)? {
-            Ahead::Run(_) => None,
-            Ahead::Speed(speed) => Some(speed),
-        }
-    }
-
-    /// Returns the greatest speed found for its start in an era of the path.
-    pub(super) fn promised(&self, era: u32) -> Real {
-        let (own, speed) = self.promise;
-        if own == era { speed } else { Real::ZERO }
     }
 
     /// Returns the steps that each axis has made at a place on the line; all steps at its end.

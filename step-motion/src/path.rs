@@ -1,5 +1,6 @@
 //! Straight lines in several axes, one after another.
 
+mod ahead;
 mod corner;
 mod cut;
 mod run;
@@ -13,6 +14,8 @@ use crate::planner::Motion;
 use crate::real::Real;
 use servowire_core::Direction;
 
+pub(crate) use ahead::Ahead;
+use ahead::Times;
 pub(crate) use cut::{End, Leaving};
 
 /// An axis of a machine.
@@ -116,10 +119,9 @@ pub struct Path<const N: usize, const M: usize> {
     /// the queue into account.
     on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
-    /// What is known of the lines ahead holds for this fraction of the requested speeds, and since the lines last changed.
+    /// The fraction of the requested speeds for which something is known of the lines ahead, and since when.
     part: Real,
-    edition: u32,
-    era: u32,
+    times: Times,
 }
 
 /// By hand, because the derived `clone_from` copies it twice.
@@ -166,8 +168,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             on: None,
             knows_all: false,
             part: Real::ONE,
-            edition: 1,
-            era: 0,
+            times: Times::FIRST,
         };
         new.set_deviation(deviation);
         Ok(new)
@@ -240,7 +241,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             self.before = Some((line.steps, line.whole));
             self.target = target;
             self.knows_all = false;
-            self.edition = self.edition.wrapping_add(1);
+            self.times.line_added();
             gone_along(&mut self.ways, &line.steps);
         }
     }
@@ -252,7 +253,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Forgets what was found about the lines, and what was promised.
     pub(super) const fn forget(&mut self) {
-        (self.edition, self.era) = (self.edition.wrapping_add(1), self.era.wrapping_add(1));
+        self.times.other_lines();
     }
 
     /// Returns whether another path of the same axes ends in the same way, so that the same line would be added to it.

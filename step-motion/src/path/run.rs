@@ -5,10 +5,9 @@
 
 mod alike;
 
-use super::{Course, Path};
+use super::{Ahead, Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
-use crate::line::Ahead;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use crate::real::Real;
 
@@ -300,82 +299,59 @@ impl<const N: usize, const M: usize> Path<N, M> {
         ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
     }
 
-    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time. Once it is known, it
-    /// stays known until the lines or the part change.
+    /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time.
     pub(crate) fn exit(&mut self, at: usize, part: Real) -> Real {
-        self.ask_for(part);
-        let mut next = at.saturating_add(1);
-        if let Some(known) = self.known(next) {
-            return known;
-        }
-        let mut runs = [(0, Run::NONE); M];
-        for place in &mut runs {
-            if self.known(next).is_some() {
-                break;
-            }
-            let Some(run) = self.run_from(next, part) else { break };
-            *place = (next, run);
-            next = next.saturating_add(run.more).saturating_add(1);
-        }
-        let mut speed = self.known(next).unwrap_or(Real::ZERO);
-        for (at, run) in runs.iter().rev().filter(|(at, _)| *at > 0) {
-            speed = self.find_entry(*at, run, speed);
-        }
-        speed
+        self.find_exit(at, part, usize::MAX).unwrap_or(Real::ZERO)
     }
 
-    /// Does a slice of that: finds how far a run leads, or how fast the last run may begin for which this is not known yet.
-    /// Returns the speed once it is known.
-    pub(crate) fn find_exit(&mut self, at: usize, part: Real) -> Option<Real> {
-        self.ask_for(part);
-        let (mut next, mut speed, mut last) = (at.saturating_add(1), Real::ZERO, None);
-        while let Some(line) = self.line(next) {
-            match line.ahead(self.edition) {
-                Some(Ahead::Speed(known)) => {
-                    speed = known;
-                    break;
-                }
-                Some(Ahead::Run(more)) => {
-                    last = Some(next);
-                    next = next.saturating_add(more).saturating_add(1);
-                }
-                None => {
-                    let more = self.run_from(next, part)?.more;
-                    self.know(next, Ahead::Run(more));
-                    return None;
-                }
-            }
-        }
-        let Some(first) = last else { return Some(speed) };
-        self.find_entry(first, &self.run_from(first, part)?, speed);
-        None
-    }
-
-    /// Forgets what was found for another fraction of the requested speeds; what was promised, the motion may need still.
-    fn ask_for(&mut self, part: Real) {
+    /// Does the same, or a slice of it: finds up to `most` runs and speeds. What was found before holds on, unless a line that was
+    /// added changes it: a new line changes the last run, and the speeds from there back to one that stays the same.
+    pub(crate) fn find_exit(&mut self, at: usize, part: Real, mut most: usize) -> Option<Real> {
         if part != self.part {
             self.part = part;
-            self.edition = self.edition.wrapping_add(1);
+            self.times.other_part();
         }
-    }
-
-    /// Finds how fast a run may begin that is to end at a speed.
-    fn find_entry(&mut self, at: usize, run: &Run, exit: Real) -> Real {
-        let entry = self.entry(at, run, exit);
-        self.know(at, Ahead::Speed(entry));
-        entry
-    }
-
-    /// Keeps what has been found for a line.
-    fn know(&mut self, at: usize, ahead: Ahead) {
-        let (edition, era) = (self.edition, self.era);
-        let place = self.first.wrapping_add(at).checked_rem(M).and_then(|at| self.lines.get_mut(at));
-        if let Some(Some(line)) = place {
-            (line.ahead, line.edition) = (ahead, edition);
-            if let Ahead::Speed(speed) = ahead {
-                line.promise = (era, speed.max(line.promised(era)));
+        let (mut runs, mut len, mut next) = ([0; M], 0, at.saturating_add(1));
+        while let (Some(place), Some(line)) = (runs.get_mut(len), self.line(next)) {
+            if line.ahead.entry(self.times).is_some() {
+                break;
             }
+            (*place, len) = (next, len.saturating_add(1));
+            let more = if let Some(more) = line.ahead.run(self.times) {
+                more
+            } else {
+                most = most.checked_sub(1)?;
+                self.find_run(next, part)?
+            };
+            next = next.saturating_add(more).saturating_add(1);
         }
+        let mut speed = self.known(next).unwrap_or(Real::ZERO);
+        for at in runs.get(..len)?.iter().rev() {
+            let entry = if let Some(entry) = self.line(*at)?.ahead.entry_to(speed) {
+                entry
+            } else {
+                most = most.checked_sub(1)?;
+                self.entry(*at, &self.run_from(*at, part)?, speed)
+            };
+            let times = self.times;
+            self.ahead(*at)?.know_entry(speed, entry, times);
+            speed = entry;
+        }
+        Some(speed)
+    }
+
+    /// Finds how far a run ahead leads, and keeps it.
+    fn find_run(&mut self, at: usize, part: Real) -> Option<usize> {
+        let more = self.run_from(at, part)?.more;
+        let open = self.line(at.saturating_add(more).saturating_add(1)).is_none();
+        let times = self.times;
+        self.ahead(at)?.know_run(more, open, times);
+        Some(more)
+    }
+
+    fn ahead(&mut self, at: usize) -> Option<&mut Ahead> {
+        let at = self.first.wrapping_add(at).checked_rem(M)?;
+        Some(&mut self.lines.get_mut(at)?.as_mut()?.ahead)
     }
 
     /// Returns the speed at the end of line `at` if it is known, or follows from what is known.
@@ -390,12 +366,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Returns the greatest speed at the end of line `at` that was found since lines have only been added.
     fn promised(&self, at: usize) -> Real {
-        self.line(at.saturating_add(1)).map_or(Real::ZERO, |line| line.promised(self.era))
+        self.line(at.saturating_add(1)).map_or(Real::ZERO, |line| line.ahead.promised(self.times))
     }
 
     /// Returns the speed at the start of line `at`, or behind the last one, if it is known.
     fn known(&self, at: usize) -> Option<Real> {
-        self.line(at).map_or(Some(Real::ZERO), |line| line.entry(self.edition))
+        self.line(at).map_or(Some(Real::ZERO), |line| line.ahead.entry(self.times))
     }
 
     /// Returns the greatest speed at which a run may begin that is to end at a speed.

@@ -99,7 +99,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(crate) fn has_to_find(&mut self) -> bool {
         let at = if self.line.is_some() { self.more } else { 0 };
         let part = self.requests.part().unwrap_or(self.path.part());
-        self.path.find_exit(at, part).is_none()
+        self.path.find_exit(at, part, 1).is_none()
     }
 
     /// Continues as another mover would, from a rest after a stop that was not requested.

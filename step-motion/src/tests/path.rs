@@ -204,14 +204,16 @@ proptest! {
         let (mut at, mut asked) = ([0; N], asked.into_iter().cycle());
         let mut find = |known: &mut Lines| {
             let (line, speed, slices) = asked.next().unwrap();
-            let found = (0..slices).find_map(|_| known.find_exit(line, part(speed)));
+            let found = (0..slices).find_map(|_| known.find_exit(line, part(speed), 1));
             let at_once = known.clone().exit(line, part(speed));
             (found.is_none_or(|found| found == at_once), line, speed)
         };
-        for (by, feed) in &lines {
+        for (done, (by, feed)) in lines.iter().enumerate() {
             at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
             known.push(at, *feed).unwrap();
-            prop_assert!(find(&mut known).0);
+            let (same, line, speed) = find(&mut known);
+            let afresh = path(&lines[..=done]).exit(line, part(speed));
+            prop_assert!(same && known.clone().exit(line, part(speed)) == afresh);
         }
         for _ in 0..ended.min(lines.len() - 1) {
             known.pass();

@@ -39,6 +39,23 @@ fn apart() -> [To; 4] {
     [([200, 0, 2], 1000), ([60, 0, 1], 1000), ([70, 0, 3], 1000), ([80, 0, 1], 1000)]
 }
 
+/// A line that is added changes the speeds from the end back to the first that stays the same, and no others are found again: here the
+/// corners allow so little that each line can come to rest.
+#[test]
+fn a_line_that_is_added_costs_the_same_behind_any_number_of_lines() {
+    let lines: std::vec::Vec<To> = (0..8).map(|at| ([400, 0, 1 + at % 2], 1000)).collect();
+    let slices = |path: &mut Lines| (1..100).find(|_| path.find_exit(0, Real::ONE, 1).is_some()).unwrap();
+    let mut all = path(&lines[..1]);
+    let mut costs = std::vec::Vec::new();
+    let mut at = all.target();
+    for (by, feed) in &lines[1..] {
+        at = [0, 1, 2].map(|axis: usize| at[axis] + by[axis]);
+        all.push(at, *feed).unwrap();
+        costs.push(slices(&mut all));
+    }
+    assert!(costs.iter().all(|cost| *cost <= 5), "{costs:?}");
+}
+
 /// From what is known of the last lines, as from their end.
 #[test]
 fn what_is_known_is_gone_on_from() {

@@ -22,7 +22,7 @@ static ASKED: Queue<9> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
 static MOVES: [Queue<129>; 3] = [const { Queue::new() }; 3];
 static RAMPS: [Queue<129>; 6] = [const { Queue::new() }; 6];
-static PATHS: [AxesQueue<3, 257>; 4] = [const { AxesQueue::new() }; 4];
+static PATHS: [AxesQueue<3, 257>; 5] = [const { AxesQueue::new() }; 5];
 
 mod toolpaths {
     include!(concat!(env!("OUT_DIR"), "/toolpaths.rs"));
@@ -131,6 +131,8 @@ struct Job {
     ahead: u32,
     /// Requests made.
     asked: usize,
+    /// Ticks to the end of a millisecond.
+    ticks: u32,
 }
 
 impl Job {
@@ -141,7 +143,7 @@ impl Job {
         });
         let path = Path::new(Clock::new(168_000_000)?, [x?, y?, z?], DEVIATION).ok()?;
         let (axes, timer) = Axes::new(queue, path);
-        Some(Self { axes, timer, path: 0, line: 0, ahead: 0, asked: 0 })
+        Some(Self { axes, timer, path: 0, line: 0, ahead: 0, asked: 0, ticks: 0 })
     }
 
     fn path(at: usize) -> Option<impl Iterator<Item = &'static ([i32; 3], u32)>> {
@@ -160,14 +162,26 @@ impl Job {
         }
     }
 
-    /// An event, and all that the background has to do then; steps in it.
-    fn event(&mut self) -> u32 {
+    /// An event, and all that the background has to do then.
+    fn event(&mut self) -> FiredAxes {
         while !self.axes.is_full() {
             let Some((to, feed)) = self.next() else { break };
             let _: Result<_, _> = self.axes.push(to, feed);
         }
         while self.axes.poll() == Work::More {}
-        self.timer.fire().steps().count_ones()
+        self.timer.fire()
+    }
+
+    /// All events of a millisecond.
+    fn millisecond(&mut self) -> bool {
+        const MILLISECOND: u32 = 168_000;
+        let mut events = 0;
+        while self.ticks < MILLISECOND && events < MILLISECOND {
+            self.ticks += self.event().wait();
+            events += 1;
+        }
+        self.ticks -= self.ticks.min(MILLISECOND);
+        events > 0
     }
 
     /// A step of any axis.
@@ -176,7 +190,7 @@ impl Job {
             if self.ahead > 0 {
                 break;
             }
-            self.ahead = self.event();
+            self.ahead = self.event().steps().count_ones();
         }
         let made = self.ahead > 0;
         self.ahead = self.ahead.saturating_sub(1);
@@ -366,6 +380,13 @@ kernels_on_states! {
         job.step()
     } as {
         Job::new(&PATHS[0]).map_or(0, |mut own| tenths_of(Job::steps(), &mut own, step_motion_axes_job, &[()]))
+    }
+
+    /// A millisecond of that motion with all of its background and the interrupt.
+    fn step_motion_axes_millisecond(job: &mut Job, _input: &i8) -> bool {
+        job.millisecond()
+    } as {
+        Job::new(&PATHS[4]).map_or(0, |mut own| tenths_of(75_000 / PART, &mut own, step_motion_axes_millisecond, &[0]))
     }
 
     /// The worst slice of the background of these axes, to 40 instructions.
