@@ -402,9 +402,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Takes a request. One for what is so already does not disturb the work on a block.
     fn change(&mut self, ask: impl FnOnce(&mut PathMover<N, M>, u64)) {
-        let before = self.path.requests();
+        let (before, lines) = (self.path.requests(), self.path.len());
         ask(&mut self.path, self.end);
-        if self.stage == Stage::Idle || !self.path.requests().are_as(before) {
+        let same = self.path.requests().are_as(before) && self.path.len() == lines;
+        if self.stage == Stage::Idle || !same {
             self.begin_anew();
         }
     }

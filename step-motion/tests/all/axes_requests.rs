@@ -7,14 +7,14 @@ use crate::machine::Machine;
 const HZ: u64 = 1_000_000;
 const SLOTS: usize = 513;
 
-struct Bench {
-    axes: Axes<'static, 2, 4, SLOTS>,
-    machine: Machine<AxesTimer<'static, 2, SLOTS>, 2>,
+pub(crate) struct Bench {
+    pub(crate) axes: Axes<'static, 2, 4, SLOTS>,
+    pub(crate) machine: Machine<AxesTimer<'static, 2, SLOTS>, 2>,
 }
 
 impl Bench {
     /// 100 mm/s, 1 m/s², 80 steps/mm.
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let axis = AxisSetup::new(Limits::new(8000, 80_000).unwrap(), 80_000).with_soft_limits(-9000, 9000);
         let path = Path::new(Clock::new(HZ as u32).unwrap(), [axis; 2], 20).unwrap();
         let queue: &'static AxesQueue<2, SLOTS> = Box::leak(Box::default());
@@ -23,7 +23,7 @@ impl Bench {
     }
 
     /// Time goes on, with a background or without one.
-    fn until(&mut self, time: u64, background: bool) {
+    pub(crate) fn until(&mut self, time: u64, background: bool) {
         if !background {
             return self.machine.until(time);
         }
@@ -32,7 +32,7 @@ impl Bench {
     }
 
     /// In the middle of a line of 8000 steps, at full speed.
-    fn running() -> Self {
+    pub(crate) fn running() -> Self {
         let mut bench = Self::new();
         bench.axes.push([8000, 0], 100_000).unwrap();
         bench.until(300_000, true);
@@ -40,7 +40,7 @@ impl Bench {
         bench
     }
 
-    fn x(&self) -> i64 {
+    pub(crate) fn x(&self) -> i64 {
         self.axes.commanded()[0]
     }
 }
@@ -87,6 +87,24 @@ fn a_stop_forgets_the_path_and_a_quick_one_is_shorter() {
     });
     assert!(STOP.contains(&ends[0]) && ends[0] == ends[1], "{ends:?}");
     assert!((340..380).contains(&(ends[0] - ends[2])), "{ends:?}");
+}
+
+/// From rest, or behind another stop, and after any slice of the work: where the stop says, and no farther.
+#[test]
+fn a_stop_forgets_lines_in_the_making() {
+    for (slices, moving) in (0..60).flat_map(|slices| [(slices, false), (slices, true)]) {
+        let mut bench = if moving { Bench::running() } else { Bench::new() };
+        bench.axes.stop();
+        bench.axes.push([0, 500], 100_000).unwrap();
+        for _ in 0..slices {
+            bench.machine.slice(&mut bench.axes);
+        }
+        bench.axes.stop();
+        let target = bench.axes.target();
+        bench.until(bench.machine.now + 3_000_000, true);
+        assert_eq!((bench.axes.commanded(), bench.axes.target()), (target, target), "{slices} {moving}");
+        assert!(bench.axes.is_at_rest());
+    }
 }
 
 #[test]
