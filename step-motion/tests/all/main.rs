@@ -2,6 +2,7 @@
 #![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::cast_precision_loss)]
 #![allow(clippy::cast_sign_loss, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
+mod axes_late;
 mod axes_requests;
 mod axis_blocks;
 mod axis_requests;

@@ -156,3 +156,23 @@ fn a_stop_that_does_not_fit_is_no_longer_than_a_hold() {
         assert!(stopped <= held, "at {at}: {stopped} steps of a stop, {held} of a hold");
     }
 }
+
+/// Twice the speed, ten times the acceleration and no limit of the jerk: for the stop, and not for the line behind it.
+#[test]
+fn the_limits_of_a_quick_stop_end_with_it() {
+    let takes = |machine: &mut Machine, now| {
+        let from = machine.commanded()[0];
+        machine.push([from + 600, 0], 5000, now).unwrap();
+        let ticks = rest(machine);
+        ticks[599] - ticks[0]
+    };
+    let mut stopped = machine();
+    let now = take(&mut stopped, 300);
+    stopped.quick_stop([Limits::new(2000, 50_000).unwrap(); 2], now);
+    let now = rest(&mut stopped).pop().unwrap() + 10_000;
+    assert!(stopped.commanded()[0] < 350);
+    let mut fresh = machine();
+    fresh.halt(0);
+    let (stopped, fresh) = (takes(&mut stopped, now), takes(&mut fresh, 0));
+    assert!(stopped.abs_diff(fresh) <= 1, "{stopped} {fresh}");
+}

@@ -92,6 +92,7 @@ fn check(plan: &Plan, n: u32, limits: Limits, [v0, v1]: [u32; 2]) -> Result<(), 
     let state = |tick: u64| plan.at(tick);
     let within = |value: i64, limit: f64| (value as f64 / 65536.0).abs() <= limit * (1.0 + 1e-6) + 1e-3;
     let corners: Vec<u64> = plan.corners().collect();
+    prop_assert_eq!((corners.first(), corners.last()), (Some(&0), Some(&plan.duration())));
     for pair in corners.windows(2) {
         for tick in [pair[0], pair[0].midpoint(pair[1]), pair[1]] {
             let s = state(tick);
@@ -245,6 +246,7 @@ fn a_plan_tells_its_jerk_and_its_steps() {
     let plan = Plan::new(Clock::MICROSECONDS, limits(250_000, 2_000_000, 40_000_000), 51_200).unwrap();
     let corners: Vec<u64> = plan.corners().collect();
     let jerks: Vec<i64> = corners.windows(2).map(|pair| plan.at(pair[0].midpoint(pair[1])).jerk).collect();
+    assert_eq!(jerks.len(), 7);
     for (got, want) in jerks.iter().zip([1, 0, -1, 0, -1, 0, 1]) {
         assert!(got.abs_diff((want * 40_000_000) << 16) <= 1 << 16, "{jerks:?}");
     }
@@ -254,6 +256,16 @@ fn a_plan_tells_its_jerk_and_its_steps() {
     assert_eq!(pulses.size_hint(), (51_200, Some(51_200)));
     pulses.next().unwrap();
     assert_eq!(pulses.size_hint(), (51_199, Some(51_199)));
+}
+
+/// 1000 steps/s at 1000 steps/s², for a second; then with half a second of 2000 steps/s³ at either end of each ramp.
+#[test]
+fn the_corners_of_a_plan() {
+    let corners =
+        |limits, steps| Plan::new(Clock::MICROSECONDS, limits, steps).unwrap().corners().collect::<Vec<u64>>();
+    assert_eq!(corners(limits(1000, 1000, 0), 2000), [0, 1_000_000, 2_000_000, 3_000_000]);
+    let halves = [0, 1, 2, 3, 5, 6, 7, 8].map(|half| half * 500_000);
+    assert_eq!(corners(limits(1000, 1000, 2000), 2500), halves);
 }
 
 /// Half the clock and 2^31 - 1 steps are allowed; one more is not.
