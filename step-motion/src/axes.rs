@@ -251,9 +251,9 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
-        self.path.move_to(target, feed, self.end)?;
+        self.path.go_to(target, feed, self.end)?;
         self.begin_anew();
-        self.tell_stops(|_, stop, end| stop.move_to(target, feed, end));
+        self.tell_stops(|_, stop, end| stop.go_to(target, feed, end));
         Ok(())
     }
 
@@ -310,7 +310,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         if let Some(queue) = self.queue.axes.first() {
             self.halts.ask(&queue.halt);
         }
-        self.path.ask_halt();
+        self.path.halt_before(self.end);
         self.begin_anew();
     }
 
@@ -421,8 +421,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             return Work::Start;
         }
         let commanded = self.commanded();
-        let was_moving = commanded != self.path.commanded() || !self.path.is_at_rest(self.end);
-        self.path.halt_at(commanded, self.end, was_moving);
+        // Or not all of what was handed out has been made.
+        self.path.halt_at(commanded, self.end, commanded != self.path.commanded());
         self.stand([None; N]);
         if let Some(queue) = self.queue.axes.first() {
             self.halts.confirmed(&queue.halt);

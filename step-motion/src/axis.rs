@@ -259,7 +259,8 @@ impl<'q, const N: usize> Axis<'q, N> {
             _ => return false,
         };
         let new = self.halts.is_pending() || self.news != News::None;
-        !new && running.is_none() && mover.is_at_rest(tick(end.end))
+        // Behind a stop that nobody has asked for, the way on may still have to be planned.
+        !new && running.is_none() && !mover.has_more() && mover.is_at_rest(tick(end.end))
     }
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motor may have run on.

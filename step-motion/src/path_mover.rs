@@ -231,10 +231,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Those of [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
-        self.path.push(target, feed)?;
-        self.requests.go_later();
-        self.look_ahead(now);
-        Ok(())
+        self.add(target, feed, now)
     }
 
     /// Sets the feed override, in percent of the speeds with which the lines were pushed. The axes' limits and the speeds
@@ -267,10 +264,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// remaining path. Lines are refused until it is at rest. Where an axis's own limits are higher, those are used: a quick
     /// stop is never longer than a [`stop`](Self::stop), even one that is already under way.
     pub fn quick_stop(&mut self, limits: [Limits; N], now: u64) {
-        let Some(plain) = self.stop_from(now) else { return self.leave(self.tick(now)) };
+        let plain = self.stop_from(now);
+        self.requests.quick_stop();
+        let Some(plain) = plain else { return self.leave(self.tick(now)) };
         let (rest, lines) = (self.rest_of(&plain), self.path.hurry(&limits));
         let Some(stop) = self.stop_anew(now, true) else { return self.leave(self.tick(now)) };
-        self.requests.quick_stop();
         // Who brakes harder before a corner comes to the line behind it later, which may allow more.
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
         if rest < latest || plain.end < stop.end {
@@ -291,6 +289,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// [`quick_stop`](Self::quick_stop). All of them leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
+        self.go_to(target, feed, now)
+    }
+
+    /// Does that if it is [ready](Self::ready).
+    pub(super) fn go_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.path.check(&target)?;
         let stop = self.stop_from(now);
         let from = stop.map_or(self.commanded, |stop| self.path.place(&self.end_of(&stop), self.begun(), self.made));
@@ -299,14 +302,21 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return Err(Error::QueueFull);
         }
         self.stop_as(stop.as_ref(), now);
-        self.push(target, feed, now)
+        self.add(target, feed, now)
+    }
+
+    fn add(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.path.push(target, feed)?;
+        self.requests.go_later();
+        self.look_ahead(now);
+        Ok(())
     }
 
     /// Makes no further step and forgets the path. The positions are those of the steps made; motors at speed run on and
     /// lose them.
     pub fn halt(&mut self, now: u64) {
         let was_moving = !self.is_at_rest(now);
-        self.ask_halt();
+        self.requests.halt();
         self.stand(now, was_moving);
     }
 
@@ -331,10 +341,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     pub(super) const fn requests(&self) -> Requests {
         self.requests
-    }
-
-    pub(super) const fn ask_halt(&mut self) {
-        self.requests.halt();
     }
 
     /// Comes to rest as a stop does, or stays there.

@@ -108,6 +108,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.replan(now);
     }
 
+    /// Makes no further step, because of a halt whose position is not known yet.
+    pub(crate) fn halt_before(&mut self, now: u64) {
+        self.requests.halt();
+        self.stand(now, self.due().is_some());
+    }
+
     /// Records a halt at a position.
     pub(crate) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
         self.commanded = commanded;

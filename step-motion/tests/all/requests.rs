@@ -115,6 +115,28 @@ fn a_stop_that_is_asked_for_again_comes_as_soon() {
     }
 }
 
+/// Also a stop that comes while the first block is in the making.
+#[test]
+fn a_stop_is_one_after_any_slice() {
+    for slices in 0..60 {
+        for ask in [Ask::Stop, Ask::Quick, Ask::Hold, Ask::Halt] {
+            all(|machine, name| {
+                machine.ask(Ask::To(100)).unwrap();
+                for _ in 0..slices {
+                    machine.work(MS / 50);
+                }
+                machine.ask(ask).unwrap();
+                machine.wait(500 * MS);
+                assert!(machine.is_at_rest() && machine.at() < 100, "{name}: {ask:?} after {slices}");
+                machine.ask(Ask::To(-5)).unwrap();
+                machine.ask(Ask::Resume).unwrap();
+                machine.wait(500 * MS);
+                assert_eq!(machine.at(), -5, "{name}: {ask:?} after {slices}");
+            });
+        }
+    }
+}
+
 /// To a clock that is ahead the quick stop is over; what is asked for with it is refused, and the stop is as it was.
 #[test]
 fn a_refused_request_does_not_end_a_quick_stop() {

@@ -57,6 +57,10 @@ pub(super) trait Driven {
     fn work(&mut self, ticks: u64) {
         self.wait(ticks);
     }
+    /// Time goes on without a background.
+    fn starve(&mut self, ticks: u64) {
+        self.wait(ticks);
+    }
     fn at(&self) -> i64;
     fn is_at_rest(&self) -> bool;
     fn is_halted(&self) -> bool;
@@ -227,6 +231,10 @@ impl Driven for AxisMachine<'_> {
         wait(&mut self.machine, &mut self.axis, ticks);
     }
 
+    fn starve(&mut self, ticks: u64) {
+        self.machine.until(self.machine.now + ticks);
+    }
+
     fn work(&mut self, ticks: u64) {
         work(&mut self.machine, &mut self.axis, ticks);
     }
@@ -280,6 +288,10 @@ impl Driven for AxesMachine<'_> {
 
     fn wait(&mut self, ticks: u64) {
         wait(&mut self.machine, &mut self.axes, ticks);
+    }
+
+    fn starve(&mut self, ticks: u64) {
+        self.machine.until(self.machine.now + ticks);
     }
 
     fn work(&mut self, ticks: u64) {
