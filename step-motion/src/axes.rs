@@ -314,6 +314,19 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.begin_anew();
     }
 
+    /// Does the same as [`PathMover::set_commanded`].
+    ///
+    /// # Errors
+    /// [`Error::Moving`] before it is [at rest](Self::is_at_rest).
+    pub fn set_commanded(&mut self, steps: [i64; N]) -> Result<(), Error> {
+        if !self.is_at_rest() {
+            return Err(Error::Moving);
+        }
+        self.begin_anew();
+        self.path.rename(steps, self.end);
+        Ok(())
+    }
+
     /// Does a slice of the background's work: a segment, a plan, or a check of the interrupt. Call it until it returns
     /// anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach).
     pub fn poll(&mut self) -> Work {

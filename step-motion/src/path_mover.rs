@@ -320,6 +320,24 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.stand(now, was_moving);
     }
 
+    /// Sets, at rest, the step counts of the present position, for instance 0 at a reference, and forgets the remaining path.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] before it is at rest.
+    pub fn set_commanded(&mut self, steps: [i64; N], now: u64) -> Result<(), Error> {
+        if !self.is_at_rest(now) {
+            return Err(Error::Moving);
+        }
+        self.rename(steps, now);
+        Ok(())
+    }
+
+    /// Does that of a mover at rest.
+    pub(super) fn rename(&mut self, steps: [i64; N], now: u64) {
+        self.commanded = steps;
+        self.leave(self.tick(now));
+    }
+
     pub(super) const fn clock(&self) -> Clock {
         self.path.clock()
     }

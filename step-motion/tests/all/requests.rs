@@ -137,6 +137,33 @@ fn a_stop_is_one_after_any_slice() {
     }
 }
 
+/// At rest, on hold too: what was to be reached is forgotten, and targets are counted from the new position.
+#[test]
+fn a_position_is_set_at_rest() {
+    all(|machine, name| {
+        under_way(machine);
+        assert_eq!(machine.ask(Ask::Set(7)), Err(Error::Moving), "{name}");
+        machine.ask(Ask::Hold).unwrap();
+        machine.wait(100 * MS);
+        let at = machine.at();
+        machine.ask(Ask::Set(7)).unwrap();
+        assert_eq!(machine.at(), at + 7, "{name}");
+        machine.ask(Ask::Resume).unwrap();
+        machine.wait(500 * MS);
+        assert_eq!(machine.at(), at + 7, "{name}: the old target has no meaning");
+        for to in [at + 7, at + 12, 0] {
+            machine.ask(Ask::To(to)).unwrap();
+            machine.wait(500 * MS);
+            assert_eq!(machine.at(), to, "{name}");
+        }
+        assert_eq!(machine.ask(Ask::To(101)), Err(Error::SoftLimit { target: 101 }), "{name}");
+        machine.ask(Ask::Halt).unwrap();
+        if machine.has_halves() {
+            assert_eq!(machine.ask(Ask::Set(1)), Err(Error::Moving), "{name}: not confirmed");
+        }
+    });
+}
+
 /// To a clock that is ahead the quick stop is over; what is asked for with it is refused, and the stop is as it was.
 #[test]
 fn a_refused_request_does_not_end_a_quick_stop() {

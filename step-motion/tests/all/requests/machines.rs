@@ -19,8 +19,8 @@ pub(super) enum Ask {
     Stop,
     Quick,
     Halt,
-    /// The present position is what it is; of an axis only.
-    Set,
+    /// The present position is called that many steps more.
+    Set(i64),
     /// A run at no speed, which is a stop; of an axis only.
     Standstill,
 }
@@ -99,7 +99,7 @@ impl Driven for MoverMachine {
             Ask::Stop => mover.stop(now),
             Ask::Quick => mover.quick_stop(hard(), now),
             Ask::Halt => mover.halt(now),
-            Ask::Set => mover.set_commanded(mover.commanded(), now)?,
+            Ask::Set(by) => mover.set_commanded(mover.commanded() + by, now)?,
         }
         Ok(())
     }
@@ -147,7 +147,8 @@ impl Driven for PathMachine {
             Ask::Stop => mover.stop(now),
             Ask::Quick => mover.quick_stop([hard()], now),
             Ask::Halt => mover.halt(now),
-            Ask::Set | Ask::Standstill => {}
+            Ask::Set(by) => mover.set_commanded(mover.commanded().map(|at| at + by), now)?,
+            Ask::Standstill => {}
         }
         Ok(())
     }
@@ -222,7 +223,10 @@ impl Driven for AxisMachine<'_> {
             Ask::Stop => axis.stop(),
             Ask::Quick => axis.quick_stop(hard()),
             Ask::Halt => axis.halt(),
-            Ask::Set => axis.set_commanded(axis.commanded())?,
+            Ask::Set(by) => {
+                axis.set_commanded(axis.commanded() + by)?;
+                self.machine.position[0] += by;
+            }
         }
         Ok(())
     }
@@ -281,7 +285,11 @@ impl Driven for AxesMachine<'_> {
             Ask::Stop => axes.stop(),
             Ask::Quick => axes.quick_stop([hard()]),
             Ask::Halt => axes.halt(),
-            Ask::Set | Ask::Standstill => {}
+            Ask::Set(by) => {
+                axes.set_commanded(axes.commanded().map(|at| at + by))?;
+                self.machine.position[0] += by;
+            }
+            Ask::Standstill => {}
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ const ASKS: [Ask; 12] = [
     Ask::Stop,
     Ask::Quick,
     Ask::Halt,
-    Ask::Set,
+    Ask::Set(0),
     Ask::Standstill,
 ];
 
@@ -43,7 +43,7 @@ struct Asked {
 impl Asked {
     /// Tells the machine, and checks whether it takes the request.
     fn ask(&mut self, machine: &mut dyn Driven, ask: Ask) {
-        if machine.has_lines() && matches!(ask, Ask::Set | Ask::Standstill) {
+        if machine.has_lines() && ask == Ask::Standstill {
             return;
         }
         let rest = machine.is_at_rest();
@@ -51,7 +51,7 @@ impl Asked {
         let (done, mut refused) = (machine.ask(ask), false);
         let there = self.held || self.stands || self.aim.is_none_or(|aim| aim == machine.at());
         // Of these the machine looks for itself.
-        let looks = matches!(ask, Ask::To(_) | Ask::Along(_) | Ask::Standstill | Ask::Set) && machine.has_halves();
+        let looks = matches!(ask, Ask::To(_) | Ask::Along(_) | Ask::Standstill | Ask::Set(_)) && machine.has_halves();
         let rest = rest || looks && self.late && there && done.is_ok();
         self.quick &= !rest;
         match ask {
@@ -61,8 +61,8 @@ impl Asked {
             Ask::Hold => self.held = true,
             Ask::Resume => self.held = false,
             Ask::Stop | Ask::Standstill => self.aim = None,
-            Ask::Set if rest => self.aim = None,
-            Ask::Set => refused = true,
+            Ask::Set(_) if rest => self.aim = None,
+            Ask::Set(_) => refused = true,
             Ask::Quick => (self.aim, self.quick) = (None, !rest),
             Ask::Halt => {
                 self.halted |= !rest && !self.unconfirmed;
