@@ -17,6 +17,7 @@ mod nearly;
 mod overrides;
 mod path_laws;
 mod path_queue;
+mod path_rests;
 mod path_stops;
 mod paths;
 mod plans;
