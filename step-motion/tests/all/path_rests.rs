@@ -151,7 +151,8 @@ fn the_last_line_is_remembered_until_it_ends() {
 /// At 1000 steps/s, half a step behind the last one, though one curve leads over both lines.
 #[test]
 fn a_line_ends_where_the_next_one_begins() {
-    let mut path = path();
+    let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();
+    let mut path = Path::new(Clock::MICROSECONDS, [AxisSetup::new(limits, 1_000_000); 2], 20).unwrap();
     path.push([300, 0], 1000).unwrap();
     path.push([600, 0], 1000).unwrap();
     let line = path.next_line().unwrap();
