@@ -424,9 +424,9 @@ mod tests {
         let third = Real::ONE / Real::new(3);
         let fine = Real::fixed(20, 0) / Real::new(1000);
         for (steps, speed, jerk, wants) in [
-            (64, 20_000, 5_000_000, [4.0, 3.5]),
-            (500, 20_000, 5_000_000, [13.5, 9.0]),
-            (5000, 50_000, 1_000_000, [71.0, 42.0]),
+            (64, 20_000, 5_000_000, [3.5, 2.9]),
+            (500, 20_000, 5_000_000, [13.0, 8.5]),
+            (5000, 50_000, 1_000_000, [68.0, 42.0]),
         ] {
             for (off, want) in [third, fine].into_iter().zip(wants) {
                 let got = cut(steps, speed, jerk, off);

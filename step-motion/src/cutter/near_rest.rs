@@ -193,12 +193,13 @@ fn shifted(time: u64) -> Option<u64> {
     (time.leading_zeros() >= 4).then_some(time << 4)
 }
 
-/// Returns how many steps next to a rest are better found one by one: a segment that begins with step k and has five is
-/// off by about 2.1 k^-3.5 of the `first` one's time. An interval there is about 0.7 k^-0.5 of that time.
+/// Returns how many steps next to a rest are better found one by one. A segment that begins with step k and has five is off
+/// by about 2.1 k^-3.5 of the `first` one's time; twice as far from the rest, one is worth what it costs. An interval there is
+/// about 0.7 k^-0.5 of that time.
 fn few(first: u64, off: u64, coarse: Option<u32>) -> u32 {
     // Off to either side by half of it.
     let by = log(first).saturating_sub(log(off)).saturating_add(28).saturating_mul(2) / 7;
-    let fine = power(1 << 16, by.clamp(0, 32 << 8)) >> 16;
+    let fine = power(2 << 16, by.clamp(0, 32 << 8)) >> 16;
     let coarse = coarse.map(|by| i32::try_from(by << 8).unwrap_or(i32::MAX).saturating_add(406) / 3);
     let few = coarse.map_or(fine, |by| fine.min(power(1 << 16, by.min(32 << 8)) >> 16));
     u32::try_from(few).unwrap_or(u32::MAX)

@@ -9,7 +9,9 @@ use crate::real::{Inverse, THIRD_OF_A_WORD, high, middle, upper};
 const MOST: u32 = 512;
 const MOST_COARSE: u32 = 2048;
 /// A segment this short has no advantage over steps found one by one.
-const FEW: u32 = 4;
+const FEW: u32 = 1;
+/// One that is expected to have fewer steps than this, as a power of 2 in 256ths, is not tried.
+const FEWEST: i32 = 384;
 /// How many other ends are tried.
 const TRIES: u8 = 6;
 
@@ -102,7 +104,7 @@ impl Part {
         let one =
             log(step).saturating_add(log(w)).saturating_add(log(self.bend(w, y))).saturating_sub(2 * 64 * 256 + 430);
         let steps = log(most).saturating_sub(one) >> 2;
-        if steps < 512 {
+        if steps < FEWEST {
             return None;
         }
         let w = power(w, steps.min(32 * 256));
