@@ -356,6 +356,10 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.clock
     }
 
+    pub(super) const fn axes(&self) -> &[AxisSetup; N] {
+        &self.axes
+    }
+
     /// Speed at which the first line begins.
     pub(super) const fn speed(&self) -> Real {
         self.speed

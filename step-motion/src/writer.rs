@@ -16,6 +16,8 @@ pub(crate) struct Writer {
     /// The end of what has been cut, in 2^-32 ticks as the interrupt adds them up; and DIR there, if it is known.
     pub(crate) end: i128,
     pub(crate) dir: Option<Direction>,
+    /// The last step; or, if there is none in the block, what is known to be no earlier.
+    pub(crate) last: i128,
     /// Slots of the block that are filled.
     pub(crate) len: usize,
 }
@@ -23,7 +25,7 @@ pub(crate) struct Writer {
 impl Writer {
     /// Creates a writer at the start of a block.
     pub(crate) const fn new(end: i128, dir: Option<Direction>) -> Self {
-        Self { end, dir, len: 0 }
+        Self { end, dir, last: end, len: 0 }
     }
 
     /// Appends steps; before them a change of DIR, if there is one, and a wait if it is too long for one event.
@@ -36,8 +38,8 @@ impl Writer {
         let first = stretch.first.wrapping_add(TICK / 2).max(self.end.wrapping_add(TICK));
         if self.dir != Some(direction) {
             self.dir = Some(direction);
-            let half = (first.saturating_sub(self.end) / 2).max(TICK);
-            self.put_wait(to, self.end.saturating_add(half));
+            let middle = self.last.saturating_add(first) / 2;
+            self.put_wait(to, middle.max(self.end.saturating_add(TICK)));
         }
         let first = first.max(self.end.wrapping_add(TICK));
         if first.wrapping_sub(self.end) > i128::from(LONGEST) << 32 {
@@ -47,6 +49,7 @@ impl Writer {
         let late = first.wrapping_sub(stretch.first);
         self.put(to, (stretch.count, kind), first, stretch.differences);
         self.end = stretch.last().wrapping_add(late);
+        self.last = self.end;
     }
 
     /// Appends a wait until a time.

@@ -20,8 +20,8 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             self.work.clone_from(&self.path);
         }
         let end = i128::from(self.end) << 32;
-        for (writer, dir) in self.writers.iter_mut().zip(self.dirs) {
-            *writer = Writer::new(end, dir);
+        for ((writer, dir), last) in self.writers.iter_mut().zip(self.dirs).zip(self.path.last_steps()) {
+            *writer = Writer { last: i128::from(last) << 32, ..Writer::new(end, dir) };
         }
         (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
         (self.stage, self.axis, self.quiet, self.coarse) = (Stage::LookAhead, 0, 0, self.finest);
@@ -71,14 +71,17 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Returns whether a step falls into the tick in which the block is to end, or into the next one.
+    /// Returns whether a step falls into the tick in which the block is to end, or into the next one, or so soon after it that
+    /// DIR would change too late.
     pub(super) fn waits_for_a_step(&mut self) -> bool {
-        let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1) && self.put_off < PUT_OFF);
-        if let Some(due) = next {
+        let dirs = self.writers.map(|writer| writer.dir);
+        let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1));
+        let next = next.or_else(|| self.work.turns_before(self.until, dirs, self.reach / 4));
+        if let Some(due) = next.filter(|_| self.put_off < PUT_OFF) {
             (self.until, self.quiet) = (due.saturating_add(1), 0);
             self.put_off = self.put_off.saturating_add(1);
         }
-        next.is_some()
+        self.quiet == 0
     }
 
     /// Ends the block at the same tick for all axes.

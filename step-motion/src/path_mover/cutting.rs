@@ -1,5 +1,7 @@
 //! Runs the lines in stretches of steps, for [`Axes`](crate::Axes), which decides when they are cut and when a line is added.
 
+use servowire_core::Direction;
+
 use crate::cutter::{Cut, Demand, Slice};
 use crate::error::Error;
 use crate::line::{Line, LinePulses, Steps};
@@ -59,6 +61,24 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         self.ended = line.first().is_none();
         Some(Cut::Steps(stretch, direction))
+    }
+
+    /// The tick of the last step of each axis.
+    pub(crate) fn last_steps(&self) -> [u64; N] {
+        self.free.map(|free| free.saturating_sub(1))
+    }
+
+    /// The tick of a step before which an axis changes DIR, if half of its pause before that step, but no more than `most`, begins
+    /// within two ticks after `now`.
+    pub(crate) fn turns_before(&self, now: u64, dirs: [Option<Direction>; N], most: u32) -> Option<u64> {
+        let line = self.line.as_ref()?;
+        let turns = line.due.iter().zip(line.directions).zip(dirs).zip(self.path.axes());
+        let late = turns.filter_map(|(((due, direction), dir), axis)| {
+            let due = due.filter(|_| dir != Some(direction))?;
+            let pause = u64::from((axis.reversal_pause / 2).min(most));
+            (due <= now.saturating_add(pause).saturating_add(2)).then_some(due)
+        });
+        late.max()
     }
 
     /// The tick at which the present plan ends.

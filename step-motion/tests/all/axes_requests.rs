@@ -304,3 +304,29 @@ fn the_deviation_counts_from_then_on() {
         assert!(apart < 300, "{apart}: {polls} {starves}");
     }
 }
+
+/// A driver needs its time between a step and DIR and between DIR and the next step, wherever a block ends: half of the pause each, or a
+/// quarter of the reach.
+#[test]
+fn dir_has_half_of_the_pause_on_either_side() {
+    for (pause, half, reach) in [(40, 20, 10_000), (900, 450, 10_000), (20_000, 2500, 10_000), (900, 25, 100)] {
+        let axis = AxisSetup::new(Limits::new(8000, 800_000).unwrap(), 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (axes, timer) = Axes::new(&queue, path);
+        let (mut axes, mut machine) = (axes.with_reach(reach), Machine::new(timer));
+        for i in 1..300_i64 {
+            let to = [i % 2 * (20 + i % 7), i % 3 * 10];
+            while axes.is_full() {
+                let soon = machine.now + 1000;
+                machine.run(&mut axes, u64::from(reach / 2), soon);
+            }
+            axes.push(to, 100_000).unwrap();
+        }
+        machine.run(&mut axes, u64::from(reach / 2), u64::MAX);
+        assert!(machine.turns.len() > 400);
+        for (before, after) in machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause} at {reach}");
+        }
+    }
+}

@@ -68,13 +68,16 @@ pub(crate) struct Machine<T, const N: usize> {
     last: [Option<u64>; N],
     /// The steps: when, which axis, and which way.
     pub(crate) steps: Vec<(u64, usize, i64)>,
+    /// The changes of DIR between steps: ticks from the step before, and to the one after.
+    pub(crate) turns: Vec<(u64, u64)>,
     pub(crate) position: [i64; N],
 }
 
 impl<T: Timer, const N: usize> Machine<T, N> {
     pub(crate) fn new(timer: T) -> Self {
-        let (turned, last, steps) = ([None; N], [None; N], Vec::new());
-        Self { timer, now: 0, compare: None, reverse: 0, turned, last, steps, position: [0; N] }
+        let (turned, last) = ([None; N], [None; N]);
+        let (steps, turns) = (Vec::new(), Vec::new());
+        Self { timer, now: 0, compare: None, reverse: 0, turned, last, steps, turns, position: [0; N] }
     }
 
     pub(crate) fn fire(&mut self) {
@@ -89,6 +92,9 @@ impl<T: Timer, const N: usize> Machine<T, N> {
             if step {
                 assert!(self.last[axis].is_none_or(|last| last < self.now), "two steps in a tick");
                 assert!(self.turned[axis].is_none_or(|turned| turned < self.now), "a step in the tick of DIR");
+                if let (Some(turned), Some(last)) = (self.turned[axis].take(), self.last[axis]) {
+                    self.turns.push((turned - last, self.now - turned));
+                }
                 let by = if back { -1 } else { 1 };
                 self.last[axis] = Some(self.now);
                 self.steps.push((self.now, axis, by));
