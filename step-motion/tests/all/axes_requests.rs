@@ -107,6 +107,24 @@ fn a_stop_forgets_lines_in_the_making() {
     }
 }
 
+/// 8000 steps/s: 200 steps at 160,000 steps/s², 20 at ten times of that.
+#[test]
+fn a_quick_stop_that_is_asked_for_again_may_be_harder() {
+    let ways = [None, Some(160_000_u32), Some(1_600_000)].map(|again| {
+        let mut bench = Bench::running();
+        let before = bench.x();
+        bench.axes.quick_stop([Limits::new(8000, 160_000).unwrap(); 2]);
+        if let Some(a) = again {
+            bench.until(302_000, true);
+            bench.axes.quick_stop([Limits::new(8000, a).unwrap(); 2]);
+        }
+        bench.until(900_000, true);
+        assert!(bench.axes.is_at_rest());
+        bench.x() - before
+    });
+    assert!(ways[0] == ways[1] && ways[0] - ways[2] > 80, "{ways:?}");
+}
+
 #[test]
 fn an_override_is_a_part_of_the_feed() {
     let mut bench = Bench::running();
