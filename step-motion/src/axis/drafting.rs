@@ -343,7 +343,11 @@ impl<const N: usize> Axis<'_, N> {
             }
             Cut::More => true,
             Cut::Later | Cut::Rest => {
-                tail.writer.put_wait(to, i128::from(tail.mover.over()) << 32);
+                let over = i128::from(tail.mover.over()) << 32;
+                // The interrupt has to be seen in the stop, however short that is.
+                let least =
+                    if tail.writer.len == self.writer.len { tail.writer.end.saturating_add(TICK) } else { over };
+                tail.writer.put_wait(to, over.max(least));
                 false
             }
         };

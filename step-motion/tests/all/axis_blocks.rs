@@ -87,6 +87,25 @@ fn a_stop_after_a_stop_is_a_rest() {
     }
 }
 
+/// 1000 steps/s, and no way to rest: a stop behind what is handed out has nothing to do once the interrupt has made that.
+#[test]
+fn a_stop_of_less_than_a_tick_is_a_rest() {
+    for at in (30_000..42_000).step_by(97) {
+        let mut bench = Bench::<129>::new(1000, MOST, 1600);
+        bench.axis.run(Direction::Forward, 1000).unwrap();
+        bench.until(400, at);
+        bench.axis.stop();
+        bench.machine.drain();
+        bench.until(400, at + 50_000);
+        assert!(bench.axis.is_at_rest(), "{at}");
+        let made = bench.at();
+        bench.axis.set_limits(Limits::new(500, MOST).unwrap()).unwrap();
+        bench.axis.move_to(made + 3).unwrap();
+        bench.until(400, at + 100_000);
+        assert!(bench.axis.is_at_rest() && bench.at() == made + 3, "{at}");
+    }
+}
+
 /// 1000 steps/s, and no way to rest, with a reaction that is shorter than an interval: back after a step as soon as may be, and not
 /// before.
 #[test]
