@@ -293,6 +293,8 @@ impl Mover {
         }
         self.bounds = checked(self.clock, limits)?;
         self.limits = limits;
+        // A request whose clock is behind must not find the motion before, which these limits may not bring to rest.
+        self.rest(self.moment(now));
         Ok(())
     }
 

@@ -440,3 +440,15 @@ fn a_run_turns_round() {
         }
     }
 }
+
+/// The way to rest at 100 is over, also for a clock that is behind: with a thousandth of the acceleration it would lead 1000 steps on.
+#[test]
+fn other_limits_do_not_act_on_the_motion_before() {
+    let mut x =
+        Mover::new(Clock::MICROSECONDS, Limits::new(8000, 2_000_000).unwrap()).unwrap().with_soft_limits(-100, 100);
+    x.move_to(100, 0).unwrap();
+    while x.pulse().is_some() {}
+    x.set_limits(Limits::new(8000, 1000).unwrap(), 1_000_000).unwrap();
+    x.hold(0);
+    assert_eq!((x.due(), x.commanded(), x.is_at_rest(1_000_000)), (None, 100, true));
+}
