@@ -149,10 +149,11 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
     }
     let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
     let high = low.min(bounds.v).max(exit);
-    // All of what is left may be cruised at this speed, which is low if there is little room.
     let v = crossing(exit, high, target, SLACK.max((target - least).scaled(-10)), need);
     bent.on_the_slope(curve);
-    finish(curve, [base, v, exit], Some(target), bounds);
+    // What is left is cruised at this speed, but it may be low: rounding is not crawled over.
+    let left = target - need(v);
+    finish(curve, [base, v, exit], Some(target).filter(|_| left > SLACK), bounds);
     Ok(())
 }
 

@@ -130,3 +130,18 @@ fn a_motion_does_not_slow_down_to_a_higher_speed() {
         }
     }
 }
+
+/// A brake under way with a little more room than it takes: that is not crawled over.
+#[test]
+fn a_little_more_than_the_least_distance_takes_little_more_time() {
+    let most = Most { v: 9.838_214_906, a: 52.917_417_449, j: Some(146.561_859_067) };
+    let state = [5.424_925_473, -28.774_183_749];
+    let (time, way) = change(state, 0.0, most);
+    let start = Motion { v: real(state[0]), a: real(-state[1]), up: false };
+    for more in [1e-7, 1e-6, 1e-5, 2e-5, 3.08e-5, 5e-5, 1e-4, 1e-3] {
+        let curve = plan(start, Goal::At(real(way + more), Real::ZERO), &bounds(most)).unwrap();
+        let took = float(curve.time - curve.skipped.0);
+        let best = model::fastest(state, way + more, 0.0, most).unwrap();
+        assert!(took <= best * 1.02, "{took} for {best}, from {time}: {more}");
+    }
+}
