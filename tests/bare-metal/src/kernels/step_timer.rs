@@ -210,7 +210,7 @@ impl Job {
             5 => {
                 let Some(hard) = limits() else { return false };
                 own.quick_stop([hard; 3]);
-            },
+            }
             _ => return own.move_to(own.target().map(|at| at + 500), 100_000).is_ok(),
         }
         true
