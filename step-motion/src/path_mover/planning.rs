@@ -31,9 +31,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let moment = self.clock().moment(self.tick(now));
         let mut start = Start { made: self.made, ..line.start };
         if moment >= line.over() {
-            let place = (start.place + line.curve.way()) - start.before;
-            let (moment, before, offset) = (self.clock().aligned(moment), Real::ZERO, Real::ZERO);
-            (start.place, start.before, start.moment, start.offset) = (place, before, moment, offset);
+            let at = start.place + line.curve.way();
+            (start.place, start.before) = (at - start.before, start.before - at);
+            (start.moment, start.offset) = (self.clock().aligned(moment), Real::ZERO);
             return (!start.whole).then_some((Motion::steady(Real::ZERO), start));
         }
         let begin = line.start.moment;

@@ -160,3 +160,31 @@ fn a_line_ends_where_the_next_one_begins() {
     let first = ticks(&mut path)[0];
     assert!((end - last).abs_diff(500) <= 1 && (first - end).abs_diff(500) <= 1, "{last} {end} {first}");
 }
+
+/// A hold that comes to rest after the last step of a line and before its end, half a step later: on from there, not from that end. At
+/// 1000 steps/s at most a step takes 1 ms of motion, however it is held.
+#[test]
+fn a_rest_before_a_line_is_not_at_its_start() {
+    let limits = Limits::new(1000, 10_000_000).unwrap().with_jerk(1_000_000_000_000).unwrap();
+    let axis = AxisSetup::new(limits, 80_000);
+    let mut rests = 0;
+    for after in (0..1000).step_by(25) {
+        let mut machine = PathMover::new(Path::<1, 4>::new(Clock::MICROSECONDS, [axis], 20).unwrap());
+        machine.push([10], 1_000_000, 0).unwrap();
+        machine.push([20], 1_000_000, 0).unwrap();
+        let mut last = 0;
+        while machine.commanded() != [10] {
+            last = machine.pulse().unwrap().tick;
+        }
+        let held = last + after;
+        machine.hold(held);
+        if machine.due().is_none() {
+            rests += 1;
+            machine.resume(held + 5000);
+            let next = machine.pulse().unwrap().tick - 5000;
+            // Less the way of the brake, of a tenth of a millisecond.
+            assert!(next >= last + 950, "{} us after {after}", next - last);
+        }
+    }
+    assert!(rests > 10, "{rests}");
+}
