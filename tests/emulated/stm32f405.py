@@ -75,6 +75,8 @@ class Line(threading.Thread):
         self.encoder.stdin.flush()
         if request == READ_ALL:
             answer = self.encoder.stdout.read(11)
+            if len(answer) < 11:
+                return False  # the encoder has ended, as at the end of the test
             self.answers.append(answer)
             answer = hurt(self.requests, answer)
             self.requests += 1
