@@ -149,10 +149,9 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
     }
     let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
     let high = low.min(bounds.v).max(exit);
-    let v = crossing(exit, high, target, SLACK.max((target - least).scaled(-10)), need);
+    let (v, left) = crossing(exit, high, target, SLACK.max((target - least).scaled(-10)), need);
     bent.on_the_slope(curve);
     // What is left is cruised at this speed, but it may be low: rounding is not crawled over.
-    let left = target - need(v);
     finish(curve, [base, v, exit], Some(target).filter(|_| left > SLACK), bounds);
     Ok(())
 }
@@ -277,15 +276,15 @@ fn least_change(v: Real, n: Real, bounds: &Bounds, jerk: &Jerk) -> Real {
 }
 
 /// Returns the largest speed between `low` and `high` for which `need` is not above `n`, but for what `enough` of `n` is
-/// worth.
+/// worth; and what it leaves of `n`.
 ///
 /// Near `low` the need grows with the square root of the excess speed, so the search runs over that root: by false
 /// position, with less weight on the end that stays (Illinois) and at least by a sixteenth of what is left, and by halving
 /// if that takes long.
-fn crossing(low: Real, high: Real, n: Real, enough: Real, need: impl Fn(Real) -> Real) -> Real {
+fn crossing(low: Real, high: Real, n: Real, enough: Real, need: impl Fn(Real) -> Real) -> (Real, Real) {
     let top = need(high);
     if top <= n {
-        return high;
+        return (high, n - top);
     }
     let (base, mut best) = (low, low);
     let (mut low, mut high) = (Real::ZERO, (high - low).sqrt());
@@ -320,7 +319,7 @@ fn crossing(low: Real, high: Real, n: Real, enough: Real, need: impl Fn(Real) ->
         }
         rose = Some(got <= n);
     }
-    best
+    (best, left)
 }
 
 #[cfg(test)]

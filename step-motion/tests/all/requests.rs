@@ -6,7 +6,7 @@ mod sequences;
 
 use step_motion::{Clock, Direction, Error, Limits, Mover};
 
-use machines::{Ask, AxesMachine, AxisMachine, Driven, MoverMachine, PathMachine};
+use machines::{Ask, Driven, MoverMachine, PathMachine, with_axes, with_axis};
 
 const MS: u64 = 1000;
 
@@ -14,8 +14,8 @@ const MS: u64 = 1000;
 fn all(test: impl Fn(&mut dyn Driven, &str)) {
     test(&mut MoverMachine::new(), "Mover");
     test(&mut PathMachine::new(), "PathMover");
-    AxisMachine::with(|machine| test(machine, "Axis"));
-    AxesMachine::with(|machine| test(machine, "Axes"));
+    with_axis(|machine| test(machine, "Axis"));
+    with_axes(|machine| test(machine, "Axes"));
 }
 
 fn under_way(machine: &mut dyn Driven) {

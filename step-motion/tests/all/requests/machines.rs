@@ -1,8 +1,7 @@
 //! An axis and a path of one axis, one by one and in two halves, that are told the same.
 
 use step_motion::{
-    Axes, AxesQueue, AxesTimer, Axis, AxisSetup, Clock, Direction, Error, Limits, Mover, Path, PathMover, Queue,
-    StepTimer, Work,
+    Axes, AxesQueue, Axis, AxisSetup, Clock, Direction, Error, Limits, Mover, Path, PathMover, Queue, Work,
 };
 
 use crate::machine::{Background, Machine, Timer};
@@ -196,106 +195,100 @@ fn work<T: Timer>(machine: &mut Machine<T, 1>, background: &mut impl Background<
 const REACH: u32 = 1000;
 const SLOTS: usize = 129;
 
-pub(super) struct AxisMachine<'q> {
-    axis: Axis<'q, SLOTS>,
-    machine: Machine<StepTimer<'q, SLOTS>, 1>,
+/// An axis, or a path of one axis, in two halves.
+struct Halves<D, T> {
+    background: D,
+    machine: Machine<T, 1>,
 }
 
-impl AxisMachine<'_> {
-    pub(super) fn with(test: impl FnOnce(&mut dyn Driven)) {
-        let queue = Queue::new();
-        let (axis, timer) = Axis::new(&queue, Clock::MICROSECONDS, limits()).unwrap();
-        let axis = axis.with_soft_limits(LOW, HIGH).with_reach(REACH);
-        test(&mut AxisMachine { axis, machine: Machine::new(timer) });
-    }
+pub(super) fn with_axis(test: impl FnOnce(&mut dyn Driven)) {
+    let queue = Queue::new();
+    let (axis, timer) = Axis::<SLOTS>::new(&queue, Clock::MICROSECONDS, limits()).unwrap();
+    let background = axis.with_soft_limits(LOW, HIGH).with_reach(REACH);
+    test(&mut Halves { background, machine: Machine::new(timer) });
 }
 
-impl Driven for AxisMachine<'_> {
+pub(super) fn with_axes(test: impl FnOnce(&mut dyn Driven)) {
+    let queue = AxesQueue::new();
+    let (axes, timer) = Axes::<1, 8, SLOTS>::new(&queue, path());
+    test(&mut Halves { background: axes.with_reach(REACH), machine: Machine::new(timer) });
+}
+
+/// What the two backgrounds call differently.
+trait Asked: Background<1> {
+    const HAS_LINES: bool;
+    fn ask(&mut self, ask: Ask) -> Result<(), Error>;
+    fn is_at_rest(&self) -> bool;
+    fn is_halted(&self) -> bool;
+}
+
+impl Asked for Axis<'_, SLOTS> {
+    const HAS_LINES: bool = false;
+
     fn ask(&mut self, ask: Ask) -> Result<(), Error> {
-        let axis = &mut self.axis;
         match ask {
-            Ask::To(to) => axis.move_to(to)?,
-            Ask::Along(to) => axis.run(way(to), SPEED)?,
-            Ask::Standstill => axis.run(Direction::Forward, 0)?,
-            Ask::Override(percent) => axis.set_override(percent),
-            Ask::Hold => axis.hold(),
-            Ask::Resume => axis.resume(),
-            Ask::Stop => axis.stop(),
-            Ask::Quick => axis.quick_stop(hard()),
-            Ask::Halt => axis.halt(),
-            Ask::Set(by) => {
-                axis.set_commanded(axis.commanded() + by)?;
-                self.machine.position[0] += by;
-            }
+            Ask::To(to) => self.move_to(to)?,
+            Ask::Along(to) => self.run(way(to), SPEED)?,
+            Ask::Standstill => self.run(Direction::Forward, 0)?,
+            Ask::Override(percent) => self.set_override(percent),
+            Ask::Hold => self.hold(),
+            Ask::Resume => self.resume(),
+            Ask::Stop => self.stop(),
+            Ask::Quick => self.quick_stop(hard()),
+            Ask::Halt => self.halt(),
+            Ask::Set(by) => self.set_commanded(self.commanded() + by)?,
         }
         Ok(())
     }
 
-    fn wait(&mut self, ticks: u64) {
-        wait(&mut self.machine, &mut self.axis, ticks);
-    }
-
-    fn starve(&mut self, ticks: u64) {
-        self.machine.until(self.machine.now + ticks);
-    }
-
-    fn work(&mut self, ticks: u64) {
-        work(&mut self.machine, &mut self.axis, ticks);
-    }
-
-    fn at(&self) -> i64 {
-        self.axis.commanded()
-    }
-
     fn is_at_rest(&self) -> bool {
-        self.axis.is_at_rest()
+        self.is_at_rest()
     }
 
     fn is_halted(&self) -> bool {
-        self.axis.is_halted()
-    }
-
-    fn has_halves(&self) -> bool {
-        true
+        self.is_halted()
     }
 }
 
-pub(super) struct AxesMachine<'q> {
-    axes: Axes<'q, 1, 8, SLOTS>,
-    machine: Machine<AxesTimer<'q, 1, SLOTS>, 1>,
-}
+impl Asked for Axes<'_, 1, 8, SLOTS> {
+    const HAS_LINES: bool = true;
 
-impl AxesMachine<'_> {
-    pub(super) fn with(test: impl FnOnce(&mut dyn Driven)) {
-        let queue = AxesQueue::new();
-        let (axes, timer) = Axes::new(&queue, path());
-        test(&mut AxesMachine { axes: axes.with_reach(REACH), machine: Machine::new(timer) });
-    }
-}
-
-impl Driven for AxesMachine<'_> {
     fn ask(&mut self, ask: Ask) -> Result<(), Error> {
-        let axes = &mut self.axes;
         match ask {
-            Ask::To(to) => axes.move_to([to], FEED)?,
-            Ask::Along(to) => axes.push([to], FEED)?,
-            Ask::Override(percent) => axes.set_override(percent),
-            Ask::Hold => axes.hold(),
-            Ask::Resume => axes.resume(),
-            Ask::Stop => axes.stop(),
-            Ask::Quick => axes.quick_stop([hard()]),
-            Ask::Halt => axes.halt(),
-            Ask::Set(by) => {
-                axes.set_commanded(axes.commanded().map(|at| at + by))?;
-                self.machine.position[0] += by;
-            }
+            Ask::To(to) => self.move_to([to], FEED)?,
+            Ask::Along(to) => self.push([to], FEED)?,
+            Ask::Override(percent) => self.set_override(percent),
+            Ask::Hold => self.hold(),
+            Ask::Resume => self.resume(),
+            Ask::Stop => self.stop(),
+            Ask::Quick => self.quick_stop([hard()]),
+            Ask::Halt => self.halt(),
+            Ask::Set(by) => self.set_commanded(self.commanded().map(|at| at + by))?,
             Ask::Standstill => {}
         }
         Ok(())
     }
 
+    fn is_at_rest(&self) -> bool {
+        self.is_at_rest()
+    }
+
+    fn is_halted(&self) -> bool {
+        self.is_halted()
+    }
+}
+
+impl<D: Asked, T: Timer> Driven for Halves<D, T> {
+    fn ask(&mut self, ask: Ask) -> Result<(), Error> {
+        self.background.ask(ask)?;
+        if let Ask::Set(by) = ask {
+            self.machine.position[0] += by;
+        }
+        Ok(())
+    }
+
     fn wait(&mut self, ticks: u64) {
-        wait(&mut self.machine, &mut self.axes, ticks);
+        wait(&mut self.machine, &mut self.background, ticks);
     }
 
     fn starve(&mut self, ticks: u64) {
@@ -303,19 +296,19 @@ impl Driven for AxesMachine<'_> {
     }
 
     fn work(&mut self, ticks: u64) {
-        work(&mut self.machine, &mut self.axes, ticks);
+        work(&mut self.machine, &mut self.background, ticks);
     }
 
     fn at(&self) -> i64 {
-        self.axes.commanded()[0]
+        self.background.made()[0]
     }
 
     fn is_at_rest(&self) -> bool {
-        self.axes.is_at_rest()
+        self.background.is_at_rest()
     }
 
     fn is_halted(&self) -> bool {
-        self.axes.is_halted()
+        self.background.is_halted()
     }
 
     fn has_halves(&self) -> bool {
@@ -323,6 +316,6 @@ impl Driven for AxesMachine<'_> {
     }
 
     fn has_lines(&self) -> bool {
-        true
+        D::HAS_LINES
     }
 }

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use step_motion::Error;
 
-use super::machines::{Ask, AxesMachine, AxisMachine, Driven, HIGH, LOW, MoverMachine, PathMachine};
+use super::machines::{Ask, Driven, HIGH, LOW, MoverMachine, PathMachine, with_axes, with_axis};
 
 const ASKS: [Ask; 12] = [
     Ask::To(60),
@@ -134,8 +134,8 @@ fn of_an_axis_and_a_path(moving: bool, asks: &[Ask], gap: u64) {
 }
 
 fn in_two_halves(moving: bool, asks: &[Ask], gap: u64) {
-    AxisMachine::with(|machine| sequence(machine, moving, asks, gap));
-    AxesMachine::with(|machine| sequence(machine, moving, asks, gap));
+    with_axis(|machine| sequence(machine, moving, asks, gap));
+    with_axes(|machine| sequence(machine, moving, asks, gap));
 }
 
 /// All at once, and each at another moment of the brake that the one before asks for.
@@ -205,8 +205,8 @@ proptest! {
         };
         test(&mut MoverMachine::new());
         test(&mut PathMachine::new());
-        AxisMachine::with(test);
-        AxesMachine::with(test);
+        with_axis(test);
+        with_axes(test);
     }
 }
 
