@@ -231,7 +231,8 @@ impl<'q, const N: usize> Axis<'q, N> {
         Self { coarse: EXACT, finest: EXACT, ..self }
     }
 
-    /// Does the same as [`Mover::with_reversal_pause`].
+    /// Does the same as [`Mover::with_reversal_pause`]. DIR changes at least half of the pause after a step, and at least half of it
+    /// before the next one.
     pub fn with_reversal_pause(mut self, ticks: u32) -> Self {
         self.mover = self.mover.with_reversal_pause(ticks);
         self

@@ -9,6 +9,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use servowire_core::Direction;
+
 use crate::word::Word;
 
 /// Some steps whose intervals change by the second and third differences of their times. Times are in 2^-32 ticks.
@@ -187,6 +189,12 @@ impl<const N: usize> Queue<N> {
         if let Some(after) = after {
             self.link(after, slot);
         }
+    }
+
+    /// Returns DIR at the end of a slot.
+    pub(crate) fn dir(&self, slot: usize) -> Option<Direction> {
+        let head = self.slots.get(slot)?.head.load(Ordering::Relaxed);
+        Some(if head & DIR == 0 { Direction::Forward } else { Direction::Reverse })
     }
 
     /// Makes `slot` follow `after` from now on.

@@ -36,11 +36,7 @@ impl Writer {
         direction: Direction,
     ) {
         let first = stretch.first.wrapping_add(TICK / 2).max(self.end.wrapping_add(TICK));
-        if self.dir != Some(direction) {
-            self.dir = Some(direction);
-            let middle = self.last.saturating_add(first) / 2;
-            self.put_wait(to, middle.max(self.end.saturating_add(TICK)));
-        }
+        self.put_turn(to, first, direction, i128::MAX);
         let first = first.max(self.end.wrapping_add(TICK));
         if first.wrapping_sub(self.end) > i128::from(LONGEST) << 32 {
             self.put_wait(to, first.saturating_sub(TICK));
@@ -50,6 +46,22 @@ impl Writer {
         self.put(to, (stretch.count, kind), first, stretch.differences);
         self.end = stretch.last().wrapping_add(late);
         self.last = self.end;
+    }
+
+    /// Appends a change of DIR, if there is one and it is before a time: in the middle between the last step and the next one, which
+    /// does not come before `next`.
+    pub(crate) fn put_turn<const N: usize>(
+        &mut self,
+        to: (&Queue<N>, usize),
+        next: i128,
+        direction: Direction,
+        before: i128,
+    ) {
+        let middle = (self.last.saturating_add(next) / 2).max(self.end.saturating_add(TICK));
+        if self.dir != Some(direction) && middle < before {
+            self.dir = Some(direction);
+            self.put_wait(to, middle);
+        }
     }
 
     /// Appends a wait until a time.

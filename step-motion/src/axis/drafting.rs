@@ -229,7 +229,8 @@ impl<const N: usize> Axis<'_, N> {
             (last.map_or(out.free, |last| tick(time(last)).saturating_add(1)), self.end.dir)
         };
         self.joint = Queue::<N>::slot(block, at);
-        self.writer = Writer::new(time(mark(at)), dir);
+        let last = i128::from(free.saturating_sub(1)) << 32;
+        self.writer = Writer { last, ..Writer::new(time(mark(at)), self.queue.dir(self.joint)) };
         self.work.back_to(out.steps.saturating_sub(steps), tick(self.writer.end), (free, dir));
     }
 
@@ -256,7 +257,13 @@ impl<const N: usize> Axis<'_, N> {
                 }
             }
             Cut::More => return Work::More,
-            Cut::Later => self.writer.put_wait(to, i128::from(until.saturating_sub(BEFORE)) << 32),
+            Cut::Later => {
+                let until = i128::from(until.saturating_sub(BEFORE)) << 32;
+                if let Some((next, direction)) = self.work.next() {
+                    self.writer.put_turn(to, i128::from(next) << 32, direction, until);
+                }
+                self.writer.put_wait(to, until);
+            }
             Cut::Rest => {
                 let over = i128::from(self.work.over().saturating_add(1)) << 32;
                 // A block has at least one event.

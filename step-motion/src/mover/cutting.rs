@@ -55,6 +55,11 @@ impl Mover {
         Cut::Steps(stretch, direction)
     }
 
+    /// A tick that is not after the next step, and DIR of that step.
+    pub(crate) fn next(&self) -> Option<(u64, Direction)> {
+        self.due.map(|due| (due, self.direction))
+    }
+
     /// The tick after the last step.
     pub(crate) const fn free(&self) -> u64 {
         self.free

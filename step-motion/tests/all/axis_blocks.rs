@@ -246,3 +246,37 @@ fn a_stop_lasts_until_rest() {
     }
     assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s behind the last steps, {wants} s are needed");
 }
+
+/// A driver needs its time between a step and DIR and between DIR and the next step, wherever a wait or a block ends, whatever is asked
+/// for in the pause, and after a stop of a late background: half of the pause each.
+#[test]
+fn dir_has_half_of_the_pause_on_either_side() {
+    for (pause, reach) in [(40, 10_000), (900, 10_000), (20_000, 10_000), (900, 100), (3000, 1600)] {
+        let mut bench = Bench::<129>::new(8000, 800_000, reach);
+        bench.axis = bench.axis.with_reversal_pause(pause);
+        let mut dice = u64::from(pause);
+        let mut below = |most: u64| {
+            dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (dice >> 33) % most
+        };
+        let (every, times) = (u64::from(reach / 2), u64::from(pause) + 10_000);
+        for _ in 0..500 {
+            bench.axis.move_to(i64::try_from(below(60)).unwrap() - 30).unwrap();
+            bench.until(every, bench.machine.now + below(times));
+            match below(4) {
+                0 => bench.axis.hold(),
+                1 => bench.axis.set_override(50),
+                2 => bench.machine.until(bench.machine.now + below(times)),
+                _ => bench.axis.stop(),
+            }
+            bench.until(every, bench.machine.now + below(times));
+            bench.axis.resume();
+            bench.axis.set_override(100);
+        }
+        assert!(bench.machine.turns.len() > 150);
+        for (before, after) in bench.machine.turns {
+            let half = u64::from(pause / 2);
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause} at {reach}");
+        }
+    }
+}
