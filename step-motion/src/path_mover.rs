@@ -372,7 +372,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn stand(&mut self, now: u64, was_moving: bool) {
         let free = self.free.iter().copied().max().unwrap_or(0);
         self.requests.halted(was_moving);
-        self.leave(self.clock().within_reach(now).max(free));
+        // Not at the end of the motion before.
+        self.leave_from(self.clock().moment(self.clock().within_reach(now).max(free)));
     }
 
     /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the
@@ -397,7 +398,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Empties the queue, at rest from a tick onwards.
     fn leave(&mut self, now: u64) {
-        let moment = self.clock().moment(now).max(self.path.start().moment);
+        self.leave_from(self.clock().moment(now).max(self.path.start().moment));
+    }
+
+    /// Does that from a moment onwards.
+    fn leave_from(&mut self, moment: u64) {
         self.requests.stopped();
         self.path.clear(self.commanded, moment);
         (self.line, self.made, self.exit, self.more) = (None, [0; N], Real::ZERO, 0);

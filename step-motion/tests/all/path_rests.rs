@@ -121,6 +121,27 @@ fn a_pause_behind_a_halt_is_whole() {
     assert!(first > now + 1_000_000, "{first} {now}");
 }
 
+/// 1000 steps/s: the line ends half a step behind its last step, which a halt does not wait for.
+#[test]
+fn a_halt_behind_the_last_step_is_a_rest() {
+    for after in [1, 100, 400] {
+        let limits = Limits::new(1000, 1_000_000_000).unwrap();
+        let mut machine =
+            PathMover::new(Path::<1, 4>::new(Clock::MICROSECONDS, [AxisSetup::new(limits, 80_000)], 20).unwrap());
+        machine.push([10], 1_000_000, 0).unwrap();
+        let last = core::iter::from_fn(|| machine.pulse()).last().unwrap().tick;
+        let now = last + after;
+        assert!(!machine.is_at_rest(now));
+        machine.halt(now);
+        assert!(machine.is_at_rest(now) && machine.is_halted(), "{after}");
+        machine.set_commanded([0], now).unwrap();
+        machine.push([1], 1_000_000, now).unwrap();
+        // Behind the last step as soon as speed allows.
+        let next = machine.due().unwrap();
+        assert!((last + 1000..last + 502 + after.max(500)).contains(&next), "{after}: {}", next - last);
+    }
+}
+
 /// A line that is pushed while the last one runs, the one before it being over, continues it.
 #[test]
 fn the_last_line_is_remembered_until_it_ends() {
