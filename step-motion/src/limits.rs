@@ -9,6 +9,8 @@ use crate::real::Real;
 /// The clock of a timer: ticks per second, 1000 to 2^30 - 1.
 ///
 /// 1 MHz is a common timer; [`NANOSECONDS`](Self::NANOSECONDS) suits the 4 µs cycle of TIDEP0061, whose PTO words are in ns.
+///
+/// Time ends 272 years or more after tick 0: no step that would be later is ever due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -79,6 +81,11 @@ impl Clock {
     pub(super) const fn moment(self, tick: u64) -> u64 {
         let shift = self.shift();
         if tick > u64::MAX >> shift { u64::MAX } else { tick << shift }
+    }
+
+    /// Returns whether a tick has moments. None of what is planned for later happens.
+    pub(super) const fn is_in_time(self, tick: u64) -> bool {
+        tick <= u64::MAX >> self.shift()
     }
 
     /// Returns a tick, or the last one at which motion may begin: from there on are as many moments as before.

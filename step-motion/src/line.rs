@@ -174,7 +174,7 @@ impl<const N: usize> LinePulses<N> {
         self.directions = line.steps.map(|steps| Direction::of(steps.into()));
         for ((frame, stepper), due) in self.axes.iter_mut().zip(&mut self.due) {
             *due = match steps {
-                Steps::Single => stepper.next(&self.curve, frame),
+                Steps::Single => stepper.next(&self.curve, frame).filter(|due| self.clock.is_in_time(*due)),
                 Steps::Stretches if self.curve.pieces().is_empty() => None,
                 Steps::Stretches => (phases::steps(frame.last(&self.curve)) > 0).then_some(0),
             };
@@ -208,7 +208,7 @@ impl<const N: usize> LinePulses<N> {
     /// Takes it.
     pub(super) fn advance(&mut self, at: usize) {
         if let (Some((frame, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
-            *due = stepper.next(&self.curve, frame);
+            *due = stepper.next(&self.curve, frame).filter(|due| self.clock.is_in_time(*due));
         }
     }
 

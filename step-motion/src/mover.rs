@@ -164,6 +164,7 @@ impl Mover {
         (self.turn, self.dir) = (None, Some(self.direction));
         let Phases { curve, frame } = &self.phases;
         self.due = self.stepper.next(curve, frame).map(|due| due.max(self.free));
+        self.due = self.due.filter(|due| self.clock.is_in_time(*due));
         if self.due.is_none() {
             self.go_on();
         } else if frame.endless && self.stepper.count() >= 1 << 30 {

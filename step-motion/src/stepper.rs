@@ -201,7 +201,7 @@ fn split(time: i128) -> (u64, u64) {
     (tick(time), since.into())
 }
 
-/// Returns the tick into which a time in 2^-32 ticks falls.
+/// Returns the tick into which a time in 2^-32 ticks falls; the first or the last one of all for a time outside them.
 pub(super) fn tick(time: i128) -> u64 {
-    u64::try_from(time.wrapping_add(HALF) >> 32).unwrap_or(0)
+    u64::try_from(time.wrapping_add(HALF) >> 32).unwrap_or(if time < 0 { 0 } else { u64::MAX })
 }

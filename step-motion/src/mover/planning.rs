@@ -116,7 +116,7 @@ impl Mover {
         } else {
             self.stepper.next(curve, frame)
         };
-        self.due = due.map(|due| due.max(self.free).max(begin));
+        self.due = due.map(|due| due.max(self.free).max(begin)).filter(|due| self.clock.is_in_time(*due));
         self.turn = None;
         if self.dir != Some(self.direction) {
             self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));

@@ -209,3 +209,31 @@ fn a_rest_before_a_line_is_not_at_its_start() {
     }
     assert!(rests > 10, "{rests}");
 }
+
+/// Time has 2^64 moments, 2^21 of them in a tick of a millisecond: 8.796 · 10^9 s. A step of x takes sqrt(5) / 2 · 10^8 s here, so 79 of
+/// them and 39 of y are in time; no later one is ever due, and the machine stays on its line, whatever is asked for.
+#[test]
+fn time_ends_on_the_line() {
+    let axis = AxisSetup::new(Limits::new(500, 5000).unwrap(), 1);
+    let path = Path::<2, 8>::new(Clock::new(1000).unwrap(), [axis; 2], 20).unwrap();
+    let mut machine = PathMover::new(path);
+    machine.set_override(1, 0);
+    machine.push([200, 100], 1, 0).unwrap();
+    machine.push([0, 0], 1, 0).unwrap();
+    let mut asked = machine.clone();
+    let all = rest(&mut machine);
+    assert!(all.is_sorted() && *all.last().unwrap() < 1 << 43);
+    assert_eq!(machine.commanded(), [79, 39]);
+    while let Some(pulse) = asked.pulse() {
+        asked.hold(pulse.tick + 1_000_000);
+        asked.resume(pulse.tick + 2_000_000);
+        let [x, y] = asked.commanded();
+        assert!((x - 2 * y).abs() <= 2, "{x} {y}");
+    }
+    assert!(asked.commanded()[0] <= 79);
+    for now in [u64::MAX >> 22, u64::MAX >> 21, u64::MAX] {
+        machine.hold(now);
+        machine.resume(now);
+        assert_eq!((machine.due(), machine.commanded()), (None, [79, 39]));
+    }
+}
