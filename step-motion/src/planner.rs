@@ -234,11 +234,7 @@ pub(super) fn fastest_exit(start: Motion, n: Real, bounds: &Bounds) -> Real {
 /// acceleration. The result is the lower end of the range of speeds, from the present one downwards, for which the distance
 /// is enough.
 pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -> Real {
-    let (from, least, n) = match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
-        None => (start.v, Real::ZERO, n),
-        Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
-        Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
-    };
+    let (from, least, n) = slope_down(start, n, bounds);
     // Within rounding of the end there is no time to slow down.
     if from <= exit || n <= SLACK {
         return from;
@@ -248,6 +244,25 @@ pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) 
         None => (from.squared() - (bounds.a * n).scaled(1)).sqrt().max(exit),
         Some(_) if distance(from, from - most, bounds) <= n => from - most,
         Some(jerk) => from - least_change(from, n, bounds, jerk).max(least).min(most),
+    }
+}
+
+/// Returns the greatest exit speed below one for which a distance does not suffice: with a limit of jerk slowing down to a third of
+/// the speed takes the greatest distance, and to less than that takes less. `None` if it does not suffice for a rest either.
+pub(super) fn slower_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -> Option<Real> {
+    bounds.jerk?;
+    let (from, least, n) = slope_down(start, n, bounds);
+    let high = exit.min(from - least);
+    let need = |v| distance(from, v, bounds);
+    (need(Real::ZERO) <= n + SLACK).then(|| crossing(Real::ZERO, high, n, SLACK, need).0)
+}
+
+/// Returns the speed from which a motion slows down, the least change of it, and the distance for that.
+fn slope_down(start: Motion, n: Real, bounds: &Bounds) -> (Real, Real, Real) {
+    match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
+        None => (start.v, Real::ZERO, n),
+        Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
+        Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
     }
 }
 
@@ -358,6 +373,40 @@ mod tests {
                 }
             }
         });
+    }
+
+    /// To the greatest speed below the hump a plan is just possible; to a little more it is not, and to a rest it is.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn a_slower_exit_than_one_that_takes_too_long() {
+        let thousandths = |n: u64| Real::new(n) / Real::new(1000);
+        let all = ((1..3000_u64, 1..400_u64), 0..=1000_u64, any::<bool>(), 0..1000_u64, 1..10_000_u64);
+        let found = core::cell::Cell::new(0);
+        proptest!(ProptestConfig::with_cases(20_000), |(((from, exit), part, up, more, jerk) in all)| {
+            let bounds = Bounds::new(Real::HUGE, Real::ONE, Some(thousandths(jerk)));
+            let mut start = Motion::steady(thousandths(from));
+            let least = (start.v * thousandths(jerk)).scaled(1).sqrt().min(Real::ONE);
+            start = Motion { a: least * thousandths(part), up, ..start };
+            let exit = start.v * thousandths(exit);
+            // Between what a rest takes and what that speed takes.
+            let fits = |n, exit| plan(start, Goal::At(n, exit), &bounds).is_ok();
+            let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &bounds) else { return Ok(()) };
+            prop_assume!(curve.way() > SLACK.scaled(10));
+            let n = curve.way() + curve.way() * thousandths(more).scaled(-2);
+            if exit <= fastest_exit(start, n, &bounds) && !fits(n, exit) {
+                let slower = slower_exit(start, n, exit, &bounds).unwrap();
+                prop_assert!(slower < exit && fits(n, slower), "{slower:?} of {exit:?}");
+                let most = slower + exit.scaled(-4);
+                prop_assert!(most >= exit || !fits(n - SLACK.scaled(2), most), "{slower:?} of {exit:?}");
+                prop_assert!(slower_exit(start, curve.way() - SLACK.scaled(2), exit, &bounds).is_none());
+                found.set(found.get() + 1);
+            }
+        });
+        assert!(found.get() > 300, "{found:?}");
+        assert!(
+            slower_exit(Motion::steady(Real::new(2)), Real::ONE, Real::ONE, &Bounds::new(Real::HUGE, Real::ONE, None))
+                .is_none()
+        );
     }
 
     /// From no speed does slowing down to more than 0.618 of it take more distance than coming to rest.

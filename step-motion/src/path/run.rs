@@ -8,7 +8,7 @@ mod alike;
 use super::{Ahead, Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
-use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
+use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slower_exit, slowest_exit};
 use crate::real::Real;
 
 pub(crate) use alike::Run;
@@ -189,7 +189,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if self.line(last)?.leave.is_some() {
             return to(speed);
         }
-        to(speed).or_else(|| {
+        // Less than was asked for may take less distance.
+        let slower = || to(slower_exit(start, left, speed, bounds)?);
+        to(speed).or_else(slower).or_else(|| {
             let slowest = slowest_exit(start, left, speed, bounds);
             // Mostly it comes near a speed from which all lines are known to be slow enough in time.
             let known = self.known_exit(last).map(|known| known.max(self.promised(last)));

@@ -74,3 +74,36 @@ fn the_end_of_the_path_is_a_rest_whatever_the_feed_was() {
         }
     }
 }
+
+/// With a limit of jerk slowing down to a third of the speed takes the greatest distance, and to almost nothing takes less. So a line
+/// that can just slow down to 99 % of the feed of the next one cannot slow down to 100 % of it: it ends below that, not above.
+#[test]
+fn another_override_does_not_pass_the_feed_of_a_slow_line() {
+    let limits = Limits::new(80_000, 2_000_000_000).unwrap().with_jerk(1_200_000_000_000).unwrap();
+    for (at, percent) in (0..14).flat_map(|at| [(at, 50), (at, 90), (at, 99)]) {
+        for (length, feed) in [(1, 200), (1, 2000), (2, 500), (5, 1000), (9, 200)] {
+            let path =
+                Path::<1, 8>::new(Clock::new(50_000_000).unwrap(), [AxisSetup::new(limits, 1_000_000)], 20).unwrap();
+            let mut machine = PathMover::new(path);
+            machine.set_override(percent, 0);
+            let ends = [5, 5 + length, 25 + length, 90 + length];
+            for (to, feed) in ends.into_iter().zip([700_000, 4_000_000, feed, 4_000_000]) {
+                machine.push([to], feed, 0).unwrap();
+            }
+            let mut last = 0;
+            while let Some(pulse) = machine.pulse() {
+                let made = machine.commanded()[0];
+                if made == at {
+                    machine.set_override(100, pulse.tick);
+                }
+                // From step to step of that line.
+                if made > ends[1] + 1 && made <= ends[2] {
+                    let least = 50_000_000 / u64::from(feed);
+                    let apart = pulse.tick - last;
+                    assert!(apart + 1 >= least, "{percent} % until {at}: {apart} rather than {least} at {made}");
+                }
+                last = pulse.tick;
+            }
+        }
+    }
+}
