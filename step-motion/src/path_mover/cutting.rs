@@ -140,3 +140,38 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.stand(now, was_moving);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::{Clock, Limits};
+    use crate::path::{AxisSetup, Path};
+
+    /// The interrupt makes a step in the tick that is nearest to its time. All steps whose tick is before the end of a block are in it,
+    /// and no others, wherever it ends.
+    #[test]
+    fn a_step_belongs_to_the_block_of_its_tick() {
+        for apart in 1..8 {
+            let axis = AxisSetup::new(Limits::new(300_000, 1 << 30).unwrap(), 1_000_000);
+            let path = Path::<1, 4>::new(Clock::MICROSECONDS, [axis], 20).unwrap();
+            let demand = Demand { off: path.clock().blur(), coarse: None, time: u64::MAX };
+            let mut mover = PathMover::new(path).cutting();
+            mover.push([2000], 1_000_000, 0).unwrap();
+            let mut begin = 0;
+            while mover.commanded() != [2000] {
+                let until = begin + apart;
+                loop {
+                    match mover.cut(0, &demand, until) {
+                        Cut::Steps(stretch, _) => {
+                            let ticks = [stretch.first, stretch.last()].map(tick);
+                            assert!(begin <= ticks[0] && ticks[1] < until, "{ticks:?} in {begin}..{until}");
+                        }
+                        Cut::More => {}
+                        Cut::Later | Cut::Rest => break,
+                    }
+                }
+                begin = until;
+            }
+        }
+    }
+}

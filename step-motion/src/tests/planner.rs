@@ -145,3 +145,24 @@ fn a_little_more_than_the_least_distance_takes_little_more_time() {
         assert!(took <= best * 1.02, "{took} for {best}, from {time}: {more}");
     }
 }
+
+/// Of the speeds at the end of a distance, the first one from the present speed downwards: with the greatest acceleration or without it, also
+/// where the distance is near its maximum, at 2/3 of the speed.
+#[test]
+fn the_slowest_exit_is_the_first_that_takes_the_distance() {
+    for v in [0.3, 1.0, 1.9, 40.0] {
+        for knee in [0.1, 0.3, 0.6, 0.7, 0.8, 1.2, 3.0].map(|part| part * v) {
+            let most = Most { v: 2.0 * v, a: knee, j: Some(knee) };
+            let longest = (0..1000).map(|k| change([v, 0.0], v * f64::from(k) / 1000.0, most).1).fold(0.0, f64::max);
+            for (part, exit) in
+                [0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1.01].into_iter().flat_map(|n| [0.0, 0.3, 0.8].map(|to| (n, to * v)))
+            {
+                let n = longest * part;
+                let got = float(slowest_exit(Motion::steady(real(v)), real(n), real(exit), &bounds(most)));
+                let (want, need) = (model::slowest_exit([v, 0.0], n, exit, most), change([v, 0.0], got, most).1);
+                let case = std::format!("{got} for {want}: {most:?} {part} {exit}");
+                assert!(got >= want - v * 1e-6 && (got <= want + v * 1e-6 || need >= n * (1.0 - 2e-6)), "{case}");
+            }
+        }
+    }
+}

@@ -217,6 +217,40 @@ fn a_halt_behind_the_end_of_what_is_planned() {
     assert!(bench.axes.is_halted() && bench.x() == 20);
 }
 
+/// An axis that is to turn in a while, with a pause that is longer than all that is queued, does not make the others late: 80 steps in
+/// each reach of 10 ms, and 400 steps of brake.
+#[test]
+fn a_long_pause_makes_no_request_late() {
+    for at in (400_000..700_000).step_by(4100) {
+        let axis = AxisSetup::new(Limits::new(8000, 80_000).unwrap(), 80_000);
+        let axes = [axis, axis.with_reversal_pause(400_000)];
+        let path = Path::<2, 4>::new(Clock::new(HZ as u32).unwrap(), axes, 20).unwrap();
+        let queue: &'static AxesQueue<2, SLOTS> = Box::leak(Box::default());
+        let (mut axes, timer) = Axes::new(queue, path);
+        let mut machine = Machine::new(timer);
+        axes.push([8000, -2], 100_000).unwrap();
+        machine.run(&mut axes, 500, at);
+        let before = axes.commanded()[0];
+        axes.hold();
+        machine.run(&mut axes, 500, at + 600_000);
+        let steps = axes.commanded()[0] - before;
+        assert!(axes.is_at_rest() && steps <= 400 + 160 + 8, "{at}: {steps}");
+    }
+}
+
+/// The second half of the slots begins behind 2^15 of them.
+#[test]
+fn the_largest_queue() {
+    static QUEUE: AxesQueue<1, 65_535> = AxesQueue::new();
+    let axis = AxisSetup::new(Limits::new(8000, 80_000).unwrap(), 80_000);
+    let path = Path::<1, 4>::new(Clock::new(HZ as u32).unwrap(), [axis], 20).unwrap();
+    let (mut axes, timer) = Axes::new(&QUEUE, path);
+    let mut machine = Machine::new(timer);
+    axes.push([2000], 100_000).unwrap();
+    machine.run(&mut axes, 500, u64::MAX);
+    assert_eq!(machine.position, [2000]);
+}
+
 /// Without a background the machine comes to rest, and goes on from there.
 #[test]
 fn a_background_that_is_late_costs_a_stop_and_no_step() {

@@ -20,12 +20,25 @@ fn limits() -> Limits {
     Limits::new(10_000, 50_000).unwrap()
 }
 
-fn config() -> HomingConfig {
-    HomingConfig::new(Direction::Forward, 2000, 300, 3000, Limits::new(10_000, 100_000).unwrap()).with_back_off(80)
+fn config(approach: u32) -> HomingConfig {
+    HomingConfig::new(Direction::Forward, 2000, approach, 3000, Limits::new(10_000, 100_000).unwrap()).with_back_off(80)
 }
 
-fn switch(at: i64) -> Switch {
-    if at >= SWITCH { Switch::Closed } else { Switch::Open }
+/// What is homed: how, and where the switch is; `None` if it never closes.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    config: HomingConfig,
+    switch: Option<i64>,
+}
+
+impl Case {
+    fn usual() -> Self {
+        Self { config: config(300), switch: Some(SWITCH) }
+    }
+
+    fn switch(self, at: i64) -> Switch {
+        if self.switch.is_some_and(|switch| at >= switch) { Switch::Closed } else { Switch::Open }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +73,7 @@ trait Bench {
 }
 
 struct OneByOne {
+    case: Case,
     mover: Mover,
     homing: Homing,
     now: u64,
@@ -67,10 +81,10 @@ struct OneByOne {
 }
 
 impl OneByOne {
-    fn new() -> Self {
+    fn new(case: Case) -> Self {
         let mut mover = Mover::new(Clock::MICROSECONDS, limits()).unwrap();
-        let homing = Homing::start(config(), &mut mover, Switch::Open, 0).unwrap();
-        Self { mover, homing, now: 0, real: 0 }
+        let homing = Homing::start(case.config, &mut mover, Switch::Open, 0).unwrap();
+        Self { case, mover, homing, now: 0, real: 0 }
     }
 }
 
@@ -94,7 +108,7 @@ impl Bench for OneByOne {
         while self.mover.due().is_some_and(|due| due <= self.now) {
             self.real += if self.mover.pulse().unwrap().direction.dir() { -1 } else { 1 };
         }
-        self.homing.poll(&mut self.mover, switch(self.real), self.now)
+        self.homing.poll(&mut self.mover, self.case.switch(self.real), self.now)
     }
 
     fn at(&self) -> (i64, i64) {
@@ -109,6 +123,7 @@ impl Bench for OneByOne {
 const SLOTS: usize = 129;
 
 struct Halves<'q> {
+    case: Case,
     axis: Axis<'q, SLOTS>,
     machine: Machine<StepTimer<'q, SLOTS>, 1>,
     homing: Homing,
@@ -117,11 +132,11 @@ struct Halves<'q> {
 }
 
 impl<'q> Halves<'q> {
-    fn new(queue: &'q Queue<SLOTS>) -> Self {
+    fn new(case: Case, queue: &'q Queue<SLOTS>) -> Self {
         let (axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits()).unwrap();
         let mut axis = axis.with_reach(2000);
-        let homing = Homing::start_axis(config(), &mut axis, Switch::Open).unwrap();
-        Self { axis, machine: Machine::new(timer), homing, more: 0 }
+        let homing = Homing::start_axis(case.config, &mut axis, Switch::Open).unwrap();
+        Self { case, axis, machine: Machine::new(timer), homing, more: 0 }
     }
 }
 
@@ -145,7 +160,7 @@ impl Bench for Halves<'_> {
         self.machine.run(&mut self.axis, 100, until);
         self.machine.until(until);
         let before = self.axis.commanded();
-        let state = self.homing.poll_axis(&mut self.axis, switch(before - self.more));
+        let state = self.homing.poll_axis(&mut self.axis, self.case.switch(before - self.more));
         let more = self.axis.commanded() - before;
         (self.machine.position[0], self.more) = (self.machine.position[0] + more, self.more + more);
         state
@@ -162,8 +177,12 @@ impl Bench for Halves<'_> {
 
 /// The same test of an axis one by one and in two halves.
 fn both(test: impl Fn(&mut dyn Bench, &str)) {
-    test(&mut OneByOne::new(), "Mover");
-    test(&mut Halves::new(&Queue::new()), "Axis");
+    both_of(Case::usual(), test);
+}
+
+fn both_of(case: Case, test: impl Fn(&mut dyn Bench, &str)) {
+    test(&mut OneByOne::new(case), "Mover");
+    test(&mut Halves::new(case, &Queue::new()), "Axis");
 }
 
 fn is_found(bench: &mut dyn Bench, case: &str) {
@@ -181,6 +200,25 @@ fn is_found(bench: &mut dyn Bench, case: &str) {
 #[test]
 fn a_switch_is_found_by_an_axis_in_two_halves_too() {
     both(|bench, name| is_found(bench, name));
+}
+
+/// It runs on for up to 11 steps behind the switch, and in two halves for 4 ms more; all of them are counted.
+#[test]
+fn a_fast_approach_knows_where_the_switch_has_closed() {
+    both_of(Case { config: config(1500), ..Case::usual() }, |bench, name| is_found(bench, name));
+}
+
+/// It has gone one step beyond the range when it stops: 40 steps at 2000 steps/s, and in two halves 4 ms and a poll more.
+#[test]
+fn a_switch_that_never_closes_is_given_up_at_the_end_of_the_range() {
+    both_of(Case { switch: None, ..Case::usual() }, |bench, name| {
+        bench.until(HomingState::Failed);
+        for _ in 0..3000 {
+            assert_eq!(bench.go(), Ok(HomingState::Failed), "{name}");
+        }
+        let (real, called) = bench.at();
+        assert!(bench.is_at_rest() && real == called && (3040..=3050).contains(&real), "{name}: {called} is at {real}");
+    });
 }
 
 /// It waits where it is, and goes on.

@@ -187,6 +187,9 @@ fn the_speed_at_a_corner_is_that_of_its_angle() {
     // All but straight on is no corner, however small the deviation: 0.03°.
     assert!(speed_at_the_corner([1000, 3000], [1001, 3000], 0) > 15_000.0);
     assert!(speed_at_the_corner([1000, 3000], [1100, 3000], 0) < 700.0);
+    // 1.2 and 1.5 mrad: a corner is one from 2^-20 of 1 less the cosine on, 1.38 mrad.
+    let near = [1004, 1005].map(|x| speed_at_the_corner([1000, 3000], [x, 3000], 0));
+    assert!(near[0] > 15_000.0 && near[1] < 700.0, "{near:?}");
 }
 
 /// The time goes on from line to line without being rounded.

@@ -176,3 +176,18 @@ fn the_limits_of_a_quick_stop_end_with_it() {
     let (stopped, fresh) = (takes(&mut stopped, now), takes(&mut fresh, 0));
     assert!(stopped.abs_diff(fresh) <= 1, "{stopped} {fresh}");
 }
+
+/// At rest behind a hold, on either line: what is planned next begins where the motion has ended, 150 steps from where it was when the
+/// hold came, half a step before a step.
+#[test]
+fn a_resume_begins_where_the_hold_has_ended() {
+    for at in (200..500).step_by(7) {
+        let mut machine = machine();
+        let now = take(&mut machine, at);
+        machine.hold(now);
+        let now = rest(&mut machine).last().unwrap() + 100_000;
+        machine.resume(now);
+        let (begin, want) = (machine.at(now)[0].position, (2 * at + 299) << 31);
+        assert!(begin.abs_diff(want) < 1 << 12, "{at}: {} / 2^32 steps from there", begin - want);
+    }
+}

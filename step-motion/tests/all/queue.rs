@@ -315,3 +315,31 @@ fn a_hold_acts_within_twice_the_reach_at_any_instant() {
         assert!(machine.position[0] - made <= 302, "{at} {before:?}: {}", machine.position[0] - made);
     }
 }
+
+/// The least reach is 16 ticks: a step in ten of them, and a hold that brakes within a step.
+#[test]
+fn a_hold_acts_within_twice_the_least_reach() {
+    for at in 2000..2200 {
+        let (axis, timer) = Axis::new(queue(), Clock::MICROSECONDS, limits(100_000, i32::MAX as u32, 0)).unwrap();
+        let (mut axis, mut machine) = (axis.with_reach(0), Machine::new(timer));
+        axis.run(Direction::Forward, 100_000).unwrap();
+        run(&mut axis, &mut machine, 1, at);
+        let made = machine.position[0];
+        axis.hold();
+        run(&mut axis, &mut machine, 1, u64::MAX);
+        assert!(machine.position[0] - made <= 4, "{at}: {}", machine.position[0] - made);
+    }
+}
+
+/// Nine slots are four for each block, and one of these is for steps.
+#[test]
+fn the_smallest_queue() {
+    let queue: &'static Queue<9> = Box::leak(Box::default());
+    let (mut axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits(1000, i32::MAX as u32, 0)).unwrap();
+    let mut machine = machine::Machine::<_, 1>::new(timer);
+    for to in [200, -3] {
+        axis.move_to(to).unwrap();
+        assert_eq!(machine.run(&mut axis, 100, u64::MAX), Work::Rest);
+        assert_eq!(machine.position[0], to);
+    }
+}

@@ -1,6 +1,7 @@
 //! What is found of the lines ahead, and what is kept where a curve does not fit.
 
 use super::*;
+use crate::limits::Limits;
 use crate::tests::model::change;
 use crate::tests::path::{Lines, To, limits, near, outcome, path, second};
 use crate::tests::{float, real};
@@ -34,6 +35,24 @@ fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
     assert_eq!([2000.0, 173_000.0, 174_000.0].map(|v| more(&path, v)), [1, 1, 0]);
 }
 
+/// Lines of one length, with the same jerk, of which one allows less acceleration: 50 steps/s² of the second axis.
+#[test]
+fn a_run_has_the_least_acceleration_of_its_lines() {
+    for turned in [false, true] {
+        let mut ways = [25, 33].map(|y: i64| ([(65_i64.pow(2) - y.pow(2)).isqrt(), y, 1], 1000));
+        if turned {
+            ways.reverse();
+        }
+        let mut path = path(&ways);
+        path.lines[1].as_mut().unwrap().corner = Real::HUGE;
+        let run = path.run_from(0, Real::ONE).unwrap();
+        let least = limits(&run.bounds);
+        let length = 4226_f64.sqrt();
+        assert_eq!(run.more, 1);
+        assert!(near(least.a, 50.0 * length / 33.0) && near(least.j.unwrap(), 1000.0 * length), "{least:?}");
+    }
+}
+
 /// Lines of which no two are one run.
 fn apart() -> [To; 4] {
     [([200, 0, 2], 1000), ([60, 0, 1], 1000), ([70, 0, 3], 1000), ([80, 0, 1], 1000)]
@@ -64,6 +83,30 @@ fn what_is_known_is_gone_on_from() {
     let all = known.exit(0, Real::ONE);
     assert!(!last.is_zero() && all == afresh.exit(0, Real::ONE), "{all:?}");
     assert_eq!(all, known.exit(0, Real::ONE));
+    assert_eq!((known.known(1), known.promised(0)), (Some(all), all));
+}
+
+/// What was found of lines does not hold once they allow more, or end elsewhere; nor does what was promised. Where lines are only added,
+/// the promise remains.
+#[test]
+fn nothing_is_known_of_lines_that_have_changed() {
+    let mut path = path(&apart());
+    for line in path.lines.iter_mut().flatten() {
+        line.corner = Real::HUGE;
+    }
+    let found = path.exit(0, Real::ONE);
+    path.push([500, 0, 30], 1000).unwrap();
+    assert_eq!((path.known(1), path.promised(0)), (None, found));
+    let longer = path.exit(0, Real::ONE);
+    path.hurry(&[Limits::new(100_000, 1 << 30).unwrap().with_jerk(1 << 43).unwrap(); 3]);
+    assert_eq!((path.known(1), path.promised(0)), (None, Real::ZERO));
+    let quicker = path.exit(0, Real::ONE);
+    assert!(longer < quicker, "{longer:?} {quicker:?}");
+    let mut afresh = path.clone();
+    for line in afresh.lines.iter_mut().flatten() {
+        line.ahead = Ahead::NONE;
+    }
+    assert_eq!(quicker, afresh.exit(0, Real::ONE));
 }
 
 /// The greatest speed from which a corner's speed or a rest can be had: of speeds below 0.618 of it the rest takes less distance.
