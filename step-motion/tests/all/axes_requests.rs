@@ -382,3 +382,29 @@ fn dir_has_half_of_the_pause_on_either_side() {
         }
     }
 }
+
+/// A line that is pushed after any slice of the work on the block before, which ends at rest: it begins in that block or behind it, and
+/// none of its steps is due before that.
+#[test]
+fn a_line_behind_a_rest_begins_at_rest() {
+    for slices in 0..250 {
+        let axis = AxisSetup::new(Limits::new(8000, 8_000_000).unwrap(), 80_000);
+        let path = Path::<3, 4>::new(Clock::MICROSECONDS, [axis; 3], 20).unwrap();
+        let queue = AxesQueue::<3, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 3>::new(timer);
+        axes.push([5, 0, 0], 100_000).unwrap();
+        for _ in 0..slices {
+            machine.slice(&mut axes);
+        }
+        axes.push([5, 50, 0], 100_000).unwrap();
+        axes.push([55, 50, 50], 100_000).unwrap();
+        assert_eq!(machine.run(&mut axes, 5000, u64::MAX), Work::Rest);
+        assert_eq!(machine.position, [55, 50, 50]);
+        let mut last = [None; 3];
+        for &(tick, axis, _) in &machine.steps {
+            let before: u64 = last[axis].replace(tick).unwrap_or(0);
+            assert!(before == 0 || tick - before >= 124, "{} of axis {axis} at {tick}, {slices}", tick - before);
+        }
+    }
+}
