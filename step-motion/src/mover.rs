@@ -267,7 +267,8 @@ impl Mover {
     pub fn halt(&mut self, now: u64) {
         let was_moving = !self.is_at_rest(now);
         self.ask_halt();
-        self.stand(now, was_moving);
+        // Whatever the caller's clock says, it is not later than the next step.
+        self.stand(self.due.map_or(now, |due| now.min(due)), was_moving);
     }
 
     /// Sets, at rest, the step count of the present position, for instance 0 at a reference.

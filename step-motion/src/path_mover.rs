@@ -317,7 +317,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn halt(&mut self, now: u64) {
         let was_moving = !self.is_at_rest(now);
         self.requests.halt();
-        self.stand(now, was_moving);
+        // Whatever the caller's clock says, it is not later than the next step.
+        self.stand(self.due().map_or(now, |due| now.min(due)), was_moving);
     }
 
     /// Sets, at rest, the step counts of the present position, for instance 0 at a reference, and forgets the remaining path.

@@ -156,6 +156,7 @@ impl<const N: usize> Axis<'_, N> {
         self.look();
         let now = tick(self.end.end).max(self.mover.free());
         let was_moving = self.position != self.mover.commanded() || !self.mover.is_at_rest(now);
+        let now = now.saturating_add(1);
         self.mover.halt_at(self.position, now, was_moving);
         (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
         self.end = Writer::new(i128::from(now) << 32, None);

@@ -124,9 +124,9 @@ impl Mover {
         self.rest(self.clock.moment(now));
     }
 
-    /// Records a halt at a position; DIR is unknown then.
+    /// Records a halt at a position; DIR is unknown then, and the last step may have been made just before.
     pub(crate) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
-        (self.commanded, self.dir) = (position, None);
+        (self.commanded, self.dir, self.free) = (position, None, now);
         self.stand(now, was_moving);
     }
 }

@@ -134,9 +134,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.stand(now, self.due().is_some());
     }
 
-    /// Records a halt at a position.
+    /// Records a halt at a position. The last step of any axis may have been made just before.
     pub(crate) fn halt_at(&mut self, commanded: [i64; N], now: u64, was_moving: bool) {
-        self.commanded = commanded;
+        (self.commanded, self.free) = (commanded, [now; N]);
         self.stand(now, was_moving);
     }
 }

@@ -408,3 +408,37 @@ fn a_line_behind_a_rest_begins_at_rest() {
         }
     }
 }
+
+/// At full speed and high acceleration, with a way back at once: the first step is a step of 125 us behind the last one, and DIR has half
+/// of the pause on either side, although nobody knows how much of what was handed out has been made.
+#[test]
+fn a_way_back_behind_a_halt_keeps_its_distance() {
+    for (pause, at) in [0, 300, 3000].into_iter().flat_map(|pause| (40..60).map(move |at| (pause, 613 * at))) {
+        let limits = Limits::new(8000, 2_000_000_000).unwrap();
+        let axis = AxisSetup::new(limits, 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 2>::new(timer);
+        axes.push([8000, 4000], 1_000_000).unwrap();
+        machine.run(&mut axes, 5000, at);
+        machine.until(at);
+        let made = machine.steps.len();
+        axes.halt();
+        assert_eq!(axes.poll(), Work::Start);
+        machine.fire();
+        assert_eq!(axes.poll(), Work::More);
+        axes.push([0, 0], 100_000).unwrap();
+        machine.run(&mut axes, 5000, at + 20_000);
+        let (before, after) = machine.steps.split_at(made);
+        for axis in 0..2 {
+            let last = before.iter().rev().find(|step| step.1 == axis).unwrap().0;
+            let first = after.iter().find(|step| step.1 == axis).unwrap().0;
+            assert!(first - last >= 124.max(u64::from(pause)), "{} behind a halt at {at}", first - last);
+        }
+        let half = u64::from(pause / 2).min(2500);
+        for (before, after) in &machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, behind a halt at {at}");
+        }
+    }
+}
