@@ -27,8 +27,8 @@ use crate::writer::{LONGEST, Writer};
 /// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or [as exact as
 /// all others](Self::with_exact_stops); every other step is exact to 3/4 of a tick, or 25 ns if that is more. If a block
 /// ends within two ticks of a step, or DIR changes, a step may be a
-/// tick or two late. Unless the background was late, DIR of an axis changes half of its reversal pause before the step, or a
-/// quarter of the reach if that is less.
+/// tick or two late. DIR of an axis changes half of its reversal pause before the step, or a quarter of the reach if that is
+/// less.
 ///
 /// It contains four copies of the [`PathMover`], so keep it in a `static` or on a large stack.
 ///
@@ -134,14 +134,16 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Creates the axes at rest at the present end of `path`, and the other end of the queue for the interrupt. A queue
     /// serves one such pair. Lines already in the path begin with the first request.
     pub fn new(queue: &'q AxesQueue<N, S>, path: Path<N, M>) -> (Self, AxesTimer<'q, N, S>) {
-        let path = PathMover::new(path).cutting();
+        let mut path = PathMover::new(path).cutting();
         let clock = path.clock();
+        let reach = (clock.hz() / 100).max(4);
+        path.set_lead(reach / 4);
         let none = [None; N];
         let out = Out { valid: false, len: 0, end: 0, dirs: none };
         let axes = Self {
             queue,
             off: clock.blur(),
-            reach: (clock.hz() / 100).max(4),
+            reach,
             shorter: 0,
             work: path.clone(),
             stops: [path.clone(), path.clone()],
@@ -172,8 +174,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
-    pub fn with_reach(self, ticks: u32) -> Self {
-        Self { reach: ticks.clamp(4, LONGEST), ..self }
+    pub fn with_reach(mut self, ticks: u32) -> Self {
+        self.reach = ticks.clamp(4, LONGEST);
+        self.path.set_lead(self.reach / 4);
+        self
     }
 
     /// Makes the stop behind each block as exact as all other steps, if the [`AxesQueue`] has slots for it. This takes

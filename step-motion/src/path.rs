@@ -426,12 +426,21 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
+    /// Returns which axes have to turn, or may have to, for steps after the lines that have ended.
+    pub(super) fn turns(&self, steps: [i32; N]) -> [bool; N] {
+        let mut turns = [false; N];
+        for ((turns, steps), gone) in turns.iter_mut().zip(steps).zip(self.gone) {
+            *turns = steps != 0 && gone != Some(Direction::of(steps.into()));
+        }
+        turns
+    }
+
     /// After a rest, the next line begins no earlier than the pause of any axis that reverses, or may have done so.
     pub(super) fn not_before_turning(&mut self) {
         let first = self.line(0).filter(|_| self.speed.is_zero());
         let Some(all) = first.map(|line| line.steps) else { return };
-        for ((axis, steps), gone) in self.axes.iter().zip(all).zip(self.gone) {
-            if steps != 0 && gone != Some(Direction::of(steps.into())) {
+        for (axis, turns) in self.axes.iter().zip(self.turns(all)) {
+            if turns {
                 let pause = self.clock.moment(axis.reversal_pause.into());
                 self.moment = self.moment.max(self.over.saturating_add(pause));
             }

@@ -71,6 +71,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     /// Its steps are taken in stretches; this is the rest of each axis's stretch.
     steps: Steps,
     left: [Option<Stretch>; N],
+    /// DIR changes at least this many ticks before a step, or half of the axis's pause, but not before the tick of a plan.
+    lead: u32,
     /// The first line has no further steps in stretches: the next one is to begin.
     ended: bool,
     /// During a stop, the path is cut off where that ends.
@@ -102,6 +104,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
             free,
             steps,
             left,
+            lead,
             ended,
             requests,
             braking,
@@ -111,7 +114,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
         (self.exit, self.wish, self.more, self.whole, self.bounds) = (*exit, *wish, *more, *whole, *bounds);
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
         (self.free, self.steps, self.left) = (*free, *steps, *left);
-        (self.ended, self.late) = (*ended, *late);
+        (self.ended, self.late, self.lead) = (*ended, *late, *lead);
         (self.requests, self.braking) = (*requests, *braking);
     }
 }
@@ -135,6 +138,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             free: [0; N],
             steps: Steps::Single,
             left: [None; N],
+            lead: 0,
             ended: false,
             requests: Requests::NONE,
             braking: false,

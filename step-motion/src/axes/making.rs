@@ -76,7 +76,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     pub(super) fn waits_for_a_step(&mut self) -> bool {
         let dirs = self.writers.map(|writer| writer.dir);
         let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1));
-        let next = next.or_else(|| self.work.turns_before(self.until, dirs, self.reach / 4));
+        let next = next.or_else(|| self.work.turns_before(self.until, dirs));
         if let Some(due) = next.filter(|_| self.put_off < PUT_OFF) {
             (self.until, self.quiet) = (due.saturating_add(1), 0);
             self.put_off = self.put_off.saturating_add(1);

@@ -18,6 +18,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Self { steps: Steps::Stretches, ..self }
     }
 
+    /// Leaves so many ticks before a step for DIR, if half of the axis's pause is not less.
+    pub(crate) const fn set_lead(&mut self, ticks: u32) {
+        self.lead = ticks;
+    }
+
     /// Does a slice of the work for the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse).
     pub(crate) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Cut {
         if self.ended {
@@ -68,14 +73,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.free.map(|free| free.saturating_sub(1))
     }
 
-    /// The tick of a step before which an axis changes DIR, if half of its pause before that step, but no more than `most`, begins
-    /// within two ticks after `now`.
-    pub(crate) fn turns_before(&self, now: u64, dirs: [Option<Direction>; N], most: u32) -> Option<u64> {
+    /// The tick of a step before which an axis changes DIR, if its lead begins within two ticks after `now`.
+    pub(crate) fn turns_before(&self, now: u64, dirs: [Option<Direction>; N]) -> Option<u64> {
         let line = self.line.as_ref()?;
         let turns = line.due.iter().zip(line.directions).zip(dirs).zip(self.path.axes());
         let late = turns.filter_map(|(((due, direction), dir), axis)| {
             let due = due.filter(|_| dir != Some(direction))?;
-            let pause = u64::from((axis.reversal_pause / 2).min(most));
+            let pause = u64::from((axis.reversal_pause / 2).min(self.lead));
             (due <= now.saturating_add(pause).saturating_add(2)).then_some(due)
         });
         late.max()

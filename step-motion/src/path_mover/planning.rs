@@ -164,7 +164,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         if self.line.is_none() {
             if !brakes {
-                self.path.not_before(now);
+                self.path.not_before(now.saturating_add(self.turning()));
             }
             self.begin();
         } else {
@@ -175,7 +175,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Plans the rest of the running line.
     pub(super) fn plan(&mut self, now: u64) {
-        let Some((motion, start)) = self.here(now) else { return };
+        let Some((motion, mut start)) = self.here(now) else { return };
+        if motion.v.is_zero() {
+            start.moment = start.moment.max(self.clock().moment(now.saturating_add(self.turning())));
+        }
         let from = (start.place, start.before);
         let part = self.requests.part();
         self.late = part.is_some();
@@ -186,6 +189,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if let Some((course, bounds)) = course {
             self.adopt(&course, start, bounds);
         }
+    }
+
+    /// Returns how many ticks DIR has to change before the first line begins, or goes on from a rest.
+    fn turning(&self) -> u64 {
+        let steps = self.path.line(0).map_or([0; N], |line| line.steps);
+        let turns = self.path.turns(steps).into_iter().zip(self.made).zip(self.path.axes());
+        let leads = turns.filter(|((turns, made), _)| *turns && *made == 0);
+        leads.map(|(_, axis)| u64::from((axis.reversal_pause / 2).min(self.lead))).max().unwrap_or(0)
     }
 
     /// Plans the rest of the running line again after lines have been added, which ask for another speed at its end. If it

@@ -442,3 +442,36 @@ fn a_way_back_behind_a_halt_keeps_its_distance() {
         }
     }
 }
+
+/// After a stop that nobody asked for, in a pause or before the first step of a way back, and after a rest.
+#[test]
+fn dir_is_in_time_behind_a_rest() {
+    let mut turns = 0;
+    for (pause, at) in [900, 4000].into_iter().flat_map(|pause| (20..120).map(move |at| (pause, 997 * at))) {
+        let axis = AxisSetup::new(Limits::new(8000, 8_000_000).unwrap(), 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 2>::new(timer);
+        for to in [[200, 100], [100, 200], [150, 0], [0, 100]] {
+            axes.push(to, 100_000).unwrap();
+        }
+        machine.run(&mut axes, 5000, at);
+        machine.drain();
+        machine.run(&mut axes, 5000, at + 40_000);
+        axes.hold();
+        machine.run(&mut axes, 5000, u64::MAX);
+        machine.now += 100_000;
+        axes.resume();
+        machine.run(&mut axes, 5000, u64::MAX);
+        axes.push([50, 50], 100_000).unwrap();
+        machine.run(&mut axes, 5000, u64::MAX);
+        assert_eq!(machine.position, [50, 50]);
+        let half = u64::from(pause / 2).min(2500);
+        for (before, after) in &machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, late at {at}");
+        }
+        turns += machine.turns.len();
+    }
+    assert!(turns > 800, "{turns}");
+}
