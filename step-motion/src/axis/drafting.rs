@@ -71,12 +71,17 @@ impl<const N: usize> Axis<'_, N> {
         }
     }
 
-    /// Takes a new request, and plans it at once if it is known where it begins.
+    /// Takes a new request, which the next slices plan; one that leaves an axis at rest there is done.
     pub(super) fn asked(&mut self, news: News) {
-        self.news = self.news.max(news);
         self.seen = UNSEEN;
-        if !self.halts.is_pending() && !self.look() && self.stage != Stage::Linked && !self.lost {
-            self.begin();
+        self.look();
+        if self.is_at_rest() {
+            return;
+        }
+        self.news = self.news.max(news);
+        if self.stage != Stage::Linked {
+            // In place of the block being made.
+            self.forget();
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) struct Stop<const N: usize> {
     pub(super) cut: bool,
     /// Its first curve, if it is not the present one.
     pub(super) first: Option<(Course, Start<N>, Bounds)>,
+    /// Time from the end of that curve to the rest, if it is known.
+    pub(super) after: Option<Real>,
 }
 
 impl<const N: usize, const M: usize> PathMover<N, M> {
@@ -54,14 +56,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.line.as_ref()?;
         if self.requests.is_stopping() {
             let end = self.path.end_of_cut()?;
-            return Some(Stop { end, left: self.leaving(), cut: true, first: None });
+            return Some(Stop { end, left: self.leaving(), cut: true, first: None, after: None });
         }
         self.stop_anew(now, false)
     }
 
     /// Returns how a stop runs that begins now, plain or quick, whatever stop is under way; `None` at rest.
     pub(super) fn stop_anew(&self, now: u64, quick: bool) -> Option<Stop<N>> {
-        let present = |end| Stop { end, left: self.leaving(), cut: false, first: None };
+        let present = |end| Stop { end, left: self.leaving(), cut: false, first: None, after: None };
         let here = self.here(now);
         // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
         if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
@@ -87,7 +89,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
             // It is whole once the path has been cut off where it ends.
             course.whole = true;
-            Stop { end, left, cut: false, first: Some((course, start, bounds)) }
+            Stop { end, left, cut: false, first: Some((course, start, bounds)), after: None }
         };
         let stop = match self.path.brake(0, motion, from, how) {
             Some(course) => planned(course),
@@ -97,7 +99,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if exit.is_zero() {
             return Some(stop);
         }
-        let stop = Stop { end: self.path.end_of_stop(more.saturating_add(1), exit).0, ..stop };
+        let (end, after) = self.path.end_of_stop(more.saturating_add(1), exit);
+        let stop = Stop { end, after: Some(after), ..stop };
         // At each joint it would have acceleration 0; on one curve it may be shorter.
         let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
         once.filter(|once| quick && once.end < stop.end).or(Some(stop))
@@ -138,7 +141,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if exit.is_zero() {
             return first;
         }
-        first.saturating_add(self.path.end_of_stop(more.saturating_add(1), exit).1.to_fixed(0))
+        let after = stop.after.unwrap_or_else(|| self.path.end_of_stop(more.saturating_add(1), exit).1);
+        first.saturating_add(after.to_fixed(0))
     }
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along

@@ -1,5 +1,6 @@
 //! The step interrupts of step-motion in each of their calls, and the background that feeds them.
 
+use servowire_core::Direction;
 use step_motion::{
     Axes, AxesQueue, AxesTimer, Axis, AxisSetup, Clock, Fired, FiredAxes, Limits, Path, Queue, StepTimer, Work,
 };
@@ -18,7 +19,7 @@ static ALL: AxesQueue<3, 11> = AxesQueue::new();
 static LINES: AxesQueue<3, 257> = AxesQueue::new();
 static LONG: Queue<129> = Queue::new();
 static SHORT: Queue<129> = Queue::new();
-static ASKED: Queue<9> = Queue::new();
+static ASKED: Queue<129> = Queue::new();
 static SLICES: Queue<129> = Queue::new();
 static MOVES: [Queue<129>; 3] = [const { Queue::new() }; 3];
 static RAMPS: [Queue<129>; 6] = [const { Queue::new() }; 6];
@@ -29,11 +30,22 @@ mod toolpaths {
 }
 use toolpaths::{AHEAD, AXES, DEVIATION, TOOLPATHS};
 
+/// Numbers that are random enough, and the same in each run.
+struct Dice(u32);
+
+impl Dice {
+    fn throw(&mut self, sides: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 16) % sides
+    }
+}
+
 /// An axis that goes back and forth, with its interrupt, and how far.
 struct Shuttle {
     axis: Axis<'static, 129>,
     timer: StepTimer<'static, 129>,
     way: i64,
+    dice: Dice,
 }
 
 impl Shuttle {
@@ -50,7 +62,7 @@ impl Shuttle {
 
     fn on(queue: &'static Queue<129>, hz: u32, limits: Limits, way: i64) -> Option<Self> {
         let (axis, timer) = Axis::new(queue, Clock::new(hz)?, limits).ok()?;
-        Some(Self { axis, timer, way })
+        Some(Self { axis, timer, way, dice: Dice(1) })
     }
 
     fn slice(&mut self) -> Work {
@@ -76,6 +88,26 @@ impl Shuttle {
                 return fired;
             }
         }
+    }
+
+    /// A random request: mostly a move.
+    fn ask(&mut self) -> bool {
+        let (way, speed) = (i64::from(self.dice.throw(5000)), self.dice.throw(50_000));
+        let own = &mut self.axis;
+        match self.dice.throw(16) {
+            0 => own.hold(),
+            1 | 2 => own.resume(),
+            3 => own.set_override(u16::try_from(speed % 150).unwrap_or(0)),
+            4 => own.stop(),
+            5 => {
+                let Some(hard) = limits() else { return false };
+                own.quick_stop(hard);
+            }
+            6 | 7 => return own.run(Direction::of(way - 2500), speed).is_ok(),
+            8..12 => return own.move_to(way / 50).is_ok(),
+            _ => return own.move_to(way - 2500).is_ok(),
+        }
+        true
     }
 
     /// At one end of its way, from which it goes all of it.
@@ -129,8 +161,7 @@ struct Job {
     line: usize,
     /// Steps that have been made and not counted yet.
     ahead: u32,
-    /// Requests made.
-    asked: usize,
+    dice: Dice,
     /// Ticks to the end of a millisecond.
     ticks: u32,
 }
@@ -143,7 +174,7 @@ impl Job {
         });
         let path = Path::new(Clock::new(168_000_000)?, [x?, y?, z?], DEVIATION).ok()?;
         let (axes, timer) = Axes::new(queue, path);
-        Some(Self { axes, timer, path: 0, line: 0, ahead: 0, asked: 0, ticks: 0 })
+        Some(Self { axes, timer, path: 0, line: 0, ahead: 0, dice: Dice(1), ticks: 0 })
     }
 
     fn path(at: usize) -> Option<impl Iterator<Item = &'static ([i32; 3], u32)>> {
@@ -197,23 +228,45 @@ impl Job {
         made
     }
 
-    /// The next request: a hold and back, another override and back, a stop of either kind, and a move.
+    /// A random request.
     fn ask(&mut self) -> bool {
-        self.asked += 1;
         let own = &mut self.axes;
-        match self.asked % 7 {
+        match self.dice.throw(10) {
             0 => own.hold(),
-            1 => own.resume(),
-            2 => own.set_override(60),
-            3 => own.set_override(100),
-            4 => own.stop(),
-            5 => {
+            1 | 2 => own.resume(),
+            3 => own.set_override(20),
+            4 => own.set_override(60),
+            5 | 6 => own.set_override(120),
+            7 => own.stop(),
+            8 => {
                 let Some(hard) = limits() else { return false };
                 own.quick_stop([hard; 3]);
             }
             _ => return own.move_to(own.target().map(|at| at + 500), 100_000).is_ok(),
         }
         true
+    }
+
+    /// Pushes lines as long as there is room, from the first path again behind the last one.
+    fn fill(&mut self) {
+        if self.path >= TOOLPATHS.len() {
+            (self.path, self.line) = (0, 0);
+        }
+        while !self.axes.is_full() {
+            let Some((to, feed)) = self.next() else { break };
+            if self.axes.push(to, feed).is_err() {
+                break;
+            }
+        }
+    }
+
+    /// An event, and a request before one of so many.
+    fn stirred(&mut self, of: u32) {
+        if self.dice.throw(of) == 0 {
+            self.ask();
+        }
+        while self.axes.poll() == Work::More {}
+        self.timer.fire();
     }
 
     /// Steps of all axes on all paths.
@@ -389,16 +442,16 @@ kernels_on_states! {
         Job::new(&PATHS[4]).map_or(0, |mut own| tenths_of(75_000 / PART, &mut own, step_motion_axes_millisecond, &[0]))
     }
 
-    /// The worst slice of the background of these axes, to 40 instructions.
+    /// The worst slice of the background of these axes, to 40 instructions, with requests at random moments.
     fn step_motion_axes_slice(job: &mut Job, _input: &u8) -> Work {
         job.axes.poll()
     } as {
         let Some(mut job) = Job::new(&PATHS[1]) else { return 0 };
-        most_tenths(1_000_000 / PART, |clock| {
-            while !job.axes.is_full() {
-                let Some((to, feed)) = job.next() else { break };
-                let _: Result<_, _> = job.axes.push(to, feed);
+        most_tenths(500_000 / PART, |clock| {
+            if job.dice.throw(400) == 0 {
+                job.ask();
             }
+            job.fill();
             match clock(&mut || step_motion_axes_slice(&mut job, &0)) {
                 Work::More => {}
                 _ => _ = job.timer.fire(),
@@ -412,51 +465,55 @@ kernels_on_states! {
         job.axes.push(to, feed).is_ok()
     } as {
         let Some(mut job) = Job::new(&PATHS[2]) else { return 0 };
-        most_tenths(3000 / PART, |clock| {
-            while job.axes.is_full() && !job.axes.is_at_rest() {
-                while job.axes.poll() == Work::More {}
-                job.timer.fire();
+        most_tenths(4000 / PART, |clock| {
+            while job.axes.is_full() {
+                job.stirred(50);
             }
             clock(&mut || step_motion_axes_push(&mut job, &0));
         })
     }
 
-    /// The worst request to these axes: each of them in turn, some way into the lines.
+    /// The worst request to these axes, at a random moment.
     fn step_motion_axes_request(job: &mut Job, _input: &u32) -> bool {
         job.ask()
     } as {
         let Some(mut job) = Job::new(&PATHS[3]) else { return 0 };
         most_tenths(8000 / PART, |clock| {
-            for _ in 0..40 {
+            for _ in 0..1 << job.dice.throw(11) {
+                job.fill();
                 job.event();
             }
             clock(&mut || step_motion_axes_request(&mut job, &0));
         })
     }
 
-    /// The worst slice of the background, to 40 instructions.
+    /// The worst slice of the background of one axis, to 40 instructions, with requests at random moments.
     fn step_motion_axis_slice(shuttle: &mut Shuttle, _input: &u8) -> Work {
         shuttle.axis.poll()
     } as {
         let Some(mut own) = Shuttle::new(&SLICES, 1000, 2_000_000) else { return 0 };
-        most_tenths(4096, |clock| match clock(&mut || step_motion_axis_slice(&mut own, &0)) {
-            Work::More => {}
-            Work::Rest => {
-                own.way = -own.way;
-                let _: Result<_, _> = own.axis.move_to(own.way);
+        most_tenths(100_000 / PART, |clock| {
+            if own.dice.throw(100) == 0 {
+                own.ask();
             }
-            _ => _ = own.timer.fire(),
+            match clock(&mut || step_motion_axis_slice(&mut own, &0)) {
+                Work::More => {}
+                _ => _ = own.timer.fire(),
+            }
         })
     }
 
-    /// A request to an axis at rest, with its plan: of 20 steps and of 5000 of an S-curve.
-    fn step_motion_axis_request(axis: &mut Axis<'static, 9>, steps: &i64) -> bool {
-        axis.move_to(*steps).is_ok()
+    /// The worst request to one axis, at a random moment.
+    fn step_motion_axis_request(shuttle: &mut Shuttle, _input: &u32) -> bool {
+        shuttle.ask()
     } as {
-        let Some(limits) = Limits::new(50_000, 100_000).ok().and_then(|limits| limits.with_jerk(1_000_000).ok()) else {
-            return 0;
-        };
-        let Ok((mut axis, _)) = Axis::new(&ASKED, Clock::MICROSECONDS, limits) else { return 0 };
-        tenths_on(&mut axis, step_motion_axis_request, &[20, 5000])
+        let Some(mut own) = Shuttle::new(&ASKED, 1000, 2_000_000) else { return 0 };
+        most_tenths(4000 / PART, |clock| {
+            for _ in 0..1 << own.dice.throw(10) {
+                while own.axis.poll() == Work::More {}
+                own.timer.fire();
+            }
+            clock(&mut || step_motion_axis_request(&mut own, &0));
+        })
     }
 }
