@@ -117,6 +117,8 @@ pub struct Axis<'q, const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Idle,
+    /// It is known where a block begins.
+    Plan,
     Block,
     Stop,
     /// The block waits for the interrupt to come near.

@@ -61,7 +61,18 @@ impl<const N: usize> Axis<'_, N> {
         match self.stage {
             Stage::Idle => {
                 let more = self.news != News::None || self.mover.has_more();
-                if more && self.begin() { Work::More } else { waits }
+                if more {
+                    self.begin();
+                    return Work::More;
+                }
+                waits
+            }
+            Stage::Plan => {
+                if self.plan() {
+                    Work::More
+                } else {
+                    waits
+                }
             }
             Stage::Block => self.cut(),
             Stage::Stop => self.cut_stop(),
@@ -184,36 +195,42 @@ impl<const N: usize> Axis<'_, N> {
         u64::from(self.reach).saturating_mul(3) / 5
     }
 
-    /// Begins a block: if there is a request, with that, behind the next segment that is far enough ahead of the interrupt;
-    /// otherwise with the motion that follows everything handed out. Returns whether there is anything to cut.
-    fn begin(&mut self) -> bool {
+    /// Begins a block: if there is a request, behind the next segment that is far enough ahead of the interrupt; otherwise
+    /// behind everything handed out.
+    fn begin(&mut self) {
         self.forget();
-        let news = core::mem::replace(&mut self.news, News::None);
+        self.told = core::mem::replace(&mut self.news, News::None);
         let (running, _) = self.current();
         self.work.clone_from(&self.mover);
         (self.joint, self.writer) = (self.last, Writer { len: 0, ..self.end });
-        if let Some((block, place)) = running.filter(|_| news != News::None) {
+        if let Some((block, place)) = running.filter(|_| self.told != News::None) {
             self.join(block, place);
         }
-        let now = tick(self.writer.end);
-        let blocks = if news == News::None || running.is_none() { 8 } else { 2 };
-        self.until = now.saturating_add(u64::from(self.reach).saturating_mul(blocks));
-        let free = self.work.free();
-        let other = if news == News::None {
+        let blocks = if self.told == News::None || running.is_none() { 8 } else { 2 };
+        self.until = tick(self.writer.end).saturating_add(u64::from(self.reach).saturating_mul(blocks));
+        self.stage = Stage::Plan;
+    }
+
+    /// Plans the request, or the motion that follows. Returns whether there is anything to cut.
+    fn plan(&mut self) -> bool {
+        let (free, told) = (self.work.free(), self.told);
+        let other = if told == News::None {
             self.work.proceed();
             true
         } else {
-            self.work.pursue(news, now)
+            self.work.pursue(told, tick(self.writer.end))
         };
+        let (running, _) = self.current();
         let brakes = self.out.get(1_usize.wrapping_sub(self.block)).is_some_and(|out| out.brakes);
         let ends_here = self.joint == self.last && (running.is_none() || !brakes);
         if !other || ends_here && !self.work.has_steps() {
+            (self.stage, self.told) = (Stage::Idle, News::None);
             return false;
         }
         if let Some(out) = self.out.get_mut(self.block) {
             *out = Out { begin: self.writer.end, free, ..Out::NONE };
         }
-        (self.stage, self.told) = (Stage::Block, news);
+        self.stage = Stage::Block;
         true
     }
 
