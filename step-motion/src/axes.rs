@@ -16,6 +16,7 @@ use crate::path::Path;
 use crate::path_mover::PathMover;
 use crate::queue::{IDLE, Queue};
 use crate::real::Real;
+use crate::requests::Requests;
 use crate::writer::{LONGEST, Writer};
 
 /// The axes of a path, whose steps are made in an interrupt.
@@ -94,6 +95,8 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     standing: bool,
     /// The interrupt has not entered the last block yet.
     pending: bool,
+    /// There is a request that the path does not follow yet.
+    asked: bool,
     /// The plan cannot be run.
     lost: bool,
     turn: u32,
@@ -165,6 +168,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             outs: [out; 2],
             standing: true,
             pending: false,
+            asked: false,
             lost: false,
             turn: 0,
             halts: Halts::NONE,
@@ -211,7 +215,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Returns whether the interrupt is stopped and no motion is pending (or it is on hold).
     pub fn is_at_rest(&self) -> bool {
-        !self.halts.is_pending() && self.standing && !self.pending && self.path.due().is_none()
+        !self.halts.is_pending() && self.standing && !self.pending && !self.goes_on()
     }
 
     /// Returns whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
@@ -276,22 +280,27 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Does the same as [`PathMover::set_override`].
     pub fn set_override(&mut self, percent: u16) {
-        self.change(|path, end| path.set_override(percent, end));
+        self.change(|requests| requests.set_override(percent));
     }
 
     /// Does the same as [`PathMover::hold`].
     pub fn hold(&mut self) {
-        self.change(PathMover::hold);
+        self.change(Requests::hold);
     }
 
     /// Does the same as [`PathMover::resume`].
     pub fn resume(&mut self) {
-        self.change(PathMover::resume);
+        self.change(Requests::resume);
     }
 
     /// Does the same as [`PathMover::stop`].
     pub fn stop(&mut self) {
-        self.change(PathMover::stop);
+        let (before, lines) = (self.path.requests(), self.path.len());
+        self.path.stop(self.end);
+        let same = self.path.requests().are_as(before) && self.path.len() == lines;
+        if self.stage == Stage::Idle || !same {
+            self.begin_anew();
+        }
         self.tell_stops(|_, stop, end| {
             stop.stop(end);
             Ok(())
@@ -320,6 +329,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
         self.path.halt_before(self.end);
         self.begin_anew();
+        self.asked = false;
     }
 
     /// Does the same as [`PathMover::set_commanded`].
@@ -363,7 +373,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             return if idle { Work::Start } else { Work::Later };
         }
         match self.stage {
-            Stage::Idle if self.lost || self.path.due().is_none() => {
+            Stage::Idle if self.lost || !self.goes_on() => {
                 if self.standing {
                     Work::Rest
                 } else {
@@ -377,6 +387,11 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             Stage::Hold => self.hold_stop(),
             Stage::Stop => self.cut_stop(),
         }
+    }
+
+    /// Returns whether there is motion to plan or to cut.
+    fn goes_on(&self) -> bool {
+        self.asked || self.path.due().is_some()
     }
 
     /// Returns the block and the place in it where the first axis is, and whether all axes are stopped.
@@ -421,13 +436,13 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.path.ready(self.is_at_rest())
     }
 
-    /// Takes a request. One for what is so already does not disturb the work on a block.
-    fn change(&mut self, ask: impl FnOnce(&mut PathMover<N, M>, u64)) {
-        let (before, lines) = (self.path.requests(), self.path.len());
-        ask(&mut self.path, self.end);
-        let same = self.path.requests().are_as(before) && self.path.len() == lines;
-        if self.stage == Stage::Idle || !same {
+    /// Takes a request, which the next block follows. One for what is so already does not disturb the work on a block, and one
+    /// that leaves the machine at rest there is done.
+    fn change(&mut self, ask: impl FnOnce(&mut Requests)) {
+        let rests = self.is_at_rest();
+        if self.path.ask(ask) {
             self.begin_anew();
+            self.asked = !rests || self.path.has_work();
         }
     }
 
@@ -470,6 +485,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             out.valid = false;
         }
         self.begin_anew();
-        (self.standing, self.pending, self.lost) = (true, false, false);
+        (self.standing, self.pending, self.asked, self.lost) = (true, false, false, false);
     }
 }

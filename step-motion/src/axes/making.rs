@@ -28,13 +28,22 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Plans the block along the lines that were added; or finds out, from the last line back, how fast it may be.
+    /// Plans the block after a request, or along the lines that were added; or finds out, from the last line back, how fast it may be.
     pub(super) fn look_ahead(&mut self) -> Work {
         if self.work.has_to_find() {
             return Work::More;
         }
-        self.work.look_ahead(self.end);
         self.stage = Stage::Block;
+        if self.asked {
+            self.work.replan(self.end);
+            if self.work.due().is_none() {
+                // It leads to no step.
+                self.path.clone_from(&self.work);
+                (self.stage, self.asked) = (Stage::Idle, false);
+            }
+        } else {
+            self.work.look_ahead(self.end);
+        }
         Work::More
     }
 
@@ -116,7 +125,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             *made = made.wrapping_add(steps);
         }
         self.path.clone_from(&self.work);
-        self.same = true;
+        (self.same, self.asked) = (true, false);
         (self.end, self.dirs) = (self.until, dirs(self.joint));
         self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
         let from = if self.standing { REST } else { 0 };

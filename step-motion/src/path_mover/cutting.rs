@@ -5,6 +5,7 @@ use servowire_core::Direction;
 use crate::cutter::{Cut, Demand, Slice};
 use crate::error::Error;
 use crate::line::{Line, LinePulses, Steps};
+use crate::requests::Requests;
 use crate::stepper::tick;
 
 use super::PathMover;
@@ -111,6 +112,18 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns whether a line of another mover would be the same here.
     pub(crate) fn ends_as(&self, other: &Self) -> bool {
         self.path.ends_as(&other.path)
+    }
+
+    /// Records a request, which [`replan`](Self::replan) follows. Returns whether it changes anything.
+    pub(crate) fn ask(&mut self, ask: impl FnOnce(&mut Requests)) -> bool {
+        let before = self.requests;
+        ask(&mut self.requests);
+        !self.requests.are_as(before)
+    }
+
+    /// Returns whether there are lines, and nothing holds them.
+    pub(crate) const fn has_work(&self) -> bool {
+        !self.path.is_empty() && !self.requests.brakes()
     }
 
     /// Sets the deviation at corners, for lines appended from now on.

@@ -160,7 +160,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Plans the rest of the motion after a request.
-    pub(super) fn replan(&mut self, now: u64) {
+    pub(crate) fn replan(&mut self, now: u64) {
         // A stop that is under way is the same one whoever asks for it.
         let brakes = self.requests.brakes();
         if self.requests.is_stopping() || self.line.is_some() && self.braking && brakes {
