@@ -13,6 +13,7 @@ use crate::halts::Halts;
 use crate::limits::{Clock, Limits};
 use crate::mover::Mover;
 use crate::mover::cutting::News;
+use crate::mover::planning::Planning;
 use crate::queue::{NONE, Queue};
 use crate::real::Real;
 use crate::requests::Requests;
@@ -94,6 +95,8 @@ pub struct Axis<'q, const N: usize> {
     writer: Writer,
     until: u64,
     told: News,
+    /// The plan of the block or of its stop, while it is being made.
+    planning: Planning,
     /// The stop behind it, while it is being cut.
     stop: Option<Tail>,
     /// Slots for the steps of a block and the exactness of its stop, adapted to the room that the previous block had; and
@@ -159,7 +162,7 @@ struct Mark {
 #[derive(Debug)]
 struct Tail {
     mover: Mover,
-    /// The mover still holds the motion that is to be stopped.
+    /// The mover still has the motion that is to be stopped.
     moves: bool,
     demand: Demand,
     writer: Writer,
@@ -208,6 +211,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             writer: Writer::new(0, None),
             until: 0,
             told: News::None,
+            planning: Planning::OVER,
             stop: None,
             room: Self::ROOM,
             coarse: COARSE,

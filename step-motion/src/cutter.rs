@@ -83,6 +83,8 @@ pub(crate) struct Demand {
     pub(crate) coarse: Option<u32>,
     /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
     pub(crate) time: u64,
+    /// How many steps may be searched in a slice.
+    pub(crate) searches: u32,
 }
 
 /// Up to this many steps fit into a segment whatever the curve is; each of them is found by itself.
@@ -172,7 +174,7 @@ impl Cutter {
         (few.stretch.count > 0).then_some(few.stretch)
     }
 
-    /// Finds the next two of the steps that are found one by one.
+    /// Finds the next of the steps that are found one by one.
     fn search(&mut self, mut few: Few, demand: &Demand) -> Slice {
         let Some(piece) = &self.piece else { return Slice::More };
         let (mut last, mut coarse) = (self.last.time(piece), 0);
@@ -180,7 +182,7 @@ impl Cutter {
             coarse = spot.v.of(piece.step) >> by;
         }
         let near = piece.off.max(coarse) >> 4;
-        for _ in 0..self.left().min(2) {
+        for _ in 0..self.left().min(demand.searches) {
             let time = piece.search(self.count, Some(last), near);
             if !few.add(piece.tick(time), demand.time.min(LONGEST)) {
                 return Slice::Steps(few.stretch);
@@ -303,7 +305,8 @@ mod tests {
     fn worst(curve: &Curve, frame: &Frame, off: Real) -> (f64, f64) {
         let (mut cutter, mut worst, mut segments) = (Cutter::new(), 0.0, 0.0);
         let most = off.scaled(48).to_wide(32 - i32::try_from(frame.shift).unwrap()) as f64 / 2_f64.powi(48);
-        while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX }) {
+        while let Some(stretch) = cutter.next(curve, frame, &Demand { off, coarse: None, time: u64::MAX, searches: 2 })
+        {
             assert!(stretch.count > 0);
             let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
             for k in 0..u32::from(stretch.count) {
@@ -403,7 +406,7 @@ mod tests {
             let curve = plan(rest, Goal::At(Real::new(n.into()), Real::ZERO), &limits.bounds(clock)).unwrap();
             let frame = Frame { to: Some(i64::from(n) << 32), ..Frame::rest(clock.shift(), 0, 0) };
             let (mut cutter, time) = (Cutter::new(), (time * 2_f64.powi(32)) as u64);
-            let demand = Demand { off: clock.blur(), coarse: None, time };
+            let demand = Demand { off: clock.blur(), coarse: None, time, searches: 2 };
             while let Some(stretch) = cutter.next(&curve, &frame, &demand) {
                 let lasts = stretch.last() - stretch.first;
                 prop_assert!(lasts <= i128::from(time) + (1 << 32), "{lasts} of {time}, {} steps", stretch.count);
@@ -447,7 +450,7 @@ mod tests {
             let state = [if up { v } else { v + more }, more / lasts, Real::ZERO];
             curve.push((lasts, steps), state, up, Bend::Flat);
             let (frame, mut cutter) = (Frame { to: None, ..Frame::rest(10, 0, 0) }, Cutter::new());
-            let demand = Demand { off: Real::new(1 << 20), coarse, time: u64::MAX };
+            let demand = Demand { off: Real::new(1 << 20), coarse, time: u64::MAX, searches: 2 };
             let counts: Vec<_> =
                 core::iter::from_fn(|| cutter.next(&curve, &frame, &demand).map(|some| some.count)).collect();
             assert!(counts.len() > 2 && counts.iter().all(|count| *count <= most), "{counts:?}");
@@ -469,7 +472,8 @@ mod tests {
             let frame = Frame { to: Some(5000 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
             let off = Real::new(Clock::MICROSECONDS.moment(1)) * Real::fixed(20, 0) / Real::new(1000);
             let (mut cutter, mut segments) = (Cutter::new(), 0.0);
-            while let Some(stretch) = cutter.next(&curve, &frame, &Demand { off, coarse, time: u64::MAX }) {
+            while let Some(stretch) = cutter.next(&curve, &frame, &Demand { off, coarse, time: u64::MAX, searches: 2 })
+            {
                 let first = cutter.count() - u32::from(stretch.count);
                 let (mut time, [mut interval, mut add, bend]) = (stretch.first, stretch.differences);
                 for count in first..cutter.count() {

@@ -269,6 +269,9 @@ pub(super) struct Jerk {
 }
 
 impl Bounds {
+    /// No motion. All bytes are zero, so an array of it is cleared rather than copied.
+    pub(super) const NONE: Self = Self { v: Real::ZERO, a: Real::ZERO, per_a: Real::ZERO, jerk: None };
+
     pub(super) fn new(v: Real, a: Real, j: Option<Real>) -> Self {
         let jerk = j.map(|j| {
             let per_j = Real::ONE / j;

@@ -1,7 +1,7 @@
 //! An axis that accepts a new request at any time.
 
 pub(super) mod cutting;
-mod planning;
+pub(super) mod planning;
 
 use crate::cutter::Stretch;
 use crate::error::Error;
@@ -166,7 +166,7 @@ impl Mover {
         self.due = self.stepper.next(curve, frame).map(|due| due.max(self.free));
         self.due = self.due.filter(|due| self.clock.is_in_time(*due));
         if self.due.is_none() {
-            self.go_on();
+            self.follow(self.go_on());
         } else if frame.endless && self.stepper.count() >= 1 << 30 {
             self.replan(self.clock.moment(tick));
         }
@@ -234,25 +234,25 @@ impl Mover {
     /// as 100. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
         self.ask_override(percent);
-        self.change(now);
+        self.follow(self.change(now));
     }
 
     /// Slows down to rest and keeps the target (feed hold).
     pub fn hold(&mut self, now: u64) {
         self.ask_hold();
-        self.change(now);
+        self.follow(self.change(now));
     }
 
     /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
         self.ask_resume();
-        self.change(now);
+        self.follow(self.change(now));
     }
 
     /// Slows down to rest and forgets the target.
     pub fn stop(&mut self, now: u64) {
         self.ask_stop();
-        self.change(now);
+        self.follow(self.change(now));
     }
 
     /// Slows down to rest within other limits, for example higher ones for a limit switch, and forgets the target. Moves
@@ -260,7 +260,7 @@ impl Mover {
     /// higher: a quick stop is never longer than a normal one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.ask_quick_stop(limits);
-        self.stop_quickly(now);
+        self.follow(self.stop_quickly(now));
     }
 
     /// Makes no further step. The position is that of the steps made; a motor at speed runs on and loses it.

@@ -138,6 +138,9 @@ enum To {
 }
 
 impl Search {
+    pub(super) const NONE: Self =
+        Self { start: Motion::steady(Real::ZERO), goal: Goal::Speed(Real::ZERO), bent: None, stage: Stage::Rising };
+
     pub(super) fn new(start: Motion, goal: Goal, bounds: &Bounds) -> Self {
         let bent = bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk));
         let stage = match bent {
@@ -210,6 +213,10 @@ impl Search {
             }
         }
     }
+}
+
+impl Found {
+    pub(super) const NONE: Self = Self { lead: Lead::Steady, from: Real::ZERO, to: To::Speed(Real::ZERO) };
 }
 
 impl Goal {

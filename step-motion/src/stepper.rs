@@ -99,7 +99,7 @@ impl Stepper {
     #[inline(never)]
     fn begin(&mut self, curve: &Curve, frame: &Frame) -> bool {
         // Half of the tolerance is left for rounding.
-        let demand = Demand { off: Real::fixed(1 << frame.shift, 8), coarse: None, time: u64::MAX };
+        let demand = Demand { off: Real::fixed(1 << frame.shift, 8), coarse: None, time: u64::MAX, searches: 2 };
         loop {
             if let Some((begin, roots)) = self.cutter.roots() {
                 self.batch = Batch::beside(begin, roots);

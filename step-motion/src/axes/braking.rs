@@ -33,7 +33,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         else {
             return Work::Later;
         };
-        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
+        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX, searches: 2 };
         match stop.cut(self.axis, &demand, u64::MAX) {
             Cut::Steps(stretch, direction) => {
                 writer.put_steps((queue, self.block), &stretch, direction);

@@ -60,7 +60,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             return Work::Later;
         };
         let time = self.until.saturating_sub(tick(writer.end)).saturating_mul(1 << 32);
-        let demand = Demand { off: self.off, coarse: None, time };
+        let demand = Demand { off: self.off, coarse: None, time, searches: 2 };
         match self.work.cut(self.axis, &demand, self.until) {
             Cut::Steps(stretch, direction) => {
                 writer.put_steps((queue, self.block), &stretch, direction);

@@ -5,6 +5,7 @@ use core::sync::atomic::Ordering;
 
 use crate::cutter::{Cut, Demand};
 use crate::mover::cutting::News;
+use crate::mover::planning::Begin;
 use crate::queue::{IDLE, Queue};
 use crate::writer::{TICK, Writer, tick};
 
@@ -44,8 +45,12 @@ impl<const N: usize> Axis<'_, N> {
     }
 
     fn slice(&mut self) -> Work {
+        let linked = self.stage == Stage::Linked;
         if self.look() {
             return Work::Later;
+        }
+        if linked && self.stage != Stage::Linked {
+            return Work::More;
         }
         let (running, slot) = self.current();
         let waits = if running.is_some() { Work::Later } else { Work::Rest };
@@ -61,11 +66,7 @@ impl<const N: usize> Axis<'_, N> {
         match self.stage {
             Stage::Idle => {
                 let more = self.news != News::None || self.mover.has_more();
-                if more {
-                    self.begin();
-                    return Work::More;
-                }
-                waits
+                if more && self.begin() { Work::More } else { waits }
             }
             Stage::Plan => {
                 if self.plan() {
@@ -196,8 +197,8 @@ impl<const N: usize> Axis<'_, N> {
     }
 
     /// Begins a block: if there is a request, behind the next segment that is far enough ahead of the interrupt; otherwise
-    /// behind everything handed out.
-    fn begin(&mut self) {
+    /// behind everything handed out. Returns whether there is anything to plan.
+    fn begin(&mut self) -> bool {
         self.forget();
         self.told = core::mem::replace(&mut self.news, News::None);
         let (running, _) = self.current();
@@ -207,28 +208,31 @@ impl<const N: usize> Axis<'_, N> {
             self.join(block, place);
         }
         let blocks = if self.told == News::None || running.is_none() { 8 } else { 2 };
-        self.until = tick(self.writer.end).saturating_add(u64::from(self.reach).saturating_mul(blocks));
+        let now = tick(self.writer.end);
+        self.until = now.saturating_add(u64::from(self.reach).saturating_mul(blocks));
+        let Some(begin) = self.work.pursue(self.told, now) else {
+            self.told = News::None;
+            return false;
+        };
+        self.planning.begin(begin);
         self.stage = Stage::Plan;
+        true
     }
 
-    /// Plans the request, or the motion that follows. Returns whether there is anything to cut.
+    /// Does a slice of the plan. Returns whether there is anything to do.
     fn plan(&mut self) -> bool {
-        let (free, told) = (self.work.free(), self.told);
-        let other = if told == News::None {
-            self.work.proceed();
-            true
-        } else {
-            self.work.pursue(told, tick(self.writer.end))
-        };
+        if self.work.plan_on(&mut self.planning) {
+            return true;
+        }
         let (running, _) = self.current();
         let brakes = self.out.get(1_usize.wrapping_sub(self.block)).is_some_and(|out| out.brakes);
         let ends_here = self.joint == self.last && (running.is_none() || !brakes);
-        if !other || ends_here && !self.work.has_steps() {
+        if ends_here && !self.work.has_steps() {
             (self.stage, self.told) = (Stage::Idle, News::None);
             return false;
         }
         if let Some(out) = self.out.get_mut(self.block) {
-            *out = Out { begin: self.writer.end, free, ..Out::NONE };
+            *out = Out { begin: self.writer.end, free: self.work.free(), ..Out::NONE };
         }
         self.stage = Stage::Block;
         true
@@ -248,7 +252,8 @@ impl<const N: usize> Axis<'_, N> {
         let (free, dir) = if steps == 0 {
             (out.free, None)
         } else {
-            let last = (0..=at).map(mark).find(|mark| mark.steps == steps);
+            let marks = (0..=at).rev().map(mark).filter(|mark| mark.end > 0);
+            let last = marks.take_while(|mark| mark.steps == steps).last();
             (last.map_or(out.free, |last| tick(time(last)).saturating_add(1)), self.end.dir)
         };
         self.joint = Queue::<N>::slot(block, at);
@@ -272,7 +277,7 @@ impl<const N: usize> Axis<'_, N> {
         }
         let until = now.saturating_add(self.part());
         let to = (self.queue, self.block);
-        match self.work.cut(&Demand { off: self.off, coarse: None, time: self.part() << 32 }, until) {
+        match self.work.cut(&Demand { off: self.off, coarse: None, time: self.part() << 32, searches: 1 }, until) {
             Cut::Steps(stretch, direction) => {
                 self.writer.put_steps(to, &stretch, direction);
                 if let Some(out) = self.out.get_mut(self.block) {
@@ -351,7 +356,7 @@ impl<const N: usize> Axis<'_, N> {
 
     /// Closes a block that is long enough: its stop comes next.
     fn close(&mut self) {
-        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX };
+        let demand = Demand { off: self.off, coarse: Some(self.coarse), time: u64::MAX, searches: 1 };
         let steps = self.out.get(self.block).map_or(0, |out| out.steps);
         self.stop = Some(Tail { mover: self.work.clone(), moves: true, demand, writer: self.writer, steps });
         self.stage = Stage::Stop;
@@ -362,7 +367,12 @@ impl<const N: usize> Axis<'_, N> {
         let Some(tail) = &mut self.stop else { return self.complete(None) };
         if core::mem::take(&mut tail.moves) {
             tail.mover.ask_stop();
-            tail.mover.pursue(News::Change, tick(tail.writer.end));
+            let begin = tail.mover.pursue(News::Change, tick(tail.writer.end));
+            self.planning.begin(begin.unwrap_or(Begin::OVER));
+            return Work::More;
+        }
+        if !self.planning.is_over() {
+            tail.mover.plan_on(&mut self.planning);
             return Work::More;
         }
         let to = (self.queue, self.block);

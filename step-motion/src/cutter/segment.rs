@@ -277,7 +277,7 @@ mod tests {
             let part = part(steps, back, Real::ONE);
             // As long as 32 steps.
             let about = Some(1 << (69 - steps));
-            let demand = Demand { off: Real::ZERO, coarse: None, time: u64::MAX };
+            let demand = Demand { off: Real::ZERO, coarse: None, time: u64::MAX, searches: 2 };
             let begin = part.spot(1 << 63).unwrap();
             let next = (0..1 << steps).find(|count| part.ahead(begin.way, part.place(*count)).is_some()).unwrap();
             for (more, some) in [(-1, false), (0, true), (1, false), (9, false)] {

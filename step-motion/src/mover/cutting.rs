@@ -6,6 +6,7 @@ use crate::stepper::tick;
 use servowire_core::Direction;
 
 use super::Mover;
+use super::planning::{Begin, Planning};
 
 /// A request that is not planned yet; of two, the greater one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -80,25 +81,25 @@ impl Mover {
         self.due.is_some() || self.has_work()
     }
 
-    /// Continues with the plan, or with the one that follows.
-    pub(crate) fn proceed(&mut self) {
-        if self.due.is_none() {
-            self.go_on();
-        } else if self.phases.frame.endless && self.stepper.count() >= 1 << 29 {
+    /// Returns how the plan of a request begins, from a tick onwards, or without one the plan that follows the present one.
+    /// `None` if a request changes nothing.
+    pub(crate) fn pursue(&self, news: News, now: u64) -> Option<Begin> {
+        match news {
+            News::None if self.due.is_none() => Some(self.go_on().unwrap_or(Begin::OVER)),
             // The steps of a plan are counted in 32 bits.
-            self.replan(self.clock.moment(self.free.saturating_sub(1)));
+            News::None if self.phases.frame.endless && self.stepper.count() >= 1 << 29 => {
+                Some(self.from(self.clock.moment(self.free.saturating_sub(1))))
+            }
+            News::None => Some(Begin::OVER),
+            News::Change => self.change(now),
+            News::Aim => Some(self.from(self.moment(now))),
+            News::Quick => Some(self.stop_quickly(now).unwrap_or(Begin::OVER)),
         }
     }
 
-    /// Plans the request from a tick onwards. Returns whether the plan has changed.
-    pub(crate) fn pursue(&mut self, news: News, now: u64) -> bool {
-        match news {
-            News::None => return false,
-            News::Change => return self.change(now),
-            News::Aim => self.replan(self.moment(now)),
-            News::Quick => self.stop_quickly(now),
-        }
-        true
+    /// Does a slice of a plan. Returns whether there is more of it.
+    pub(crate) fn plan_on(&mut self, planning: &mut Planning) -> bool {
+        self.plan(planning)
     }
 
     /// Takes back the last steps of the present plan, as of a tick; `free` is the tick after the last step that remains. If
@@ -143,11 +144,11 @@ mod tests {
         let limits = Limits::new(400_000, 8_000_000).unwrap();
         let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap().cutting();
         mover.ask_run(Direction::Forward, 400_000);
-        assert!(mover.pursue(News::Aim, 0));
-        let demand = Demand { off: Clock::MICROSECONDS.blur(), coarse: None, time: u64::MAX };
+        mover.follow(mover.pursue(News::Aim, 0));
+        let demand = Demand { off: Clock::MICROSECONDS.blur(), coarse: None, time: u64::MAX, searches: 2 };
         let (mut last, interval) = (None, 5_i128 << 31);
         while mover.commanded() < 3 << 32 {
-            mover.proceed();
+            mover.follow(mover.pursue(News::None, 0));
             match mover.cut(&demand, u64::MAX) {
                 Cut::Steps(stretch, direction) => {
                     let gap = last.map(|last: i128| stretch.first - last);

@@ -2,7 +2,7 @@
 
 use crate::limits::Bounds;
 use crate::phases::{Frame, P, Phases, steps};
-use crate::planner::{Goal, Motion, plan_into};
+use crate::planner::{Found, Goal, Motion, Search};
 use crate::real::Real;
 use crate::stepper::Stepper;
 use servowire_core::Direction;
@@ -19,33 +19,34 @@ impl Mover {
         self.clock.moment(self.due.map_or(now, |due| now.min(due)))
     }
 
-    /// Plans a request that changes the present motion, unless that is a quick stop. Returns whether the plan has changed.
-    pub(super) fn change(&mut self, now: u64) -> bool {
+    /// Returns how the plan of a request begins that changes the present motion, unless that is a quick stop.
+    pub(super) fn change(&self, now: u64) -> Option<Begin> {
         let moment = self.moment(now);
         // A stop under way stays the same, whichever request causes it.
         let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
-        let other = !self.is_moving(moment) || !self.requests.is_quick() && !same;
-        if other {
-            self.replan(moment);
-            return true;
+        if !self.is_moving(moment) || !self.requests.is_quick() && !same {
+            return Some(self.from(moment));
         }
         // Behind the last step of the stop nothing else would begin what follows it.
-        let goes_on = self.due.is_none() && self.has_work();
-        if goes_on {
-            self.go_on();
-        }
-        goes_on
+        if self.due.is_none() { self.go_on() } else { None }
     }
 
-    /// Plans a quick stop.
-    pub(super) fn stop_quickly(&mut self, now: u64) {
+    /// Returns how the plan of a quick stop begins.
+    pub(super) fn stop_quickly(&self, now: u64) -> Option<Begin> {
         let moment = self.moment(now);
         if self.requests.is_quick() && self.is_moving(moment) {
-            let bounds = self.quick;
-            self.replan_within(moment, &bounds);
-        } else {
-            // To the caller the motion has ended: the caller's clock may be ahead.
-            self.change(now);
+            return Some(Begin { quick: true, ..self.from(moment) });
+        }
+        // To the caller the motion has ended: the caller's clock may be ahead.
+        self.change(now)
+    }
+
+    /// Plans to the end.
+    pub(super) fn follow(&mut self, begin: Option<Begin>) {
+        if let Some(begin) = begin {
+            let mut planning = Planning::OVER;
+            planning.begin(begin);
+            while self.plan(&mut planning) {}
         }
     }
 
@@ -67,12 +68,9 @@ impl Mover {
         self.rest(self.clock.moment(self.clock.within_reach(now).max(self.free)));
     }
 
-    /// Ends a plan, and continues to the aim if the axis is not there.
-    pub(super) fn go_on(&mut self) {
-        let end = self.phases.end();
-        if self.has_work() {
-            self.replan(end);
-        }
+    /// Returns how the plan begins that follows the present one, if the axis is not at its aim.
+    pub(super) fn go_on(&self) -> Option<Begin> {
+        self.has_work().then(|| self.from(self.phases.end()))
     }
 
     pub(super) fn has_work(&self) -> bool {
@@ -84,23 +82,40 @@ impl Mover {
             }
     }
 
+    /// Plans from a moment to the aim.
     pub(super) fn replan(&mut self, moment: u64) {
-        let bounds = self.bounds;
-        self.replan_within(moment, &bounds);
+        self.follow(Some(self.from(moment)));
     }
 
-    /// Plans from the state at a moment to the aim.
-    fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
+    /// Returns how that begins.
+    pub(super) fn from(&self, moment: u64) -> Begin {
         let moment = moment.max(self.phases.frame.begin);
-        if self.is_moving(moment) {
-            self.onward(moment, bounds);
-        } else {
-            self.anew(moment, bounds);
+        let stage = if self.is_moving(moment) { Stage::Onward(moment) } else { Stage::Anew(moment) };
+        Begin { stage, quick: false }
+    }
+
+    /// Does a slice of a plan. Returns whether there is more of it.
+    pub(super) fn plan(&mut self, planning: &mut Planning) -> bool {
+        match planning.stage {
+            Stage::Over => return false,
+            Stage::Onward(moment) => self.onward(moment, planning),
+            Stage::Anew(moment) => self.anew(moment, planning),
+            Stage::Search => match planning.search.step(&planning.own) {
+                None => {}
+                Some(Ok(found)) => (planning.stage, planning.found) = (Stage::Draw, found),
+                Some(Err(_)) => self.beyond_reach(planning),
+            },
+            Stage::Draw => {
+                planning.search.draw(&mut self.phases.curve, &planning.found, &planning.own);
+                planning.stage = self.drawn(&planning.origin);
+            }
         }
-        if self.due.is_none() && self.has_work() {
-            // There is no step on the way to rest, so the next plan begins there.
-            self.anew(self.phases.end(), bounds);
-        }
+        !planning.is_over()
+    }
+
+    /// Returns the limits of a plan.
+    const fn bounds_of(&self, planning: &Planning) -> Bounds {
+        if planning.quick { self.quick } else { self.bounds }
     }
 
     /// Starts the plan that has just been made.
@@ -125,31 +140,67 @@ impl Mover {
     }
 
     /// Plans on from the present motion. Positions are counted from the steps made.
-    fn onward(&mut self, moment: u64, bounds: &Bounds) {
+    fn onward(&mut self, moment: u64, planning: &mut Planning) {
         let Phases { curve, frame } = &self.phases;
-        let (state, last) = (frame.within(curve, moment), if self.braking { frame.last(curve) } else { 0 });
+        let (state, last) = (frame.within(curve, moment), self.braking.then(|| frame.last(curve)));
         let made = i64::try_from(self.commanded.abs_diff(self.origin)).unwrap_or(0) << 32;
-        let p = state.p.wrapping_sub(made);
-        let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
-        let bounds = &bounds.holding(state.v, state.a);
-        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
-        let again = self.braking;
-        self.braking = !self.plan(self.direction, start, frame, bounds);
-        if self.braking {
-            let Phases { curve, frame } = self.phases.anew(frame);
-            // A stop always has room.
-            let _: Result<_, _> = plan_into(curve, start, Goal::Speed(Real::ZERO), bounds);
-            if again {
-                // Rounding must not add a step to a stop within higher limits.
-                frame.to = Some(frame.last(curve).min(last.saturating_sub(made)));
+        let motion = Motion { v: state.v, a: state.a.0, up: state.a.1 };
+        let frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, state.p.wrapping_sub(made)) };
+        // Rounding must not add a step to a stop within higher limits.
+        let most = last.map(|last| last.saturating_sub(made));
+        let bounds = self.bounds_of(planning).holding(state.v, state.a);
+        planning.origin = Origin { rest: None, motion, frame, bounds, most };
+        if !self.seek(motion, frame, &bounds, planning) {
+            self.beyond_reach(planning);
+        }
+    }
+
+    /// Begins the search for a plan to the aim, in the present direction; returns false if that is behind, or to rest.
+    fn seek(&mut self, start: Motion, frame: Frame, bounds: &Bounds, planning: &mut Planning) -> bool {
+        let Some((want, own)) = self.goal(self.direction, bounds) else { return false };
+        let (goal, to) = match want {
+            Want::Speed(v) => (Goal::Speed(v), None),
+            Want::At(target) => {
+                let Some(left) = ahead(self.commanded, target, self.direction) else { return false };
+                let to = i64::from(left) << 32;
+                let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
+                (Goal::At(Real::fixed(way, P), Real::ZERO), Some(to))
             }
+        };
+        self.braking = false;
+        self.phases.anew(Frame { to, endless: to.is_none(), ..frame });
+        planning.search(start, goal, own);
+        true
+    }
+
+    /// Plans a stop, from a motion that cannot reach the aim; from rest, nothing.
+    fn beyond_reach(&mut self, planning: &mut Planning) {
+        let Origin { rest, motion, frame, bounds, .. } = planning.origin;
+        if let Some(end) = rest {
+            self.rest(end);
+            planning.stage = Stage::Over;
+        } else {
+            self.braking = true;
+            self.phases.anew(frame);
+            // A stop always has room.
+            planning.search(motion, Goal::Speed(Real::ZERO), bounds);
+        }
+    }
+
+    /// Starts a plan that has been drawn; if there is no step on the way to rest, the next plan begins there.
+    fn drawn(&mut self, origin: &Origin) -> Stage {
+        if let Some(most) = origin.most.filter(|_| self.braking) {
+            let Phases { curve, frame } = &mut self.phases;
+            frame.to = Some(frame.last(curve).min(most));
         }
         self.adopt();
+        let anew = origin.rest.is_none() && self.due.is_none() && self.has_work();
+        if anew { Stage::Anew(self.phases.end()) } else { Stage::Over }
     }
 
     /// Plans from rest.
-    fn anew(&mut self, moment: u64, bounds: &Bounds) {
-        let end = self.phases.end();
+    fn anew(&mut self, moment: u64, planning: &mut Planning) {
+        let (end, bounds) = (self.phases.end(), self.bounds_of(planning));
         self.rest(end);
         (self.due, self.turn) = (None, None);
         let mut begin = moment.max(end);
@@ -160,6 +211,7 @@ impl Mover {
         }
         self.braking = false;
         if !self.has_work() {
+            planning.stage = Stage::Over;
             return;
         }
         self.idle = begin.div_ceil(self.clock.moment(1));
@@ -173,31 +225,10 @@ impl Mover {
         }
         self.direction = direction;
         let frame = Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0);
-        if self.plan(direction, Motion::steady(Real::ZERO), frame, bounds) {
-            self.adopt();
-        } else {
-            self.rest(end);
+        planning.origin.rest = Some(end);
+        if !self.seek(Motion::steady(Real::ZERO), frame, &bounds, planning) {
+            self.beyond_reach(planning);
         }
-    }
-
-    /// Replaces the present plan by one to the aim; returns false if the aim is a stop, or can no longer be reached.
-    fn plan(&mut self, direction: Direction, start: Motion, frame: Frame, bounds: &Bounds) -> bool {
-        let Some((want, bounds)) = self.goal(direction, bounds) else { return false };
-        let Phases { curve, frame } = self.phases.anew(frame);
-        let goal = match want {
-            Want::At(target) => {
-                let Some(left) = ahead(self.commanded, target, direction) else { return false };
-                let to = i64::from(left) << 32;
-                frame.to = Some(to);
-                let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
-                Goal::At(Real::fixed(way, P), Real::ZERO)
-            }
-            Want::Speed(v) => {
-                frame.endless = true;
-                Goal::Speed(v)
-            }
-        };
-        plan_into(curve, start, goal, &bounds).is_ok()
     }
 
     /// Returns what to do in this direction; `None` for a stop.
@@ -219,7 +250,85 @@ impl Mover {
     }
 }
 
+/// How a plan begins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Begin {
+    stage: Stage,
+    /// Within the limits of the quick stop.
+    quick: bool,
+}
+
+impl Begin {
+    /// Nothing is to be planned.
+    pub(crate) const OVER: Self = Self { stage: Stage::Over, quick: false };
+}
+
+/// A plan while it is being made. It is large, so all of it stays in place.
+#[derive(Debug)]
+pub(crate) struct Planning {
+    stage: Stage,
+    quick: bool,
+    origin: Origin,
+    /// The search, within its own limits, and what it has found.
+    search: Search,
+    own: Bounds,
+    found: Found,
+}
+
+impl Planning {
+    pub(crate) const OVER: Self = Self {
+        stage: Stage::Over,
+        quick: false,
+        origin: Origin {
+            rest: Some(0),
+            motion: Motion::steady(Real::ZERO),
+            frame: Frame::rest(0, 0, 0),
+            bounds: Bounds::NONE,
+            most: None,
+        },
+        search: Search::NONE,
+        own: Bounds::NONE,
+        found: Found::NONE,
+    };
+
+    pub(crate) const fn begin(&mut self, Begin { stage, quick }: Begin) {
+        (self.stage, self.quick) = (stage, quick);
+    }
+
+    pub(crate) const fn is_over(&self) -> bool {
+        matches!(self.stage, Stage::Over)
+    }
+
+    fn search(&mut self, start: Motion, goal: Goal, own: Bounds) {
+        (self.search, self.own, self.stage) = (Search::new(start, goal, &own), own, Stage::Search);
+    }
+}
+
+/// What comes next.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    /// From the motion at a moment, or from the rest after it.
+    Onward(u64),
+    Anew(u64),
+    Search,
+    Draw,
+    Over,
+}
+
+/// Where a plan begins: at a rest since a moment, or else in a motion.
+#[derive(Debug, Clone, Copy)]
+struct Origin {
+    rest: Option<u64>,
+    motion: Motion,
+    frame: Frame,
+    /// The limits, as high as the motion needs.
+    bounds: Bounds,
+    /// Where the stop under way ends, if there is one.
+    most: Option<i64>,
+}
+
 /// The goal of a plan.
+#[derive(Debug, Clone, Copy)]
 enum Want {
     At(i64),
     Speed(Real),

@@ -220,7 +220,7 @@ fn the_longest_piece_beside_a_rest() {
 fn what_is_near_a_rest() {
     for case in cases() {
         let ((_, frame), mut rest) = (case.curve(), case.rest().unwrap());
-        let demand = Demand { off: Real::new(case.first).scaled(-20), coarse: Some(13), time: u64::MAX };
+        let demand = Demand { off: Real::new(case.first).scaled(-20), coarse: Some(13), time: u64::MAX, searches: 2 };
         let few = few(rest.first.get(), demand.off.to_fixed(bits(&frame)), demand.coarse);
         assert!((5..60).contains(&few), "{few} of {case:?}");
         for far in 0..70 {
@@ -314,7 +314,7 @@ fn segments_beside_a_rest() {
         cutter.count = begin;
         let (off, mut near) = (Real::new(4), 0);
         let few = few(case.rest().unwrap().first.get(), off.to_fixed(22), None).min(64);
-        let demand = Demand { off, coarse: None, time: u64::MAX };
+        let demand = Demand { off, coarse: None, time: u64::MAX, searches: 2 };
         let mut next = begin;
         while cutter.count() < end {
             let Slice::Steps(stretch) = cutter.slice(&curve, &frame, &demand) else { continue };
@@ -344,7 +344,7 @@ fn a_run_is_as_long_as_the_table() {
         let mut cutter = Cutter::new();
         assert!(cutter.roots().is_none());
         cutter.count = if case.back { REST as u32 - 20 } else { REST as u32 };
-        let demand = Demand { off: Real::new(4), coarse: None, time: u64::MAX };
+        let demand = Demand { off: Real::new(4), coarse: None, time: u64::MAX, searches: 2 };
         cutter.slice(&curve, &frame, &demand);
         let want = if case.back { 20 } else { case.steps.min(64) as u32 };
         let within = case.time(cutter.count().into()).is_some();

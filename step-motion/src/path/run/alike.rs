@@ -38,11 +38,7 @@ pub(super) fn allowed<const N: usize>(line: &Line<N>, part: Option<Real>) -> Rea
 
 impl Run {
     /// All bytes are zero, so an array of it is cleared rather than copied.
-    pub(super) const NONE: Self = Self {
-        more: 0,
-        length: Real::ZERO,
-        bounds: Bounds { v: Real::ZERO, a: Real::ZERO, per_a: Real::ZERO, jerk: None },
-    };
+    pub(super) const NONE: Self = Self { more: 0, length: Real::ZERO, bounds: Bounds::NONE };
 
     /// Adds the next line; returns false if it has to stay outside.
     #[inline]
