@@ -356,7 +356,7 @@ pub(super) fn slower_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -
     let (from, least, n) = slope_down(start, n, bounds);
     let high = exit.min(from - least);
     let need = |v| distance(from, v, bounds);
-    (need(Real::ZERO) <= n + SLACK).then(|| crossing(Real::ZERO, high, n, SLACK, need).0)
+    (need(Real::ZERO) <= n + SLACK).then(|| Crossing::new((Real::ZERO, high), n, SLACK, need).find(need))
 }
 
 /// Returns the speed from which a motion slows down, the least change of it, and the distance for that.
@@ -427,6 +427,14 @@ impl Crossing {
     }
 
     const MOST: u8 = 40;
+
+    /// Returns that speed.
+    fn find(mut self, need: impl Fn(Real) -> Real) -> Real {
+        while !self.is_over() {
+            self.step(&need);
+        }
+        self.best
+    }
 
     fn is_over(&self) -> bool {
         self.round >= Self::MOST || self.left <= self.enough || (self.high - self.low).scaled(40) <= self.high
