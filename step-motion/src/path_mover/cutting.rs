@@ -171,7 +171,7 @@ mod tests {
         for apart in 1..8 {
             let axis = AxisSetup::new(Limits::new(300_000, 1 << 30).unwrap(), 1_000_000);
             let path = Path::<1, 4>::new(Clock::MICROSECONDS, [axis], 20).unwrap();
-            let demand = Demand { off: path.clock().blur(), coarse: None, time: u64::MAX };
+            let demand = Demand { off: path.clock().blur(), coarse: None, time: u64::MAX, searches: 2 };
             let mut mover = PathMover::new(path).cutting();
             mover.push([2000], 1_000_000, 0).unwrap();
             let mut begin = 0;
