@@ -48,8 +48,8 @@ impl Writer {
         self.last = self.end;
     }
 
-    /// Appends a change of DIR, if there is one and it is before a time: in the middle between the last step and the next one, which
-    /// does not come before `next`.
+    /// Appends a change of DIR, if there is one and it is before a time: in the middle between the last step and `next`, which is not
+    /// after the next one.
     pub(crate) fn put_turn<const N: usize>(
         &mut self,
         to: (&Queue<N>, usize),

@@ -276,7 +276,12 @@ impl<const N: usize> Axis<'_, N> {
             return Work::More;
         }
         let until = now.saturating_add(self.part());
-        let to = (self.queue, self.block);
+        let (to, wait) = ((self.queue, self.block), i128::from(until.saturating_sub(BEFORE)) << 32);
+        // Before the motion begins: once it has, another request may make the first step earlier.
+        let direction = self.work.direction();
+        if self.writer.dir != Some(direction) && self.work.has_steps() {
+            self.writer.put_turn(to, i128::from(self.work.begin()) << 32, direction, wait);
+        }
         match self.work.cut(&Demand { off: self.off, coarse: None, time: self.part() << 32, searches: 1 }, until) {
             Cut::Steps(stretch, direction) => {
                 self.writer.put_steps(to, &stretch, direction);
@@ -284,14 +289,8 @@ impl<const N: usize> Axis<'_, N> {
                     out.steps = out.steps.saturating_add(stretch.count.into());
                 }
             }
-            Cut::More => return Work::More,
-            Cut::Later => {
-                let until = i128::from(until.saturating_sub(BEFORE)) << 32;
-                if let Some((next, direction)) = self.work.next() {
-                    self.writer.put_turn(to, i128::from(next) << 32, direction, until);
-                }
-                self.writer.put_wait(to, until);
-            }
+            Cut::More => {}
+            Cut::Later => self.writer.put_wait(to, wait),
             Cut::Rest => {
                 let over = i128::from(self.work.over().saturating_add(1)) << 32;
                 // A block has at least one event.

@@ -56,9 +56,9 @@ impl Mover {
         Cut::Steps(stretch, direction)
     }
 
-    /// A tick that is not after the next step, and DIR of that step.
-    pub(crate) fn next(&self) -> Option<(u64, Direction)> {
-        self.due.map(|due| (due, self.direction))
+    /// The tick at which the present plan begins.
+    pub(crate) fn begin(&self) -> u64 {
+        self.phases.frame.begin.div_ceil(self.clock.moment(1))
     }
 
     /// The tick after the last step.

@@ -263,9 +263,11 @@ fn dir_has_half_of_the_pause_on_either_side() {
         for _ in 0..500 {
             bench.axis.move_to(i64::try_from(below(60)).unwrap() - 30).unwrap();
             bench.until(every, bench.machine.now + below(times));
-            match below(4) {
+            match below(5) {
                 0 => bench.axis.hold(),
                 1 => bench.axis.set_override(50),
+                // So slow that another request makes the next step much earlier.
+                3 => bench.axis.run(Direction::Reverse, 1 + u32::try_from(below(20)).unwrap()).unwrap(),
                 2 => bench.machine.until(bench.machine.now + below(times)),
                 _ => bench.axis.stop(),
             }
