@@ -260,6 +260,41 @@ mod tests {
         }
     }
 
+    /// An approach that takes 40 steps to rest, 2000² / 2 / 50,000: position 0 is where the switch closed, not where it ended. With a
+    /// switch that closes only once, it ends at most the range behind the start of the approach, and those 40 steps and a poll.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn a_fast_approach_is_counted_and_has_its_range() {
+        for (direction, breaks) in DIRECTIONS.into_iter().flat_map(|direction| [(direction, false), (direction, true)])
+        {
+            let (config, _) = parts(direction);
+            let limits = Limits::new(10_000, 50_000).unwrap();
+            let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+            let config = HomingConfig { approach: 2000, range: 1000, stop: limits, ..config }.with_back_off(600);
+            let (sign, mut real, mut rest) = (if direction.dir() { -1 } else { 1 }, 0, None);
+            let mut homing = Homing::start(config, &mut mover, Switch::Open, 0).unwrap();
+            for now in (0..3_000_000).step_by(20) {
+                while mover.due().is_some_and(|due| due <= now) {
+                    real += if mover.pulse().unwrap().direction.dir() { -1 } else { 1 };
+                }
+                let approaches = matches!(homing.state(), HomingState::Approaching | HomingState::Settling);
+                let closed = real * sign >= 700 && !(breaks && approaches);
+                homing.poll(&mut mover, switch(closed), now).unwrap();
+                if homing.state() == HomingState::BackingOff {
+                    rest = Some(real);
+                }
+            }
+            if breaks {
+                assert_eq!(homing.state(), HomingState::Failed);
+                let way = (real - rest.unwrap()) * sign;
+                assert!((1001 + 40..1001 + 43).contains(&way), "{way} steps");
+            } else {
+                assert_eq!((homing.state(), real - mover.commanded()), (HomingState::Done, 700 * sign));
+                assert!((39..42).contains(&(mover.commanded() * sign)), "{}", mover.commanded());
+            }
+        }
+    }
+
     #[test]
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn no_switch_and_a_switch_that_stays_closed() {

@@ -282,3 +282,33 @@ fn dir_has_half_of_the_pause_on_either_side() {
         }
     }
 }
+
+/// A quick stop that is asked for when the interrupt has just gone over to the next block, before the background knows: 2 steps of brake.
+#[test]
+fn a_quick_stop_behind_a_linked_block_is_quick() {
+    for at in (200_000..300_000).step_by(997) {
+        let mut bench = Bench::<129>::new(20_000, 200_000, 10_000);
+        bench.axis.run(Direction::Forward, 20_000).unwrap();
+        bench.until(2500, at);
+        bench.machine.until(at + 4000);
+        let made = bench.at();
+        bench.axis.quick_stop(Limits::new(20_000, 100_000_000).unwrap());
+        bench.until(2500, at + 400_000);
+        assert!(bench.axis.is_at_rest() && bench.at() - made <= 404, "{at}: {} steps", bench.at() - made);
+    }
+}
+
+/// A background that is not called any more: at constant speed the axis stops after eight times the reach, what is linked behind it
+/// included, and two tenths of a second of brake.
+#[test]
+fn a_late_background_stops_the_axis_in_time() {
+    for at in (300_000..500_000).step_by(2111) {
+        let mut bench = Bench::<257>::new(20_000, 100_000, 10_000);
+        bench.axis.run(Direction::Forward, 20_000).unwrap();
+        bench.until(5000, at);
+        let last = bench.machine.now;
+        bench.machine.drain();
+        let stopped = bench.machine.steps.last().unwrap().0 - last;
+        assert!(stopped <= 290_000, "{stopped} us after {at}");
+    }
+}

@@ -205,3 +205,36 @@ fn a_rest_stays_one_whatever_fires() {
         }
     }
 }
+
+/// A speed above the greatest one is taken as that, and the override is a part of it.
+#[test]
+fn an_override_is_a_part_of_a_speed_that_is_too_high() {
+    let mut bench = Bench::new();
+    bench.axis.run(Direction::Forward, 12_000).unwrap();
+    for (percent, steps) in [(50, 400), (75, 600), (100, 800)] {
+        bench.axis.set_override(percent);
+        bench.until(bench.machine.now + 300_000);
+        let before = bench.at();
+        bench.until(bench.machine.now + 100_000);
+        assert!((bench.at() - before - steps).abs() <= 1, "{percent} %: {}", bench.at() - before);
+    }
+}
+
+/// What was linked when a halt came is over: a call of the interrupt that nobody has asked for begins nothing.
+#[test]
+fn nothing_begins_behind_a_halt() {
+    let mut bench = Bench::new();
+    for halts in 0..3 {
+        bench.axis.move_to(1000 * (halts + 1)).unwrap();
+        bench.until(bench.machine.now + 100_000);
+        bench.axis.halt();
+        bench.machine.fire();
+        assert_eq!(bench.axis.poll(), Work::More);
+        let made = bench.machine.steps.len();
+        for _ in 0..5 {
+            bench.machine.fire();
+            assert_eq!(bench.machine.compare, None);
+        }
+        assert!(bench.machine.steps.len() == made && bench.axis.is_at_rest());
+    }
+}

@@ -121,6 +121,36 @@ fn a_pause_behind_a_halt_is_whole() {
     assert!(first > now + 1_000_000, "{first} {now}");
 }
 
+/// The line back has been cut off by a stop: the axis has not turned there, but does on the line after the next one.
+#[test]
+fn a_line_that_was_cut_off_turns_no_axis() {
+    let setups = [setup(), setup().with_reversal_pause(200_000)];
+    let mut machine = PathMover::new(Path::<2, 8>::new(Clock::MICROSECONDS, setups, 1000).unwrap());
+    for to in [[300, 300], [600, 0]] {
+        machine.push(to, 1000, 0).unwrap();
+    }
+    let (mut now, mut last) = (0, 0);
+    while machine.commanded() != [100, 100] {
+        now = machine.pulse().unwrap().tick;
+    }
+    machine.stop(now);
+    let [x, y] = machine.target();
+    assert!(y < 300);
+    machine.push([x + 10, y], 1000, now).unwrap();
+    machine.push([x + 200, y - 20], 1000, now).unwrap();
+    let mut up = true;
+    while let Some(pulse) = machine.pulse() {
+        if pulse.axis == 1 {
+            if pulse.direction.dir() && up {
+                assert!(pulse.tick - last >= 200_000, "{}", pulse.tick - last);
+                up = false;
+            }
+            last = pulse.tick;
+        }
+    }
+    assert!(!up && machine.commanded() == [x + 200, y - 20]);
+}
+
 /// 1000 steps/s: the line ends half a step behind its last step, which a halt does not wait for.
 #[test]
 fn a_halt_behind_the_last_step_is_a_rest() {
