@@ -107,3 +107,26 @@ fn another_override_does_not_pass_the_feed_of_a_slow_line() {
         }
     }
 }
+
+/// Two lines that are one run at the override under way are two at the new one, and the motion can only come to rest along both, a
+/// little before their end: 66 steps from 600 steps/s. It goes on from there.
+#[test]
+fn a_brake_that_nobody_asked_for_goes_on_to_the_end() {
+    let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();
+    for behind in 300..400 {
+        for (first, second) in [(34, 34), (35, 35), (36, 36), (30, 42)] {
+            let axis = AxisSetup::new(limits, 1_000_000);
+            let mut machine = PathMover::new(Path::<1, 8>::new(Clock::MICROSECONDS, [axis], 20).unwrap());
+            machine.set_override(200, 0);
+            for (to, feed) in [(400, 300), (400 + first, 1000), (400 + first + second, 500)] {
+                machine.push([to], feed, 0).unwrap();
+            }
+            while let Some(pulse) = machine.pulse() {
+                if machine.commanded() == [behind] {
+                    machine.set_override(100, pulse.tick);
+                }
+            }
+            assert_eq!(machine.commanded(), [400 + first + second], "{behind}");
+        }
+    }
+}
