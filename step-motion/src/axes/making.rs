@@ -30,7 +30,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
 
     /// Plans the block after a request, or along the lines that were added; or finds out, from the last line back, how fast it may be.
     pub(super) fn look_ahead(&mut self) -> Work {
-        if self.work.has_to_find() {
+        if self.work.has_to_find(self.asked.then_some(self.end)) {
             return Work::More;
         }
         self.stage = Stage::Block;

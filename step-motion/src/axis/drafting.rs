@@ -221,7 +221,7 @@ impl<const N: usize> Axis<'_, N> {
 
     /// Does a slice of the plan. Returns whether there is anything to do.
     fn plan(&mut self) -> bool {
-        if self.work.plan_on(&mut self.planning) {
+        if self.work.plan(&mut self.planning) {
             return true;
         }
         let (running, _) = self.current();
@@ -371,7 +371,7 @@ impl<const N: usize> Axis<'_, N> {
             return Work::More;
         }
         if !self.planning.is_over() {
-            tail.mover.plan_on(&mut self.planning);
+            tail.mover.plan(&mut self.planning);
             return Work::More;
         }
         let to = (self.queue, self.block);

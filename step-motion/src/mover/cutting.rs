@@ -6,7 +6,7 @@ use crate::stepper::tick;
 use servowire_core::Direction;
 
 use super::Mover;
-use super::planning::{Begin, Planning};
+use super::planning::Begin;
 
 /// A request that is not planned yet; of two, the greater one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,11 +95,6 @@ impl Mover {
             News::Aim => Some(self.from(self.moment(now))),
             News::Quick => Some(self.stop_quickly(now).unwrap_or(Begin::OVER)),
         }
-    }
-
-    /// Does a slice of a plan. Returns whether there is more of it.
-    pub(crate) fn plan_on(&mut self, planning: &mut Planning) -> bool {
-        self.plan(planning)
     }
 
     /// Takes back the last steps of the present plan, as of a tick; `free` is the tick after the last step that remains. If

@@ -10,9 +10,8 @@ use servowire_core::Direction;
 use super::{Aim, Mover};
 
 impl Mover {
-    /// Returns the moment of a request. An axis that moves is somewhere between its last step and the next one, whatever
-    /// the caller's
-    /// clock says: an earlier time would plan steps that have already been made, and a later one would make the missing
+    /// Returns the moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the
+    /// caller's clock says: an earlier time would plan steps that have already been made, and a later one would make the missing
     /// steps in a burst.
     pub(super) fn moment(&self, now: u64) -> u64 {
         let now = self.clock.within_reach(now).max(self.free.saturating_sub(1));
@@ -95,7 +94,7 @@ impl Mover {
     }
 
     /// Does a slice of a plan. Returns whether there is more of it.
-    pub(super) fn plan(&mut self, planning: &mut Planning) -> bool {
+    pub(crate) fn plan(&mut self, planning: &mut Planning) -> bool {
         match planning.stage {
             Stage::Over => return false,
             Stage::Onward(moment) => self.onward(moment, planning),

@@ -104,6 +104,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.lead(at, start, left, (&run, run.bounds, run.bounds), speeds)
     }
 
+    /// Does a slice of the look-ahead for a course from a motion on the first line. Returns whether there is more of it.
+    pub(crate) fn has_to_find(&mut self, start: Motion, (part, present): (Real, Option<Bounds>)) -> bool {
+        let run = self.under_way(0, start, (Some(part), present)).and_then(|kind| self.run(0, kind, M));
+        run.is_some_and(|run| self.find_exit(run.more, part, 1).is_none())
+    }
+
     /// Returns the run that a course leads along, what is left of it, and the speed at its end: the one to plan for, and the
     /// one that the later lines ask for.
     fn goal(

@@ -131,9 +131,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.set_deviation(deviation);
     }
 
-    /// Does a slice of the work for [`look_ahead`](Self::look_ahead), and for a stop on these lines. Returns whether there is more
-    /// of it.
-    pub(crate) fn has_to_find(&mut self) -> bool {
+    /// Does a slice of the work for [`look_ahead`](Self::look_ahead), and for a stop on these lines; or, `asked` at a tick, for
+    /// [`replan`](Self::replan). Returns whether there is more of it.
+    pub(crate) fn has_to_find(&mut self, asked: Option<u64>) -> bool {
+        if let (Some(now), Some(part)) = (asked, self.requests.part()) {
+            if let Some((motion, _)) = self.here(now) {
+                return self.path.has_to_find(motion, (part, self.bounds));
+            }
+        }
         let at = if self.line.is_some() { self.more } else { 0 };
         let part = self.requests.part().unwrap_or(self.path.part());
         self.path.find_exit(at, part, 1).is_none()
