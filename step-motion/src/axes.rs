@@ -329,7 +329,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
         self.path.halt_before(self.end);
         self.begin_anew();
-        self.asked = false;
     }
 
     /// Does the same as [`PathMover::set_commanded`].

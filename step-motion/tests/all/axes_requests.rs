@@ -64,6 +64,45 @@ fn a_hold_stops_and_a_resume_goes_on() {
     assert_eq!(bench.axes.commanded(), [8000, 0]);
 }
 
+/// A line of a step takes 7 ms, less than a block: what is left of it then holds nothing.
+#[test]
+fn a_hold_behind_the_last_step_adds_no_time() {
+    let [plain, held] = [false, true].map(|hold| {
+        let mut bench = Bench::new();
+        bench.axes.push([1, 0], 100_000).unwrap();
+        while bench.machine.slice(&mut bench.axes) == Work::More {}
+        if hold {
+            bench.axes.hold();
+            while bench.machine.slice(&mut bench.axes) == Work::More {}
+        }
+        bench.machine.drain();
+        while bench.machine.slice(&mut bench.axes) == Work::More {}
+        assert!(bench.axes.commanded() == [1, 0] && bench.axes.is_at_rest());
+        bench.machine.now
+    });
+    assert_eq!(held, plain);
+}
+
+/// A request that has not been planned is done with what was to be planned.
+#[test]
+fn an_axis_is_at_rest_once_a_halt_is_confirmed() {
+    for ask in [Axes::hold, Axes::resume, |axes: &mut Axes<'static, 2, 4, SLOTS>| axes.set_override(50)] {
+        for behind in [false, true] {
+            let mut bench = Bench::running();
+            if !behind {
+                ask(&mut bench.axes);
+            }
+            bench.axes.halt();
+            if behind {
+                ask(&mut bench.axes);
+            }
+            bench.machine.drain();
+            assert_eq!(bench.axes.poll(), Work::More);
+            assert!(bench.axes.is_at_rest(), "{behind}");
+        }
+    }
+}
+
 #[test]
 fn a_stop_forgets_the_path_and_a_quick_one_is_shorter() {
     let ends = [None, Some(80_000_u32), Some(800_000)].map(|quick| {
