@@ -2938,7 +2938,7 @@ typedef struct {
  * The background end. It belongs to its queue: it is not copied.
  */
 typedef struct {
-    uint64_t _private[1128];
+    uint64_t _private[1248];
 } sw_motion_axis_t;
 
 /**

@@ -58,7 +58,7 @@ const _: () = assert!(align_of::<Queue<SLOTS>>() <= align_of::<sw_motion_queue_t
 #[repr(C)]
 #[derive(Debug)]
 pub struct sw_motion_axis_t {
-    pub(crate) _private: [MaybeUninit<u64>; 1128],
+    pub(crate) _private: [MaybeUninit<u64>; 1248],
 }
 state!(pinned sw_motion_axis_t, Axis<'static, SLOTS>, 0x61);
 
