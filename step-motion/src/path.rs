@@ -16,7 +16,7 @@ use servowire_core::Direction;
 
 pub(crate) use ahead::Ahead;
 use ahead::Times;
-pub(crate) use cut::{End, Leaving, Legs};
+pub(crate) use cut::{End, Leaving};
 
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

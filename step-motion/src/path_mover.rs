@@ -368,7 +368,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Comes to rest as a stop does, or stays there.
-    fn stop_as(&mut self, stop: Option<&Stop<N, M>>, now: u64) {
+    fn stop_as(&mut self, stop: Option<&Stop<N>>, now: u64) {
         let Some(stop) = stop else { return self.leave(self.tick(now)) };
         self.requests.stop();
         self.leave_at(stop);

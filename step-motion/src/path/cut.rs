@@ -5,18 +5,15 @@ use crate::limits::Bounds;
 use crate::line::Line;
 use crate::real::Real;
 
-/// How a stop leaves the lines of a curve.
+/// How a stop leaves the lines of its first curve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leaving {
-    /// The last of them.
-    pub(crate) last: usize,
+    /// Lines after the first one.
+    pub(crate) more: usize,
     pub(crate) exit: Real,
     /// The limits of the run that they belong to, if that run has been planned again.
     pub(crate) bounds: Option<Bounds>,
 }
-
-/// How a stop leaves the lines of each curve behind its first one, as far as that is known.
-pub(crate) type Legs<const M: usize> = [Option<Leaving>; M];
 
 /// Where a stop ends.
 #[derive(Debug, Clone, Copy)]
@@ -62,26 +59,17 @@ impl<const N: usize, const M: usize> Path<N, M> {
         to
     }
 
-    /// Returns how a stop leaves the lines from line `at` on, at a speed.
-    fn leg(&self, at: usize, speed: Real) -> Leaving {
-        match self.begin_to_brake(at, speed) {
-            Some((course, bounds)) => {
-                Leaving { last: at.saturating_add(course.more), exit: course.exit, bounds: Some(bounds) }
-            }
-            None => Leaving { last: at, exit: speed, bounds: None },
-        }
-    }
-
-    /// Cuts the queue off at an end, if the first line begins at `from` and a stop leaves it as `first` and `legs` say.
-    pub(crate) fn cut(&mut self, to: &End<N>, from: [i64; N], made: [u32; N], (first, legs): (Leaving, &Legs<M>)) {
+    /// Cuts the queue off at an end, if the first line begins at `from` and a stop leaves it as `first` says.
+    pub(crate) fn cut(&mut self, to: &End<N>, from: [i64; N], made: [u32; N], first: Leaving) {
         self.target = self.place(to, from, made);
         let (at, place) = to.at;
-        let Leaving { last: mut end, exit: mut speed, mut bounds } = first;
-        let mut legs = legs.iter().flatten().copied();
+        let Leaving { more: mut end, exit: mut speed, mut bounds } = first;
         for i in 0..self.len {
             if i > end && i <= at {
-                let leg = legs.next().unwrap_or_else(|| self.leg(i, speed));
-                (end, speed, bounds) = (leg.last, leg.exit, leg.bounds);
+                let course = self.begin_to_brake(i, speed);
+                (end, speed, bounds) = course.map_or((i, speed, None), |(course, bounds)| {
+                    (i.saturating_add(course.more), course.exit, Some(bounds))
+                });
             }
             let mut entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
             if let (Some(Some(line)), Some(bounds)) = (&mut entry, bounds.filter(|_| i <= end)) {

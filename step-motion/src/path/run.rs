@@ -5,7 +5,7 @@
 
 mod alike;
 
-use super::{Ahead, Course, Leaving, Legs, Path};
+use super::{Ahead, Course, Path};
 use crate::curve::Curve;
 use crate::limits::Bounds;
 use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slower_exit, slowest_exit};
@@ -292,22 +292,19 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some((Course { curve, exit, wish: exit, whole: true, more: 0 }, line.bounds))
     }
 
-    /// Returns where a stop ends that has a given speed at the start of line `at`, how long it takes from there, and how it
-    /// leaves the lines of each of its curves.
-    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> ((usize, Real), Real, Legs<M>) {
-        let (mut time, mut legs) = (Real::ZERO, [None; M]);
-        for leg in &mut legs {
-            let Some((Course { curve, exit, more, .. }, bounds)) = self.begin_to_brake(at, speed) else { break };
-            let last = at.saturating_add(more);
-            *leg = Some(Leaving { last, exit, bounds: Some(bounds) });
+    /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`; and how long
+    /// it takes from there.
+    pub(crate) fn end_of_stop(&self, mut at: usize, mut speed: Real) -> ((usize, Real), Real) {
+        let mut time = Real::ZERO;
+        while let Some((Course { curve, exit, more, .. }, _)) = self.begin_to_brake(at, speed) {
             time = time + curve.time;
             if exit.is_zero() {
-                return (self.locate(at, curve.way(), last), time, legs);
+                return (self.locate(at, curve.way(), at.saturating_add(more)), time);
             }
-            (at, speed) = (last.saturating_add(1), exit);
+            (at, speed) = (at.saturating_add(more).saturating_add(1), exit);
         }
         let last = self.len.saturating_sub(1);
-        ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time, legs)
+        ((last, self.line(last).map_or(Real::ZERO, |line| line.length)), time)
     }
 
     /// Returns the speed at which line `at` is to end so that all lines after it can slow down in time.

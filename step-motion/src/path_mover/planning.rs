@@ -2,7 +2,7 @@
 
 use crate::limits::Bounds;
 use crate::line::{LinePulses, Start, Steps};
-use crate::path::{Course, End, Leaving, Legs};
+use crate::path::{Course, End, Leaving};
 use crate::planner::Motion;
 use crate::real::Real;
 
@@ -13,7 +13,7 @@ mod tests;
 
 /// How a stop runs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stop<const N: usize, const M: usize> {
+pub(super) struct Stop<const N: usize> {
     /// The line where it ends, and the place on it.
     pub(super) end: (usize, Real),
     /// How it leaves the lines of its first curve.
@@ -22,8 +22,7 @@ pub(super) struct Stop<const N: usize, const M: usize> {
     pub(super) cut: bool,
     /// Its first curve, if it is not the present one.
     pub(super) first: Option<(Course, Start<N>, Bounds)>,
-    /// How it goes on behind that curve, and how long that takes, if it is known.
-    pub(super) legs: Legs<M>,
+    /// Time from the end of that curve to the rest, if it is known.
     pub(super) after: Option<Real>,
 }
 
@@ -49,22 +48,22 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Returns how the present motion leaves its lines.
     pub(super) const fn leaving(&self) -> Leaving {
-        Leaving { last: self.more, exit: self.exit, bounds: None }
+        Leaving { more: self.more, exit: self.exit, bounds: None }
     }
 
     /// Returns how a stop runs; `None` at rest.
-    pub(super) fn stop_from(&self, now: u64) -> Option<Stop<N, M>> {
+    pub(super) fn stop_from(&self, now: u64) -> Option<Stop<N>> {
         self.line.as_ref()?;
         if self.requests.is_stopping() {
             let end = self.path.end_of_cut()?;
-            return Some(Stop { end, left: self.leaving(), cut: true, first: None, legs: [None; M], after: None });
+            return Some(Stop { end, left: self.leaving(), cut: true, first: None, after: None });
         }
         self.stop_anew(now, false)
     }
 
     /// Returns how a stop runs that begins now, plain or quick, whatever stop is under way; `None` at rest.
-    pub(super) fn stop_anew(&self, now: u64, quick: bool) -> Option<Stop<N, M>> {
-        let present = |end| Stop { end, left: self.leaving(), cut: false, first: None, legs: [None; M], after: None };
+    pub(super) fn stop_anew(&self, now: u64, quick: bool) -> Option<Stop<N>> {
+        let present = |end| Stop { end, left: self.leaving(), cut: false, first: None, after: None };
         let here = self.here(now);
         // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
         if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) {
@@ -76,44 +75,39 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if self.braking && !quick {
             // A stop under way stays the same.
             let line = self.line.as_ref()?;
-            let stop =
-                present(self.path.locate(0, (line.start.place + line.curve.way()) - line.start.before, self.more));
-            return Some(self.beyond(stop));
+            let end = if self.exit.is_zero() {
+                self.path.locate(0, (line.start.place + line.curve.way()) - line.start.before, self.more)
+            } else {
+                self.path.end_of_stop(self.more.saturating_add(1), self.exit).0
+            };
+            return Some(present(end));
         }
         let from = (start.place, start.before);
         let how = (self.bounds, self.braking);
         let planned = |(mut course, bounds): (Course, Bounds)| {
             let end = self.path.locate(0, (start.place + course.curve.way()) - start.before, course.more);
-            let left = Leaving { last: course.more, exit: course.exit, bounds: Some(bounds) };
+            let left = Leaving { more: course.more, exit: course.exit, bounds: Some(bounds) };
             // It is whole once the path has been cut off where it ends.
             course.whole = true;
-            Stop { end, left, cut: false, first: Some((course, start, bounds)), legs: [None; M], after: None }
+            Stop { end, left, cut: false, first: Some((course, start, bounds)), after: None }
         };
         let stop = match self.path.brake(0, motion, from, how) {
             Some(course) => planned(course),
             None => present((self.more, self.path.line(self.more)?.length)),
         };
-        if stop.left.exit.is_zero() {
+        let Leaving { more, exit, .. } = stop.left;
+        if exit.is_zero() {
             return Some(stop);
         }
-        let stop = self.beyond(stop);
+        let (end, after) = self.path.end_of_stop(more.saturating_add(1), exit);
+        let stop = Stop { end, after: Some(after), ..stop };
         // At each joint it would have acceleration 0; on one curve it may be shorter.
         let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
         once.filter(|once| quick && once.end < stop.end).or(Some(stop))
     }
 
-    /// Adds to a stop how it goes on behind its first curve, if that does not end at rest.
-    fn beyond(&self, stop: Stop<N, M>) -> Stop<N, M> {
-        let Leaving { last, exit, .. } = stop.left;
-        if exit.is_zero() {
-            return stop;
-        }
-        let (end, after, legs) = self.path.end_of_stop(last.saturating_add(1), exit);
-        Stop { end, legs, after: Some(after), ..stop }
-    }
-
     /// Returns where a stop ends: with the steps of a stop under way, or no more than these.
-    pub(super) fn end_of(&self, stop: &Stop<N, M>) -> End<N> {
+    pub(super) fn end_of(&self, stop: &Stop<N>) -> End<N> {
         let (at, under_way) = (stop.end, self.braking && !stop.cut && self.exit.is_zero());
         let most = if under_way && at.0 == self.more { self.steps_at_end() } else { None };
         let least = most.filter(|_| stop.first.is_none()).unwrap_or([0; N]);
@@ -135,7 +129,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Returns the moment at which a stop comes to rest.
-    pub(super) fn rest_of(&self, stop: &Stop<N, M>) -> u64 {
+    pub(super) fn rest_of(&self, stop: &Stop<N>) -> u64 {
         let first = match &stop.first {
             Some((Course { curve, .. }, start, _)) => {
                 let time = start.offset + (curve.time - curve.skipped.0);
@@ -143,18 +137,18 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             }
             None => self.line.as_ref().map_or(0, LinePulses::over),
         };
-        let Leaving { last, exit, .. } = stop.left;
+        let Leaving { more, exit, .. } = stop.left;
         if exit.is_zero() {
             return first;
         }
-        let after = stop.after.unwrap_or_else(|| self.path.end_of_stop(last.saturating_add(1), exit).1);
+        let after = stop.after.unwrap_or_else(|| self.path.end_of_stop(more.saturating_add(1), exit).1);
         first.saturating_add(after.to_fixed(0))
     }
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along
     /// the shorter path may differ by its rounding, and leave a line at a speed that it had not.
-    pub(super) fn leave_at(&mut self, stop: &Stop<N, M>) {
-        self.path.cut(&self.end_of(stop), self.begun(), self.made, (stop.left, &stop.legs));
+    pub(super) fn leave_at(&mut self, stop: &Stop<N>) {
+        self.path.cut(&self.end_of(stop), self.begun(), self.made, stop.left);
         if let Some((course, start, bounds)) = &stop.first {
             self.adopt(course, *start, *bounds);
         }

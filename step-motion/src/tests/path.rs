@@ -324,7 +324,7 @@ fn the_time_of_a_stop_over_lines_that_differ() {
         }
         (at, speed) = (at + course.more + 1, course.exit);
     }
-    let (_, time, _) = path.end_of_stop(0, real(1000.0 / second()));
+    let (_, time) = path.end_of_stop(0, real(1000.0 / second()));
     assert!(curves > 1 && near(float(time) / second(), want), "{time:?} for {want} in {curves}");
 }
 
@@ -424,8 +424,7 @@ proptest! {
         let before = if exit.is_zero() { Vec::new() } else { chain(&path, more + 1, exit) };
         let made = [made, 0, 0];
         let place = path.place(&End { at: end, least: [0; N], most: [u32::MAX; N] }, [7; N], made);
-        let first = Leaving { last: more, exit, bounds: Some(bounds) };
-        path.cut(&End { at: end, least: [0; N], most: [u32::MAX; N] }, [7; N], made, (first, &[None; _]));
+        path.cut(&End { at: end, least: [0; N], most: [u32::MAX; N] }, [7; N], made, Leaving { more, exit, bounds: Some(bounds) });
         prop_assert_eq!((path.len(), path.target()), (end.0 + 1, place), "{}", case);
         prop_assert!(path.end_of_cut().is_some_and(|(at, length)| at == end.0 && near(float(length), float(end.1))), "{case}");
         for axis in 0..N {
