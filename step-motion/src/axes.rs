@@ -137,16 +137,14 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Creates the axes at rest at the present end of `path`, and the other end of the queue for the interrupt. A queue
     /// serves one such pair. Lines already in the path begin with the first request.
     pub fn new(queue: &'q AxesQueue<N, S>, path: Path<N, M>) -> (Self, AxesTimer<'q, N, S>) {
-        let mut path = PathMover::new(path).cutting();
+        let path = PathMover::new(path).cutting();
         let clock = path.clock();
-        let reach = (clock.hz() / 100).max(4);
-        path.set_lead(reach / 4);
         let none = [None; N];
         let out = Out { valid: false, len: 0, end: 0, dirs: none };
         let axes = Self {
             queue,
             off: clock.blur(),
-            reach,
+            reach: (clock.hz() / 100).max(4),
             shorter: 0,
             work: path.clone(),
             stops: [path.clone(), path.clone()],
@@ -178,10 +176,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
-    pub fn with_reach(mut self, ticks: u32) -> Self {
-        self.reach = ticks.clamp(4, LONGEST);
-        self.path.set_lead(self.reach / 4);
-        self
+    pub fn with_reach(self, ticks: u32) -> Self {
+        Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
 
     /// Makes the stop behind each block as exact as all other steps, if the [`AxesQueue`] has slots for it. This takes
@@ -430,8 +426,9 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Refuses motion until a halt has been seen, and during a quick stop.
-    fn ready(&self) -> Result<(), Error> {
+    fn ready(&mut self) -> Result<(), Error> {
         self.halts.ready()?;
+        self.path.set_lead(self.reach / 4);
         self.path.ready(self.is_at_rest())
     }
 

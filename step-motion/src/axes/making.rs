@@ -16,6 +16,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         if reach < 4 {
             return self.give_up();
         }
+        self.path.set_lead(self.reach / 4);
         if !core::mem::take(&mut self.same) {
             self.work.clone_from(&self.path);
         }

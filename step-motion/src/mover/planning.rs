@@ -349,3 +349,19 @@ const fn edge((low, high): (i64, i64), direction: Direction) -> i64 {
         Direction::Reverse => low,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::{Clock, Limits};
+
+    /// Where no step of a plan is in time, nothing follows that plan.
+    #[test]
+    fn an_axis_at_the_end_of_time_stands() {
+        let mut mover = Mover::new(Clock::MICROSECONDS, Limits::new(1, 1).unwrap()).unwrap();
+        mover.ask_move(10, 0).unwrap();
+        mover.rest(u64::MAX - 5);
+        mover.replan(u64::MAX - 5);
+        assert_eq!((mover.due(), mover.commanded()), (None, 0));
+    }
+}

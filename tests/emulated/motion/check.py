@@ -43,9 +43,10 @@ class Machine:
 MACHINES = {
     # A step within 3/4 of a tick of 100 ns.
     "rp2040": Machine([80, 80], [5_000] * 2, [200_000] * 2, [240, 120], 60_000, 0.02, 75e-9, 0.01),
-    # The interrupt computes before it switches the pins: up to 1.5 us, twice if two axes step a tick apart.
+    # The interrupt computes before it switches the pins: up to 1.5 us, twice behind an event a tick before, of another axis or where a
+    # block ends.
     "stm32f405": Machine(
-        [80, 80, 400], [20_000, 20_000, 10_000], [400_000, 400_000, 200_000], [480, 240, 180], 100_000, 0.004, 1.5e-6, 0.003
+        [80, 80, 400], [20_000, 20_000, 10_000], [400_000, 400_000, 200_000], [480, 240, 180], 100_000, 0.004, 3e-6, 0.003
     ),
 }
 
