@@ -59,6 +59,8 @@ class Chip:
         self.registers, self.costs = {}, {}
         self.clock, self.executed, self.longest = 0.0, 0, 0
         self.flags, self.matches = 0, {CCR1: None, CCR2: None}
+        # How long the present handler waited for the one before.
+        self.waited = 0
         self.heard, self.coming, self.sent = [], [], 0.0
         self.console, self.edges, self.levels, self.after = bytearray(), [], 0, None
         self.background, self.handler = self.core(), self.core()
@@ -140,7 +142,7 @@ class Chip:
         elif address == GPIOC + BSRR:
             levels = (self.levels & ~(value >> 16) | value) & 0xFFFF
             if levels != self.levels:
-                self.edges.append((self.clock, levels & 7, levels >> AXES & 7))
+                self.edges.append((self.clock, levels & 7, levels >> AXES & 7, self.waited))
             self.levels = levels
         elif NVIC <= address < NVIC + 0x20:
             value |= self.registers.get(address, 0)
@@ -160,7 +162,10 @@ class Chip:
 
     def interrupts(self):
         """All that are pending, one behind the other."""
+        behind = False
         while self.background.reg_read(UC_ARM_REG_PRIMASK) & 1 == 0 and (number := self.pending()) is not None:
+            late = (self.ticks() - self.registers.get(TIM2 + CCR1, 0)) & 0xFFFFFFFF
+            self.waited, behind = late * TICK if behind and late >> 31 == 0 else 0, True
             self.clock += ENTRY * self.slower
             uc = self.handler
             uc.reg_write(UC_ARM_REG_SP, (self.background.reg_read(UC_ARM_REG_SP) - FRAME) & ~7)
@@ -192,14 +197,14 @@ class Chip:
 
 
 def run(image, lines, rests, stall=None, slower=1.0):
-    """As rp2040.mjs does: what was said and typed, and the edges."""
+    """As rp2040.mjs does: what was said and typed, and the edges; and of each edge how long its handler waited for another."""
     chip = Chip(image, slower)
     said, typed, steps, seen, taken, answered, rested = [], [], 0, 0, 0, True, 0.0
     last = 0
     while len([text for _, text in said if text.startswith("rest")]) < rests or chip.clock < rested + 0.005 * HZ:
         assert chip.clock < 3 * HZ, f"it comes to no end: {said}"
         chip.turn()
-        for _, levels, _ in chip.edges[seen:]:
+        for _, levels, *_ in chip.edges[seen:]:
             steps += levels & ~last & 1
             last = levels
         seen = len(chip.edges)
