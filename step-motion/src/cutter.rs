@@ -17,7 +17,7 @@ mod stretch;
 use near_rest::FromRest;
 pub(crate) use near_rest::Roots;
 use part::{LONGEST, Part, Slower, Spot};
-pub(crate) use stretch::{Cut, Stretch};
+pub(crate) use stretch::{Cut, Demand, Stretch};
 
 use crate::curve::Curve;
 use crate::phases::Frame;
@@ -72,19 +72,6 @@ struct Few {
     since: u64,
     interval: i64,
     add: i64,
-}
-
-/// The requirements on a segment.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Demand {
-    /// How far off a step may be, in moments.
-    pub(crate) off: Real,
-    /// For a stop that is only a precaution: a step may also be off by 2^-this of an interval.
-    pub(crate) coarse: Option<u32>,
-    /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
-    pub(crate) time: u64,
-    /// How many steps may be searched in a slice.
-    pub(crate) searches: u32,
 }
 
 /// Up to this many steps fit into a segment whatever the curve is; each of them is found by itself.

@@ -1,6 +1,21 @@
-//! Stretches of steps, which a cutter returns.
+//! Stretches of steps: what is demanded of a cutter, and what it returns.
 
 use servowire_core::Direction;
+
+use crate::real::Real;
+
+/// The requirements on a segment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Demand {
+    /// How far off a step may be, in moments.
+    pub(crate) off: Real,
+    /// For a stop that is only a precaution: a step may also be off by 2^-this of an interval.
+    pub(crate) coarse: Option<u32>,
+    /// Time that its steps may take, in 2^-32 ticks; one step may take longer.
+    pub(crate) time: u64,
+    /// How many steps may be searched in a slice.
+    pub(crate) searches: u32,
+}
 
 /// A stretch of steps. Times are in 2^-32 ticks, on the clock for the first step, and as differences after it.
 #[derive(Debug, Clone, Copy)]
