@@ -28,6 +28,17 @@ impl Bench {
     fn at(&self) -> i64 {
         self.machine.position[0]
     }
+
+    /// At each override, in percent, so many steps in 100 ms.
+    fn follows<const N: usize>(&mut self, overrides: [(u16, i64); N]) {
+        for (percent, steps) in overrides {
+            self.axis.set_override(percent);
+            self.until(self.machine.now + 300_000);
+            let before = self.at();
+            self.until(self.machine.now + 100_000);
+            assert!((self.at() - before - steps).abs() <= 1, "{percent} %: {}", self.at() - before);
+        }
+    }
 }
 
 #[test]
@@ -35,13 +46,7 @@ fn an_override_is_a_part_of_the_greatest_speed() {
     let mut bench = Bench::new();
     bench.axis.move_to(100_000).unwrap();
     bench.until(300_000);
-    for (percent, steps) in [(25, 200), (0, 0), (100, 800), (250, 800)] {
-        bench.axis.set_override(percent);
-        bench.until(bench.machine.now + 300_000);
-        let before = bench.at();
-        bench.until(bench.machine.now + 100_000);
-        assert!((bench.at() - before - steps).abs() <= 1, "{percent} %: {}", bench.at() - before);
-    }
+    bench.follows([(25, 200), (0, 0), (100, 800), (250, 800)]);
 }
 
 #[test]
@@ -211,13 +216,7 @@ fn a_rest_stays_one_whatever_fires() {
 fn an_override_is_a_part_of_a_speed_that_is_too_high() {
     let mut bench = Bench::new();
     bench.axis.run(Direction::Forward, 12_000).unwrap();
-    for (percent, steps) in [(50, 400), (75, 600), (100, 800)] {
-        bench.axis.set_override(percent);
-        bench.until(bench.machine.now + 300_000);
-        let before = bench.at();
-        bench.until(bench.machine.now + 100_000);
-        assert!((bench.at() - before - steps).abs() <= 1, "{percent} %: {}", bench.at() - before);
-    }
+    bench.follows([(50, 400), (75, 600), (100, 800)]);
 }
 
 /// What was linked when a halt came is over: a call of the interrupt that nobody has asked for begins nothing.

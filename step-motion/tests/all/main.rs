@@ -4,6 +4,7 @@
 
 mod axes_late;
 mod axes_requests;
+mod axes_turns;
 mod axis_blocks;
 mod axis_requests;
 mod bounds;

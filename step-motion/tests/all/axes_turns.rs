@@ -1,0 +1,126 @@
+//! Where an axis of a path turns round: DIR, the pause, and the steps on either side.
+
+use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
+
+use crate::machine::Machine;
+
+const SLOTS: usize = 513;
+
+/// A driver needs its time between a step and DIR and between DIR and the next step, wherever a block ends: half of the pause each, or a
+/// quarter of the reach.
+#[test]
+fn dir_has_half_of_the_pause_on_either_side() {
+    for (pause, half, reach) in [(40, 20, 10_000), (900, 450, 10_000), (20_000, 2500, 10_000), (900, 25, 100)] {
+        let axis = AxisSetup::new(Limits::new(8000, 800_000).unwrap(), 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (axes, timer) = Axes::new(&queue, path);
+        let (mut axes, mut machine) = (axes.with_reach(reach), Machine::new(timer));
+        for i in 1..300_i64 {
+            let to = [i % 2 * (20 + i % 7), i % 3 * 10];
+            while axes.is_full() {
+                let soon = machine.now + 1000;
+                machine.run(&mut axes, u64::from(reach / 2), soon);
+            }
+            axes.push(to, 100_000).unwrap();
+        }
+        machine.run(&mut axes, u64::from(reach / 2), u64::MAX);
+        assert!(machine.turns.len() > 400);
+        for (before, after) in machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause} at {reach}");
+        }
+    }
+}
+
+/// A line that is pushed after any slice of the work on the block before, which ends at rest: it begins in that block or behind it, and
+/// none of its steps is due before that.
+#[test]
+fn a_line_behind_a_rest_begins_at_rest() {
+    for slices in 0..250 {
+        let axis = AxisSetup::new(Limits::new(8000, 8_000_000).unwrap(), 80_000);
+        let path = Path::<3, 4>::new(Clock::MICROSECONDS, [axis; 3], 20).unwrap();
+        let queue = AxesQueue::<3, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 3>::new(timer);
+        axes.push([5, 0, 0], 100_000).unwrap();
+        for _ in 0..slices {
+            machine.slice(&mut axes);
+        }
+        axes.push([5, 50, 0], 100_000).unwrap();
+        axes.push([55, 50, 50], 100_000).unwrap();
+        assert_eq!(machine.run(&mut axes, 5000, u64::MAX), Work::Rest);
+        assert_eq!(machine.position, [55, 50, 50]);
+        let mut last = [None; 3];
+        for &(tick, axis, _) in &machine.steps {
+            let before: u64 = last[axis].replace(tick).unwrap_or(0);
+            assert!(before == 0 || tick - before >= 124, "{} of axis {axis} at {tick}, {slices}", tick - before);
+        }
+    }
+}
+
+/// At full speed and high acceleration, with a way back at once: the first step is a step of 125 us behind the last one, and DIR has half
+/// of the pause on either side, although nobody knows how much of what was handed out has been made.
+#[test]
+fn a_way_back_behind_a_halt_keeps_its_distance() {
+    for (pause, at) in [0, 300, 3000].into_iter().flat_map(|pause| (40..60).map(move |at| (pause, 613 * at))) {
+        let limits = Limits::new(8000, 2_000_000_000).unwrap();
+        let axis = AxisSetup::new(limits, 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 2>::new(timer);
+        axes.push([8000, 4000], 1_000_000).unwrap();
+        machine.run(&mut axes, 5000, at);
+        machine.until(at);
+        let made = machine.steps.len();
+        axes.halt();
+        assert_eq!(axes.poll(), Work::Start);
+        machine.fire();
+        assert_eq!(axes.poll(), Work::More);
+        axes.push([0, 0], 100_000).unwrap();
+        machine.run(&mut axes, 5000, at + 20_000);
+        let (before, after) = machine.steps.split_at(made);
+        for axis in 0..2 {
+            let last = before.iter().rev().find(|step| step.1 == axis).unwrap().0;
+            let first = after.iter().find(|step| step.1 == axis).unwrap().0;
+            assert!(first - last >= 124.max(u64::from(pause)), "{} behind a halt at {at}", first - last);
+        }
+        let half = u64::from(pause / 2).min(2500);
+        for (before, after) in &machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, behind a halt at {at}");
+        }
+    }
+}
+
+/// After a stop that nobody asked for, in a pause or before the first step of a way back, and after a rest.
+#[test]
+fn dir_is_in_time_behind_a_rest() {
+    let mut turns = 0;
+    for (pause, at) in [900, 4000].into_iter().flat_map(|pause| (20..120).map(move |at| (pause, 997 * at))) {
+        let axis = AxisSetup::new(Limits::new(8000, 8_000_000).unwrap(), 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 2>::new(timer);
+        for to in [[200, 100], [100, 200], [150, 0], [0, 100]] {
+            axes.push(to, 100_000).unwrap();
+        }
+        machine.run(&mut axes, 5000, at);
+        machine.drain();
+        machine.run(&mut axes, 5000, at + 40_000);
+        axes.hold();
+        machine.run(&mut axes, 5000, u64::MAX);
+        machine.now += 100_000;
+        axes.resume();
+        machine.run(&mut axes, 5000, u64::MAX);
+        axes.push([50, 50], 100_000).unwrap();
+        machine.run(&mut axes, 5000, u64::MAX);
+        assert_eq!(machine.position, [50, 50]);
+        let half = u64::from(pause / 2).min(2500);
+        for (before, after) in &machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, late at {at}");
+        }
+        turns += machine.turns.len();
+    }
+    assert!(turns > 800, "{turns}");
+}
