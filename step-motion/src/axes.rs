@@ -69,7 +69,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     /// point.
     path: PathMover<N, M>,
     end: u64,
-    dirs: [Option<Direction>; N],
+    dirs: [Direction; N],
     made: [u32; N],
     /// The block being made from it: the stage of the work, its copy of the path, whether that is still the same, the block
     /// and its writers.
@@ -127,7 +127,7 @@ struct Out<const N: usize> {
     len: usize,
     /// Where the stop ends.
     end: u64,
-    dirs: [Option<Direction>; N],
+    dirs: [Direction; N],
 }
 
 /// How often the end of a block may be postponed so that it makes no step late.
@@ -139,8 +139,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     pub fn new(queue: &'q AxesQueue<N, S>, path: Path<N, M>) -> (Self, AxesTimer<'q, N, S>) {
         let path = PathMover::new(path).cutting();
         let clock = path.clock();
-        let none = [None; N];
-        let out = Out { valid: false, len: 0, end: 0, dirs: none };
+        let dirs = [Direction::Forward; N];
+        let out = Out { valid: false, len: 0, end: 0, dirs };
         let axes = Self {
             queue,
             off: clock.blur(),
@@ -150,17 +150,17 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             stops: [path.clone(), path.clone()],
             path,
             end: 0,
-            dirs: none,
+            dirs,
             made: [0; N],
             stage: Stage::Idle,
             same: false,
             block: 0,
-            writers: [Writer::new(0, None); N],
+            writers: [Writer::new(0, Direction::Forward); N],
             axis: 0,
             quiet: 0,
             until: 0,
             put_off: 0,
-            joint: [Writer::new(0, None); N],
+            joint: [Writer::new(0, Direction::Forward); N],
             coarse: COARSE,
             finest: COARSE,
             outs: [out; 2],
@@ -343,8 +343,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Does a slice of the background's work: a segment, a plan, or a check of the interrupt. Call it until it returns
     /// anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach).
     pub fn poll(&mut self) -> Work {
-        if let Some(report) = self.halts.report() {
-            return self.confirm(report);
+        if self.halts.is_pending() {
+            return self.confirm();
         }
         if self.pending && self.is_in(1_usize.wrapping_sub(self.block)) {
             (self.pending, self.standing) = (false, false);
@@ -448,14 +448,18 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self, report: u32) -> Work {
-        if self.queue.axes.iter().any(|queue| queue.current.load(Ordering::Acquire) != report) {
-            return Work::Start;
+    fn confirm(&mut self) -> Work {
+        let mut dirs = self.dirs;
+        for (dir, queue) in dirs.iter_mut().zip(&self.queue.axes) {
+            match self.halts.dir(queue.current.load(Ordering::Acquire)) {
+                Some(level) => *dir = level,
+                None => return Work::Start,
+            }
         }
         let commanded = self.commanded();
         // Or not all of what was handed out has been made.
         self.path.halt_at(commanded, self.end, commanded != self.path.commanded());
-        self.stand([None; N]);
+        self.stand(dirs);
         if let Some(queue) = self.queue.axes.first() {
             self.halts.confirmed(&queue.halt);
         }
@@ -472,7 +476,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.block = 1_usize.wrapping_sub(block);
     }
 
-    fn stand(&mut self, dirs: [Option<Direction>; N]) {
+    fn stand(&mut self, dirs: [Direction; N]) {
         self.dirs = dirs;
         for (made, queue) in self.made.iter_mut().zip(&self.queue.axes) {
             *made = queue.made.load(Ordering::Acquire);

@@ -146,8 +146,15 @@ struct Out {
 }
 
 impl Out {
-    const NONE: Self =
-        Self { begin: 0, free: 0, len: 0, steps: 0, position: 0, rest: Writer::new(0, None), brakes: false };
+    const NONE: Self = Self {
+        begin: 0,
+        free: 0,
+        len: 0,
+        steps: 0,
+        position: 0,
+        rest: Writer::new(0, Direction::Forward),
+        brakes: false,
+    };
 }
 
 /// Where the events of a slot end, counted from the start of its block: in 2^-32 ticks, and in steps. Time 0: nothing may
@@ -201,14 +208,14 @@ impl<'q, const N: usize> Axis<'q, N> {
             position: 0,
             made: 0,
             mover,
-            end: Writer::new(0, None),
+            end: Writer::new(0, Direction::Forward),
             last: 0,
             news: News::None,
             stage: Stage::Idle,
             block: 0,
             joint: 0,
             work,
-            writer: Writer::new(0, None),
+            writer: Writer::new(0, Direction::Forward),
             until: 0,
             told: News::None,
             planning: Planning::OVER,

@@ -33,8 +33,10 @@ pub(crate) struct Segment {
 pub(crate) struct Kind {
     /// A step, or merely DIR and a wait.
     pub(crate) step: bool,
-    /// DIR is high: backwards.
+    /// DIR is high from it on: backwards.
     pub(crate) reverse: bool,
+    /// DIR changes here: the only event of its segment.
+    pub(crate) edge: bool,
     /// The axes of a path end a block, or a stop, here.
     pub(crate) joint: Joint,
 }
@@ -57,6 +59,20 @@ pub(crate) const COUNT: u32 = 0xffff;
 /// The bit of a [`Joint`], and the bit of one at rest.
 pub(crate) const JOINT: u32 = 1 << 28;
 pub(crate) const REST: u32 = 1 << 27;
+/// The bit of a change of DIR, so many bits below that of DIR.
+pub(crate) const EDGE: u32 = DIR >> BELOW;
+const BELOW: u32 = 3;
+
+/// Returns the bit of DIR before the event of a head.
+#[inline(always)]
+pub(crate) const fn dir_before(head: u32) -> u32 {
+    (head ^ head << BELOW) & DIR
+}
+
+/// Returns DIR of a head, or of the report of a halt.
+pub(crate) const fn dir(word: u32) -> Direction {
+    if word & DIR == 0 { Direction::Forward } else { Direction::Reverse }
+}
 
 impl Segment {
     pub(crate) const fn head(&self) -> u32 {
@@ -70,7 +86,8 @@ impl Segment {
             Joint::Block => JOINT,
             Joint::Rest => JOINT | REST,
         };
-        delta | if self.kind.reverse { DIR } else { 0 } | joint | self.count as u32
+        let dir = if self.kind.reverse { DIR } else { 0 } | if self.kind.edge { EDGE } else { 0 };
+        delta | dir | joint | self.count as u32
     }
 }
 
@@ -78,7 +95,7 @@ impl Segment {
 pub(crate) const NONE: u32 = u32::MAX;
 /// In the reader's report: it has stopped at the end of that slot.
 pub(crate) const IDLE: u32 = 1 << 31;
-/// From this bit up to [`IDLE`]: the ticket of the halt that put the reader there.
+/// From this bit up to [`DIR`]: the ticket of the halt that put the reader there; then DIR as the halt has left it.
 pub(crate) const TICKET: u32 = 16;
 
 /// A segment in words.
@@ -193,8 +210,7 @@ impl<const N: usize> Queue<N> {
 
     /// Returns DIR at the end of a slot.
     pub(crate) fn dir(&self, slot: usize) -> Option<Direction> {
-        let head = self.slots.get(slot)?.head.load(Ordering::Relaxed);
-        Some(if head & DIR == 0 { Direction::Forward } else { Direction::Reverse })
+        self.slots.get(slot).map(|slot| dir(slot.head.load(Ordering::Relaxed)))
     }
 
     /// Makes `slot` follow `after` from now on.
@@ -218,12 +234,23 @@ mod tests {
     #[test]
     fn a_segment_in_words() {
         let head = |step, reverse, joint| {
-            let kind = Kind { step, reverse, joint };
+            let kind = Kind { step, reverse, edge: false, joint };
             Segment { count: 0x1234, kind, first: 0, interval: 0, add: 0, bend: 0 }.head()
         };
         assert_eq!(head(true, false, Joint::No), 0x4000_1234);
         assert_eq!(head(true, true, Joint::No), 0xe000_1234);
         assert_eq!(head(false, false, Joint::Block), 0x1000_1234);
         assert_eq!(head(false, true, Joint::Rest), 0x3800_1234);
+        let turn = |reverse| {
+            let kind = Kind { step: false, reverse, edge: true, joint: Joint::No };
+            Segment { count: 1, kind, first: 0, interval: 0, add: 0, bend: 0 }.head()
+        };
+        assert_eq!([turn(false), turn(true)], [0x0400_0001, 0x2400_0001]);
+        for (level, heads) in [
+            (0, [head(true, false, Joint::No), head(false, false, Joint::Rest), turn(true)]),
+            (0x2000_0000, [head(true, true, Joint::No), head(false, true, Joint::Block), turn(false)]),
+        ] {
+            assert_eq!(heads.map(dir_before), [level; 3]);
+        }
     }
 }

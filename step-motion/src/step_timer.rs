@@ -4,7 +4,7 @@ use core::sync::atomic::{Ordering, fence};
 
 use servowire_core::Direction;
 
-use crate::queue::{COUNT, DELTA, DIR, IDLE, JOINT, Joint, Kind, Queue, REST, Segment, Slot, TICKET};
+use crate::queue::{COUNT, DELTA, DIR, IDLE, JOINT, Joint, Kind, Queue, REST, Segment, Slot, TICKET, dir, dir_before};
 
 /// What the caller of [`StepTimer::fire`] has to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +24,7 @@ impl Fired {
     /// The level of DIR from now on; it never changes together with a step.
     #[inline(always)]
     pub const fn direction(self) -> Direction {
-        if self.head & DIR == 0 { Direction::Forward } else { Direction::Reverse }
+        dir(self.head)
     }
 
     /// Ticks from this event to the next one, at least 1: add them to the compare register. 0: no event follows; stop the
@@ -86,7 +86,7 @@ impl<'q, const N: usize> StepTimer<'q, N> {
     /// other user.
     #[doc(hidden)]
     pub fn endless(queue: &'q Queue<N>, count: u16) -> Self {
-        let kind = Kind { step: true, reverse: false, joint: Joint::No };
+        let kind = Kind { step: true, reverse: false, edge: false, joint: Joint::No };
         let segment = Segment { count, kind, first: 5 << 32, interval: 5 << 32, add: 1, bend: 1 };
         for (slot, after) in [(1, 0), (2, 1)] {
             queue.put(slot, &segment, Some(after));
@@ -150,15 +150,17 @@ impl<'q, const N: usize> StepTimer<'q, N> {
         Fired { head, wait: 0 }
     }
 
-    /// Makes no step, whatever was planned; the next motion starts afresh.
+    /// Makes no step, whatever was planned, and leaves DIR as it is; the next motion starts afresh.
     #[cold]
     #[inline(never)]
     pub(crate) fn halted(&mut self, ticket: u32) -> Fired {
         if let Some(slot) = self.queue.slots.first() {
             self.slot = slot;
         }
-        (self.head, self.fraction) = (self.head & DIR | STANDING, 0);
-        self.queue.current.store(IDLE | ticket << TICKET, Ordering::Release);
+        // The next event, which is not made, may have been a change of DIR.
+        let dir = dir_before(self.head);
+        (self.head, self.fraction) = (dir | STANDING, 0);
+        self.queue.current.store(IDLE | ticket << TICKET | dir, Ordering::Release);
         Fired { head: self.head, wait: 0 }
     }
 }

@@ -13,9 +13,9 @@ pub(crate) const LONGEST: u32 = 1 << 30;
 /// Where the next segment is written.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Writer {
-    /// The end of what has been cut, in 2^-32 ticks as the interrupt adds them up; and DIR there, if it is known.
+    /// The end of what has been cut, in 2^-32 ticks as the interrupt adds them up; and DIR there.
     pub(crate) end: i128,
-    pub(crate) dir: Option<Direction>,
+    pub(crate) dir: Direction,
     /// The last step; or, if there is none in the block, what is known to be no earlier.
     pub(crate) last: i128,
     /// Slots of the block that are filled.
@@ -24,7 +24,7 @@ pub(crate) struct Writer {
 
 impl Writer {
     /// Creates a writer at the start of a block.
-    pub(crate) const fn new(end: i128, dir: Option<Direction>) -> Self {
+    pub(crate) const fn new(end: i128, dir: Direction) -> Self {
         Self { end, dir, last: end, len: 0 }
     }
 
@@ -38,10 +38,8 @@ impl Writer {
         let first = stretch.first.wrapping_add(TICK / 2).max(self.end.wrapping_add(TICK));
         self.put_turn(to, first, direction, i128::MAX);
         let first = first.max(self.end.wrapping_add(TICK));
-        if first.wrapping_sub(self.end) > i128::from(LONGEST) << 32 {
-            self.put_wait(to, first.saturating_sub(TICK));
-        }
-        let kind = Kind { step: true, reverse: direction.dir(), joint: Joint::No };
+        self.put_long_wait(to, first);
+        let kind = Kind { step: true, ..self.rest(Joint::No) };
         let late = first.wrapping_sub(stretch.first);
         self.put(to, (stretch.count, kind), first, stretch.differences);
         self.end = stretch.last().wrapping_add(late);
@@ -58,9 +56,11 @@ impl Writer {
         before: i128,
     ) {
         let middle = (self.last.saturating_add(next) / 2).max(self.end.saturating_add(TICK));
-        if self.dir != Some(direction) && middle < before {
-            self.dir = Some(direction);
-            self.put_wait(to, middle);
+        if self.dir != direction && middle < before {
+            self.put_long_wait(to, middle);
+            self.dir = direction;
+            self.put(to, (1, Kind { edge: true, ..self.rest(Joint::No) }), middle, [0; 3]);
+            self.end = middle;
         }
     }
 
@@ -85,16 +85,21 @@ impl Writer {
 
     /// Appends an event that all axes of a path share; it must come after the last event of this axis.
     pub(crate) fn put_joint<const N: usize>(&mut self, to: (&Queue<N>, usize), at: i128, joint: Joint) {
-        if at.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
-            self.put_wait(to, at.saturating_sub(TICK));
-        }
+        self.put_long_wait(to, at);
         self.put(to, (1, self.rest(joint)), at, [0; 3]);
         self.end = at;
     }
 
+    /// Appends a wait up to the tick before an event, if that is too far ahead to be reached in one.
+    fn put_long_wait<const N: usize>(&mut self, to: (&Queue<N>, usize), at: i128) {
+        if at.saturating_sub(self.end) > i128::from(LONGEST) << 32 {
+            self.put_wait(to, at.saturating_sub(TICK));
+        }
+    }
+
     /// Returns the kind of an event without a step.
-    fn rest(&self, joint: Joint) -> Kind {
-        Kind { step: false, reverse: self.dir.is_some_and(Direction::dir), joint }
+    const fn rest(&self, joint: Joint) -> Kind {
+        Kind { step: false, reverse: self.dir.dir(), edge: false, joint }
     }
 
     /// Appends events: the time of the first one, and the differences from it. Restarting the differences takes them one
@@ -137,7 +142,7 @@ mod tests {
     /// The events of block 0 as the interrupt makes them: when, whether it is a step, and which way.
     fn events(write: impl FnOnce(&mut Writer, (&Queue<SLOTS>, usize))) -> Vec<(u64, bool, bool)> {
         let queue: &'static Queue<SLOTS> = Box::leak(Box::default());
-        let mut writer = Writer::new(0, Some(Direction::Forward));
+        let mut writer = Writer::new(0, Direction::Forward);
         write(&mut writer, (queue, 0));
         queue.link(0, Queue::<SLOTS>::slot(0, 0));
         let mut timer = StepTimer::new(queue);
@@ -182,6 +187,10 @@ mod tests {
         assert_eq!(steps(Direction::Forward, MOST), [(most, true, false), (most + 7, true, false)]);
         let far = [(most, false, false), (most + 1, true, false), (most + 8, true, false)];
         assert_eq!(steps(Direction::Forward, MOST + 1), far);
+        let turn = [(most, false, false), (most + 4, false, false), (most + 5, false, true)];
+        let wait = [(2 * most + 5, false, true), (2 * most + 9, false, true)];
+        let back = [(2 * most + 10, true, true), (2 * most + 17, true, true)];
+        assert_eq!(steps(Direction::Reverse, 2 * MOST + 10), [&turn[..], &wait, &back].concat());
     }
 
     #[test]
@@ -197,7 +206,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_counted_and_not_written() {
         let queue = Queue::<SLOTS>::new();
-        let mut writer = Writer::new(0, None);
+        let mut writer = Writer::new(0, Direction::Forward);
         for tick in 1..=20 {
             writer.put_joint((&queue, 0), tick * TICK, Joint::No);
         }

@@ -26,8 +26,8 @@ impl<const N: usize> Axis<'_, N> {
     /// returns anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach); more often
     /// if the slots of a block hold less than that.
     pub fn poll(&mut self) -> Work {
-        if let Some(report) = self.halts.report() {
-            return self.confirm(report);
+        if self.halts.is_pending() {
+            return self.confirm();
         }
         let current = self.queue.current.load(Ordering::Acquire);
         if current == self.seen {
@@ -166,17 +166,15 @@ impl<const N: usize> Axis<'_, N> {
     }
 
     /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self, report: u32) -> Work {
-        if self.queue.current.load(Ordering::Acquire) != report {
-            return Work::Start;
-        }
+    fn confirm(&mut self) -> Work {
+        let Some(dir) = self.halts.dir(self.queue.current.load(Ordering::Acquire)) else { return Work::Start };
         self.look();
         let now = tick(self.end.end).max(self.mover.free());
         let was_moving = self.position != self.mover.commanded() || !self.mover.is_at_rest(now);
         let now = now.saturating_add(1);
         self.mover.halt_at(self.position, now, was_moving);
         (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
-        self.end = Writer::new(i128::from(now) << 32, None);
+        self.end = Writer::new(i128::from(now) << 32, dir);
         self.halts.confirmed(&self.queue.halt);
         self.lost = false;
         Work::More
@@ -254,11 +252,12 @@ impl<const N: usize> Axis<'_, N> {
         } else {
             let marks = (0..=at).rev().map(mark).filter(|mark| mark.end > 0);
             let last = marks.take_while(|mark| mark.steps == steps).last();
-            (last.map_or(out.free, |last| tick(time(last)).saturating_add(1)), self.end.dir)
+            (last.map_or(out.free, |last| tick(time(last)).saturating_add(1)), Some(self.end.dir))
         };
         self.joint = Queue::<N>::slot(block, at);
         let last = i128::from(free.saturating_sub(1)) << 32;
-        self.writer = Writer { last, ..Writer::new(time(mark(at)), self.queue.dir(self.joint)) };
+        let level = self.queue.dir(self.joint).unwrap_or(self.end.dir);
+        self.writer = Writer { last, ..Writer::new(time(mark(at)), level) };
         self.work.back_to(out.steps.saturating_sub(steps), tick(self.writer.end), (free, dir));
     }
 
@@ -279,7 +278,7 @@ impl<const N: usize> Axis<'_, N> {
         let (to, wait) = ((self.queue, self.block), i128::from(until.saturating_sub(BEFORE)) << 32);
         // Before the motion begins: once it has, another request may make the first step earlier.
         let direction = self.work.direction();
-        if self.writer.dir != Some(direction) && self.work.has_steps() {
+        if self.writer.dir != direction && self.work.has_steps() {
             self.writer.put_turn(to, i128::from(self.work.begin()) << 32, direction, wait);
         }
         match self.work.cut(&Demand { off: self.off, coarse: None, time: self.part() << 32, searches: 1 }, until) {

@@ -120,7 +120,7 @@ impl Mover {
         self.rest(self.clock.moment(now));
     }
 
-    /// Records a halt at a position; DIR is unknown then, and the last step may have been made just before.
+    /// Records a halt at a position; DIR may have changed since the last step, and that may have been made just before.
     pub(crate) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
         (self.commanded, self.dir, self.free) = (position, None, now);
         self.stand(now, was_moving);

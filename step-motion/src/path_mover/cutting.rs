@@ -75,11 +75,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// The tick of a step before which an axis changes DIR, if its lead begins within two ticks after `now`.
-    pub(crate) fn turns_before(&self, now: u64, dirs: [Option<Direction>; N]) -> Option<u64> {
+    pub(crate) fn turns_before(&self, now: u64, dirs: [Direction; N]) -> Option<u64> {
         let line = self.line.as_ref()?;
         let turns = line.due.iter().zip(line.directions).zip(dirs).zip(self.path.axes());
         let late = turns.filter_map(|(((due, direction), dir), axis)| {
-            let due = due.filter(|_| dir != Some(direction))?;
+            let due = due.filter(|_| dir != direction)?;
             let pause = u64::from((axis.reversal_pause / 2).min(self.lead));
             (due <= now.saturating_add(pause).saturating_add(2)).then_some(due)
         });

@@ -70,14 +70,16 @@ pub(crate) struct Machine<T, const N: usize> {
     pub(crate) steps: Vec<(u64, usize, i64)>,
     /// The changes of DIR between steps: ticks from the step before, and to the one after.
     pub(crate) turns: Vec<(u64, u64)>,
+    /// Ticks from the last step of an axis to each change of its DIR, whether or not a step follows before the next one.
+    pub(crate) edges: Vec<u64>,
     pub(crate) position: [i64; N],
 }
 
 impl<T: Timer, const N: usize> Machine<T, N> {
     pub(crate) fn new(timer: T) -> Self {
         let (turned, last) = ([None; N], [None; N]);
-        let (steps, turns) = (Vec::new(), Vec::new());
-        Self { timer, now: 0, compare: None, reverse: 0, turned, last, steps, turns, position: [0; N] }
+        let (steps, turns, edges) = (Vec::new(), Vec::new(), Vec::new());
+        Self { timer, now: 0, compare: None, reverse: 0, turned, last, steps, turns, edges, position: [0; N] }
     }
 
     pub(crate) fn fire(&mut self) {
@@ -87,6 +89,7 @@ impl<T: Timer, const N: usize> Machine<T, N> {
             if back != (self.reverse >> axis & 1 != 0) {
                 assert!(!step, "DIR changes with a step");
                 assert!(self.last[axis].is_none_or(|last| last < self.now), "DIR changes in the tick of a step");
+                self.edges.extend(self.last[axis].map(|last| self.now - last));
                 self.turned[axis] = Some(self.now);
             }
             if step {

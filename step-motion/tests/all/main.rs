@@ -10,6 +10,7 @@ mod axis_requests;
 mod bounds;
 mod brakes;
 mod changes;
+mod halts;
 mod homing;
 mod laws;
 mod lines;

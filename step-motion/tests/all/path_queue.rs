@@ -355,15 +355,15 @@ fn few_slots_cost_exactness_and_never_a_step() {
     assert!(!refused_with_slots::<129>(1_000_000, false));
 }
 
-/// Two lines that do not fit into `S` slots, and a slow one behind what was made of them: how often each was refused, and whether
-/// that was in motion.
-fn given_up<const S: usize>() -> [Vec<bool>; 2] {
+/// Two lines one way or the other that do not fit into `S` slots, and a slow one behind what was made of them: how often each was
+/// refused, and whether that was in motion.
+fn given_up<const S: usize>(way: i64) -> [Vec<bool>; 2] {
     let queue: &'static AxesQueue<N, S> = Box::leak(Box::default());
     let setup = AxisSetup::new(limits(20_000, 200_000, 4_000_000), 80_000);
     let (axes, timer) = Axes::new(queue, path(1_000_000, [setup; N], 20));
     let (mut axes, mut machine) = (axes.with_reach(6000), machine::Machine::<_, N>::new(timer));
-    axes.push([3000, 211, 7], 250_000).unwrap();
-    axes.push([3000, 900, 7], 250_000).unwrap();
+    axes.push([way * 3000, way * 211, way * 7], 250_000).unwrap();
+    axes.push([way * 3000, way * 900, way * 7], 250_000).unwrap();
     [(); 2].map(|()| {
         let mut refused = Vec::new();
         loop {
@@ -376,7 +376,7 @@ fn given_up<const S: usize>() -> [Vec<bool>; 2] {
         }
         let [x, y, z] = machine.position;
         assert_eq!((axes.target(), axes.is_at_rest(), axes.is_halted()), ([x, y, z], true, false));
-        axes.push([x + 3, y, z], 1000).unwrap();
+        axes.push([x + way * 3, y, z], 1000).unwrap();
         refused
     })
 }
@@ -384,9 +384,10 @@ fn given_up<const S: usize>() -> [Vec<bool>; 2] {
 /// A path that is given up, at rest or in motion, is not the end: what fits is run afterwards.
 #[test]
 fn what_does_not_fit_is_given_up_and_no_more() {
-    let [first, second] = given_up::<9>();
+    // The way back takes a slot for DIR.
+    let [first, second] = given_up::<9>(-1);
     assert!(first == [false] && !second.is_empty(), "{first:?} {second:?}");
-    assert_eq!([given_up::<33>(), given_up::<37>()], [[vec![true], vec![]], [vec![true], vec![]]]);
+    assert_eq!([given_up::<33>(1), given_up::<37>(1)], [[vec![true], vec![]], [vec![true], vec![]]]);
 }
 
 /// A step in 100 ticks at constant speed, and blocks that end at any of these ticks: no step waits for the end of a block.
