@@ -85,9 +85,8 @@ pub struct Mover {
     soft: Option<(i64, i64)>,
     /// Ticks of rest before the direction changes.
     pause: u32,
-    /// Tick at which DIR changes for the next step, and the earliest tick at which it may.
+    /// Tick at which DIR changes for the next step.
     turn: Option<u64>,
-    idle: u64,
     /// DIR of the last step; `None` if DIR may have changed since.
     dir: Option<Direction>,
     /// The present plan is a stop.
@@ -132,7 +131,6 @@ impl Mover {
             soft: None,
             pause: 0,
             turn: None,
-            idle: 0,
             dir: Some(Direction::Forward),
             braking: false,
         })
@@ -183,9 +181,11 @@ impl Mover {
         self.direction
     }
 
-    /// The tick at which DIR is to be switched to [`direction`](Self::direction) for the next step: in the middle of the
-    /// rest between the steps on either side, so that the driver has half of the rest before the edge and half after it.
-    /// `None` if DIR does not change before the next step.
+    /// The tick at which DIR is to be switched to [`direction`](Self::direction): in the middle of the
+    /// [pause](Self::with_reversal_pause), which ends where the motion begins, so that the driver has at least half of the pause before
+    /// the edge and half after it. It is between the steps on either side without a pause too, and it is never before the request that
+    /// has changed it: whatever is asked for then, the first step comes no earlier than the pause allows.
+    /// `None` if DIR has not changed since the last step, and is not to change.
     pub const fn turn(&self) -> Option<u64> {
         self.turn
     }

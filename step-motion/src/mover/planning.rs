@@ -128,14 +128,10 @@ impl Mover {
             self.all = if frame.endless { u32::MAX } else { steps(frame.last(curve)) };
             (self.all > 0).then_some(begin)
         } else {
-            self.stepper.next(curve, frame)
+            let turned = self.turn.map_or(0, |turn| turn.saturating_add(1));
+            self.stepper.next(curve, frame).map(|due| due.max(turned))
         };
         self.due = due.map(|due| due.max(self.free).max(begin)).filter(|due| self.clock.is_in_time(*due));
-        self.turn = None;
-        if self.dir != Some(self.direction) {
-            self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
-            self.dir = None;
-        }
     }
 
     /// Plans on from the present motion. Positions are counted from the steps made.
@@ -201,7 +197,7 @@ impl Mover {
     fn anew(&mut self, moment: u64, planning: &mut Planning) {
         let (end, bounds) = (self.phases.end(), self.bounds_of(planning));
         self.rest(end);
-        (self.due, self.turn) = (None, None);
+        self.due = None;
         let mut begin = moment.max(end);
         if let Some(last) = self.free.checked_sub(1) {
             // The axis has come to rest up to half a step beyond that step, but the plan begins at the step.
@@ -213,13 +209,15 @@ impl Mover {
             planning.stage = Stage::Over;
             return;
         }
-        self.idle = begin.div_ceil(self.clock.moment(1));
         let direction = match self.aim {
             Aim::At(target) if target < self.commanded => Direction::Reverse,
             Aim::Run(direction, _) => direction,
             _ => Direction::Forward,
         };
         if self.dir != Some(direction) {
+            // Before the motion begins: once it has, another request may make the first step earlier.
+            let idle = begin.div_ceil(self.clock.moment(1));
+            (self.turn, self.dir) = (Some(idle.saturating_add(u64::from(self.pause / 2))), None);
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
         }
         self.direction = direction;

@@ -31,3 +31,4 @@ mod serde;
 mod stops;
 mod straight;
 mod toolpaths;
+mod turns;

@@ -130,7 +130,7 @@ fn the_reversal_pause_is_kept_after_a_halt() {
     mover.move_to(-100, 60_000).unwrap();
     let due = mover.due().unwrap();
     assert!(due > 67_000);
-    assert_eq!(mover.turn(), Some(60_000_u64.midpoint(due)));
+    assert!(mover.turn().is_some_and(|turn| turn >= 63_500 && turn + 3500 <= due));
     // Halted in the pause, when DIR may have changed already.
     mover.halt(61_000);
     mover.move_to(-100, 62_000).unwrap();
