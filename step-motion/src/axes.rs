@@ -12,7 +12,7 @@ use crate::axis::{COARSE, EXACT, Work};
 use crate::error::Error;
 use crate::halts::Halts;
 use crate::limits::Limits;
-use crate::path::Path;
+use crate::path::{AxisSetup, Path};
 use crate::path_mover::PathMover;
 use crate::queue::{IDLE, Queue};
 use crate::real::Real;
@@ -175,6 +175,15 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         (axes, AxesTimer::new(queue))
     }
 
+    pub(super) const fn requests(&self) -> Requests {
+        self.path.requests()
+    }
+
+    /// The setup of each axis.
+    pub(super) const fn setup(&self) -> &[AxisSetup; N] {
+        self.path.axes()
+    }
+
     /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
     pub fn with_reach(self, ticks: u32) -> Self {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
@@ -228,6 +237,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
+        self.path.check(&target)?;
         let line = self.path.line_to(target, feed)?;
         // In the copies it is mostly the same one.
         let like = [&self.work, &self.stops[0], &self.stops[1]].map(|other| other.ends_as(&self.path));
@@ -258,6 +268,12 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// # Errors
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.path.check(&target)?;
+        self.move_freely(target, feed)
+    }
+
+    /// Does that wherever the soft limits are.
+    pub(super) fn move_freely(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
         self.path.go_to(target, feed, self.end)?;
         self.begin_anew();

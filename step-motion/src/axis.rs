@@ -372,6 +372,22 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.set_limits(limits, tick(self.end.end))
     }
 
+    /// Moves to a target that may be outside the soft limits.
+    pub(super) fn move_freely(&mut self, target: i64) -> Result<(), Error> {
+        self.ready()?;
+        self.mover.ask_free_move(target, self.commanded())?;
+        self.asked(News::Aim);
+        Ok(())
+    }
+
+    /// Runs, whatever the soft limits are.
+    pub(super) fn run_freely(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
+        self.ready()?;
+        self.mover.ask_free_run(direction, speed);
+        self.asked(News::Aim);
+        Ok(())
+    }
+
     /// Takes a request, unless it is for what is so already.
     fn change(&mut self, ask: impl FnOnce(&mut Mover)) {
         let before = self.requests();

@@ -48,5 +48,13 @@ servowire_core::errors! {
             /// The smallest sufficient number.
             needed: u64,
         },
+        /// A path has no such axis.
+        #[error("axis {axis} of {axes}; the first is 0")]
+        NoAxis = 9 {
+            /// The axis, as requested.
+            axis: u32,
+            /// How many there are.
+            axes: u32,
+        },
     }
 }

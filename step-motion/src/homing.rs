@@ -2,11 +2,13 @@
 
 mod homed;
 
-use self::homed::{Homed, OneByOne};
+use self::homed::{Homed, OneByOne, OneOf, PathOneByOne};
+use crate::axes::Axes;
 use crate::axis::Axis;
 use crate::error::Error;
 use crate::limits::Limits;
 use crate::mover::Mover;
+use crate::path_mover::PathMover;
 use servowire_core::Direction;
 
 /// How an axis looks for its switch.
@@ -77,7 +79,10 @@ pub enum HomingState {
 /// the second time.
 ///
 /// Call [`poll`](Self::poll) with the level of the switch often, at least once per step of the approach; take the steps
-/// from the [`Mover`] as usual, or have them made by the interrupt of an [`Axis`].
+/// from the [`Mover`] as usual, or have them made by the interrupt of an [`Axis`]. The axes of a path are homed one after another;
+/// the speeds of the search are rounded down to whole µm/s there, and the lines still in the queue are forgotten.
+///
+/// Soft limits are positions, so they do not count before there is a reference: a homing may leave them.
 ///
 /// A hold and an override act on it as on any motion: it waits, and goes on. A move, a stop or a halt that somebody else
 /// asks for ends it.
@@ -91,6 +96,8 @@ pub struct Homing {
     mark: i64,
     /// The number of the axis's last request, which was of this homing.
     asked: u32,
+    /// Which axis of a path it is.
+    axis: usize,
 }
 
 impl Homing {
@@ -99,7 +106,7 @@ impl Homing {
     /// # Errors
     /// [`Error::Moving`] if the axis is not at rest.
     pub fn start(config: HomingConfig, mover: &mut Mover, switch: Switch, now: u64) -> Result<Self, Error> {
-        Self::begin(config, &mut OneByOne { mover, now }, switch)
+        Self::begin(config, &mut OneByOne { mover, now }, switch, 0)
     }
 
     /// Does the same as [`start`](Self::start), of an axis in two halves.
@@ -111,7 +118,34 @@ impl Homing {
         axis: &mut Axis<'_, N>,
         switch: Switch,
     ) -> Result<Self, Error> {
-        Self::begin(config, axis, switch)
+        Self::begin(config, axis, switch, 0)
+    }
+
+    /// Does the same as [`start`](Self::start), of one axis of a path (from 0).
+    ///
+    /// # Errors
+    /// The same, and [`Error::NoAxis`].
+    pub fn start_path<const N: usize, const M: usize>(
+        config: HomingConfig,
+        mover: &mut PathMover<N, M>,
+        axis: usize,
+        switch: Switch,
+        now: u64,
+    ) -> Result<Self, Error> {
+        Self::begin(config, &mut OneOf { lines: PathOneByOne { mover, now }, axis }, switch, axis)
+    }
+
+    /// Does the same as [`start`](Self::start), of one axis (from 0) of a path in two halves.
+    ///
+    /// # Errors
+    /// The same, and [`Error::NoAxis`].
+    pub fn start_axes<const N: usize, const M: usize, const S: usize>(
+        config: HomingConfig,
+        axes: &mut Axes<'_, N, M, S>,
+        axis: usize,
+        switch: Switch,
+    ) -> Result<Self, Error> {
+        Self::begin(config, &mut OneOf { lines: axes, axis }, switch, axis)
     }
 
     /// The present state.
@@ -136,11 +170,38 @@ impl Homing {
         self.go_on(axis, switch)
     }
 
-    fn begin(config: HomingConfig, axis: &mut impl Homed, switch: Switch) -> Result<Self, Error> {
+    /// Does the same as [`poll`](Self::poll), of the axis of a path.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn poll_path<const N: usize, const M: usize>(
+        &mut self,
+        mover: &mut PathMover<N, M>,
+        switch: Switch,
+        now: u64,
+    ) -> Result<HomingState, Error> {
+        let axis = self.axis;
+        self.go_on(&mut OneOf { lines: PathOneByOne { mover, now }, axis }, switch)
+    }
+
+    /// Does the same as [`poll_axis`](Self::poll_axis), of the axis of a path.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn poll_axes<const N: usize, const M: usize, const S: usize>(
+        &mut self,
+        axes: &mut Axes<'_, N, M, S>,
+        switch: Switch,
+    ) -> Result<HomingState, Error> {
+        let axis = self.axis;
+        self.go_on(&mut OneOf { lines: axes, axis }, switch)
+    }
+
+    fn begin(config: HomingConfig, axis: &mut impl Homed, switch: Switch, at: usize) -> Result<Self, Error> {
         if !axis.is_at_rest() {
             return Err(Error::Moving);
         }
-        let mut new = Self { config, state: HomingState::Seeking, mark: axis.position(), asked: 0 };
+        let mut new = Self { config, state: HomingState::Seeking, mark: axis.position(), asked: 0, axis: at };
         if switch == Switch::Closed {
             new.back_off(axis)?;
         } else {

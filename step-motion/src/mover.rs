@@ -31,8 +31,8 @@ enum Aim {
     Rest,
     /// Be at a position.
     At(i64),
-    /// Keep a speed, in steps/s.
-    Run(Direction, u32),
+    /// Keep a speed, in steps/s, and come to rest at this position if there is one.
+    Run(Direction, u32, Option<i64>),
 }
 
 /// An axis whose target, speed and override may change at any tick.
@@ -142,7 +142,8 @@ impl Mover {
         Self { pause: ticks, ..self }
     }
 
-    /// Sets a range that no target may leave, both ends included; [`run`](Self::run) stops at its end.
+    /// Sets a range that no target may leave, both ends included, except those of a [`Homing`](crate::Homing); [`run`](Self::run) stops at
+    /// its end.
     pub const fn with_soft_limits(self, low: i64, high: i64) -> Self {
         Self { soft: Some((low, high)), ..self }
     }
@@ -219,7 +220,7 @@ impl Mover {
     }
 
     /// Runs at a speed in steps/s until another request or to the soft limit; the speed is at most the greatest one. 0
-    /// stops.
+    /// stops. On the way to a soft limit it comes to rest for a moment every 2^31 - 1 steps.
     ///
     /// # Errors
     /// [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
@@ -316,12 +317,30 @@ impl Mover {
         self.requests
     }
 
+    /// Moves to a target that may be outside the soft limits.
+    pub(super) fn move_freely(&mut self, target: i64, now: u64) -> Result<(), Error> {
+        self.ready(self.is_at_rest(now))?;
+        self.ask_free_move(target, self.commanded)?;
+        self.replan(self.moment(now));
+        Ok(())
+    }
+
+    /// Runs, whatever the soft limits are.
+    pub(super) fn run_freely(&mut self, direction: Direction, speed: u32, now: u64) -> Result<(), Error> {
+        self.ready(self.is_at_rest(now))?;
+        self.ask_free_run(direction, speed);
+        self.replan(self.moment(now));
+        Ok(())
+    }
+
     pub(super) fn ask_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
-        if let Some((low, high)) = self.soft {
-            if target < low || target > high {
-                return Err(Error::SoftLimit { target: clamp(target) });
-            }
+        if self.soft.is_some_and(|(low, high)| target < low || target > high) {
+            return Err(Error::SoftLimit { target: clamp(target) });
         }
+        self.ask_free_move(target, from)
+    }
+
+    pub(super) fn ask_free_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
         let away = target.abs_diff(from);
         if away > u64::from(u32::MAX / 2) {
             return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
@@ -331,11 +350,20 @@ impl Mover {
         Ok(())
     }
 
-    pub(super) const fn ask_run(&mut self, direction: Direction, speed: u32) {
+    pub(super) fn ask_run(&mut self, direction: Direction, speed: u32) {
+        let end = self.soft.map(|(low, high)| if direction.dir() { low } else { high });
+        self.run_to(direction, speed, end);
+    }
+
+    pub(super) const fn ask_free_run(&mut self, direction: Direction, speed: u32) {
+        self.run_to(direction, speed, None);
+    }
+
+    const fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>) {
         if speed == 0 {
             return self.ask_stop();
         }
-        self.aim = Aim::Run(direction, speed);
+        self.aim = Aim::Run(direction, speed, end);
         self.requests.go();
     }
 

@@ -39,7 +39,7 @@ impl AxisSetup {
         Self { limits, steps_per_m, soft_limits: None, reversal_pause: 0 }
     }
 
-    /// Sets a range that no line may leave, both ends included, in steps.
+    /// Sets a range that no line may leave, both ends included, in steps, except those of a [`Homing`](crate::Homing).
     pub const fn with_soft_limits(self, low: i64, high: i64) -> Self {
         Self { soft_limits: Some((low, high)), ..self }
     }
@@ -205,18 +205,18 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// [`Error::QueueFull`]; [`Error::SoftLimit`] outside the soft limits of an axis; [`Error::TooManySteps`] for a line of more
     /// than 2^31 - 1 steps.
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.check(&target)?;
         if let Some(line) = self.line_to(target, feed)? {
             self.add(line, target);
         }
         Ok(())
     }
 
-    /// Returns the line that a push would add; `None` for one of zero length.
+    /// Returns the line that a push would add, wherever the soft limits are; `None` for one of zero length.
     pub(super) fn line_to(&self, target: [i64; N], feed: u32) -> Result<Option<Line<N>>, Error> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
-        self.check(&target)?;
         let steps = Self::steps(self.target, target)?;
         let length = self.length(&steps);
         if length.is_zero() {

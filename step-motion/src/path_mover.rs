@@ -8,7 +8,7 @@ use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::line::{AxisPulse, LinePulses, Steps};
-use crate::path::Path;
+use crate::path::{AxisSetup, Path};
 use crate::plan::Setpoint;
 use crate::real::Real;
 use crate::requests::Requests;
@@ -235,6 +235,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Those of [`Path::push`]; [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
+        self.path.check(&target)?;
         self.add(target, feed, now)
     }
 
@@ -293,13 +294,18 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// [`Error::TooManySteps`] more than 2^31 - 1 steps from there; [`Error::Moving`] during a
     /// [`quick_stop`](Self::quick_stop). All of them leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.path.check(&target)?;
+        self.move_freely(target, feed, now)
+    }
+
+    /// Does that wherever the soft limits are.
+    pub(super) fn move_freely(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
         self.go_to(target, feed, now)
     }
 
     /// Does that if it is [ready](Self::ready).
     pub(super) fn go_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
-        self.path.check(&target)?;
         let stop = self.stop_from(now);
         let from = stop.map_or(self.commanded, |stop| self.path.place(&self.end_of(&stop), self.begun(), self.made));
         Path::<N, M>::steps(from, target)?;
@@ -311,7 +317,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     fn add(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
-        self.path.push(target, feed)?;
+        if let Some(line) = self.path.line_to(target, feed)? {
+            self.path.add(line, target);
+        }
         self.requests.go_later();
         self.look_ahead(now);
         Ok(())
@@ -348,6 +356,15 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.clock()
     }
 
+    pub(super) const fn axes(&self) -> &[AxisSetup; N] {
+        self.path.axes()
+    }
+
+    /// Refuses a target outside the soft limits.
+    pub(super) fn check(&self, target: &[i64; N]) -> Result<(), Error> {
+        self.path.check(target)
+    }
+
     /// Plans again if new lines allow the present one to end at another speed.
     pub(super) fn look_ahead(&mut self, now: u64) {
         if self.line.is_none() {
@@ -369,9 +386,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Comes to rest as a stop does, or stays there.
     fn stop_as(&mut self, stop: Option<&Stop<N>>, now: u64) {
-        let Some(stop) = stop else { return self.leave(self.tick(now)) };
         self.requests.stop();
-        self.leave_at(stop);
+        match stop {
+            Some(stop) => self.leave_at(stop),
+            None => self.leave(self.tick(now)),
+        }
     }
 
     /// Makes no further step, because of a halt.

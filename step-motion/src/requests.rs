@@ -108,9 +108,9 @@ impl Requests {
         (self.stop, self.halted) = (Stop::None, self.halted || was_moving);
     }
 
-    /// Holds, or goes on, as others do.
+    /// Holds, or goes on, as others do, to which the same has been asked.
     pub(crate) const fn hold_as(&mut self, other: Self) {
-        (self.held, self.percent) = (other.held, other.percent);
+        (self.held, self.percent, self.number) = (other.held, other.percent, other.number);
     }
 
     /// A number that changes with each motion, stop and halt, so that whoever asked for the last one knows whether it still counts.

@@ -1,9 +1,12 @@
-//! The axis that is homed: one by one, or in two halves.
+//! The axis that is homed: by itself or of a path, one by one or in two halves.
 
+use crate::axes::Axes;
 use crate::axis::Axis;
 use crate::error::Error;
 use crate::limits::Limits;
 use crate::mover::Mover;
+use crate::path::AxisSetup;
+use crate::path_mover::PathMover;
 use crate::requests::Requests;
 use servowire_core::Direction;
 
@@ -11,6 +14,7 @@ pub(super) trait Homed {
     fn position(&self) -> i64;
     fn is_at_rest(&self) -> bool;
     fn requests(&self) -> Requests;
+    /// Where the soft limits are does not count before there is a reference.
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error>;
     fn move_to(&mut self, target: i64) -> Result<(), Error>;
     fn stop(&mut self);
@@ -38,11 +42,11 @@ impl Homed for OneByOne<'_> {
     }
 
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
-        self.mover.run(direction, speed, self.now)
+        self.mover.run_freely(direction, speed, self.now)
     }
 
     fn move_to(&mut self, target: i64) -> Result<(), Error> {
-        self.mover.move_to(target, self.now)
+        self.mover.move_freely(target, self.now)
     }
 
     fn stop(&mut self) {
@@ -72,11 +76,11 @@ impl<const N: usize> Homed for Axis<'_, N> {
     }
 
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
-        self.run(direction, speed)
+        self.run_freely(direction, speed)
     }
 
     fn move_to(&mut self, target: i64) -> Result<(), Error> {
-        self.move_to(target)
+        self.move_freely(target)
     }
 
     fn stop(&mut self) {
@@ -89,5 +93,164 @@ impl<const N: usize> Homed for Axis<'_, N> {
 
     fn set_commanded(&mut self, steps: i64) -> Result<(), Error> {
         self.set_commanded(steps)
+    }
+}
+
+/// The lines of a path: one by one, or in two halves.
+pub(super) trait Lines<const N: usize> {
+    fn setup(&self) -> &[AxisSetup; N];
+    fn commanded(&self) -> [i64; N];
+    fn is_at_rest(&self) -> bool;
+    fn requests(&self) -> Requests;
+    fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error>;
+    fn stop(&mut self);
+    fn quick_stop(&mut self, limits: [Limits; N]);
+    fn set_commanded(&mut self, steps: [i64; N]) -> Result<(), Error>;
+}
+
+/// One of the axes of a path; the others stay where they are.
+pub(super) struct OneOf<L, const N: usize> {
+    pub(super) lines: L,
+    pub(super) axis: usize,
+}
+
+impl<L: Lines<N>, const N: usize> OneOf<L, N> {
+    fn setup(&self) -> Result<AxisSetup, Error> {
+        let [axis, axes] = [self.axis, N].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
+        self.lines.setup().get(self.axis).copied().ok_or(Error::NoAxis { axis, axes })
+    }
+
+    /// The positions of all axes, with another one of this axis.
+    fn with(&self, position: i64) -> [i64; N] {
+        let mut all = self.lines.commanded();
+        if let Some(own) = all.get_mut(self.axis) {
+            *own = position;
+        }
+        all
+    }
+}
+
+impl<L: Lines<N>, const N: usize> Homed for OneOf<L, N> {
+    fn position(&self) -> i64 {
+        self.lines.commanded().get(self.axis).copied().unwrap_or(0)
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.lines.is_at_rest()
+    }
+
+    fn requests(&self) -> Requests {
+        self.lines.requests()
+    }
+
+    /// A line that is longer than any range.
+    fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
+        let setup = self.setup()?;
+        if speed == 0 {
+            self.lines.stop();
+            return Ok(());
+        }
+        let feed = (u64::from(speed) * 1_000_000).checked_div(setup.steps_per_m.into()).unwrap_or(0);
+        let far = i64::from(i32::MAX);
+        let target = match direction {
+            Direction::Forward => self.position().saturating_add(far),
+            Direction::Reverse => self.position().saturating_sub(far),
+        };
+        self.lines.move_to(self.with(target), u32::try_from(feed).unwrap_or(u32::MAX))
+    }
+
+    fn move_to(&mut self, target: i64) -> Result<(), Error> {
+        self.setup()?;
+        self.lines.move_to(self.with(target), u32::MAX)
+    }
+
+    fn stop(&mut self) {
+        self.lines.stop();
+    }
+
+    fn quick_stop(&mut self, limits: Limits) {
+        let mut all = self.lines.setup().map(|setup| setup.limits);
+        if let Some(own) = all.get_mut(self.axis) {
+            *own = limits;
+        }
+        self.lines.quick_stop(all);
+    }
+
+    fn set_commanded(&mut self, steps: i64) -> Result<(), Error> {
+        self.lines.set_commanded(self.with(steps))
+    }
+}
+
+/// A path mover at a tick.
+pub(super) struct PathOneByOne<'a, const N: usize, const M: usize> {
+    pub(super) mover: &'a mut PathMover<N, M>,
+    pub(super) now: u64,
+}
+
+impl<const N: usize, const M: usize> Lines<N> for PathOneByOne<'_, N, M> {
+    fn setup(&self) -> &[AxisSetup; N] {
+        self.mover.axes()
+    }
+
+    fn commanded(&self) -> [i64; N] {
+        self.mover.commanded()
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.mover.is_at_rest(self.now)
+    }
+
+    fn requests(&self) -> Requests {
+        self.mover.requests()
+    }
+
+    fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.mover.move_freely(target, feed, self.now)
+    }
+
+    fn stop(&mut self) {
+        self.mover.stop(self.now);
+    }
+
+    fn quick_stop(&mut self, limits: [Limits; N]) {
+        self.mover.quick_stop(limits, self.now);
+    }
+
+    fn set_commanded(&mut self, steps: [i64; N]) -> Result<(), Error> {
+        self.mover.set_commanded(steps, self.now)
+    }
+}
+
+impl<const N: usize, const M: usize, const S: usize> Lines<N> for &mut Axes<'_, N, M, S> {
+    fn setup(&self) -> &[AxisSetup; N] {
+        Axes::setup(self)
+    }
+
+    fn commanded(&self) -> [i64; N] {
+        Axes::commanded(self)
+    }
+
+    fn is_at_rest(&self) -> bool {
+        Axes::is_at_rest(self)
+    }
+
+    fn requests(&self) -> Requests {
+        Axes::requests(self)
+    }
+
+    fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        self.move_freely(target, feed)
+    }
+
+    fn stop(&mut self) {
+        Axes::stop(self);
+    }
+
+    fn quick_stop(&mut self, limits: [Limits; N]) {
+        Axes::quick_stop(self, limits);
+    }
+
+    fn set_commanded(&mut self, steps: [i64; N]) -> Result<(), Error> {
+        Axes::set_commanded(self, steps)
     }
 }

@@ -77,7 +77,8 @@ impl Mover {
             && match self.aim {
                 Aim::Rest => false,
                 Aim::At(target) => target != self.commanded,
-                Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.commanded),
+                Aim::Run(direction, _, Some(end)) => self.ahead(end, direction).is_some_and(|steps| steps > 0),
+                Aim::Run(..) => true,
             }
     }
 
@@ -156,7 +157,7 @@ impl Mover {
         let (goal, to) = match want {
             Want::Speed(v) => (Goal::Speed(v), None),
             Want::At(target) => {
-                let Some(left) = ahead(self.commanded, target, self.direction) else { return false };
+                let Some(left) = self.ahead(target, self.direction) else { return false };
                 let to = i64::from(left) << 32;
                 let Ok(way) = u64::try_from(to.saturating_sub(frame.from)) else { return false };
                 (Goal::At(Real::fixed(way, P), Real::ZERO), Some(to))
@@ -166,6 +167,13 @@ impl Mover {
         self.phases.anew(Frame { to, endless: to.is_none(), ..frame });
         planning.search(start, goal, own);
         true
+    }
+
+    /// Returns the steps to a target in a direction, of which a plan has no more than 2^31 - 1; `None` if the target is behind.
+    fn ahead(&self, target: i64, direction: Direction) -> Option<u32> {
+        let ahead = if direction.dir() { target <= self.commanded } else { target >= self.commanded };
+        let steps = target.abs_diff(self.commanded).min(u64::from(u32::MAX / 2));
+        u32::try_from(steps).ok().filter(|_| ahead)
     }
 
     /// Plans a stop, from a motion that cannot reach the aim; from rest, nothing.
@@ -211,7 +219,7 @@ impl Mover {
         }
         let direction = match self.aim {
             Aim::At(target) if target < self.commanded => Direction::Reverse,
-            Aim::Run(direction, _) => direction,
+            Aim::Run(direction, ..) => direction,
             _ => Direction::Forward,
         };
         if self.dir != Some(direction) {
@@ -234,12 +242,12 @@ impl Mover {
         match self.aim {
             Aim::Rest => None,
             Aim::At(target) => Some((Want::At(target), bounds.slower(bounds.v * part))),
-            Aim::Run(way, _) if way != direction => None,
-            Aim::Run(_, speed) => {
+            Aim::Run(way, ..) if way != direction => None,
+            Aim::Run(_, speed, end) => {
                 let v = Real::new(speed.into()) / Real::new(self.clock.moments().into());
                 let v = v.min(bounds.v) * part;
-                match self.soft {
-                    Some(soft) => Some((Want::At(edge(soft, direction)), bounds.slower(v))),
+                match end {
+                    Some(end) => Some((Want::At(end), bounds.slower(v))),
                     None => Some((Want::Speed(v), *bounds)),
                 }
             }
@@ -329,23 +337,6 @@ struct Origin {
 enum Want {
     At(i64),
     Speed(Real),
-}
-
-/// Returns the steps from a position to a target in a direction; `None` if the target is behind.
-fn ahead(position: i64, target: i64, direction: Direction) -> Option<u32> {
-    let steps = match direction {
-        Direction::Forward => target.checked_sub(position)?,
-        Direction::Reverse => position.checked_sub(target)?,
-    };
-    u32::try_from(steps).ok().filter(|steps| *steps <= u32::MAX / 2)
-}
-
-/// Returns the end of a range in a direction.
-const fn edge((low, high): (i64, i64), direction: Direction) -> i64 {
-    match direction {
-        Direction::Forward => high,
-        Direction::Reverse => low,
-    }
 }
 
 #[cfg(test)]
