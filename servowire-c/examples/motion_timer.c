@@ -18,8 +18,12 @@ void motion_interrupt(void);
 
 void motion_init(void)
 {
-    static const sw_motion_limits_t limits = {4000000, 20000, 200000}; /* steps/s3, steps/s, steps/s2 */
-    (void)sw_motion_start(&axis, &timer, &queue, 1000000, &limits);
+    static const sw_motion_setup_t setup = {
+        .limits = {.jerk = 4000000, .speed = 20000, .acceleration = 200000}, /* steps/s3, steps/s, steps/s2 */
+        .clock_hz = 1000000,
+        .reversal_pause = 20, /* us */
+    };
+    (void)sw_motion_start(&axis, &timer, &queue, &setup);
     (void)sw_motion_move_to(&axis, 3000);
 }
 

@@ -887,6 +887,48 @@ typedef int32_t sw_motion_error_t;
 #endif // __cplusplus
 
 /**
+ * The progress of a homing.
+ */
+enum sw_motion_homing_state_t
+#ifdef __cplusplus
+  : int32_t
+#endif // __cplusplus
+ {
+    /**
+     * At rest; position 0 is the place where the switch closed.
+     */
+    SW_MOTION_HOMING_DONE = 0,
+    /**
+     * Looking for the switch.
+     */
+    SW_MOTION_HOMING_SEEKING = 1,
+    /**
+     * On the switch, slowing down.
+     */
+    SW_MOTION_HOMING_STOPPING = 2,
+    /**
+     * Backing off from the switch.
+     */
+    SW_MOTION_HOMING_BACKING_OFF = 3,
+    /**
+     * Approaching the switch slowly.
+     */
+    SW_MOTION_HOMING_APPROACHING = 4,
+    /**
+     * On the switch again, slowing down.
+     */
+    SW_MOTION_HOMING_SETTLING = 5,
+    /**
+     * No switch was found within the range, or it stays closed, and the axis is stopped; or somebody else has
+     * asked it for something, and it does that. Its position is not a reference.
+     */
+    SW_MOTION_HOMING_FAILED = 6,
+};
+#ifndef __cplusplus
+typedef int32_t sw_motion_homing_state_t;
+#endif // __cplusplus
+
+/**
  * What the background has left to do.
  */
 enum sw_motion_work_t
@@ -2975,6 +3017,37 @@ typedef struct {
 } sw_motion_limits_t;
 
 /**
+ * What an axis is. What is not needed is 0.
+ */
+typedef struct {
+    /**
+     * How fast it may go.
+     */
+    sw_motion_limits_t limits;
+    /**
+     * The range that no target may leave, both ends included, in steps; sw_motion_run() stops at its end. Both
+     * 0: there is none. They do not count in a homing.
+     */
+    int64_t soft_low;
+    /**
+     * Its other end.
+     */
+    int64_t soft_high;
+    /**
+     * Ticks of the timer in a second, 1000 to 2^30 - 1.
+     */
+    uint32_t clock_hz;
+    /**
+     * Ticks between two steps in different directions, at least.
+     */
+    uint32_t reversal_pause;
+    /**
+     * A request takes effect after at most twice so many ticks, at least 16. 0: 10 ms.
+     */
+    uint32_t reach;
+} sw_motion_setup_t;
+
+/**
  * What the interrupt has to do.
  */
 typedef struct {
@@ -2992,6 +3065,43 @@ typedef struct {
      */
     uint8_t reverse;
 } sw_motion_fired_t;
+
+/**
+ * A homing.
+ */
+typedef struct {
+    uint64_t _private[16];
+} sw_motion_homing_t;
+
+/**
+ * How an axis looks for its switch.
+ */
+typedef struct {
+    /**
+     * Limits for the stop at the switch, beyond which there must be room to come to rest.
+     */
+    sw_motion_limits_t stop;
+    /**
+     * Speed of the search, in steps/s.
+     */
+    uint32_t seek;
+    /**
+     * Speed of the second, exact approach, in steps/s.
+     */
+    uint32_t approach;
+    /**
+     * How far to back off before that, in steps.
+     */
+    uint32_t back_off;
+    /**
+     * After this many steps without a switch the search is abandoned.
+     */
+    uint32_t range;
+    /**
+     * Where the switch is: 1 in reverse, 0 forward.
+     */
+    uint8_t reverse;
+} sw_motion_homing_setup_t;
 
 /**
  * A receiver of start-stop fields from an oversampled line. Its content is private.
@@ -4901,14 +5011,13 @@ sw_result_t sw_hdsl_parse_acceleration(uint16_t raw, int16_t *delta_delta);
 sw_result_t sw_hdsl_build_acceleration(int16_t delta_delta, uint16_t *out);
 
 /**
- * Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. The clock of
- * the timer has 1000 to 2^30 - 1 ticks a second. Neither end may be in use during this call.
+ * Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. Neither end may
+ * be in use during this call.
  */
 sw_result_t sw_motion_start(sw_motion_axis_t *axis,
                             sw_motion_timer_t *timer,
                             sw_motion_queue_t *queue,
-                            uint32_t clock_hz,
-                            const sw_motion_limits_t *limit);
+                            const sw_motion_setup_t *setup);
 
 /**
  * Returns the event that is due now. Call it in the interrupt of the timer, and once when sw_motion_poll()
@@ -4937,6 +5046,12 @@ sw_result_t sw_motion_run(sw_motion_axis_t *axis, uint8_t reverse, uint32_t spee
 sw_result_t sw_motion_stop(sw_motion_axis_t *axis);
 
 /**
+ * Slows down to rest within other limits, higher ones for a limit switch; the target is dropped. Moves are
+ * refused until it is at rest. A quick stop is never longer than sw_motion_stop(), even one under way.
+ */
+sw_result_t sw_motion_quick_stop(sw_motion_axis_t *axis, const sw_motion_limits_t *limit);
+
+/**
  * Stops at once: no further step is made.
  */
 sw_result_t sw_motion_halt(sw_motion_axis_t *axis);
@@ -4952,6 +5067,21 @@ sw_result_t sw_motion_hold(sw_motion_axis_t *axis);
 sw_result_t sw_motion_resume(sw_motion_axis_t *axis);
 
 /**
+ * Sets the feed override, in percent of the speed; more than 100 counts as 100, and 0 holds.
+ */
+sw_result_t sw_motion_set_override(sw_motion_axis_t *axis, uint16_t percent);
+
+/**
+ * Sets other limits, at rest.
+ */
+sw_result_t sw_motion_set_limits(sw_motion_axis_t *axis, const sw_motion_limits_t *limit);
+
+/**
+ * Says, at rest, which position this is, in steps: 0 at a reference.
+ */
+sw_result_t sw_motion_set_commanded(sw_motion_axis_t *axis, int64_t position);
+
+/**
  * Tells the commanded position of the axis, in steps.
  */
 sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position);
@@ -4960,6 +5090,28 @@ sw_result_t sw_motion_commanded(const sw_motion_axis_t *axis, int64_t *position)
  * Returns whether the axis is at rest; false for a state that was not started.
  */
 bool sw_motion_is_at_rest(const sw_motion_axis_t *axis);
+
+/**
+ * Returns whether the last stop was sw_motion_halt(): the steps are counted, but the motor may have run on.
+ * False for a state that was not started.
+ */
+bool sw_motion_is_halted(const sw_motion_axis_t *axis);
+
+/**
+ * Starts the homing of an axis at rest: fast towards its switch, back, and slowly towards it again. `closed`
+ * is the level of the switch, 1 for an axis at the switch or beyond it; such an axis moves off it first.
+ */
+sw_result_t sw_motion_home(sw_motion_homing_t *homing,
+                           sw_motion_axis_t *axis,
+                           const sw_motion_homing_setup_t *setup,
+                           uint8_t closed);
+
+/**
+ * Looks at the switch, and asks the axis for what comes next. Call it often, at least once a step of the
+ * approach, beside sw_motion_poll(). A hold and an override act on a homing as on any motion; a move, a stop
+ * or a halt ends it. Returns sw_motion_homing_state_t, or a refusal.
+ */
+sw_result_t sw_motion_homing_poll(sw_motion_homing_t *homing, sw_motion_axis_t *axis, uint8_t closed);
 
 /**
  * Prepares a receiver: samples per bit, and data bits per field (8 for a UART).

@@ -1,5 +1,9 @@
 //! Steps within limits of speed, acceleration and jerk: planned in the background, made in a timer interrupt.
 
+mod homing;
+
+pub use homing::*;
+
 use core::mem::MaybeUninit;
 
 use step_motion::{Axis, Clock, Direction, Error, Limits, Queue, StepTimer, Work};
@@ -83,6 +87,25 @@ pub struct sw_motion_limits_t {
     pub acceleration: u32,
 }
 
+/// What an axis is. What is not needed is 0.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct sw_motion_setup_t {
+    /// How fast it may go.
+    pub limits: sw_motion_limits_t,
+    /// The range that no target may leave, both ends included, in steps; sw_motion_run() stops at its end. Both
+    /// 0: there is none. They do not count in a homing.
+    pub soft_low: i64,
+    /// Its other end.
+    pub soft_high: i64,
+    /// Ticks of the timer in a second, 1000 to 2^30 - 1.
+    pub clock_hz: u32,
+    /// Ticks between two steps in different directions, at least.
+    pub reversal_pause: u32,
+    /// A request takes effect after at most twice so many ticks, at least 16. 0: 10 ms.
+    pub reach: u32,
+}
+
 /// What the interrupt has to do.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,33 +120,37 @@ pub struct sw_motion_fired_t {
 }
 
 #[inline(always)]
-fn error(error: Error) -> Refused {
+pub(crate) fn error(error: Error) -> Refused {
     refused(Protocol::Motion, error.class().number())
 }
 
-fn limits(it: &sw_motion_limits_t) -> Result<Limits, Refused> {
+pub(crate) fn limits(it: &sw_motion_limits_t) -> Result<Limits, Refused> {
     let limits = in_range(Limits::new(it.speed, it.acceleration).ok())?;
     if it.jerk == 0 { Ok(limits) } else { in_range(limits.with_jerk(it.jerk).ok()) }
 }
 
-/// Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. The clock of
-/// the timer has 1000 to 2^30 - 1 ticks a second. Neither end may be in use during this call.
+/// Prepares an axis at rest at position 0: its two ends, and the `static` queue between them. Neither end may
+/// be in use during this call.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_start(
     axis: Option<&mut MaybeUninit<sw_motion_axis_t>>,
     timer: Option<&mut MaybeUninit<sw_motion_timer_t>>,
     queue: Option<&'static mut MaybeUninit<sw_motion_queue_t>>,
-    clock_hz: u32,
-    limit: Option<&sw_motion_limits_t>,
+    setup: Option<&sw_motion_setup_t>,
 ) -> sw_result_t {
     border(|| {
         let (axis, timer, place) = (there(axis)?, there(timer)?, there(queue)?.as_mut_ptr().cast::<Queue<SLOTS>>());
-        let (clock, limits) = (in_range(Clock::new(clock_hz))?, limits(there(limit)?)?);
+        let setup = there(setup)?;
+        let (clock, limits) = (in_range(Clock::new(setup.clock_hz))?, limits(&setup.limits)?);
+        let soft = in_range((setup.soft_low <= setup.soft_high).then_some((setup.soft_low, setup.soft_high)))?;
         // SAFETY: large enough and aligned, as asserted above; nobody uses it.
         unsafe { place.write(Queue::new()) };
         // SAFETY: it was written, and the caller leaves it where it is for ever; from now on it is only shared.
         let queue: &'static Queue<SLOTS> = unsafe { &*place };
         let (background, interrupt) = Axis::new(queue, clock, limits).map_err(error)?;
+        let background = background.with_reversal_pause(setup.reversal_pause);
+        let background = if soft == (0, 0) { background } else { background.with_soft_limits(soft.0, soft.1) };
+        let background = if setup.reach == 0 { background } else { background.with_reach(setup.reach) };
         sw_motion_axis_t::start(Some(axis), background)?;
         sw_motion_timer_t::start(Some(timer), interrupt)?;
         OK
@@ -188,6 +215,20 @@ pub extern "C" fn sw_motion_stop(axis: Option<&mut sw_motion_axis_t>) -> sw_resu
     })
 }
 
+/// Slows down to rest within other limits, higher ones for a limit switch; the target is dropped. Moves are
+/// refused until it is at rest. A quick stop is never longer than sw_motion_stop(), even one under way.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_quick_stop(
+    axis: Option<&mut sw_motion_axis_t>,
+    limit: Option<&sw_motion_limits_t>,
+) -> sw_result_t {
+    border(|| {
+        let (axis, limits) = (sw_motion_axis_t::get(axis)?, limits(there(limit)?)?);
+        axis.quick_stop(limits);
+        OK
+    })
+}
+
 /// Stops at once: no further step is made.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_halt(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
@@ -215,6 +256,37 @@ pub extern "C" fn sw_motion_resume(axis: Option<&mut sw_motion_axis_t>) -> sw_re
     })
 }
 
+/// Sets the feed override, in percent of the speed; more than 100 counts as 100, and 0 holds.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_set_override(axis: Option<&mut sw_motion_axis_t>, percent: u16) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.set_override(percent);
+        OK
+    })
+}
+
+/// Sets other limits, at rest.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_set_limits(
+    axis: Option<&mut sw_motion_axis_t>,
+    limit: Option<&sw_motion_limits_t>,
+) -> sw_result_t {
+    border(|| {
+        let (axis, limits) = (sw_motion_axis_t::get(axis)?, limits(there(limit)?)?);
+        axis.set_limits(limits).map_err(error)?;
+        OK
+    })
+}
+
+/// Says, at rest, which position this is, in steps: 0 at a reference.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_set_commanded(axis: Option<&mut sw_motion_axis_t>, position: i64) -> sw_result_t {
+    border(|| {
+        sw_motion_axis_t::get(axis)?.set_commanded(position).map_err(error)?;
+        OK
+    })
+}
+
 /// Tells the commanded position of the axis, in steps.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_commanded(
@@ -232,4 +304,11 @@ pub extern "C" fn sw_motion_commanded(
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_is_at_rest(axis: Option<&sw_motion_axis_t>) -> bool {
     sw_motion_axis_t::look(axis).is_ok_and(Axis::is_at_rest)
+}
+
+/// Returns whether the last stop was sw_motion_halt(): the steps are counted, but the motor may have run on.
+/// False for a state that was not started.
+#[unsafe(no_mangle)]
+pub extern "C" fn sw_motion_is_halted(axis: Option<&sw_motion_axis_t>) -> bool {
+    sw_motion_axis_t::look(axis).is_ok_and(Axis::is_halted)
 }

@@ -135,9 +135,11 @@ fn both_ends_of_a_motion() {
     let place = std::boxed::Box::into_raw(std::boxed::Box::new(MaybeUninit::<sw_motion_queue_t>::zeroed()));
     let (mut axis, mut timer) = (MaybeUninit::zeroed(), MaybeUninit::zeroed());
     let limits = sw_motion_limits_t { jerk: 0, speed: 1_000, acceleration: 100_000 };
+    let setup =
+        sw_motion_setup_t { limits, soft_low: 0, soft_high: 0, clock_hz: 1_000_000, reversal_pause: 0, reach: 0 };
     // SAFETY: the place stays until the end of the test.
     let queue = unsafe { &mut *place };
-    assert_eq!(sw_motion_start(Some(&mut axis), Some(&mut timer), Some(queue), 1_000_000, Some(&limits)), 0);
+    assert_eq!(sw_motion_start(Some(&mut axis), Some(&mut timer), Some(queue), Some(&setup)), 0);
     // SAFETY: they were started.
     let (axis, timer) = unsafe { (axis.assume_init_mut(), timer.assume_init_mut()) };
     assert_eq!(sw_motion_move_to(Some(axis), 3), 0);
@@ -178,6 +180,7 @@ fn no_two_kinds_of_state_have_the_same_mark() {
         crate::hdsl::sw_hdsl_t::MARK,
         crate::hdsl::sw_hdsl_tracker_t::MARK,
         crate::motion::sw_motion_axis_t::MARK,
+        crate::motion::sw_motion_homing_t::MARK,
         crate::motion::sw_motion_timer_t::MARK,
         crate::nrz::sw_nrz_t::MARK,
         crate::rtex::sw_rtex_axis_t::MARK,
