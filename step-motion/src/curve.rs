@@ -200,6 +200,18 @@ mod tests {
         }
     }
 
+    /// No phase is added where nothing is to be gone, or cannot be.
+    #[test]
+    fn a_cruise_of_nothing_is_none() {
+        let mut curve = Curve::new();
+        for (v, distance) in [(2, 0), (0, 2), (0, 0)] {
+            curve.cruise(Real::new(v), Real::new(distance));
+            assert!(curve.pieces().is_empty() && curve.time.is_zero(), "{curve:?}");
+        }
+        curve.cruise(Real::new(2), Real::new(8));
+        assert!(curve.pieces().len() == 1 && curve.way() == Real::new(8), "{curve:?}");
+    }
+
     #[test]
     fn a_piece_ends_where_the_next_one_begins() {
         let mut curve = Curve::new();

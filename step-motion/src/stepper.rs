@@ -205,3 +205,19 @@ fn split(time: i128) -> (u64, u64) {
 pub(super) fn tick(time: i128) -> u64 {
     u64::try_from(time.wrapping_add(HALF) >> 32).unwrap_or(if time < 0 { 0 } else { u64::MAX })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The nearest one, up to the half of the way to the next; and the first or the last one of all.
+    #[test]
+    fn the_tick_of_a_time() {
+        let last = i128::from(u64::MAX);
+        let times =
+            [(0, 0), (HALF - 1, 0), (HALF, 1), (7 << 32, 7), (-HALF, 0), (-HALF - 1, 0), (-9 << 32, 0), (i128::MIN, 0)];
+        assert_eq!(times.map(|(time, _)| tick(time)), times.map(|(_, want)| want));
+        let late = [last << 32, (last << 32) + HALF, (last + 5) << 32];
+        assert_eq!(late.map(tick), [u64::MAX; 3]);
+    }
+}

@@ -83,6 +83,51 @@ fn a_hold_behind_the_last_step_adds_no_time() {
     assert_eq!(held, plain);
 }
 
+/// Of a machine that has nothing to do.
+#[test]
+fn a_request_at_rest_leaves_it_at_rest() {
+    let mut bench = Bench::new();
+    for ask in [Axes::hold, |axes: &mut Axes<'static, 2, 4, SLOTS>| axes.set_override(50), Axes::resume, Axes::stop] {
+        ask(&mut bench.axes);
+        assert!(bench.axes.is_at_rest());
+        assert_eq!(bench.axes.poll(), Work::Rest);
+    }
+    bench.axes.hold();
+    bench.axes.push([10, 0], 100_000).unwrap();
+    bench.until(100_000, true);
+    bench.axes.set_override(50);
+    assert!(bench.axes.is_at_rest() && bench.axes.commanded() == [0, 0]);
+    bench.axes.resume();
+    assert!(!bench.axes.is_at_rest());
+}
+
+/// In one slice after the other a stop is asked for again: it has the same steps as if it was not.
+#[test]
+fn a_stop_that_is_asked_for_again_is_the_same_one() {
+    for quick in [false, true] {
+        let [once, again] = [false, true].map(|again| {
+            let mut bench = Bench::running();
+            let stop = |axes: &mut Axes<'static, 2, 4, SLOTS>| {
+                if quick {
+                    axes.quick_stop([Limits::new(8000, 200_000).unwrap(); 2]);
+                } else {
+                    axes.stop();
+                }
+            };
+            stop(&mut bench.axes);
+            while !bench.axes.is_at_rest() {
+                bench.machine.slice(&mut bench.axes);
+                if again {
+                    stop(&mut bench.axes);
+                }
+                bench.machine.until(bench.machine.now + 20);
+            }
+            bench.machine.steps
+        });
+        assert!(once.len() > 2000 && once == again, "{quick}");
+    }
+}
+
 /// A request that has not been planned is done with what was to be planned.
 #[test]
 fn an_axis_is_at_rest_once_a_halt_is_confirmed() {

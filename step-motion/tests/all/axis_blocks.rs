@@ -87,6 +87,34 @@ fn a_stop_after_a_stop_is_a_rest() {
     }
 }
 
+/// At 1000 steps/s² rest comes up to 32 ms after the last step; what is asked for in between leaves nothing to make.
+#[test]
+fn a_request_behind_the_last_step_adds_no_time() {
+    let asks: [fn(&mut Axis<'static, 129>); 5] = [
+        |_| {},
+        |axis| axis.hold(),
+        |axis| axis.stop(),
+        |axis| axis.set_override(50),
+        |axis| axis.quick_stop(Limits::new(9, 9).unwrap()),
+    ];
+    for made in 1..9 {
+        let ends = asks.map(|ask| {
+            let mut bench = Bench::<129>::new(2000, 1000, 10_000);
+            bench.axis.move_to(made).unwrap();
+            while bench.at() < made {
+                bench.until(500, bench.machine.now + 500);
+            }
+            ask(&mut bench.axis);
+            while bench.machine.slice(&mut bench.axis) == Work::More {}
+            bench.machine.drain();
+            assert_eq!(bench.machine.slice(&mut bench.axis), Work::Rest);
+            (bench.machine.now, bench.axis.is_at_rest())
+        });
+        assert_eq!(ends, [ends[0]; 5], "behind step {made}");
+        assert!(ends[0].1);
+    }
+}
+
 /// 1000 steps/s, and no way to rest: a stop behind what is handed out has nothing to do once the interrupt has made that.
 #[test]
 fn a_stop_of_less_than_a_tick_is_a_rest() {
