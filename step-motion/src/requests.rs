@@ -263,6 +263,16 @@ mod tests {
         assert!(!after(&[Requests::hold, |requests| requests.halt()]).brakes(), "it ends a hold");
     }
 
+    /// What was asked of a copy in another order, or not at all, counts as it does for the other one.
+    #[test]
+    fn a_copy_holds_as_the_other_one_does() {
+        let other = after(&[Requests::stop, Requests::hold, |requests| requests.set_override(50)]);
+        let mut copy = after(&[|requests| requests.go(), Requests::quick_stop]);
+        copy.hold_as(other);
+        assert!(copy.number() == other.number() && copy.is_quick());
+        assert_eq!((copy.held, copy.percent), (true, 50));
+    }
+
     /// A halt at rest after one of a motion, and others the same.
     #[test]
     fn what_lasts_until_another_motion() {

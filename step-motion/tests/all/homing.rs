@@ -1,6 +1,7 @@
 //! A homing beside other requests to its axis: by itself and of a path, one by one and in two halves.
 
 mod benches;
+mod laws;
 
 use step_motion::{
     AxesQueue, AxisSetup, Clock, Direction, Error, Homing, HomingConfig, HomingState, Limits, Mover, Path, PathMover,

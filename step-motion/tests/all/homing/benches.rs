@@ -11,7 +11,7 @@ use crate::machine::Machine;
 /// Positions, so they do not count before there is a reference: the switch is beyond them, and so is where it backs off to.
 const SOFT: (i64, i64) = (-60, 200);
 
-/// What is homed: how, and where the switch is; `None` if it never closes.
+/// What is homed: how, and how far ahead the switch is; `None` if it never closes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Case {
     pub(super) config: HomingConfig,
@@ -23,8 +23,14 @@ impl Case {
         Self { config: config(300), switch: Some(SWITCH) }
     }
 
-    fn switch(self, at: i64) -> Switch {
-        if self.switch.is_some_and(|switch| at >= switch) { Switch::Closed } else { Switch::Open }
+    /// Where the switch closes.
+    pub(super) fn place(self) -> Option<i64> {
+        self.switch.map(|switch| if self.config.direction.dir() { -switch } else { switch })
+    }
+
+    pub(super) fn switch(self, at: i64) -> Switch {
+        let ahead = if self.config.direction.dir() { -at } else { at };
+        if self.switch.is_some_and(|switch| ahead >= switch) { Switch::Closed } else { Switch::Open }
     }
 }
 
@@ -70,7 +76,7 @@ pub(super) struct OneByOne {
 impl OneByOne {
     pub(super) fn new(case: Case) -> Self {
         let mut mover = Mover::new(Clock::MICROSECONDS, limits()).unwrap().with_soft_limits(SOFT.0, SOFT.1);
-        let homing = Homing::start(case.config, &mut mover, Switch::Open, 0).unwrap();
+        let homing = Homing::start(case.config, &mut mover, case.switch(0), 0).unwrap();
         Self { case, mover, homing, now: 0, real: 0 }
     }
 }
@@ -122,7 +128,7 @@ impl<'q> Halves<'q> {
     pub(super) fn new(case: Case, queue: &'q Queue<SLOTS>) -> Self {
         let (axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits()).unwrap();
         let mut axis = axis.with_reach(2000).with_soft_limits(SOFT.0, SOFT.1);
-        let homing = Homing::start_axis(case.config, &mut axis, Switch::Open).unwrap();
+        let homing = Homing::start_axis(case.config, &mut axis, case.switch(0)).unwrap();
         Self { case, axis, machine: Machine::new(timer), homing, more: 0 }
     }
 }
@@ -184,7 +190,7 @@ impl OfPath {
     pub(super) fn new(case: Case) -> Self {
         let mut mover = PathMover::new(path());
         mover.set_commanded([OTHER, 0], 0).unwrap();
-        let homing = Homing::start_path(case.config, &mut mover, 1, Switch::Open, 0).unwrap();
+        let homing = Homing::start_path(case.config, &mut mover, 1, case.switch(0), 0).unwrap();
         Self { case, mover, homing, now: 0, real: 0 }
     }
 }
@@ -240,7 +246,7 @@ impl<'q> OfAxes<'q> {
         let (axes, timer) = Axes::new(queue, path());
         let mut axes = axes.with_reach(2000);
         axes.set_commanded([OTHER, 0]).unwrap();
-        let homing = Homing::start_axes(case.config, &mut axes, 1, Switch::Open).unwrap();
+        let homing = Homing::start_axes(case.config, &mut axes, 1, case.switch(0)).unwrap();
         let mut machine = Machine::new(timer);
         machine.position[0] = OTHER;
         Self { case, axes, machine, homing, more: 0, stalls }
