@@ -31,18 +31,19 @@ pub(crate) const AXES: usize = 3;
 pub(crate) struct Part {
     /// Run a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), dwells (G4), references (G28, G30), G53 to
     /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min; arcs are chords
-    /// within 2 um. Anything else is refused with its line.
+    /// within 2 um. M0, M1, M6 and M60 come to rest, M2 and M30 end it, and spindle, coolant and tool words move nothing. Anything
+    /// else is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
     /// Steps per millimetre of each axis of a part program.
-    #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", requires = "gcode", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     steps_per_mm: u32,
     /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000,low=0,high=300,pause=0.5, in mm/min, mm/s²,
     /// mm/s³, soft limits in mm, and ms of rest before each change of direction; repeat it for each axis.
     #[arg(long, value_name = "AXIS", requires = "gcode")]
     axis: Vec<setup::Setup>,
     /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P override it.
-    #[arg(long, value_name = "UM", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    #[arg(long, value_name = "UM", requires = "gcode", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     deviation: u32,
     /// Leave out the lines of a part program that begin with a slash.
     #[arg(long, requires = "gcode")]
@@ -55,6 +56,7 @@ impl Part {
     pub(crate) const ACCELERATION: u32 = 400_000;
 
     /// Reads all of a part program for faults, and for lines beyond the soft limits of an axis; how many straight lines it has.
+    /// Says on standard error where the file goes on behind the end of its program.
     pub(crate) fn check(&self, path: &Path) -> Result<usize, Box<dyn std::error::Error>> {
         let (mut lines, mut program) = (0, self.open(path)?);
         // Their speeds play no part.
@@ -65,6 +67,9 @@ impl Part {
                 return Err(program.refuse(what).into());
             }
             lines += 1;
+        }
+        if let Some(note) = program.behind_the_end()? {
+            eprintln!("{note}");
         }
         if lines == 0 {
             let what = "no motion in it: a line with G0 or G1 and X, Y or Z begins one";

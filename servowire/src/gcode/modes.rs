@@ -121,7 +121,11 @@ impl State {
             self.feed = Some(feed);
         }
         if smooth {
-            let most = numbers.p.map(|p| (p * self.unit * 1000.0).round() as u32);
+            let most = numbers.p.map(|p| p * self.unit);
+            if let Some(most) = most.filter(|most| !(0.0..=1000.0).contains(most)) {
+                return Err(format!("G64 P: corners rounded by {most} mm: from 0 to 1000"));
+            }
+            let most = most.map(|most| (most * 1000.0).round() as u32);
             items.push_back(Item::Deviation(most));
         } else if numbers.p.is_some() && once != Some(Once::Dwell) {
             return Err("P belongs to G4 and G64".to_owned());
@@ -303,7 +307,8 @@ impl State {
     }
 }
 
-/// Codes have at most one digit after the point: G28.1 is 281.
+/// Codes have at most one digit after the point: G28.1 is 281, and a number with more digits is no code.
 fn tenths(number: f64) -> i64 {
-    (number * 10.0).round() as i64
+    let tenths = (number * 10.0).round();
+    if (number * 10.0 - tenths).abs() < 1e-6 { tenths as i64 } else { i64::MIN }
 }

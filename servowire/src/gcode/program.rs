@@ -1,7 +1,7 @@
 //! The content of a part program as straight lines and rests, read line by line.
 
 use std::collections::VecDeque;
-use std::io::BufRead;
+use std::io::{self, BufRead};
 
 use servowire_decode::fault::{At, Fault};
 
@@ -16,6 +16,8 @@ pub(super) struct Program<R> {
     number: u64,
     /// Lines that begin with a slash are skipped.
     block_delete: bool,
+    /// It has words; a percent sign behind them ends it.
+    begun: bool,
     over: bool,
     state: State,
     items: VecDeque<Item>,
@@ -24,7 +26,7 @@ pub(super) struct Program<R> {
 impl<R: BufRead> Program<R> {
     pub(super) fn new(name: &str, text: R, block_delete: bool) -> Self {
         let (state, items) = (State::default(), VecDeque::new());
-        Self { name: name.to_owned(), text, number: 0, block_delete, over: false, state, items }
+        Self { name: name.to_owned(), text, number: 0, block_delete, begun: false, over: false, state, items }
     }
 
     /// A fault of the line that was read last, which ends the program.
@@ -41,19 +43,41 @@ impl<R: BufRead> Program<R> {
     }
 
     fn line(&mut self) -> Result<(), Fault> {
-        let mut line = Vec::new();
-        let fault = |number, what| Fault::new(&self.name, number, what);
-        let got = self.text.read_until(b'\n', &mut line).map_err(|e| fault(At::File, e.to_string()))?;
-        self.number += 1;
-        let line = String::from_utf8_lossy(&line);
+        let Some(line) = self.read()? else {
+            self.over = true;
+            return Ok(());
+        };
         let done = words(&line).and_then(|words| {
             if words.optional && self.block_delete {
                 return Ok(false);
             }
-            self.state.block(&words.words, &mut self.items)
+            self.begun |= !words.list.is_empty();
+            let over = self.state.block(&words.list, &mut self.items)?;
+            Ok(over || (words.percent && self.begun))
         });
-        self.over = done.map_err(|what| fault(At::Line(self.number), what))? || got == 0;
+        self.over = done.map_err(|what| Fault::new(&self.name, At::Line(self.number), what))?;
         Ok(())
+    }
+
+    /// Reads a line; `None` at the end of the file.
+    fn read(&mut self) -> Result<Option<String>, Fault> {
+        let mut line = Vec::new();
+        let fault = |e: io::Error| Fault::new(&self.name, At::File, e.to_string());
+        let got = self.text.read_until(b'\n', &mut line).map_err(fault)?;
+        self.number += 1;
+        Ok((got > 0).then(|| String::from_utf8_lossy(&line).into_owned()))
+    }
+
+    /// Where the program has ended before its file: the first line behind M2, M30 or a percent sign that is more than a comment.
+    pub(super) fn behind_the_end(&mut self) -> Result<Option<Fault>, Fault> {
+        let end = self.number;
+        while let Some(line) = self.read()? {
+            if !words(&line).is_ok_and(|words| words.list.is_empty()) {
+                let what = format!("not run, nor is what follows: the program ends in line {end}");
+                return Ok(Some(Fault::new(&self.name, At::Line(self.number), what)));
+            }
+        }
+        Ok(None)
     }
 }
 

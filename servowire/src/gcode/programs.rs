@@ -238,7 +238,30 @@ fn refusals_name_the_line_and_what_to_do() {
         ("M98 P1", "M98 is not in the subset"),
         ("G0 X#1", "values are numbers, not variables"),
         ("hello world", "line 1"),
+        ("G1.04 X1 F100", "line 1: G1.04 is not in the subset"),
+        ("G0 X1\nM30.04", "line 2: M30.04 is not in the subset"),
+        ("G64 P-1", "corners rounded by -1 mm"),
+        ("G64 P1001", "from 0 to 1000"),
     ] {
         assert!(refused(text).contains(want), "{text}: {}", refused(text));
+    }
+}
+
+/// As in RS274/NGC: nothing is run behind M2, M30, or a percent sign behind the first words.
+#[test]
+fn a_program_ends_before_its_file() {
+    for (text, lines, behind) in [
+        ("G0 X1\nM2\nG0 X5\n", 1, Some("part.nc, line 3: not run, nor is what follows: the program ends in line 2")),
+        ("G0 X1\nM30\n\n(a note)\nBLAH\n", 1, Some("part.nc, line 5: ")),
+        ("%\nO7\nG0 X1\n%\nG0 X5\n", 1, Some("part.nc, line 5: ")),
+        ("%\n\n(two signs)\n%\nG0 X1\nX2\n", 2, None),
+        ("%\nG0 X1\nM30\n%\n\n; no more\n", 1, None),
+        ("G0 X1\nX2", 2, None),
+    ] {
+        let mut program = Program::new("part.nc", text.as_bytes(), false);
+        assert_eq!(program.by_ref().map(Result::unwrap).count(), lines, "{text}");
+        let said = program.behind_the_end().unwrap().map(|fault| fault.to_string());
+        assert!(said.is_some() == behind.is_some(), "{text}: {said:?}");
+        assert!(said.unwrap_or_default().starts_with(behind.unwrap_or_default()), "{text}");
     }
 }

@@ -68,7 +68,9 @@ impl FromStr for Setup {
                 setting.split_once('=').ok_or_else(|| format!("\"{setting}\" is not a setting, such as speed=6000"))?;
             let (place, least) = new.place(key.trim())?;
             let value = value.trim().parse().ok().filter(|value: &f64| least.allows(*value) && value.is_finite());
-            *place = Some(value.ok_or_else(|| format!("\"{setting}\": {}", least.name()))?);
+            if place.replace(value.ok_or_else(|| format!("\"{setting}\": {}", least.name()))?).is_some() {
+                return Err(format!("{} is there twice", key.trim()));
+            }
         }
         new.check()?;
         Ok(new)
@@ -177,6 +179,7 @@ mod tests {
             ("A:speed=1", "\"A\" is not an axis"),
             ("X:feed=1", "\"feed\": steps-per-mm, speed"),
             ("X:speed", "is not a setting"),
+            ("X:speed=1, speed=2", "speed is there twice"),
             ("X:speed=0", "above 0"),
             ("X:steps-per-mm=20000", "0.001 to 10000"),
             ("X:low=NaN", "a number"),

@@ -10,9 +10,11 @@ pub(super) struct Word {
 /// The content of a line.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Words {
-    pub(super) words: Vec<Word>,
+    pub(super) list: Vec<Word>,
     /// Whether it begins with a slash, so that it may be skipped.
     pub(super) optional: bool,
+    /// Whether it is a percent sign, which stands before and behind a program.
+    pub(super) percent: bool,
 }
 
 /// Returns the words of a line, without its number, its comments and its checksum.
@@ -20,6 +22,7 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
     let text = checked(line.trim_start_matches('\u{feff}').trim())?;
     let mut out = Words::default();
     if text.starts_with('%') {
+        out.percent = true;
         return Ok(out);
     }
     let mut left = text.chars().peekable();
@@ -50,14 +53,17 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
                     (Err(_), _) if digits.is_empty() => return Err(format!("{letter} has no number")),
                     (Err(_), _) => return Err(format!("{letter}{digits}: \"{digits}\" is not a number")),
                 };
-                out.words.push(Word { letter, value });
+                out.list.push(Word { letter, value });
             }
             '#' | '[' => return Err("values are numbers, not variables or sums; write the number".to_owned()),
+            '\0' | char::REPLACEMENT_CHARACTER => {
+                return Err("a byte that is no text: a part program is a text file, in ASCII or UTF-8".to_owned());
+            }
             _ => return Err(format!("\"{letter}\" is not G-code: a word is a letter and a number")),
         }
     }
     // The number of a line, and of a program.
-    out.words.retain(|word| !matches!(word.letter, 'N' | 'O'));
+    out.list.retain(|word| !matches!(word.letter, 'N' | 'O'));
     Ok(out)
 }
 
@@ -74,7 +80,7 @@ mod tests {
     use super::*;
 
     fn pairs(line: &str) -> Vec<(char, f64)> {
-        words(line).unwrap().words.iter().map(|word| (word.letter, word.value)).collect()
+        words(line).unwrap().list.iter().map(|word| (word.letter, word.value)).collect()
     }
 
     #[test]
@@ -106,6 +112,7 @@ mod tests {
             ("G0 X1.2.3", "not a number"),
             ("G0 (left", "unterminated comment"),
             ("G0 &", "is not G-code"),
+            ("\u{fffd}\u{fffd}G\0", "a byte that is no text"),
         ] {
             let error = words(line).unwrap_err();
             assert!(error.contains(want), "{line}: {error}");
