@@ -11,8 +11,9 @@
    every line of the drawing is a dependency. Dependencies of tests do not count. An arrow leads to the name under it; if no other one
    leads to that row, to the whole row.
 3. CONTRIBUTING.md lists the folder of every package.
-4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder. Its first screen of 45
-   lines shows what to call: code, or a table that begins with what one has.
+4. The README of what is published is its page on docs.rs too, where no link leads out of the crate's folder; the paths of items that
+   it names are in lib.rs, because elsewhere they lead nowhere. Its first screen of 45 lines shows what to call: code, or a table that
+   begins with what one has.
 5. Every public name has a user (`names.py`).
 6. Figures that the README of servowire-drivers repeats are those of their sources: the table of the images, `budget.toml`.
 """
@@ -352,8 +353,8 @@ def faults_of_map(text, packages):
 
 
 def faults_of_links(name, text):
-    for found in re.finditer(r"\]\((\.\./[^)]*)\)", text):
-        yield f"{name}: the link {found[1]} leads nowhere on docs.rs"
+    for found in re.finditer(r"\]\((\.\./[^)]*|\w+(?:::|@)[^)]*)\)", text):
+        yield f"{name}: the link {found[1]} leads nowhere {'on docs.rs' if found[1].startswith('.') else 'but in rustdoc'}"
 
 
 def faults_of_first_screen(name, text):
@@ -472,7 +473,7 @@ def self_test():
         faults = list(faults_of_drawing(DRAWING, wrong, names | extra))
         equal(f"a drawing that is wrong ({words})", True, any(words in fault for fault in faults))
     places = [{"manifest_path": str(ROOT / name / "Cargo.toml")} for name in "ab"]
-    equal("links", 1, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f)"))))
+    equal("links", 2, len(list(faults_of_links("README.md", "[a](../b/README.md) [c](d.md) [e](https://f) [g](h::I)"))))
     equal("first screens", 1, sum(len(list(faults_of_first_screen("README.md", "\n" * n + "```rust"))) for n in (44, 45)))
     images, budget = "| [`one`](a/README.md) | 1 kB | 2 B | 3 B | 4 |", "two = { O3 = 1234.4, Os = 56.2, limit_O3 = 7 }"
     equal("true figures", [], list(faults_of_figures("| `one` | x | 1 kB | 2 B | 3 B |\n| y | `two` | 1,234; 56 |", images, budget)))

@@ -1,4 +1,18 @@
 #![doc = include_str!("../README.md")]
+//!
+//! [`Device::hear`]: device::Device::hear
+//! [`hear_words`]: master::Master::hear_words
+//! [`HFrame::finished`]: master::HFrame::finished
+//! [`HFrame`]: master::HFrame
+//! [`Master::fast`]: master::Master::fast
+//! [`Master::hear_bits`]: master::Master::hear_bits
+//! [`Master::hear`]: master::Master::hear
+//! [`Master::safe`]: master::Master::safe
+//! [`Master::start_short`]: master::Master::start_short
+//! [`Master::transmission`]: master::Master::transmission
+//! [`Report`]: inspect::Report
+//! [`start_long`]: master::Master::start_long
+//! [`Transmission`]: device::Transmission
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]

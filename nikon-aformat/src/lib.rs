@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+//!
+//! [`Detection`]: master::Detection
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]

@@ -1,4 +1,37 @@
 #![doc = include_str!("../README.md")]
+//!
+//! [`Arrival`]: master::Arrival
+//! [`AskError::ServoOn`]: master::AskError::ServoOn
+//! [`Axis::arrival`]: master::Axis::arrival
+//! [`Axis::ask_sub`]: master::Axis::ask_sub
+//! [`Axis::counters`]: master::Axis::counters
+//! [`Axis::disobeys`]: master::Axis::disobeys
+//! [`Axis::evidence`]: master::Axis::evidence
+//! [`Axis::not_sent`]: master::Axis::not_sent
+//! [`Axis::stop`]: master::Axis::stop
+//! [`Axis`]: master::Axis
+//! [`AxisConfig::deceleration`]: master::AxisConfig::deceleration
+//! [`AxisConfig::stop`]: master::AxisConfig::stop
+//! [`Behaviour`]: device::Behaviour
+//! [`ClearableIf`]: master::procedure::ClearableIf
+//! [`ClearAlarm`]: master::procedure::ClearAlarm
+//! [`CommandEnded`]: master::CommandEnded
+//! [`Failure::Stopped`]: master::Failure::Stopped
+//! [`Fault`]: device::Fault
+//! [`Held`]: master::AxisState::Held
+//! [`Home`]: master::procedure::Home
+//! [`inspect`]: mod@inspect
+//! [`Limits::echo`]: master::Limits::echo
+//! [`Master`]: master::Master
+//! [`Ring::is_torn`]: master::Ring::is_torn
+//! [`Ring::stop`]: master::Ring::stop
+//! [`Ring`]: master::Ring
+//! [`Run`]: master::Run
+//! [`SameMacId`]: master::SameMacId
+//! [`SetpointError::Step`]: master::SetpointError::Step
+//! [`StopReason::WrongMacId`]: master::StopReason::WrongMacId
+//! [`SwitchOnError`]: master::SwitchOnError
+//! [`TimedOut`]: master::Failure::TimedOut
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]

@@ -1,4 +1,7 @@
 #![doc = include_str!("../README.md")]
+//!
+//! [`Hints::guard`]: capture::Hints::guard
+//! [`Settings`]: settings::Settings
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,

@@ -1,4 +1,15 @@
 #![doc = include_str!("../README.md")]
+//!
+//! [`Behaviour`]: device::Behaviour
+//! [`Detection`]: master::Detection
+//! [`EepromAccess`]: master::EepromAccess
+//! [`Fault`]: device::Fault
+//! [`Line::hand_over_ns`]: master::Line::hand_over_ns
+//! [`Line::latency_budget_ns`]: master::Line::latency_budget_ns
+//! [`MultiTurnZero`]: master::MultiTurnZero
+//! [`Reset`]: master::Reset
+//! [`SingleTurnZero`]: master::SingleTurnZero
+//! [`Transaction`]: master::Transaction
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
