@@ -61,8 +61,8 @@ impl EncoderId {
         }
     }
 
-    /// Returns the width of the position, if this receiver supports the encoder: acceleration of 11 bits, position of 8..=40
-    /// bits, no continuation.
+    /// Returns the width of the position, if this receiver supports the encoder: acceleration of 11 bits, position of 11..=40
+    /// bits (an identifier says how many more than the acceleration has), no continuation.
     ///
     /// # Errors
     /// [`Error::UnsupportedEncoder`].
