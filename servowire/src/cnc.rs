@@ -52,6 +52,9 @@ use wires::{LONGEST_CABLE_NS, Physics};
 /// Steps/s of an axis: one in each cycle of 4 us.
 const MOST_STEPS: u32 = 250_000;
 
+/// Steps of a move: a turn at 1/256.
+const STEPS: u32 = 51_200;
+
 /// Runs of more cycles than this have a progress bar.
 const LONG: u64 = 2_000_000;
 
@@ -75,10 +78,10 @@ pub struct Arguments {
     #[arg(long, value_name = "NS", value_parser = cycle_time)]
     cycle_time: Option<u32>,
     /// Print cycle time against devices, cable and payload, and stop; with --svg, draw it.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["dance", "independent", "vcd", "pcapng", "wav"])]
     scaling: bool,
     /// Length of a move in steps; 51200 steps are one turn at 1/256.
-    #[arg(long, value_name = "N", default_value_t = 51_200, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with = "dance", default_value_t = STEPS, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, which suits that machine. In a longer cycle motion is slower in proportion.
@@ -234,9 +237,14 @@ impl Arguments {
     /// use.
     pub(crate) fn run(&self) -> ExitCode {
         let mut out = BufWriter::new(io::stdout().lock());
+        if self.scaling && self.part.gcode.is_some() {
+            eprintln!("error: --scaling runs no part program");
+            return ExitCode::from(2);
+        }
         if self.scaling {
             let drawn = self.svg.as_deref().map_or(Ok(()), |path| draw(path, scaling::draw));
-            return match scaling::table(&mut out).map_err(Into::into).and(drawn) {
+            let table = scaling::table(&mut out).and_then(|()| out.flush());
+            return match table.map_err(Into::into).and(drawn) {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(error) => failed(error.as_ref()),
             };
@@ -264,7 +272,7 @@ impl Arguments {
         let devices = self.driver_fault.map(|(device, ..)| device);
         for device in self.unplug.map(|(device, _)| device).into_iter().chain(devices) {
             if device > usize::from(self.devices) {
-                return Err(format!("device {device} of {}", self.devices).into());
+                return Err(format!("there is no device {device}: the line has {} (--devices)", self.devices).into());
             }
         }
         if let Some((k, ns)) = self.cables.iter().enumerate().find(|(_, ns)| **ns > LONGEST_CABLE_NS) {
@@ -277,6 +285,12 @@ impl Arguments {
         if let Some(path) = &self.part.gcode {
             if usize::from(self.devices) < AXES || self.dance || self.independent || self.cycles.is_some() {
                 return Err("--gcode moves X, Y and Z, and nothing else: it needs three devices, and no --dance, --independent or --cycles".into());
+            }
+            if self.steps != STEPS || self.moves != 1 || self.k != 1 {
+                return Err("--steps, --moves and --k are for moves, and not for --gcode".into());
+            }
+            if self.freq.len() > 1 {
+                return Err("a part program has one --freq, the greatest of each axis".into());
             }
             self.part.check(path)?;
             let limits = Limits::new(self.freq.first().copied().unwrap_or(Part::SPEED), self.accel)?;
@@ -348,7 +362,7 @@ impl Arguments {
         let mut record =
             Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles, cycle_ns)?;
         let mut curves = self.svg.is_some().then(|| Curves::new(cycle_ns));
-        let mut sound = self.wav.as_deref().map(|path| named(path, Sound::create(path, cycle_ns))).transpose()?;
+        let mut sound = self.wav.as_deref().map(|path| Sound::create(path, cycle_ns)).transpose()?;
         let bar = self.bar();
         let mut cycle = 0;
         while let Some(progress) = line.step(&mut host, &mut record) {
@@ -403,12 +417,12 @@ impl Arguments {
     }
 }
 
-/// The error with the file that it is about.
 /// Writes a picture into a file.
 fn draw(path: &Path, picture: impl FnOnce() -> Drawn<String>) -> Drawn {
     named(path, picture().and_then(|svg| Ok(fs::write(path, svg)?)))
 }
 
+/// The error with the file that it is about.
 fn named<T>(path: &Path, result: Result<T, impl fmt::Display>) -> Result<T, Box<dyn Error>> {
     result.map_err(|error| format!("{}: {error}", path.display()).into())
 }

@@ -74,10 +74,19 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     }
     let files = arguments.files.len();
     let described = arguments.reading.describes_a_file();
+    let mut empty = false;
     let piped = match if files == 0 { files::piped(described.is_some()) } else { Piped::Nothing } {
         Piped::Content(input) => Some(input),
         Piped::Silence => {
             eprintln!("nothing has arrived on standard input: showing the bundled captures; name - to wait for input");
+            None
+        }
+        Piped::EmptyFile => {
+            eprintln!("error: standard input: the file is empty");
+            return ExitCode::FAILURE;
+        }
+        Piped::EmptyPipe => {
+            empty = true;
             None
         }
         Piped::Nothing => None,
@@ -104,7 +113,11 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         }
     }
     let headed = files != 1 && piped.is_none();
-    print(arguments, piped.is_some(), headed, |printer| all(arguments, piped, printer))
+    let code = print(arguments, piped.is_some(), headed, |printer| all(arguments, piped, printer));
+    if empty {
+        eprintln!("standard input was empty: these are the bundled captures");
+    }
+    code
 }
 
 /// Decodes the bytes heard by a serial port.
@@ -290,7 +303,7 @@ fn vcd_out(arguments: &Decode) -> Result<Option<VcdOut>, Fault> {
     let Some(path) = &arguments.vcd else { return Ok(None) };
     let file = File::create(path)
         .map_err(|e| Fault::new(&path.display().to_string(), At::File, format!("cannot be created: {e}")))?;
-    let vcd = VcdOut::new(BufWriter::new(file));
+    let vcd = VcdOut::new(files::written(path, file));
     Ok(Some(match (arguments.cut, arguments.around) {
         (Some((from, to)), _) => vcd.within(from, to),
         (None, Some(around)) => vcd.around(around),
@@ -299,7 +312,10 @@ fn vcd_out(arguments: &Decode) -> Result<Option<VcdOut>, Fault> {
 }
 
 /// Returns why the request is impossible for a capture of this kind.
-fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<&'static str> {
+fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<String> {
+    if let Some(what) = arguments.reading.misplaced(capture) {
+        return Some(what);
+    }
     let timeless = match capture {
         Capture::Bytes(log) => arguments.reading.rtex.period.is_none() && !log.has_times(),
         _ => false,
@@ -310,7 +326,7 @@ fn cannot(arguments: &Decode, capture: &mut Capture, has_times: bool) -> Option<
         (arguments.svg.is_some() && timeless, "a log of bytes has no times for a picture"),
         (has_times && timeless, "a log of bytes has no times for --from and --to"),
     ];
-    cannot.into_iter().find(|(is, _)| *is).map(|(_, what)| what)
+    cannot.into_iter().find(|(is, _)| *is).map(|(_, what)| what.to_owned())
 }
 
 /// Reports what is wrong; the file is not good.

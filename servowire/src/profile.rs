@@ -20,6 +20,7 @@ use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
 use crate::gcode::Part;
+use servowire_decode::fault::Fault;
 use servowire_decode::time;
 
 /// Compute the times of the steps of a move on a 4 us cycle.
@@ -52,7 +53,7 @@ pub struct Arguments {
     #[arg(long, value_name = "A", value_parser = clap::value_parser!(u32).range(1..))]
     accel: Option<u32>,
     /// Greatest jerk in steps/s³, for the S-curve; by default ten times A² / V.
-    #[arg(long, value_name = "J", requires = "accel")]
+    #[arg(long, value_name = "J", requires = "accel", value_parser = clap::value_parser!(u64).range(1..))]
     jerk: Option<u64>,
     /// Show all shapes side by side, within --accel and --jerk.
     #[arg(long, requires = "accel", conflicts_with_all = ["csv", "json"])]
@@ -102,9 +103,12 @@ enum Mode {
 }
 
 impl Arguments {
-    /// Runs the command. 0: done; 1: cannot write; 2: the move is not possible.
+    /// Runs the command. 0: done; 1: it ended early, or the output cannot be written; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
         let out = &mut BufWriter::new(io::stdout().lock());
+        if let Some(what) = self.misplaced() {
+            return wrong_use(&what);
+        }
         if let Some(path) = &self.part.gcode {
             return self.follow(path, out);
         }
@@ -120,6 +124,31 @@ impl Arguments {
             }
         };
         written(done)
+    }
+
+    /// Returns what to say of an option that the motion has no use for. Clap would let a conflict outweigh what an option requires.
+    fn misplaced(&self) -> Option<String> {
+        let ramp = self.compare || self.shape == Shape::Sin2;
+        let of_moves = [
+            (self.tone.is_some(), "--tone"),
+            (self.steps != 0, "--steps"),
+            (self.k.is_some(), "--k"),
+            (self.shape != Shape::Sin2, "--shape"),
+            (self.compare, "--compare"),
+        ];
+        let of_the_ramp = [
+            (self.init_sync != Parameters::INIT_SYNC, "--init-sync"),
+            (self.arithmetic != Mode::Corrected, "--arithmetic"),
+        ];
+        let first = |options: &[(bool, &'static str)]| options.iter().find(|(is, _)| *is).map(|(_, option)| *option);
+        if self.part.gcode.is_some() {
+            let option = first(&of_moves).or(first(&of_the_ramp));
+            return option.map(|option| format!("{option} is for a single move, and not for --gcode"));
+        }
+        if self.jerk.is_some() && !(self.compare || self.shape == Shape::SCurve) {
+            return Some("--jerk is for --shape s-curve, --compare and --gcode".to_owned());
+        }
+        first(&of_the_ramp).filter(|_| !ramp).map(|option| format!("{option} is for the published ramp, --shape sin2"))
     }
 
     /// A part program.
@@ -223,6 +252,10 @@ fn written(done: Result<(), Box<dyn Error>>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // The reader has seen enough.
         Err(e) if is_broken_pipe(e.as_ref()) => ExitCode::SUCCESS,
+        Err(e) if e.is::<Fault>() => {
+            eprintln!("error: {e}");
+            ExitCode::FAILURE
+        }
         Err(e) => {
             eprintln!("error: cannot write: {e}");
             ExitCode::FAILURE
@@ -235,7 +268,7 @@ fn wrong_use(error: &dyn Display) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Returns number and time of every step, in ns from the start.
+/// Writes number and time of every step, in ns from the start.
 fn write_ticks(made: &Move, json: bool, out: &mut dyn Write) -> io::Result<()> {
     if !json {
         writeln!(out, "step,time_ns")?;

@@ -9,9 +9,9 @@ use std::sync::LazyLock;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use rtex_block::position::Gear;
-use servowire_decode::capture::{self, Format, Hints};
+use servowire_decode::capture::{self, Capture, Format, Hints};
 use servowire_decode::codec::Codec;
-use servowire_decode::fault::Stop;
+use servowire_decode::fault::{At, Fault, Stop};
 use servowire_decode::output::Output;
 use servowire_decode::output::filter::Filter;
 use servowire_decode::output::printer::Printer;
@@ -231,6 +231,33 @@ impl Reading {
         said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
     }
 
+    /// Returns what to say of an option that a capture of this kind has no use for.
+    pub(crate) fn misplaced(&self, capture: &Capture) -> Option<String> {
+        let (levels, bytes, packets) = match capture {
+            Capture::Edges(_) | Capture::Samples(_) => (true, false, false),
+            Capture::Bytes(_) => (false, true, false),
+            Capture::Packets(_) => (false, false, true),
+        };
+        let rtex = bytes && self.protocol.0.is_none_or(|codec| codec.name == "rtex");
+        let (of_levels, of_rtex, of_packets) = (
+            (levels, "captures of levels"),
+            (rtex, "RTEX blocks in logs of bytes"),
+            (packets, "captures of a network"),
+        );
+        let said = [
+            (self.line.channel.is_some(), "--channel", of_levels),
+            (self.line.tx.is_some(), "--tx", of_levels),
+            (self.line.polarity.is_some(), "--polarity", of_levels),
+            (self.file.threshold.is_some(), "--threshold", of_levels),
+            (self.file.fcs.is_some(), "--fcs", of_packets),
+            (self.rtex.block_size.is_some(), "--block-size", of_rtex),
+            (self.rtex.period.is_some(), "--period", of_rtex),
+            (self.rtex.mac_id.is_some(), "--mac-id", of_rtex),
+        ];
+        let misplaced = said.into_iter().find(|(is, _, (holds, _))| *is && !holds);
+        misplaced.map(|(_, option, (_, what))| format!("{option} is for {what}"))
+    }
+
     /// Returns the rate of the line, if it was given.
     pub(crate) fn bit_rate(&self) -> Option<u32> {
         self.line.bit_rate
@@ -300,6 +327,9 @@ impl Reading {
         let input = files::open(path, false)?;
         let name = input.name().to_owned();
         let capture = capture::open(input, self.hints())?;
+        if let Some(what) = self.misplaced(&capture) {
+            return Err(Fault::new(&name, At::File, what).into());
+        }
         let date = capture.date().map(str::to_owned);
         let notes = RefCell::new(Vec::new());
         let note = |note: &Note| notes.borrow_mut().push(note.to_string());

@@ -18,7 +18,7 @@ use crate::terminal::say;
 
 /// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
 ///
-/// Exit code 0: the map could be read, whatever its content; 2: it could not.
+/// Exit code 0: the map could be read, whatever its content; 1: it could not be printed; 2: it could not be read.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// The registers, as bytes or as hex digits; - for the standard input. More bytes may follow.
@@ -42,19 +42,23 @@ enum Receiver {
 }
 
 impl Arguments {
-    /// Prints the map. 2: it could not be read.
+    /// Prints the map. 1: it could not be printed; 2: it could not be read.
     pub fn run(&self) -> ExitCode {
-        match self.text().and_then(|text| Ok(say(format_args!("{text}"))?)) {
-            Ok(()) => ExitCode::SUCCESS,
+        match self.text().map(|text| say(format_args!("{text}"))) {
+            Ok(Ok(())) => ExitCode::SUCCESS,
+            Ok(Err(error)) => {
+                eprintln!("error: cannot write: {error}");
+                ExitCode::FAILURE
+            }
             Err(error) => {
-                eprintln!("servowire registers: {}: {error}", self.file.display());
+                eprintln!("error: {}: {error}", self.file.display());
                 ExitCode::from(2)
             }
         }
     }
 
     fn text(&self) -> Result<String, Box<dyn Error>> {
-        let bytes = bytes(&read(&self.file)?);
+        let bytes = bytes(&read(&self.file)?)?;
         let rest = bytes.get(self.at..).unwrap_or_default();
         let mut text = String::new();
         match self.receiver {
@@ -84,12 +88,18 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Decodes pairs of hex digits with or without spaces between them; anything else is taken as it is.
-fn bytes(file: &[u8]) -> Vec<u8> {
+/// Decodes pairs of hex digits with or without spaces between them; other text is refused, and anything else is taken as it is.
+fn bytes(file: &[u8]) -> Result<Vec<u8>, &'static str> {
     let digits: Vec<u8> = file.iter().copied().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let pairs = digits.chunks_exact(2).map(|pair| core::str::from_utf8(pair).ok());
     let bytes: Option<Vec<u8>> = pairs.map(|pair| u8::from_str_radix(pair?, 16).ok()).collect();
-    bytes.filter(|_| digits.len() % 2 == 0 && digits.iter().all(u8::is_ascii_hexdigit)).unwrap_or_else(|| file.to_vec())
+    match bytes.filter(|_| digits.len() % 2 == 0 && digits.iter().all(u8::is_ascii_hexdigit)) {
+        Some(bytes) => Ok(bytes),
+        None if digits.iter().all(u8::is_ascii_graphic) => Err(
+            "text that is not pairs of hex digits: leave out addresses, names and signs, or give the bytes themselves",
+        ),
+        None => Ok(file.to_vec()),
+    }
 }
 
 /// A map in the layout of the SDK, and whether it follows SICK's rules.

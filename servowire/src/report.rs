@@ -134,8 +134,11 @@ impl Arguments {
         if gatherer.tables.is_empty() {
             return Err(read.fault.unwrap_or_else(|| format!("{file}: no frame in it")).into());
         }
-        for sentence in read.fault.iter().chain(&read.refusals) {
-            eprintln!("error: {file}: {sentence}");
+        if let Some(fault) = &read.fault {
+            eprintln!("error: {fault}");
+        }
+        if let Some(refusals) = &read.refusals {
+            eprintln!("error: {file}: {refusals}");
         }
         let good = read.fault.is_none() && gatherer.refused == 0;
         let (bytes, sha256) = hash(&self.file)?;

@@ -166,7 +166,7 @@ impl Arguments {
             Ok(code) => code,
             Err(fault) => {
                 let name = if fault.names_itself() { String::new() } else { format!("{}: ", self.port) };
-                eprintln!("{name}{fault}");
+                eprintln!("error: {name}{fault}");
                 ExitCode::FAILURE
             }
         }

@@ -33,24 +33,28 @@ enum Protocol {
 }
 
 impl Arguments {
-    /// Prints the plan, or draws it. 2: it could not be made or written.
+    /// Prints the plan, or draws it. 1: it could not be written; 2: it could not be made.
     pub fn run(&self) -> ExitCode {
-        match self.try_run() {
-            Ok(()) => ExitCode::SUCCESS,
+        let plan = match &self.protocol {
+            Protocol::Tformat(arguments) => Ok(arguments.plan()),
+            Protocol::Nikon(arguments) => arguments.plan(),
+        };
+        match plan.map(|plan| self.write(&plan)) {
+            Ok(Ok(())) => ExitCode::SUCCESS,
+            Ok(Err(error)) => {
+                eprintln!("error: cannot write: {error}");
+                ExitCode::FAILURE
+            }
             Err(error) => {
-                eprintln!("servowire timing: {error}");
+                eprintln!("error: {error}");
                 ExitCode::from(2)
             }
         }
     }
 
-    fn try_run(&self) -> Result<(), Box<dyn Error>> {
-        let plan = match &self.protocol {
-            Protocol::Tformat(arguments) => arguments.plan(),
-            Protocol::Nikon(arguments) => arguments.plan()?,
-        };
+    fn write(&self, plan: &Plan) -> Result<(), Box<dyn Error>> {
         if let Some(path) = &self.svg {
-            fs::write(path, drawing::svg(&plan)?).map_err(|error| format!("{}: {error}", path.display()))?;
+            fs::write(path, drawing::svg(plan)?).map_err(|error| format!("{}: {error}", path.display()))?;
         } else {
             say(format_args!("{plan}"))?;
         }

@@ -1,10 +1,10 @@
 //! Speed and position of the axes over time, and the sound of the motors.
 
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
 use crate::drawing::{Chart, Drawn, Share, Sheet, Stroke};
+use crate::files::{Written, create};
 
 /// Maximum number of points in a curve.
 const POINTS: usize = 2000;
@@ -75,7 +75,7 @@ impl Curves {
 
 /// The sound of the motors, written while they run: each hums with its full steps.
 pub(super) struct Sound {
-    writer: hound::WavWriter<BufWriter<File>>,
+    writer: hound::WavWriter<BufWriter<Written>>,
     cycle_ns: u32,
     written: u64,
     last: [i64; 4],
@@ -91,7 +91,7 @@ impl Sound {
             bits_per_sample: 16,
             sample_format: hound::SampleFormat::Int,
         };
-        let writer = hound::WavWriter::create(path, spec)?;
+        let writer = hound::WavWriter::new(create(path)?, spec)?;
         Ok(Self { writer, cycle_ns, written: 0, last: [0; 4], volume: [0.0; 4] })
     }
 

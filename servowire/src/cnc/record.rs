@@ -1,17 +1,18 @@
 //! Records what a logic analyser and a network tap would have seen, as VCD and pcapng.
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 use std::time::Duration;
 
-use pcap_file::DataLink;
 use pcap_file::pcapng::PcapNgWriter;
 use pcap_file::pcapng::blocks::enhanced_packet::{EnhancedPacketBlock, EnhancedPacketOption};
 use pcap_file::pcapng::blocks::interface_description::{InterfaceDescriptionBlock, InterfaceDescriptionOption};
+use pcap_file::{DataLink, PcapError};
 use sorte_proto::{FrameType, Preamble};
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
+
+use crate::files::{Written, create};
 
 use super::axis::Seen;
 
@@ -31,7 +32,7 @@ const EXCHANGE: u32 = 1;
 #[derive(Default)]
 pub(super) struct Recorder {
     vcd: Option<Trace>,
-    packets: Option<PcapNgWriter<BufWriter<File>>>,
+    packets: Option<PcapNgWriter<BufWriter<Written>>>,
     /// Cycles still to be recorded, including the present one.
     cycles: u64,
     /// Notes that a cycle has begun.
@@ -104,7 +105,7 @@ impl Recorder {
                 // Bits 0 and 1: inbound, outbound.
                 options: vec![EnhancedPacketOption::Flags(if answer { 1 } else { 2 })],
             });
-            self.keep(result.map(|_| ()).map_err(io::Error::other));
+            self.keep(result.map(|_| ()).map_err(cause));
         }
     }
 
@@ -130,14 +131,16 @@ impl Recorder {
     }
 }
 
-/// Creates a file to write into; the error names it.
-pub(super) fn create(path: &Path) -> io::Result<BufWriter<File>> {
-    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
-    File::create(path).map(BufWriter::new).map_err(named)
+/// The library's own text about a failed write says only that bytes could not be read.
+fn cause(error: PcapError) -> io::Error {
+    match error {
+        PcapError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
 }
 
-fn open(path: &Path) -> io::Result<PcapNgWriter<BufWriter<File>>> {
-    let mut packets = PcapNgWriter::new(create(path)?).map_err(io::Error::other)?;
+fn open(path: &Path) -> io::Result<PcapNgWriter<BufWriter<Written>>> {
+    let mut packets = PcapNgWriter::new(create(path)?).map_err(cause)?;
     let interface = |linktype, name: &'static str, note: &'static str, fcs_bits: Option<u8>| {
         let mut options = vec![
             InterfaceDescriptionOption::IfName(Cow::Borrowed(name)),
@@ -157,7 +160,7 @@ fn open(path: &Path) -> io::Result<PcapNgWriter<BufWriter<File>>> {
         None,
     );
     for block in [start_up, exchange] {
-        packets.write_pcapng_block(block).map_err(io::Error::other)?;
+        packets.write_pcapng_block(block).map_err(cause)?;
     }
     Ok(packets)
 }
@@ -178,7 +181,7 @@ enum Level {
 }
 
 struct Trace {
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<BufWriter<Written>>,
     tx: IdCode,
     rx: IdCode,
     frame: IdCode,

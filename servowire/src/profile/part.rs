@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::error::Error;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::Path;
 
@@ -14,6 +14,7 @@ use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
 use super::Arguments;
 use crate::drawing::{Chart, Drawn, Sheet, Stroke};
+use crate::files::{Written, create};
 use crate::gcode::{AXES, Steps};
 
 const NAMES: [&str; AXES] = ["X", "Y", "Z"];
@@ -73,7 +74,7 @@ pub(super) fn write(
     }
     bar.finish_and_clear();
     if let Some(fault) = steps.fault() {
-        return Err(fault.to_string().into());
+        return Err(fault.clone().into());
     }
     writeln!(out, "path    {lines} straight lines in {:.6} s", steps.end() as f64 / 1e9)?;
     for (name, axis) in NAMES.iter().zip(&axes).filter(|(_, axis)| axis.steps > 0) {
@@ -120,7 +121,7 @@ fn rows(json: bool, lines: usize, mut steps: Steps, out: &mut dyn Write) -> Resu
     }
     bar.finish_and_clear();
     if let Some(fault) = steps.fault() {
-        return Err(fault.to_string().into());
+        return Err(fault.clone().into());
     }
     Ok(out.flush()?)
 }
@@ -144,7 +145,7 @@ enum Change {
 
 /// Writes STEP and DIR of each axis.
 struct Wires {
-    to: Writer<BufWriter<File>>,
+    to: Writer<BufWriter<Written>>,
     axes: Vec<Wire>,
     /// Events not yet written: when, what, and on which axis.
     changes: BinaryHeap<Reverse<(u64, Change, usize)>>,
@@ -152,8 +153,7 @@ struct Wires {
 
 impl Wires {
     fn new(path: &Path) -> Result<Self, Box<dyn Error>> {
-        let file = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let mut to = Writer::new(BufWriter::new(file));
+        let mut to = Writer::new(create(path)?);
         to.timescale(1, TimescaleUnit::NS)?;
         to.add_module("axes")?;
         let mut axes = Vec::new();

@@ -399,7 +399,7 @@ fn a_damaged_network_capture_is_refused_where_it_breaks() {
 #[test]
 fn wrong_use_is_explained() {
     for (arguments, word) in [
-        (["--unplug", "9@1"], "device 9 of 4"),
+        (["--unplug", "9@1"], "there is no device 9: the line has 4"),
         (["--driver-fault", "300@1"], "device from 1 to 254"),
         (["--driver-fault", "3@1=XYZ"], "is not one of OTS"),
         (["--cycle-time", "5000"], "multiple of 4000"),

@@ -155,7 +155,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     // A backup is not overwritten.
     let output = bench.talk(&["eeprom", "backup", "--pages", "1", &first]);
     assert_eq!(output.status.code(), Some(1));
-    assert_eq!(text(&output), format!("{first}: the file already exists; backups are not overwritten\n"));
+    assert_eq!(text(&output), format!("error: {first}: the file already exists; backups are not overwritten\n"));
 
     let mut pages = backup.pages().to_vec();
     pages[1][0] = 0x12;
@@ -166,7 +166,7 @@ fn the_memory_is_backed_up_and_restored_only_when_one_insists() {
     assert!(text(&output).contains("nothing was written"), "{}", text(&output));
     // Where the memory would go is a file already: nothing is written.
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &first, &second]);
-    assert_eq!(text(&output), format!("{first}: the file already exists; backups are not overwritten\n"));
+    assert_eq!(text(&output), format!("error: {first}: the file already exists; backups are not overwritten\n"));
     let output =
         bench.talk(&["--json", "eeprom", "restore", "--overwrite-eeprom", "--yes", "--before", &before, &second]);
     assert_eq!(text(&output), format!("{{\"backup\":\"{before}\",\"differed\":1,\"written\":1}}\n"));
@@ -302,7 +302,8 @@ fn what_is_wrong_is_said() {
         let output = program.args(["talk", "--port", port]).args(arguments).output().unwrap();
         assert!(begin.elapsed() < Duration::from_secs(10));
         assert_eq!(output.status.code(), Some(1), "{}", text(&output));
-        String::from_utf8(output.stderr).unwrap()
+        let said = String::from_utf8(output.stderr).unwrap();
+        said.strip_prefix("error: ").unwrap().to_owned()
     };
     assert!(at("/dev/ttyNone", &["read"]).starts_with("/dev/ttyNone: there is no such port; there "));
     assert!(at("/dev/null", &["read"]).starts_with("/dev/null: this is not a serial port"));

@@ -1,0 +1,139 @@
+//! What has no use for what is asked is said, and nothing is done in its place.
+
+use std::process::{Command, Stdio};
+
+use crate::common::{self, Bench, good_traffic};
+
+#[test]
+fn options_that_a_capture_has_no_use_for() {
+    let bench = Bench::new();
+    let line = bench.file("a.vcd", good_traffic(2.5e6).vcd());
+    for (options, want) in [
+        (&["--mac-id", "3"][..], "a.vcd: --mac-id is for RTEX blocks in logs of bytes"),
+        (&["--block-size", "16"], "--block-size is for RTEX"),
+        (&["--period", "500us", "--gear", "8/1"], "--period is for RTEX"),
+        (&["--fcs", "yes"], "--fcs is for captures of a network"),
+    ] {
+        common::decode(&line, options).fails_with(want);
+    }
+    let log = bench.file("log.txt", "1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n");
+    common::decode(&log, &["--bytes"]).is_good();
+    for (options, want) in [
+        (&["--channel", "3"][..], "--channel is for captures of levels"),
+        (&["--tx", "a", "--rx", "b"], "--tx is for captures of levels"),
+        (&["--polarity", "inverted"], "--polarity is for captures of levels"),
+        (&["--threshold", "1.5"], "--threshold is for captures of levels"),
+        (&["--protocol", "tformat", "--mac-id", "3"], "--mac-id is for RTEX"),
+    ] {
+        common::decode(&log, &[&["--bytes"], options].concat()).fails_with(want);
+    }
+}
+
+#[test]
+fn options_that_a_move_has_no_use_for() {
+    let bench = Bench::new();
+    let part = bench.file("a.nc", "G0 X1\n");
+    let part = part.to_str().unwrap();
+    let ramp = ["--freq", "1000", "--steps", "9"];
+    let refused = |arguments: &[&str]| {
+        let run = common::servowire(arguments);
+        assert!(run.code == 2 && run.out.is_empty() && run.err.starts_with("error: "), "{arguments:?}: {}", run.err);
+    };
+    for options in [
+        &["--shape", "s-curve"][..],
+        &["--steps", "7"],
+        &["--tone", "cis"],
+        &["--k", "2"],
+        &["--compare", "--accel", "1000"],
+        &["--init-sync", "5"],
+        &["--arithmetic", "carried"],
+    ] {
+        refused(&[&["profile", "--gcode", part], options].concat());
+    }
+    for options in [
+        &["--deviation", "5"][..],
+        &["--steps-per-mm", "5"],
+        &["--axis", "X:speed=5"],
+        &["--block-delete"],
+        &["--accel", "100", "--jerk", "0"],
+    ] {
+        refused(&[&["profile"], &ramp[..], options].concat());
+    }
+    for options in [&["--jerk", "100"][..], &["--init-sync", "5"], &["--arithmetic", "carried"]] {
+        refused(&[&["profile", "--shape", "trapezoid", "--accel", "100"], &ramp[..], options].concat());
+    }
+    for options in [&["--steps", "5"][..], &["--moves", "3"], &["--k", "3"], &["--freq", "1000,2000"], &["--scaling"]] {
+        refused(&[&["cnc", "--gcode", part], options].concat());
+    }
+    let out = bench.path("out");
+    for option in ["--vcd", "--pcapng", "--wav"] {
+        refused(&["cnc", "--scaling", option, out.to_str().unwrap()]);
+    }
+    for options in [&["--dance", "--steps", "5"][..], &["--deviation", "5"], &["--scaling", "--axis", "X:speed=5"]] {
+        refused(&[&["cnc"], options].concat());
+    }
+}
+
+/// A file that is no register map is not shown as one.
+#[test]
+fn a_text_is_no_register_map() {
+    let bench = Bench::new();
+    let hex = "00 11 22 33 44 55 66 77 88 99 AA BB CC DD EE FF\n".repeat(8);
+    for (text, code) in [
+        (hex.clone(), 0),
+        (good_traffic(2.5e6).vcd(), 2),
+        (format!("{hex}0"), 2),
+        (hex.replace("00 11", "0000: 00 11"), 2),
+        (hex.replace(' ', ", 0x"), 2),
+    ] {
+        let file = bench.file("map", &text);
+        let run = common::servowire(&["registers", file.to_str().unwrap()]);
+        let told = run.err.contains("text that is not pairs of hex digits");
+        assert!(run.code == code && told == (code == 2), "{text}: {}", run.err);
+    }
+}
+
+/// The bundled captures are not shown for a file of the user's that is empty, and not without a word for such a pipe.
+#[test]
+fn a_standard_input_without_content() {
+    let bench = Bench::new();
+    let empty = std::fs::File::open(bench.file("empty.vcd", "")).unwrap();
+    let decode = |input: Stdio| {
+        let output = Command::new(env!("CARGO_BIN_EXE_servowire")).arg("decode").stdin(input).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap(), output.stdout.is_empty())
+    };
+    let note = "standard input was empty: these are the bundled captures\n";
+    let (code, said, nothing) = decode(Stdio::null());
+    assert!(code == Some(0) && !said.contains(note) && !nothing, "{said}");
+    if cfg!(unix) {
+        let (code, said, nothing) = decode(empty.into());
+        assert!(code == Some(1) && said == "error: standard input: the file is empty\n" && nothing, "{said}");
+        let (code, said, nothing) = decode(Stdio::piped());
+        assert!(code == Some(0) && said.ends_with(note) && !nothing, "{said}");
+    }
+}
+
+/// A sentence about a file names it once.
+#[test]
+fn a_report_names_its_capture_once() {
+    let bench = Bench::new();
+    let text = good_traffic(2.5e6).vcd();
+    let cut = bench.file("cut.vcd", &text[..=text.rfind("1!").unwrap()]);
+    let page = bench.path("page.html");
+    let run = common::servowire(&["report", cut.to_str().unwrap(), "-o", page.to_str().unwrap()]);
+    run.fails_with("the file ends in the middle of a value change");
+    assert!(run.err.lines().all(|line| line.matches("cut.vcd").count() == 1), "{}", run.err);
+}
+
+#[test]
+fn a_part_program_that_goes_on_behind_its_end() {
+    let bench = Bench::new();
+    let part = bench.file("a.nc", "G0 X1\nM30\n\nG0 X9\nno G-code\n");
+    let run = common::servowire(&["profile", "--gcode", part.to_str().unwrap()]);
+    assert!(run.is_good().out.contains("axis X  80 steps, at 80 in the end"), "{}", run.out);
+    assert!(
+        run.err.ends_with("a.nc, line 4: not run, nor is what follows: the program ends in line 2\n"),
+        "{}",
+        run.err
+    );
+}
