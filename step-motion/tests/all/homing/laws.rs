@@ -5,8 +5,8 @@ use step_motion::{AxesQueue, Direction, Error, HomingConfig, HomingState, Limits
 
 use super::benches::{Ask, Bench, Case, Halves, OfAxes, OfPath, OneByOne};
 
-/// 100 us each.
-const POLLS: u32 = 150_000;
+/// 100 us each: twice what the slowest search takes, with a background that is late.
+const POLLS: u32 = 500_000;
 
 fn cases() -> u32 {
     std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
