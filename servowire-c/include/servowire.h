@@ -3090,7 +3090,8 @@ typedef struct {
      */
     uint32_t approach;
     /**
-     * How far to back off before that, in steps.
+     * How far to back off before that, in steps: farther than the stop at the switch takes and what the axis makes
+     * in twice its reach before, or the switch stays closed.
      */
     uint32_t back_off;
     /**

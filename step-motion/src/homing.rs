@@ -22,7 +22,8 @@ pub struct HomingConfig {
     pub seek: u32,
     /// Speed of the second, exact approach, in steps/s.
     pub approach: u32,
-    /// How far to back off before the second approach, in steps.
+    /// How far to back off before the second approach, in steps: farther than the stop at the switch takes, or that stays closed.
+    /// In two halves the axis runs on for up to twice its reach first.
     pub back_off: u32,
     /// After this many steps without a switch the search is abandoned.
     pub range: u32,
@@ -86,6 +87,33 @@ pub enum HomingState {
 ///
 /// A hold and an override act on it as on any motion: it waits, and goes on. A move, a stop or a halt that somebody else
 /// asks for ends it.
+///
+/// ```
+/// use step_motion::{
+///     Axes, AxesQueue, AxisSetup, Clock, Direction, Homing, HomingConfig, HomingState, Limits, Path, Switch, Work,
+/// };
+/// static QUEUE: AxesQueue<2, 129> = AxesQueue::new();
+/// let limits = Limits::new(20_000, 200_000)?;
+/// let axis = AxisSetup::new(limits, 80_000).with_soft_limits(0, 24_000);
+/// let (mut axes, mut timer) = Axes::new(&QUEUE, Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?);
+/// let config = HomingConfig::new(Direction::Reverse, 4000, 400, 30_000, limits).with_back_off(200);
+/// let mut motors = [300, 500]; // steps from the switches
+/// for at in 0..2 {
+///     let mut homing = Homing::start_axes(config, &mut axes, at, Switch::Open)?;
+///     while homing.state() != HomingState::Done {
+///         while axes.poll() == Work::More {}
+///         // what the timer does
+///         let fired = timer.fire();
+///         for (axis, motor) in motors.iter_mut().enumerate().filter(|(axis, _)| fired.steps() >> axis & 1 != 0) {
+///             *motor += if fired.reverse() >> axis & 1 != 0 { -1 } else { 1 };
+///         }
+///         let switch = if motors[at] <= 0 { Switch::Closed } else { Switch::Open };
+///         assert_ne!(homing.poll_axes(&mut axes, switch)?, HomingState::Failed);
+///     }
+/// }
+/// assert_eq!(axes.commanded(), motors); // each switch closes at its position 0
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_copy_implementations, reason = "a copy would go on from a state that is over")]

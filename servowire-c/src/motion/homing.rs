@@ -39,7 +39,8 @@ pub struct sw_motion_homing_setup_t {
     pub seek: u32,
     /// Speed of the second, exact approach, in steps/s.
     pub approach: u32,
-    /// How far to back off before that, in steps.
+    /// How far to back off before that, in steps: farther than the stop at the switch takes and what the axis makes
+    /// in twice its reach before, or the switch stays closed.
     pub back_off: u32,
     /// After this many steps without a switch the search is abandoned.
     pub range: u32,
