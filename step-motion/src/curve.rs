@@ -34,6 +34,12 @@ pub(super) struct Piece {
 }
 
 impl Piece {
+    /// Creates a piece at constant speed from the start of a curve.
+    pub(super) const fn steady(v: Real) -> Self {
+        let none = Real::ZERO;
+        Self { time: none, p: none, v, a: none, j: none, up: true, bend: Bend::Flat }
+    }
+
     /// Returns the state `t` after the start.
     #[inline(never)]
     pub(super) fn after(&self, t: Real) -> Self {

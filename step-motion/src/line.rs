@@ -200,6 +200,38 @@ impl<const N: usize> LinePulses<N> {
         (Motion { v, a, up }, at - before, before - at)
     }
 
+    /// Returns whether the machine is on the line, or behind it, at a moment.
+    pub(super) fn has_begun(&self, moment: u64) -> bool {
+        let Start { place, before, moment: begin, .. } = self.start;
+        if before.is_zero() {
+            return moment >= begin || !place.is_zero();
+        }
+        self.motion(moment.min(self.end)).2.is_zero()
+    }
+
+    /// Returns the motion at a moment on a way that leads to the start of the line, if its curve leads along that.
+    pub(super) fn before(&self, moment: u64, way: Real) -> Option<Piece> {
+        let Start { place, before, .. } = self.start;
+        let (frame, _) = self.axes.first().filter(|_| !before.is_zero())?;
+        let there = self.curve.at(frame.time(&self.curve, moment.min(self.end)))?;
+        let p = (way + place + (there.p - self.curve.skipped.1)) - before;
+        Some(if moment < self.end { Piece { p, ..there } } else { Piece { p, ..Piece::steady(Real::ZERO) } })
+    }
+
+    /// Returns the distance from a moment to the end of the curve, and the motion from there on: if there is more than one piece
+    /// of the curve, at the mean speed.
+    pub(super) fn to_the_end(&self, moment: u64) -> (Real, Piece) {
+        let time = self.axes.first().map_or(Real::ZERO, |(frame, _)| frame.time(&self.curve, moment));
+        let (Some(there), Some(last)) = (self.curve.at(time), self.curve.pieces().last()) else {
+            return (Real::ZERO, Piece::steady(Real::ZERO));
+        };
+        let way = self.curve.p - there.p;
+        if moment >= self.start.moment && time >= last.time {
+            return (way, Piece { p: Real::ZERO, ..there });
+        }
+        (way, Piece::steady(way / Real::new(self.end.saturating_sub(moment).max(1))))
+    }
+
     /// Returns when the next step is due, and on which axis.
     pub(super) fn first(&self) -> Option<(u64, usize)> {
         self.due.iter().enumerate().filter_map(|(axis, due)| due.map(|due| (due, axis))).min()

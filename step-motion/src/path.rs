@@ -463,6 +463,13 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
     }
 
+    /// After a rest, the next line begins no earlier than a moment.
+    pub(super) fn not_before_moment(&mut self, moment: u64) {
+        if self.speed.is_zero() && moment > self.moment {
+            self.moment = self.clock.aligned(moment);
+        }
+    }
+
     /// Returns line `at` of the queue.
     pub(super) fn line(&self, at: usize) -> Option<&Line<N>> {
         if at >= self.len {

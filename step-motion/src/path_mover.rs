@@ -1,15 +1,16 @@
 //! A path that can be held, slowed down and abandoned at any time.
 
 mod cutting;
+mod places;
 mod planning;
 
+use self::places::Behind;
 use self::planning::Stop;
 use crate::cutter::Stretch;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::line::{AxisPulse, LinePulses, Steps};
 use crate::path::{AxisSetup, Path};
-use crate::plan::Setpoint;
 use crate::real::Real;
 use crate::requests::Requests;
 
@@ -61,6 +62,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     /// The speed that was asked for last does not fit on the rest of the present line: it is planned on the next one. A brake that does
     /// not fit is not, or a hold would be shorter than a stop.
     late: bool,
+    /// What is left of the line before the first one.
+    behind: Behind<N>,
     /// Steps of the first line that have been made.
     made: [u32; N],
     commanded: [i64; N],
@@ -98,6 +101,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
             whole,
             bounds,
             late,
+            behind,
             made,
             commanded,
             origin,
@@ -115,7 +119,7 @@ impl<const N: usize, const M: usize> Clone for PathMover<N, M> {
         (self.made, self.commanded, self.origin) = (*made, *commanded, *origin);
         (self.free, self.steps, self.left) = (*free, *steps, *left);
         (self.ended, self.late, self.lead) = (*ended, *late, *lead);
-        (self.requests, self.braking) = (*requests, *braking);
+        (self.requests, self.braking, self.behind) = (*requests, *braking, *behind);
     }
 }
 
@@ -132,6 +136,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             whole: true,
             bounds: None,
             late: false,
+            behind: Behind::rest(position),
             made: [0; N],
             commanded: position,
             origin: position,
@@ -168,7 +173,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             (*made, *own) = (made.saturating_add(1), free);
             *position = pulse.direction.advance(*position);
         }
-        self.settle();
+        self.settle(tick);
         Some(pulse)
     }
 
@@ -195,26 +200,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns whether no line can be pushed.
     pub const fn is_full(&self) -> bool {
         self.path.is_full()
-    }
-
-    /// Returns position, speed, acceleration and jerk of each axis at a tick that is not before the last step. Between the
-    /// last step of a line and its end, half a step later, they are those of the end.
-    pub fn at(&self, now: u64) -> [Setpoint; N] {
-        let moment = self.clock().moment(now);
-        let mut states = self.commanded.map(|position| Setpoint::at_rest(position.saturating_mul(1 << 32)));
-        if let Some(line) = &self.line {
-            let own = line.axes.iter().zip(line.directions).zip(self.origin);
-            for (state, (((frame, _), direction), origin)) in states.iter_mut().zip(own) {
-                let mut there = frame.at(&line.curve, moment);
-                if !line.start.before.is_zero() {
-                    // Before the start of the line the machine is on the previous one; it is reported at that line's end.
-                    there.p = there.p.max(0);
-                }
-                let there = Setpoint::new(self.clock(), there);
-                *state = there.on_axis(origin, direction);
-            }
-        }
-        states
     }
 
     /// Returns whether all axes are at rest at a tick with no step pending (or on hold).
@@ -279,9 +264,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
         if rest < latest || plain.end < stop.end {
             self.path.calm(lines);
-            self.leave_at(&plain);
+            self.leave_at(&plain, now);
         } else {
-            self.leave_at(&stop);
+            self.leave_at(&stop, now);
         }
     }
 
@@ -350,6 +335,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub(super) fn rename(&mut self, steps: [i64; N], now: u64) {
         self.commanded = steps;
         self.leave(self.tick(now));
+        self.behind = Behind::rest(steps);
     }
 
     pub(super) const fn clock(&self) -> Clock {
@@ -388,7 +374,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn stop_as(&mut self, stop: Option<&Stop<N>>, now: u64) {
         self.requests.stop();
         match stop {
-            Some(stop) => self.leave_at(stop),
+            Some(stop) => self.leave_at(stop, now),
             None => self.leave(self.tick(now)),
         }
     }
@@ -398,15 +384,21 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let free = self.free.iter().copied().max().unwrap_or(0);
         self.requests.halted(was_moving);
         // Not at the end of the motion before.
-        self.leave_from(self.clock().moment(self.clock().within_reach(now).max(free)));
+        let rest = self.clock().moment(self.clock().within_reach(now).max(free));
+        self.stay_behind(rest);
+        self.leave_from(rest);
     }
 
     /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the
     /// caller's clock says.
     fn tick(&self, now: u64) -> u64 {
-        let last = self.free.iter().copied().max().unwrap_or(0).saturating_sub(1);
-        let now = self.clock().within_reach(now).max(last);
+        let now = self.clock().within_reach(now).max(self.last());
         self.due().map_or(now, |due| now.min(due))
+    }
+
+    /// The tick of the last step.
+    fn last(&self) -> u64 {
+        self.free.iter().copied().max().unwrap_or(0).saturating_sub(1)
     }
 
     /// Where the first line begins, in steps.
@@ -423,7 +415,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Empties the queue, at rest from a tick onwards.
     fn leave(&mut self, now: u64) {
-        self.leave_from(self.clock().moment(now).max(self.path.start().moment));
+        let now = self.clock().moment(now);
+        self.stay_behind(now);
+        self.leave_from(now.max(self.path.start().moment));
     }
 
     /// Does that from a moment onwards.

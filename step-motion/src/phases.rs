@@ -90,6 +90,14 @@ impl Frame {
         if !self.endless && moment >= self.end(curve) { self.rests(curve) } else { self.within(curve, moment) }
     }
 
+    /// Returns the same, but at rest the place at which the curve ends, which may be between steps.
+    pub(super) fn unrounded(&self, curve: &Curve, moment: u64) -> State {
+        if moment < self.end(curve) {
+            return self.within(curve, moment);
+        }
+        State { p: self.position(curve, curve.p), ..self.rests(curve) }
+    }
+
     fn rests(&self, curve: &Curve) -> State {
         State { p: self.last(curve), v: Real::ZERO, a: (Real::ZERO, true), j: (Real::ZERO, true) }
     }

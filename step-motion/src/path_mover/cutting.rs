@@ -27,7 +27,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Does a slice of the work for the next steps of an axis that fall before a tick, in place of [`pulse`](Self::pulse).
     pub(crate) fn cut(&mut self, at: usize, demand: &Demand, until: u64) -> Cut {
         if self.ended {
-            self.ended = self.go_over();
+            self.ended = self.go_over(0);
             return Cut::More;
         }
         self.cut_line(at, demand, until).unwrap_or(Cut::Later)

@@ -147,7 +147,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Ends the path where a stop ends, and adopts the stop's first curve: it is not planned again, because a plan along
     /// the shorter path may differ by its rounding, and leave a line at a speed that it had not.
-    pub(super) fn leave_at(&mut self, stop: &Stop<N>) {
+    pub(super) fn leave_at(&mut self, stop: &Stop<N>, now: u64) {
         self.path.cut(&self.end_of(stop), self.begun(), self.made, stop.left);
         if let Some((course, start, bounds)) = &stop.first {
             self.adopt(course, *start, *bounds);
@@ -156,7 +156,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             // A stop at a joint, but for rounding: on the line before it.
             (self.more, self.whole) = (stop.end.0, true);
         }
-        self.settle();
+        self.settle(now);
     }
 
     /// Plans the rest of the motion after a request.
@@ -174,7 +174,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         } else {
             self.plan(now);
         }
-        self.settle();
+        self.settle(now);
     }
 
     /// Plans the rest of the running line.
@@ -212,7 +212,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         if let Some((course, bounds)) = course {
             self.adopt(&course, start, bounds);
         }
-        self.settle();
+        self.settle(now);
     }
 
     /// Begins the first line.
@@ -230,6 +230,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return false;
         }
         self.path.not_before_steps(self.free);
+        self.path.not_before_moment(self.behind.over);
         self.path.not_before_turning();
         let speed = self.path.speed();
         let course = match part {
@@ -282,16 +283,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     }
 
     /// Takes out lines that have ended, and begins the next one.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn settle(&mut self, now: u64) {
         for _ in 0..=M {
-            if !self.go_over() {
+            if !self.go_over(now) {
                 return;
             }
         }
     }
 
     /// Takes out the first line if it has ended, and begins the next one. Returns whether that may have ended as well.
-    pub(super) fn go_over(&mut self) -> bool {
+    pub(super) fn go_over(&mut self, now: u64) -> bool {
         let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return false };
         if line.first().is_some() {
             return false;
@@ -304,9 +305,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             return false;
         }
         let cut = first.cut;
+        self.leave_behind(now);
         if self.more > 0 {
             self.go_on();
-        } else {
+        } else if let Some(line) = &self.line {
             self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
             if cut {
                 self.requests.stopped();

@@ -18,6 +18,7 @@ mod machine;
 mod nearly;
 mod overrides;
 mod path_laws;
+mod path_places;
 mod path_queue;
 mod path_rests;
 mod path_stops;

@@ -52,21 +52,23 @@ struct Watched {
     last: [Option<u64>; N],
     now: u64,
     steps: u32,
+    /// The last step of a line has been made, and none of the next one.
+    ended: bool,
 }
 
 impl Watched {
     fn new(j: u64, deviation: u32) -> Self {
         let axes = [axis(20_000, 400_000, j, 80_000), axis(15_000, 200_000, j, 80_000), axis(4000, 50_000, 0, 400_000)];
         let machine = PathMover::new(Path::new(Clock::new(72_000_000).unwrap(), axes, deviation).unwrap());
-        Self { machine, axes, lines: VecDeque::new(), position: [0; N], last: [None; N], now: 0, steps: 0 }
+        Self { machine, axes, lines: VecDeque::new(), position: [0; N], last: [None; N], now: 0, steps: 0, ended: true }
     }
 
     /// No axis exceeds what it can take, neither as it says nor as two places a little apart say.
     fn limits_hold(&self, tick: u64) -> Result<(), TestCaseError> {
         let then = self.machine.due().map_or(tick, |due| due.min(tick + 7200));
         let (states, later) = (self.machine.at(tick), self.machine.at(then));
-        // Half a step before a line begins the state is that of its begin: whole steps.
-        let (then, later) = if begins(&states) { (tick, states) } else { (then, later) };
+        // The next line, which it comes to within half a step, leads somewhere else.
+        let (then, later) = if self.ended { (tick, states) } else { (then, later) };
         let seconds = then.saturating_sub(tick) as f64 / HZ;
         for ((s, l), axis) in states.iter().zip(&later).zip(&self.axes) {
             let within = |value: f64, limit: f64| value.abs() <= limit * (1.0 + 1e-6) + 0.01;
@@ -113,6 +115,7 @@ impl Watched {
                 prop_assert!((self.position[k] as f64 - want).abs() <= 0.5 + slack, "axis {k}: {:?}", self.position);
             }
             (self.last[i], self.now, self.steps) = (Some(pulse.tick), pulse.tick, self.steps + 1);
+            self.ended = self.machine.len() < self.lines.len();
             // More than one if a stop has cut the next one off before its first step.
             while self.machine.len() < self.lines.len() {
                 prop_assert_eq!(self.position, self.lines.pop_front().unwrap().end);
@@ -126,6 +129,7 @@ impl Watched {
     /// The lines end where the machine says that it will stop.
     fn stopped(&mut self, kept: usize, target: [i64; N]) -> Result<(), TestCaseError> {
         prop_assert!(kept <= self.lines.len());
+        self.ended |= kept == 0;
         self.lines.truncate(kept);
         if let Some(last) = self.lines.back_mut() {
             last.end = target;
@@ -178,7 +182,7 @@ impl Watched {
         self.limits_hold(now)?;
         // No jump, unless nothing moved or the line is another one.
         let after = self.machine.at(now);
-        if moving && was > 0 && !self.lines.is_empty() && !begins(&after) {
+        if moving && was > 0 && !self.lines.is_empty() && !self.ended {
             for ((b, a), axis) in before.iter().zip(&after).zip(&self.axes) {
                 let limits = axis.limits;
                 if b.speed == 0 {
@@ -196,11 +200,6 @@ impl Watched {
         }
         Ok(())
     }
-}
-
-/// Where a line begins all axes are at whole steps.
-fn begins(states: &[Setpoint; N]) -> bool {
-    states.iter().all(|state| state.position.trailing_zeros() >= 32)
 }
 
 fn speed(state: &Setpoint) -> f64 {

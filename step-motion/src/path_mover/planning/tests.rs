@@ -98,7 +98,7 @@ fn a_stop_at_a_joint_but_for_rounding() {
         let (course, bounds) = mover.path.brake(0, motion, (start.place, start.before), how).unwrap();
         let (end, more) = (course.more, course.more + 1);
         assert!(mover.adopt(&Course { more, whole: false, ..course }, start, bounds));
-        mover.settle();
+        mover.settle(now);
         now = now.max(take(&mut mover, steps));
         let stop = mover.stop_from(now).unwrap().end;
         assert!(stop.0 <= end && stop.0 + 1 == mover.more, "{stop:?} {end}");

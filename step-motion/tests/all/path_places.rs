@@ -1,0 +1,136 @@
+//! `PathMover::at` for a cyclic master: a place that does not jump, whatever is asked for.
+
+use proptest::prelude::*;
+use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
+
+const N: usize = 2;
+
+#[derive(Debug, Clone, Copy)]
+enum Ask {
+    Push([i64; N], u32),
+    MoveTo([i64; N], u32),
+    Override(u16),
+    Hold,
+    Resume,
+    Stop,
+    Quick(u32),
+    Halt,
+}
+
+/// A machine whose user looks where it is, and where it was when the user last looked.
+struct Seen {
+    machine: PathMover<N, 6>,
+    hz: f64,
+    speeds: [f64; N],
+    now: u64,
+    last: (u64, [i64; N]),
+    looks: u32,
+}
+
+impl Seen {
+    fn new(hz: u32, limits: [Limits; N]) -> Self {
+        let axes = [AxisSetup::new(limits[0], 80_000), AxisSetup::new(limits[1], 50_000)];
+        let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, 50).unwrap());
+        let speeds = limits.map(|limits| limits.speed().into());
+        Self { machine, hz: hz.into(), speeds, now: 0, last: (0, [0; N]), looks: 0 }
+    }
+
+    /// No axis has gone further since then than its speed allows: half of a tick of rounding, and 2^-13 steps. And it is within half
+    /// a step of what was made.
+    fn look(&mut self) {
+        let there = self.machine.at(self.now).map(|state| state.position);
+        let (then, before) = self.last;
+        for axis in 0..N {
+            let way = (there[axis] - before[axis]).abs() as f64 / 2_f64.powi(32);
+            let most = self.speeds[axis] * ((self.now - then) as f64 + 0.5) / self.hz + 1.0 / 8192.0;
+            assert!(way <= most, "axis {axis} goes {way} from {then} to {}, {most} at the most", self.now);
+            let off = ((there[axis] - (self.machine.commanded()[axis] << 32)) as f64 / 2_f64.powi(32)).abs();
+            let most = 0.5 + self.speeds[axis] / self.hz + 1.0 / 8192.0;
+            assert!(off <= most, "axis {axis} is {off} off at {}, {most} at the most", self.now);
+        }
+        (self.last, self.looks) = ((self.now, there), self.looks + 1);
+    }
+
+    /// Looks before and after each step, and in the ticks around.
+    fn until(&mut self, time: u64) {
+        while let Some(due) = self.machine.due().filter(|due| *due <= time) {
+            for early in [50, 1, 0] {
+                self.now = self.now.max(due.saturating_sub(early));
+                self.look();
+            }
+            self.machine.pulse();
+            self.look();
+            for _ in 0..2 {
+                let next = self.now + 1;
+                if next <= time && self.machine.due().is_none_or(|due| due > next) {
+                    self.now = next;
+                    self.look();
+                }
+            }
+        }
+        // Whatever ends, or begins, without a step.
+        let step = (time.saturating_sub(self.now) / 64).max(1);
+        while self.now < time {
+            self.now = (self.now + step).min(time);
+            self.look();
+        }
+    }
+
+    fn ask(&mut self, ask: Ask) {
+        let (machine, now) = (&mut self.machine, self.now);
+        match ask {
+            Ask::Push(to, feed) => _ = machine.push(to, feed, now),
+            Ask::MoveTo(to, feed) => _ = machine.move_to(to, feed, now),
+            Ask::Override(percent) => machine.set_override(percent, now),
+            Ask::Hold => machine.hold(now),
+            Ask::Resume => machine.resume(now),
+            Ask::Stop => machine.stop(now),
+            Ask::Quick(a) => machine.quick_stop([Limits::new(1, a).unwrap(); N], now),
+            Ask::Halt => machine.halt(now),
+        }
+        self.look();
+    }
+}
+
+fn place() -> impl Strategy<Value = [i64; N]> {
+    prop_oneof![[-60..60_i64, -60..60_i64], [-3..3_i64, -3..3_i64]]
+}
+
+fn ask() -> impl Strategy<Value = Ask> {
+    let feed = prop_oneof![1000..300_000_u32, 10..1000_u32];
+    prop_oneof![
+        6 => (place(), feed.clone()).prop_map(|(to, feed)| Ask::Push(to, feed)),
+        2 => (place(), feed).prop_map(|(to, feed)| Ask::MoveTo(to, feed)),
+        3 => (0..150_u16).prop_map(Ask::Override),
+        3 => Just(Ask::Hold),
+        4 => Just(Ask::Resume),
+        2 => Just(Ask::Stop),
+        2 => prop_oneof![1..200_000_u32, 1_000_000..2_000_000_u32].prop_map(Ask::Quick),
+        1 => Just(Ask::Halt),
+    ]
+}
+
+fn limits() -> impl Strategy<Value = Limits> {
+    let jerk = prop_oneof![Just(None), (1000..100_000_000_u64).prop_map(Some)];
+    let speed = prop_oneof![1..20_000_u32, 1..4_u32];
+    (speed, 1..400_000_u32, jerk).prop_map(|(v, a, j)| {
+        let limits = Limits::new(v, a).unwrap();
+        j.map_or(limits, |j| limits.with_jerk(j).unwrap())
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4 * ProptestConfig::default().cases, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_place_does_not_jump(
+        hz in prop_oneof![Just(1_000_000_u32), 100_000..72_000_000_u32], limits in [limits(), limits()],
+        asks in prop::collection::vec((ask(), prop_oneof![0..3_000_u64, 0..300_000_u64]), 1..20),
+    ) {
+        let mut seen = Seen::new(hz, limits);
+        for (ask, micros) in asks {
+            seen.ask(ask);
+            seen.until(seen.now + micros * u64::from(hz) / 1_000_000);
+        }
+    }
+}
