@@ -87,6 +87,23 @@ fn a_stop_after_a_stop_is_a_rest() {
     }
 }
 
+/// In the pause before a way back too, where such a stop has nothing to do: what is asked for then is done at once.
+#[test]
+fn a_stop_in_a_pause_is_a_rest() {
+    for at in (2000..90_000).step_by(1777) {
+        let mut bench = Bench::<129>::new(20_000, 200_000, 1000);
+        bench.axis = bench.axis.with_reversal_pause(100_000);
+        bench.axis.move_to(100).unwrap();
+        bench.until(250, 500_000);
+        bench.axis.move_to(0).unwrap();
+        bench.until(250, 500_000 + at);
+        bench.machine.drain();
+        bench.axis.stop();
+        assert!(bench.axis.is_at_rest() && bench.at() == 100, "{at}");
+        assert_eq!(bench.machine.slice(&mut bench.axis), Work::Rest);
+    }
+}
+
 /// At 1000 steps/s² rest comes up to 32 ms after the last step; what is asked for in between leaves nothing to make.
 #[test]
 fn a_request_behind_the_last_step_adds_no_time() {

@@ -157,3 +157,44 @@ fn a_rest_that_fits_is_kept_before_a_line_that_allows_less() {
         assert!(near(limits(&bounds).j.unwrap() / most.j.unwrap(), 1.0));
     }
 }
+
+/// A stop that fits on the first line does not keep to the limits of the next one, also if it begins a little before the first.
+#[test]
+fn a_stop_that_fits_takes_no_limits_of_the_next_line() {
+    let path = path(&[([2000, 0, 20], 4500), ([72, 0, 1], 4500)]);
+    let line = path.line(0).unwrap();
+    let (length, most) = (float(line.length), limits(&line.bounds));
+    let way = change([4500.0, 0.0], 0.0, most).1;
+    for (before, room) in [(0.0, 1e-3), (0.4, 1e-3), (0.4, 0.7)] {
+        let from = (real(length + before - way - room), real(before));
+        let stop = path.stop(0, steady(4500.0), from, (None, false), false).unwrap();
+        let (course, bounds) = stop.unwrap();
+        let (got, _, exit) = outcome(&course);
+        assert!(near(got, way) && exit == 0.0 && course.more == 0, "{got} for {way}, {exit}");
+        assert!(near(limits(&bounds).j.unwrap() / most.j.unwrap(), 1.0), "{before} {room}");
+    }
+}
+
+/// What was promised for full speed holds at an override of 30 %: the motion leaves its run at the least speed that the distance allows,
+/// although it could come to rest at the joint between the two lines, of which the first one allows more jerk.
+#[test]
+fn an_override_stops_at_no_joint() {
+    let lines = [([2000, 0, 20], 4500), ([72, 0, 1], 4500), ([6000, 0, 0], 4500)];
+    let mut path = path(&lines);
+    for line in path.lines.iter_mut().flatten() {
+        line.corner = Real::HUGE;
+    }
+    let [first, next] = [0, 1].map(|at| path.line(at).unwrap());
+    let (length, most) = (float(first.length), limits(&first.bounds));
+    let (all, least) = (length + float(next.length), limits(&next.bounds));
+    let rest = change([4500.0, 0.0], 0.0, most).1;
+    let place = length - rest - 40.0;
+    let left = all - place;
+    assert!(left < change([4500.0, 0.0], 0.0, least).1 && left < change([4500.0, 0.0], 1350.0, least).1);
+    assert!(near(float(path.exit(1, Real::ONE)) * second(), 4500.0));
+    let part = real(0.3);
+    let (course, _) = path.course(0, steady(4500.0), (real(place), Real::ZERO), (part, None)).unwrap();
+    let (got, _, exit) = outcome(&course);
+    assert!(course.more == 1 && near(got, left), "{} {got} for {left}", course.more);
+    assert!(exit > 1350.0 && (change([4500.0, 0.0], exit, least).1 - left).abs() < 1e-2, "{exit}");
+}
