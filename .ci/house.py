@@ -15,7 +15,8 @@
    it names are in lib.rs, because elsewhere they lead nowhere. Its first screen of 45 lines shows what to call: code, or a table that
    begins with what one has.
 5. Every public name has a user (`names.py`).
-6. Figures that the README of servowire-drivers repeats are those of their sources: the table of the images, `budget.toml`.
+6. No two examples of the workspace have one name: cargo builds them into the same file, and warns of it.
+7. Figures that the README of servowire-drivers repeats are those of their sources: the table of the images, `budget.toml`.
 """
 
 import json
@@ -352,6 +353,12 @@ def faults_of_map(text, packages):
             yield f"CONTRIBUTING.md: the map lacks {folder}/"
 
 
+def faults_of_examples(packages):
+    names = [target["name"] for package in packages for target in package["targets"] if target["kind"] == ["example"]]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        yield f"{names.count(name)} examples are called {name}"
+
+
 def faults_of_links(name, text):
     for found in re.finditer(r"\]\((\.\./[^)]*|\w+(?:::|@)[^)]*)\)", text):
         yield f"{name}: the link {found[1]} leads nowhere {'on docs.rs' if found[1].startswith('.') else 'but in rustdoc'}"
@@ -394,6 +401,7 @@ def check():
         *faults_of_imports(roots),
         *faults_of_drawing((ROOT / "README.md").read_text(), dependencies(packages), {name_of(p) for p in packages}),
         *faults_of_map((ROOT / "CONTRIBUTING.md").read_text(), workspace),
+        *faults_of_examples(workspace),
         *(
             fault
             for file in (Path(package["manifest_path"]).with_name("README.md") for package in workspace if package["publish"] is None)
@@ -478,6 +486,7 @@ def self_test():
     images, budget = "| [`one`](a/README.md) | 1 kB | 2 B | 3 B | 4 |", "two = { O3 = 1234.4, Os = 56.2, limit_O3 = 7 }"
     equal("true figures", [], list(faults_of_figures("| `one` | x | 1 kB | 2 B | 3 B |\n| y | `two` | 1,234; 56 |", images, budget)))
     equal("figures", 2, len(list(faults_of_figures("| `one` | x | 1 kB | 2 B | 4 B |\n| y | `two` | 1,234; 50 |", images, budget))))
+    equal("examples", 1, len(list(faults_of_examples([{"targets": [{"name": "a", "kind": ["example"]}] * 2}]))))
     equal("the map", 1, len(list(faults_of_map("| `a/` |", places))))
     public_names.self_test(equal)
     print("house: the checks see what they look for")

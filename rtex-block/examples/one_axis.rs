@@ -1,6 +1,6 @@
 //! What a machine does with one axis: text, parameters, position set, motion by the host and by the drive, latches, an alarm.
 //!
-//! `cargo run -p rtex-block --example axis`
+//! `cargo run -p rtex-block --example one_axis`
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,

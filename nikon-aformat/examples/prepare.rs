@@ -1,4 +1,4 @@
-//! A bench prepares an encoder before it is built in, and then reads it on a bus: `cargo run -p nikon-aformat --example commissioning`.
+//! A bench prepares an encoder before it is built in, and then reads it on a bus: `cargo run -p nikon-aformat --example prepare`.
 //!
 //! Identification code, address, alarms, turns and an EEPROM word are set by procedures that say whether it is done. The encoders
 //! are simulated, with readings of their own of what the documents leave open.
