@@ -142,7 +142,7 @@ pub(crate) fn count(len: usize) -> u16 {
 }
 
 servowire_core::one_line!(LongFrame<'_> {
-    Self { frame_type, payload, status, .. } => "{}, {} bytes, STATUS {}", frame_type, payload.len(), status;
+    Self { frame_type, payload, status, .. } => "{}, {} bytes of payload, STATUS {}", frame_type, payload.len(), status;
 });
 
 #[cfg(test)]
@@ -158,6 +158,7 @@ mod tests {
             (7, FrameType::Alarm, Status::from_bits_retain(0x85))
         );
         assert_eq!((frame.payload(), frame.fcs()), (&[1, 2, 3, 4, 5][..], fcs(&bytes[..9])));
+        assert!(std::format!("{frame}").contains(", 5 bytes of payload, "), "{frame}");
     }
 
     #[test]
