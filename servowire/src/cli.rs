@@ -91,7 +91,7 @@ fn man(command: Option<&str>) -> ExitCode {
     };
     let mut text = Vec::new();
     match clap_mangen::Man::new(page).render(&mut text) {
-        Ok(()) => print(sections(&String::from_utf8_lossy(&text)).as_bytes()),
+        Ok(()) => print(sections(&String::from_utf8_lossy(&text), command == Some("decode")).as_bytes()),
         Err(e) => {
             eprintln!("error: {e}");
             ExitCode::FAILURE
@@ -99,12 +99,14 @@ fn man(command: Option<&str>) -> ExitCode {
     }
 }
 
-/// With the names that manual pages have for examples and exit codes.
-fn sections(page: &str) -> String {
+/// With the names that manual pages have for examples and exit codes. `drives`: a drive may need attention.
+fn sections(page: &str, drives: bool) -> String {
     let page = page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n.nf\n");
     let status = ".fi\n.SH \"EXIT STATUS\"\n.TP\n0\nEverything is good.\n.TP\n1\nA frame was refused, or a file could not be \
                   read or written.\n.TP\n2\nWrong use.\n";
-    format!("{}\n{status}", page.trim_end())
+    let more =
+        if drives { ".TP\n4\nAll frames are good, but a drive needs attention.\n.TP\n5\nBoth 1 and 4.\n" } else { "" };
+    format!("{}\n{status}{more}", page.trim_end())
 }
 
 #[cfg(test)]
@@ -118,7 +120,8 @@ mod tests {
         for name in ["decode", "report", "explain"] {
             let mut text = Vec::new();
             clap_mangen::Man::new(whole.find_subcommand(name).unwrap().clone()).render(&mut text).unwrap();
-            let page = sections(&String::from_utf8(text).unwrap());
+            let page = sections(&String::from_utf8(text).unwrap(), name == "decode");
+            assert_eq!(page.ends_with("\n.TP\n5\nBoth 1 and 4.\n"), name == "decode", "{page}");
             assert!(page.contains(&format!(".SH EXAMPLES\n.nf\n  servowire {name} ")), "{page}");
             assert!(page.contains("\n.fi\n.SH \"EXIT STATUS\"\n") && !page.contains("EXTRA"), "{page}");
         }

@@ -191,14 +191,14 @@ pub struct Arguments {
 fn hertz(text: &str) -> Result<u32, String> {
     match time::frequency(text).map(f64::round) {
         Some(hertz) if (1.0..=f64::from(u32::MAX)).contains(&hertz) => Ok(hertz as u32),
-        _ => Err(format!("\"{text}\" is not a frequency from 1 Hz to 4 GHz, as 100k or 250000")),
+        _ => Err(format!("\"{text}\" is not a frequency from 1 Hz to 4 GHz, such as 100k or 250000")),
     }
 }
 
 fn probability(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(p) if (0.0..1.0).contains(&p) => Ok(p),
-        _ => Err(format!("\"{text}\" is not a probability from 0 to below 1, as 1e-6")),
+        _ => Err(format!("\"{text}\" is not a probability from 0 to below 1, such as 1e-6")),
     }
 }
 
@@ -220,7 +220,7 @@ fn incident(text: &str) -> Result<(usize, u64), String> {
     let parts = text.split_once('@').and_then(|(device, cycle)| Some((device.parse().ok()?, cycle.parse().ok()?)));
     match parts {
         Some((device @ 1..=254, cycle)) => Ok((device, cycle)),
-        _ => Err(format!("\"{text}\" is not a device from 1 to 254 and a cycle, as 3@10000")),
+        _ => Err(format!("\"{text}\" is not a device from 1 to 254 and a cycle, such as 3@10000")),
     }
 }
 

@@ -36,7 +36,7 @@ impl Arguments {
     /// Prints the plan, or draws it. 1: it could not be written; 2: it could not be made.
     pub fn run(&self) -> ExitCode {
         let plan = match &self.protocol {
-            Protocol::Tformat(arguments) => Ok(arguments.plan()),
+            Protocol::Tformat(arguments) => arguments.plan(),
             Protocol::Nikon(arguments) => arguments.plan(),
         };
         match plan.map(|plan| self.write(&plan)) {
@@ -61,6 +61,10 @@ impl Arguments {
         Ok(())
     }
 }
+
+/// Why there is no cycle: the controller takes no response that begins then.
+const SOON: &str = "the response begins so soon after the request that the controller does not accept it as an answer";
+const LATE: &str = "the response begins so late that the controller has stopped waiting for it";
 
 /// An action of one party, in ns from the start of the request.
 #[derive(Debug, Clone, PartialEq, Eq)]

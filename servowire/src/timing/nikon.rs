@@ -13,7 +13,7 @@ use nikon_aformat::{
     BitRate, Command, EncoderAddress, EncoderId, FRAME_BITS, Operation, Request, Resolution, UserAddress,
 };
 
-use super::{Bar, Plan};
+use super::{Bar, LATE, Plan, SOON};
 use crate::units::one_of;
 
 /// Nikon A-format encoders, one or several on a bus.
@@ -149,26 +149,33 @@ fn free(request: Request, on_line: Addresses, line: Line, responses: &[Heard]) -
             (1..).zip(&heard.contents).map(move |(k, content)| (*content, heard.start_ns + k * frame_ns))
         })
     };
-    let unheard = "the response begins so soon after the request that the controller does not accept it as an answer";
+    // A controller looks at its clock until the first frame has come.
+    let waited_ns = responses.first().map_or(0, |heard| heard.start_ns + frame_ns - 1);
     if request.command().is_multi_response() {
         let start = || BusTransaction::start(request, Resolution::default(), on_line, line, 0);
         let (mut heard, mut lost) = (start(), start());
+        if !matches!(heard.poll(waited_ns), Progress::Pending { .. }) {
+            return Err(LATE.into());
+        }
         for (content, end_ns) in frames() {
             let _ = heard.hear(&[Some(content)], end_ns);
         }
         match (heard.progress(), lost.poll(u64::MAX)) {
             (Progress::Done { ready_ns, .. }, Progress::Done { ready_ns: fault_ns, .. }) => Ok((ready_ns, fault_ns)),
-            _ => Err(unheard.into()),
+            _ => Err(SOON.into()),
         }
     } else {
         let start = || Transaction::start(request, Resolution::default(), line, 0);
         let (mut heard, mut lost) = (start(), start());
+        if !matches!(heard.poll(waited_ns), Progress::Pending { .. }) {
+            return Err(LATE.into());
+        }
         for (content, end_ns) in frames() {
             let _ = heard.hear(&[Some(content)], end_ns);
         }
         match (heard.progress(), lost.poll(u64::MAX)) {
             (Progress::Done { ready_ns, .. }, Progress::Failed { ready_ns: fault_ns, .. }) => Ok((ready_ns, fault_ns)),
-            _ => Err(unheard.into()),
+            _ => Err(SOON.into()),
         }
     }
 }
@@ -231,7 +238,15 @@ mod tests {
         let one = Arguments { command: Some(Command::Abs40), ..arguments(BitRate::Mbit4, &[0, 1]) };
         assert!(one.plan().unwrap_err().to_string().contains("addresses one encoder"));
         let early = Arguments { turn_around: 100, ..arguments(BitRate::Mbit4, &[0]) };
-        assert!(early.plan().is_err());
+        assert_eq!(early.plan().unwrap_err().to_string(), SOON);
+        // 1000 bits at 4 Mbit/s are 250 us, and a response with idle time in it 20 us.
+        for command in [Command::Abs40, Command::Abs40Mt] {
+            let after = |turn_around| {
+                let command = Some(command);
+                Arguments { command, turn_around, ..arguments(BitRate::Mbit4, &[0]) }.plan()
+            };
+            assert!(after(249_000).is_ok() && after(300_000).unwrap_err().to_string() == LATE, "{command}");
+        }
     }
 
     /// Every command has a plan, those with arguments too.

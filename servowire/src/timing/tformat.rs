@@ -1,10 +1,13 @@
 //! T-Format: one encoder, one request after the other.
 
+use std::error::Error;
+
 use clap::Args;
+use tformat::device::Device;
 use tformat::master::{Line, Progress, Transaction};
 use tformat::{Adf, BitRate, DataId, Request};
 
-use super::{Bar, Plan};
+use super::{Bar, LATE, Plan, SOON};
 use crate::units::tformat_rate;
 
 /// One Tamagawa T-Format encoder.
@@ -28,12 +31,12 @@ pub(super) struct Arguments {
 }
 
 fn data_id(text: &str) -> Result<DataId, String> {
-    let code = u8::from_str_radix(text, 16).map_err(|error| error.to_string())?;
+    let code = u8::from_str_radix(text, 16).map_err(|_| format!("\"{text}\" is not a data ID, such as 3 or D"))?;
     DataId::from_code(code).ok_or_else(|| tformat::Error::UnknownDataId { code }.to_string())
 }
 
 impl Arguments {
-    pub(super) fn plan(&self) -> Plan {
+    pub(super) fn plan(&self) -> Result<Plan, Box<dyn Error>> {
         let Self { rate, id, cable, turn_around, latency } = *self;
         let line = Line::new(rate).with_hand_over_ns(latency);
         let way_ns = 5 * i64::from(cable);
@@ -52,7 +55,18 @@ impl Arguments {
             bar("encoder", format!("response {}", response.join(" ")), answer_ns, end_ns),
             bar("controller", "hand-over".to_owned(), end_ns, handed_ns),
         ];
-        let mut lost = Transaction::start(Request::of(id, Adf::from_bits(0), 0), line, 0);
+        let request = Request::of(id, Adf::from_bits(0), 0);
+        let mut heard = Transaction::start(request, line, 0);
+        let answer = Device::<1>::new(0x17, rate).answer(request, 0).ok_or("the encoder is silent")?;
+        // A controller looks at its clock until the first field has come.
+        let waited_ns = answer_ns + i64::from(rate.fields_ns(1)) + i64::from(latency) - 1;
+        if let Progress::Failed { .. } = heard.poll(waited_ns.try_into()?) {
+            return Err(LATE.into());
+        }
+        if !matches!(heard.hear(answer.emit().as_bytes(), end_ns.try_into()?), Progress::Done { .. }) {
+            return Err(SOON.into());
+        }
+        let mut lost = Transaction::start(request, line, 0);
         let fault_ns = match lost.poll(u64::MAX) {
             Progress::Failed { ready_ns, .. } => ready_ns,
             _ => 0,
@@ -60,7 +74,7 @@ impl Arguments {
         let title = format!("T-Format, {id} at {rate}");
         // The driver of the next request may be switched on when the response is over.
         let cycle_ns = u64::try_from(handed_ns + lead_ns).unwrap_or(0);
-        Plan { title, bars, cycle_ns, fault_ns }
+        Ok(Plan { title, bars, cycle_ns, fault_ns })
     }
 }
 
@@ -69,7 +83,22 @@ mod tests {
     use super::*;
 
     fn plan(rate: BitRate, id: DataId, cable: u16) -> Plan {
-        Arguments { rate, id, cable, turn_around: 3_000, latency: 0 }.plan()
+        Arguments { rate, id, cable, turn_around: 3_000, latency: 0 }.plan().unwrap()
+    }
+
+    /// A controller takes nothing that begins less than four bits after its request, 1.6 us, and waits 10 us.
+    #[test]
+    fn a_response_that_no_controller_takes() {
+        for id in DataId::ALL {
+            let plan = |turn_around| Arguments { rate: BitRate::Mbit2_5, id, cable: 0, turn_around, latency: 0 }.plan();
+            for (turn_around, want) in [(0, SOON), (1_590, SOON), (10_100, LATE), (20_000, LATE), (u32::MAX, LATE)] {
+                assert_eq!(plan(turn_around).unwrap_err().to_string(), want, "{id} after {turn_around} ns");
+            }
+            assert!([1_600, 3_000, 10_000].map(plan).iter().all(Result::is_ok), "{id}");
+        }
+        let late =
+            Arguments { rate: BitRate::Mbit5, id: DataId::ReadAll, cable: 0, turn_around: 3_000, latency: 60_000 };
+        assert!(late.plan().is_ok());
     }
 
     /// The end of the response, in us, with 3 us of turn-around: IDs 0, 1, 2, 3, 6, 7, 8, C, D.
