@@ -301,6 +301,16 @@ impl Bounds {
         Self::new(self.v.max(other.v), self.a.max(other.a), jerk)
     }
 
+    /// Returns the lower of the two limits of each kind.
+    pub(super) fn or_lower(self, other: &Self) -> Self {
+        let (a, v) = (self.a.min(other.a), self.v.min(other.v));
+        let j = match (self.jerk, other.jerk) {
+            (Some(own), Some(other)) => Some(own.j.min(other.j)),
+            (own, other) => own.or(other).map(|jerk| jerk.j),
+        };
+        Self::new(v, a, j)
+    }
+
     /// Returns whether the acceleration or the jerk may be higher.
     pub(super) fn allows_more(&self, than: &Self) -> bool {
         self.a > than.a || self.jerk.zip(than.jerk).is_some_and(|(own, than)| own.j > than.j)

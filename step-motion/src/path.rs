@@ -3,6 +3,7 @@
 mod ahead;
 mod corner;
 mod cut;
+mod passed;
 mod run;
 
 use crate::curve::{Curve, Piece};
@@ -17,6 +18,7 @@ use servowire_core::Direction;
 pub(crate) use ahead::Ahead;
 use ahead::Times;
 pub(crate) use cut::{End, Leaving};
+use passed::Passed;
 
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,6 +121,8 @@ pub struct Path<const N: usize, const M: usize> {
     /// the queue into account.
     on: Option<(Course, Start<N>, Bounds)>,
     knows_all: bool,
+    /// The line that was taken out last.
+    passed: Option<Passed<N>>,
     /// The fraction of the requested speeds for which something is known of the lines ahead, and since when.
     part: Real,
     times: Times,
@@ -167,6 +171,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             offset: Real::ZERO,
             on: None,
             knows_all: false,
+            passed: None,
             part: Real::ONE,
             times: Times::FIRST,
         };
@@ -317,31 +322,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(())
     }
 
-    /// Lets the lines use the higher of their own limits and these, for a stop that is to be planned again. Returns the lines
-    /// as they were.
-    pub(super) fn hurry(&mut self, limits: &[Limits; N]) -> [Option<Line<N>>; M] {
-        self.forget();
-        let (own, lines) = (self.axes, self.lines);
-        for (axis, limits) in self.axes.iter_mut().zip(limits) {
-            axis.limits = axis.limits.or_higher(*limits);
-        }
-        for i in 0..self.len {
-            let Some(line) = self.line(i) else { break };
-            let (bounds, _) = self.bounds(&line.steps, line.whole, 1);
-            let place = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
-            if let Some(Some(line)) = place {
-                (line.bounds, line.leave) = (bounds.or_higher(&line.bounds), None);
-            }
-        }
-        self.axes = own;
-        lines
-    }
-
-    /// Takes the lines as they were before [`hurry`](Self::hurry).
-    pub(super) const fn calm(&mut self, lines: [Option<Line<N>>; M]) {
-        self.lines = lines;
-    }
-
     /// Returns the steps of each axis from one position to another.
     pub(super) fn steps(from: [i64; N], to: [i64; N]) -> Result<[i32; N], Error> {
         let mut steps = [0; N];
@@ -403,6 +383,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if let Some(place) = self.lines.get_mut(self.first) {
             if let Some(line) = place.take() {
                 gone_along(&mut self.gone, &line.made());
+                self.passed = Some(Passed::new(&line));
             }
         }
         self.first = self.first.wrapping_add(1).checked_rem(M).unwrap_or(0);

@@ -27,15 +27,17 @@ struct Shorter {
 impl<const N: usize, const M: usize> Path<N, M> {
     /// Returns the run that begins at line `at`; it has at most `most` lines after the first one.
     fn run(&self, at: usize, kind: Kind, most: usize) -> Option<Run> {
-        let mut run = self.single(at, kind.part)?;
+        let mut run = self.single(at, kind)?;
         self.lengthen(at, &mut run, kind, most);
         Some(run)
     }
 
-    /// Returns a run of one line.
-    fn single(&self, at: usize, part: Option<Real>) -> Option<Run> {
+    /// Returns a run of one line, and of what is left of the line before.
+    fn single(&self, at: usize, Kind { part, early, .. }: Kind) -> Option<Run> {
         let line = self.line(at)?;
-        let bounds = Bounds { v: allowed(line, part), ..line.bounds };
+        let own = Bounds { v: allowed(line, part), ..line.bounds };
+        let passed = self.passed.as_ref().zip(early);
+        let bounds = passed.map_or(own, |(passed, most)| passed.lower(&own, most));
         Some(Run { more: 0, length: line.length, bounds })
     }
 
@@ -67,14 +69,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
         };
         // It does not fit: as far as it can to the end of the run.
         let left = (run.length + before) - place;
-        let shorter = Shorter { kind: self.under_way(at, start, (None, how.0))?, how };
+        let shorter = Shorter { kind: self.under_way(at, (start, before), (None, how.0))?, how };
         let limits = (&run, own, own.slower(start.v));
         self.leave(at, start, left, limits, (Real::ZERO, Real::ZERO), shorter)
     }
 
-    /// Returns the limits of a brake on a run: braking under way keeps its own if these are higher.
+    /// Returns the limits of a brake on a run: on a single line braking under way keeps its own if these are higher. Other lines may
+    /// not allow those.
     fn own(run: &Run, (present, brakes): (Option<Bounds>, bool)) -> Bounds {
-        present.filter(|_| brakes).map_or(run.bounds, |least| run.bounds.or_higher(&least))
+        present.filter(|_| brakes && run.more == 0).map_or(run.bounds, |least| run.bounds.or_higher(&least))
     }
 
     /// Plans in the same way, keeping to a fraction of the requested speeds.
@@ -86,7 +89,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         how: (Real, Option<Bounds>),
     ) -> Option<(Course, Bounds)> {
         let (run, left, speeds) = self.goal(at, start, from, how)?;
-        let kind = self.under_way(at, start, (Some(how.0), how.1))?;
+        let kind = self.under_way(at, (start, from.1), (Some(how.0), how.1))?;
         let shorter = Shorter { kind, how: (None, false) };
         self.leave(at, start, left, (&run, run.bounds, run.bounds), speeds, shorter)
     }
@@ -105,8 +108,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Does a slice of the look-ahead for a course from a motion on the first line. Returns whether there is more of it.
-    pub(crate) fn has_to_find(&mut self, start: Motion, (part, present): (Real, Option<Bounds>)) -> bool {
-        let run = self.under_way(0, start, (Some(part), present)).and_then(|kind| self.run(0, kind, M));
+    pub(crate) fn has_to_find(&mut self, from: (Motion, Real), (part, present): (Real, Option<Bounds>)) -> bool {
+        let run = self.under_way(0, from, (Some(part), present)).and_then(|kind| self.run(0, kind, M));
         run.is_some_and(|run| self.find_exit(run.more, part, 1).is_none())
     }
 
@@ -119,15 +122,20 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         (part, present): (Real, Option<Bounds>),
     ) -> Option<(Run, Real, (Real, Real))> {
-        let run = self.run(at, self.under_way(at, start, (Some(part), present))?, M)?;
+        let run = self.run(at, self.under_way(at, (start, before), (Some(part), present))?, M)?;
         let left = (run.length + before) - place;
         let wish = self.exit(at.saturating_add(run.more), part);
         Some((run, left, (wish.min(fastest_exit(start, left, &run.bounds)), wish)))
     }
 
-    /// Returns the runs for a motion on line `at`: with the speed that it reaches if it goes on as it is, and its acceleration
+    /// Returns the runs for a motion on line `at`, or a distance before it: with the speed that it reaches if it goes on as it is, and its acceleration
     /// and jerk.
-    fn under_way(&self, at: usize, start: Motion, (part, present): (Option<Real>, Option<Bounds>)) -> Option<Kind> {
+    fn under_way(
+        &self,
+        at: usize,
+        (start, before): (Motion, Real),
+        (part, present): (Option<Real>, Option<Bounds>),
+    ) -> Option<Kind> {
         let first = self.line(at)?;
         let (mut speed, mut held) = (start.v, [Real::ZERO; 2]);
         if let Some(jerk) = first.bounds.jerk.filter(|_| !start.a.is_zero()) {
@@ -138,7 +146,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 speed = start.v + (start.a.squared() / j).half();
             }
         }
-        Some(Kind { part, speed, held, any: false })
+        Some(Kind { part, speed, held, any: false, early: self.early(start, before, &first.bounds) })
+    }
+
+    /// Returns the greatest speed of a motion a distance before a line; only what it can reach there counts.
+    fn early(&self, start: Motion, before: Real, bounds: &Bounds) -> Option<Real> {
+        let passed = self.passed.as_ref().filter(|_| !before.is_zero())?;
+        let most = passed.speed();
+        Some(if fastest_exit(start, before, bounds) > most { most } else { Real::HUGE })
     }
 
     /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with `any`, lines that may
@@ -152,9 +167,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         how: (Option<Bounds>, bool),
         any: bool,
     ) -> Option<Result<(Course, Bounds), (Run, Bounds)>> {
-        let kind = Kind { any, ..self.under_way(at, start, (None, how.0))? };
+        let kind = Kind { any, ..self.under_way(at, (start, before), (None, how.0))? };
         // With the limits of no more lines than the stop takes.
-        let mut run = self.single(at, None)?;
+        let mut run = self.single(at, kind)?;
         let mut own = run.bounds;
         for _ in 0..M {
             own = Self::own(&run, how);
@@ -226,7 +241,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Returns the runs of fewer lines, the shortest first.
     fn shorter(&self, at: usize, kind: Kind, than: usize) -> [Option<Run>; M] {
         let mut runs = [None; M];
-        let mut run = self.single(at, kind.part);
+        let mut run = self.single(at, kind);
         for (more, place) in runs.iter_mut().take(than).enumerate() {
             if let Some(run) = &mut run {
                 self.lengthen(at, run, kind, more);
@@ -413,7 +428,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Returns the run that begins at line `at`, from the corner before it, at a fraction of the requested speeds.
     fn run_from(&self, at: usize, part: Real) -> Option<Run> {
-        self.run(at, Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false }, M)
+        self.run(at, Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false, early: None }, M)
     }
 
     /// Returns the greatest speed at the start of a run that its corner and the lines on both sides allow.

@@ -135,8 +135,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// [`replan`](Self::replan). Returns whether there is more of it.
     pub(crate) fn has_to_find(&mut self, asked: Option<u64>) -> bool {
         if let (Some(now), Some(part)) = (asked, self.requests.part()) {
-            if let Some((motion, _)) = self.here(now) {
-                return self.path.has_to_find(motion, (part, self.bounds));
+            if let Some((motion, start)) = self.here(now) {
+                return self.path.has_to_find((motion, start.before), (part, self.bounds));
             }
         }
         let at = if self.line.is_some() { self.more } else { 0 };

@@ -12,6 +12,7 @@ mod brakes;
 mod changes;
 mod halts;
 mod homing;
+mod joints;
 mod laws;
 mod lines;
 mod machine;

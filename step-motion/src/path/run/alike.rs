@@ -29,6 +29,8 @@ pub(super) struct Kind {
     pub(super) held: [Real; 2],
     /// Also lines that allow other accelerations.
     pub(super) any: bool,
+    /// The motion is still on the line before: the speed that it may have there.
+    pub(super) early: Option<Real>,
 }
 
 /// Returns the speed that a line allows.
@@ -42,7 +44,7 @@ impl Run {
 
     /// Adds the next line; returns false if it has to stay outside.
     #[inline]
-    pub(super) fn add<const N: usize>(&mut self, line: &Line<N>, Kind { part, speed, held, any }: Kind) -> bool {
+    pub(super) fn add<const N: usize>(&mut self, line: &Line<N>, Kind { part, speed, held, any, .. }: Kind) -> bool {
         let Run { more, length, bounds } = self;
         let fastest = if part.is_some() { bounds.v.max(speed) } else { speed };
         let (Some(jerk), Some(other), true) = (bounds.jerk, line.bounds.jerk, line.corner >= fastest) else {
