@@ -30,7 +30,8 @@ impl<const N: usize> Passed<N> {
 
     /// Returns limits of which acceleration and jerk are no higher than on the line, for at most a speed.
     pub(super) fn lower(&self, bounds: &Bounds, most: Real) -> Bounds {
-        Bounds { v: bounds.v.min(most), ..bounds.or_lower(&self.bounds) }
+        let v = bounds.v.min(most);
+        if bounds.allows_more(&self.bounds) { Bounds { v, ..bounds.or_lower(&self.bounds) } } else { bounds.slower(v) }
     }
 }
 

@@ -35,10 +35,20 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// Returns a run of one line, and of what is left of the line before.
     fn single(&self, at: usize, Kind { part, early, .. }: Kind) -> Option<Run> {
         let line = self.line(at)?;
-        let own = Bounds { v: allowed(line, part), ..line.bounds };
-        let passed = self.passed.as_ref().zip(early);
-        let bounds = passed.map_or(own, |(passed, most)| passed.lower(&own, most));
-        Some(Run { more: 0, length: line.length, bounds })
+        let bounds = Bounds { v: allowed(line, part), ..line.bounds };
+        let mut run = Run { more: 0, length: line.length, bounds };
+        if !early.is_zero() {
+            self.slow_before(&mut run, early);
+        }
+        Some(run)
+    }
+
+    /// Lowers the limits of a run to those of the line before, and its speed.
+    #[cold]
+    fn slow_before(&self, run: &mut Run, most: Real) {
+        if let Some(passed) = &self.passed {
+            run.bounds = passed.lower(&run.bounds, most);
+        }
     }
 
     /// Adds lines to a run that begins at line `at`, up to `most` after the first one.
@@ -149,11 +159,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some(Kind { part, speed, held, any: false, early: self.early(start, before, &first.bounds) })
     }
 
-    /// Returns the greatest speed of a motion a distance before a line; only what it can reach there counts.
-    fn early(&self, start: Motion, before: Real, bounds: &Bounds) -> Option<Real> {
-        let passed = self.passed.as_ref().filter(|_| !before.is_zero())?;
+    /// Returns the greatest speed of a motion a distance before a line, if that is less than it can reach there; 0 on the line.
+    fn early(&self, Motion { v, a, .. }: Motion, before: Real, bounds: &Bounds) -> Real {
+        let Some(passed) = self.passed.as_ref().filter(|_| !before.is_zero()) else { return Real::ZERO };
         let most = passed.speed();
-        Some(if fastest_exit(start, before, bounds) > most { most } else { Real::HUGE })
+        let reached = v.squared() + (bounds.a.max(a) * before).scaled(1);
+        if bounds.v > most && reached > most.squared() { most } else { Real::HUGE }
     }
 
     /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with `any`, lines that may
@@ -428,7 +439,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
 
     /// Returns the run that begins at line `at`, from the corner before it, at a fraction of the requested speeds.
     fn run_from(&self, at: usize, part: Real) -> Option<Run> {
-        self.run(at, Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false, early: None }, M)
+        self.run(
+            at,
+            Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false, early: Real::ZERO },
+            M,
+        )
     }
 
     /// Returns the greatest speed at the start of a run that its corner and the lines on both sides allow.

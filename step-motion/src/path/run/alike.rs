@@ -29,8 +29,8 @@ pub(super) struct Kind {
     pub(super) held: [Real; 2],
     /// Also lines that allow other accelerations.
     pub(super) any: bool,
-    /// The motion is still on the line before: the speed that it may have there.
-    pub(super) early: Option<Real>,
+    /// The speed that it may have on the line before, if it is still there; otherwise 0.
+    pub(super) early: Real,
 }
 
 /// Returns the speed that a line allows.

@@ -29,8 +29,13 @@ fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
     // 173,205 steps/s at most along the second line, where all axes have 100,000; the corner does not count here.
     path.lines[1].as_mut().unwrap().corner = Real::HUGE;
     let more = |path: &Lines, v: f64| {
-        let kind =
-            Kind { part: Some(Real::ONE), speed: real(v / second()), held: [Real::ZERO; 2], any: true, early: None };
+        let kind = Kind {
+            part: Some(Real::ONE),
+            speed: real(v / second()),
+            held: [Real::ZERO; 2],
+            any: true,
+            early: Real::ZERO,
+        };
         path.run(0, kind, 8).unwrap().more
     };
     assert_eq!([2000.0, 173_000.0, 174_000.0].map(|v| more(&path, v)), [1, 1, 0]);
