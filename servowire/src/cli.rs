@@ -24,7 +24,7 @@ enum Command {
     Report(report::Arguments),
     /// Show one frame of a capture, bit by bit.
     Explain(explain::Arguments),
-    /// Compute the times of the steps of a move on a 4 us cycle.
+    /// Compute the times of the steps of a move or a part program.
     Profile(profile::Arguments),
     /// Run the reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),

@@ -23,15 +23,14 @@ use crate::gcode::Part;
 use servowire_decode::fault::Fault;
 use servowire_decode::time;
 
-/// Compute the times of the steps of a move on a 4 us cycle.
+/// Compute the times of the steps of a move or a part program.
 ///
 /// The sin² ramp and the integers of the 250 kHz motion controller of TIDEP0061: for every step the cycle of its pulse
 /// and the start of the pulse in that cycle. Without an output option, prints a summary and a table of the ramp.
 ///
 /// With --shape trapezoid or s-curve, computes the fastest move within --accel and --jerk; --compare shows all shapes side by
-/// side, at the
-/// same speed and peak acceleration. With --gcode the steps of three axes along the path of a part program, each axis within
-/// --freq, --accel and --jerk (100 kHz, 400000 steps/s² and none).
+/// side, at the same speed and peak acceleration. With --gcode the steps of three axes along the path of a part program, each
+/// axis within --freq, --accel and --jerk (100 kHz, 400000 steps/s² and none).
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Step frequency at full speed, such as 94570 or 94.57kHz.
