@@ -153,3 +153,20 @@ fn between(clock: Clock, (from, to): (i64, i64), way: Real, there: &Piece) -> Se
     let state = Setpoint::new(clock, state).on_axis(0, direction);
     Setpoint { position: from.saturating_add(state.position), ..state }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2^-15 of a step are a way, and less is rounding: nothing waits for that.
+    #[test]
+    fn what_rounding_leaves_is_no_way() {
+        for off in [0, 1, 1 << 16, (1 << 17) - 1] {
+            assert!(gap(7 << 32, (7 << 32) + off).is_zero() && gap(off, 0).is_zero(), "{off}");
+        }
+        for off in [1_i64 << 17, 1 << 31, 5 << 32] {
+            let want = Real::fixed(off.unsigned_abs(), 32);
+            assert!(gap(0, off) == want && gap(-off, 0) == want, "{off}");
+        }
+    }
+}

@@ -137,3 +137,49 @@ proptest! {
         }
     }
 }
+
+/// Along two lines straight on, with a joint where it speeds up, at full speed and where it slows down, and with another override shortly
+/// before that: in each tick as along a single line.
+#[test]
+fn a_joint_straight_on_is_not_seen() {
+    let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();
+    let machine = |lines: &[i64]| {
+        let path = Path::<N, 6>::new(Clock::MICROSECONDS, [AxisSetup::new(limits, 1_000_000); N], 20).unwrap();
+        let mut machine = PathMover::new(path);
+        for half in lines {
+            machine.push([2 * half, *half], 1000, 0).unwrap();
+        }
+        machine
+    };
+    for (joint, from, percent) in
+        [(20, 0, 100), (200, 0, 100), (460, 0, 100), (20, 15, 50), (30, 29, 70), (200, 195, 50), (460, 455, 50)]
+    {
+        let mut both = [machine(&[joint, 500]), machine(&[500])];
+        let (mut asked, mut seen, mut odd) = (false, 0, 0);
+        for now in (0..3_000_000).step_by(83) {
+            for machine in &mut both {
+                while machine.due().is_some_and(|due| due <= now) {
+                    machine.pulse();
+                }
+            }
+            if !asked && both[1].commanded()[1] >= from {
+                asked = true;
+                for machine in &mut both {
+                    machine.set_override(percent, now);
+                }
+            }
+            let [states, want] = [0, 1].map(|of: usize| both[of].at(now));
+            for (state, want) in states.into_iter().zip(want) {
+                let off = (state.position - want.position).abs();
+                assert!(off < 1 << 19, "{joint} {from}: {off} at {now}");
+                assert!((state.speed - want.speed).abs() < 1 << 14, "{joint} {from}: {state:?} {want:?} at {now}");
+                // Rounding may put the change of a jerk into the tick beside.
+                let near = |a: i64, b: i64| (a - b).abs() <= 1 << 16;
+                odd += u32::from(!near(state.acceleration, want.acceleration) || !near(state.jerk, want.jerk));
+            }
+            seen += u32::from(both[0].len() == 1 && both[0].commanded()[1] == joint);
+        }
+        assert_eq!(both.map(|machine| machine.commanded()), [[1000, 500]; 2]);
+        assert!(seen > 5 && odd <= 4, "{joint} {from}: {seen} {odd}");
+    }
+}
