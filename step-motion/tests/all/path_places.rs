@@ -44,9 +44,6 @@ impl Seen {
             let way = (there[axis] - before[axis]).abs() as f64 / 2_f64.powi(32);
             let most = self.speeds[axis] * ((self.now - then) as f64 + 0.5) / self.hz + 1.0 / 8192.0;
             assert!(way <= most, "axis {axis} goes {way} from {then} to {}, {most} at the most", self.now);
-            let speed = self.machine.at(self.now)[axis].speed as f64 / 65536.0;
-            let most = self.speeds[axis] * (1.0 + 2e-5) + 2.0 / 65536.0;
-            assert!(speed.abs() <= most, "axis {axis} at {speed} steps/s at {}, {most} at the most", self.now);
             let off = ((there[axis] - (self.machine.commanded()[axis] << 32)) as f64 / 2_f64.powi(32)).abs();
             let most = 0.5 + self.speeds[axis] / self.hz + 1.0 / 8192.0;
             assert!(off <= most, "axis {axis} is {off} off at {}, {most} at the most", self.now);
