@@ -154,9 +154,7 @@ impl Arguments {
     fn follow(&self, path: &Path, out: &mut dyn Write) -> ExitCode {
         let planned = || -> Result<_, Box<dyn Error>> {
             let lines = self.part.check(path)?;
-            let speed = self
-                .freq
-                .map_or(Part::SPEED, |frequency| (frequency.numerator() / u32::from(frequency.denominator())).max(1));
+            let speed = self.freq.map_or(Ok(Part::SPEED), whole)?;
             let limits = Limits::new(speed, self.accel.unwrap_or(Part::ACCELERATION))?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
             Ok((lines, self.part.steps(path, limits)?))
@@ -186,11 +184,10 @@ impl Arguments {
 
     /// Returns the requested shape, or all shapes.
     fn moves(&self) -> Result<Vec<Move>, Box<dyn Error>> {
-        let frequency = match (self.tone, self.freq) {
-            (Some(tone), _) => tone.frequency(),
-            (None, frequency) => frequency.unwrap_or(Frequency::from_hz(1)),
+        let speed = match (self.tone.map(Tone::frequency), self.freq) {
+            (Some(tone), _) => tone.numerator() / u32::from(tone.denominator()),
+            (None, frequency) => whole(frequency.unwrap_or(Frequency::from_hz(1)))?,
         };
-        let speed = (frequency.numerator() / u32::from(frequency.denominator())).max(1);
         let acceleration = self.accel.ok_or("--shape trapezoid and s-curve need --accel")?;
         let flat = Limits::new(speed, acceleration)?;
         let jerk = self.jerk.unwrap_or(u64::from(acceleration).pow(2) / u64::from(speed) * 10);
@@ -290,6 +287,13 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
         _ => None,
     });
     io.or(json).or(csv) == Some(io::ErrorKind::BrokenPipe)
+}
+
+/// The limit of an axis.
+fn whole(frequency: Frequency) -> Result<u32, &'static str> {
+    let (hz, of) = (frequency.numerator(), u32::from(frequency.denominator()));
+    let speed = hz.checked_div(of).filter(|speed| *speed > 0 && hz % of == 0);
+    speed.ok_or("--freq is the limit of an axis here: whole steps/s, at least 1")
 }
 
 /// Whole millihertz: finer than the speed constant anywhere in its range.
@@ -413,6 +417,11 @@ mod tests {
         let json = shapes("--freq 1k --steps 1 --shape s-curve --accel 10000 --jerk 1000000 --json").unwrap();
         assert_eq!(json, "{\"step\":0,\"time_ns\":15874011}\n");
         assert!(shapes("--freq 1k --steps 3 --shape trapezoid").is_err());
+        for frequency in ["0.2", "999.5"] {
+            let error = shapes(&format!("--freq {frequency} --steps 3 --shape trapezoid --accel 10000")).unwrap_err();
+            assert!(error.to_string().contains("whole steps/s"), "{error}");
+        }
+        assert!(shapes("--freq 0.999k --steps 3 --shape trapezoid --accel 10000").is_ok());
     }
 
     #[test]
