@@ -5,6 +5,9 @@ use crate::limits::{Bounds, Limits};
 use crate::line::Line;
 use crate::real::Real;
 
+#[cfg(test)]
+mod tests;
+
 /// What a line has allowed that has been taken out.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

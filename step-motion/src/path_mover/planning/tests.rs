@@ -111,6 +111,20 @@ fn a_stop_at_a_joint_but_for_rounding() {
     }
 }
 
+/// Where a curve leads over a joint nothing is planned: it goes on as it began, which costs little. A request plans it anew.
+#[test]
+fn a_joint_on_a_curve_costs_no_plan() {
+    let mut mover = mover([(5000, 50_000); 2], 1000, &[[200, 0], [150, 0], [300, 0]]);
+    let began = |mover: &Lines| mover.line.as_ref().map(|line| (line.start.moment, mover.more));
+    for (steps, more) in [(1, 2), (198, 2), (2, 1), (148, 1), (2, 0), (200, 0)] {
+        take(&mut mover, steps);
+        assert_eq!(began(&mover), Some((0, more)));
+    }
+    let now = take(&mut mover, 1);
+    mover.set_override(90, now);
+    assert_eq!(began(&mover), Some((mover.clock().moment(now), 0)));
+}
+
 #[test]
 fn a_curve_without_the_steps_that_remain_is_not_begun() {
     let mut mover = mover([(5000, 50_000); 2], 1000, &[[100, 0]]);
@@ -122,7 +136,8 @@ fn a_curve_without_the_steps_that_remain_is_not_begun() {
     assert_eq!((mover.commanded(), mover.due()), ([100, 0], None));
 }
 
-/// Over lines that differ in their limits: on one curve, or with acceleration 0 at each joint, whichever ends first.
+/// Over lines that differ in their limits: on one curve, or with acceleration 0 at each joint, whichever ends first. How long the second
+/// one takes behind its first curve is known with its end, so it need not be planned again for that.
 #[test]
 fn a_quick_stop_is_the_shorter_of_two() {
     let mut shorter = [0, 0];
@@ -136,10 +151,11 @@ fn a_quick_stop_is_the_shorter_of_two() {
             let Some((course, _)) = mover.path.brake(0, motion, from, how) else { continue };
             let once = mover.path.stop(0, motion, from, how, true).and_then(Result::ok);
             let (Some((once, _)), false) = (once, course.exit.is_zero()) else { continue };
-            let joints = mover.path.end_of_stop(course.more + 1, course.exit).0;
+            let (joints, time) = mover.path.end_of_stop(course.more + 1, course.exit);
             let once = mover.path.locate(0, (from.0 + once.curve.way()) - from.1, once.more);
-            let stop = mover.stop_anew(now, true).unwrap().end;
-            assert!(stop == if once < joints { once } else { joints }, "{steps}: {stop:?} of {once:?} and {joints:?}");
+            let Stop { end, after, .. } = mover.stop_anew(now, true).unwrap();
+            let want = if once < joints { (once, None) } else { (joints, Some(time)) };
+            assert!((end, after) == want, "{steps}: {end:?} {after:?} of {once:?} and {joints:?}");
             shorter[usize::from(once < joints)] += 1;
         }
     }
