@@ -60,7 +60,7 @@ same_elsewhere() {
 
 # run IMAGE: what it prints as $images/IMAGE.txt; report.py judges it
 run() {
-    timeout 300 qemu-system-arm -machine mps2-an386 -display none -serial none -monitor none \
+    timeout 900 qemu-system-arm -machine mps2-an386 -display none -serial none -monitor none \
         -icount shift=0 -semihosting-config enable=on,target=native -kernel "$images/$1.elf" \
         >"$images/$1.txt" || echo "$1: QEMU ended with code $?" >&2
 }
