@@ -141,6 +141,17 @@ fn the_most_before_a_line_that_ends_at_a_corner() {
     assert!((4..12).contains(&rests), "{rests}");
 }
 
+/// What is known to be slower than a corner, here for the end of the path, leaves the most before it what it is without that.
+#[test]
+fn what_is_known_to_be_slow_is_no_corner() {
+    let mut path = path(&[([300, 0, 2], 1000), ([100, 0, 3], 1000), ([40, 0, 3], 1000)]);
+    path.lines[2].as_mut().unwrap().corner = real(700.0 / second());
+    let most = path.most(0);
+    let known = float(path.exit(1, Real::ONE)) * second();
+    assert!(known > 0.0 && known < 600.0, "{known}");
+    assert_eq!(path.most(0), most);
+}
+
 /// A line that allows less jerk comes when the motion has just as much room left as it needs to come to rest before it.
 #[test]
 fn a_rest_that_fits_is_kept_before_a_line_that_allows_less() {
