@@ -357,20 +357,21 @@ fn an_encoder_that_is_not_there_is_said_to_be_so() {
     let close = "for f in /proc/self/fd/*; do f=${f##*/}; [ $f -lt 3 ] || eval \"exec $f>&-\"; done; exec \"$@\"";
     let program = Command::new("bash")
         .args(["-c", close, "bash", "timeout", "20", env!("CARGO_BIN_EXE_servowire")])
-        .args(["talk", "--port", &bench.name, "watch", "--period", "1"])
+        .args(["talk", "--port", &bench.name, "--timeout", "2000", "watch", "--period", "1"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    thread::sleep(Duration::from_millis(500));
+    // It first waits as long as for an answer.
+    thread::sleep(Duration::from_millis(3000));
     bench.end();
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output).contains(": the port is gone or refused: "), "{}", text(&output));
     let counted = String::from_utf8_lossy(&output.stdout);
-    // On a machine with much else to do a response may come too late; that the port is gone counts as nothing missing.
-    let (good, bad) = counted.lines().last().unwrap().rsplit_once(" good, ").unwrap();
-    let good: u32 = good.rsplit(' ').next().unwrap().parse().unwrap();
-    let bad: u32 = bad.strip_suffix(" refused or missing").unwrap().parse().unwrap();
-    assert!(good > 0 && bad * 10 <= good, "{counted}");
+    // That the port is gone counts as nothing missing. But programs of other tests may hold its other end for a moment, where nobody
+    // answers any more: then the last request has no response.
+    let (good, bad) = counted.lines().last().unwrap().split_once(" good, ").unwrap();
+    assert!(good.parse::<u32>().unwrap() > 100, "{counted}");
+    assert!(["0 refused or missing", "1 refused or missing"].contains(&bad), "{counted}");
 }
