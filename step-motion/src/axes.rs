@@ -2,6 +2,7 @@
 
 mod braking;
 mod making;
+mod standing;
 
 use core::sync::atomic::Ordering;
 
@@ -14,7 +15,6 @@ use crate::halts::Halts;
 use crate::limits::Limits;
 use crate::path::{AxisSetup, Path};
 use crate::path_mover::PathMover;
-use crate::queue::{IDLE, Queue};
 use crate::real::Real;
 use crate::requests::Requests;
 use crate::writer::{LONGEST, Writer};
@@ -173,15 +173,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             hard: None,
         };
         (axes, AxesTimer::new(queue))
-    }
-
-    pub(super) const fn requests(&self) -> Requests {
-        self.path.requests()
-    }
-
-    /// The setup of each axis.
-    pub(super) const fn setup(&self) -> &[AxisSetup; N] {
-        self.path.axes()
     }
 
     /// Sets how many ticks of motion are in each half of the queue, at least 4; 10 ms by default.
@@ -356,6 +347,15 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Ok(())
     }
 
+    pub(super) const fn requests(&self) -> Requests {
+        self.path.requests()
+    }
+
+    /// The setup of each axis.
+    pub(super) const fn setup(&self) -> &[AxisSetup; N] {
+        self.path.axes()
+    }
+
     /// Does a slice of the background's work: a segment, a plan, or a check of the interrupt. Call it until it returns
     /// anything but [`Work::More`], again after each request, and every half [reach](Self::with_reach).
     pub fn poll(&mut self) -> Work {
@@ -405,22 +405,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.asked || self.path.due().is_some()
     }
 
-    /// Returns the block and the place in it where the first axis is, and whether all axes are stopped.
-    fn place(&self) -> (Option<(usize, usize)>, bool) {
-        let mut places = self.queue.axes.iter().map(|queue| queue.current.load(Ordering::Acquire));
-        let first = places.next().unwrap_or(IDLE);
-        let idle = first & IDLE != 0 && places.all(|current| current & IDLE != 0);
-        (Queue::<S>::place((first & 0xffff) as usize), idle)
-    }
-
-    /// Returns whether all axes have entered a block.
-    fn is_in(&self, block: usize) -> bool {
-        self.queue.axes.iter().all(|queue| {
-            let slot = (queue.current.load(Ordering::Acquire) & 0xffff) as usize;
-            Queue::<S>::place(slot).is_some_and(|(own, _)| own == block)
-        })
-    }
-
     /// Returns whether the interrupt may reach the stop of a block, or that stop is being cut.
     fn may_come_to(&self, block: usize) -> bool {
         let cut = self.stage == Stage::Stop && block == self.block;
@@ -461,46 +445,5 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Forgets what has been cut but not handed out.
     const fn begin_anew(&mut self) {
         (self.stage, self.same) = (Stage::Idle, false);
-    }
-
-    /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self) -> Work {
-        let mut dirs = self.dirs;
-        for (dir, queue) in dirs.iter_mut().zip(&self.queue.axes) {
-            match self.halts.dir(queue.current.load(Ordering::Acquire)) {
-                Some(level) => *dir = level,
-                None => return Work::Start,
-            }
-        }
-        let commanded = self.commanded();
-        // Or not all of what was handed out has been made.
-        self.path.halt_at(commanded, self.end, commanded != self.path.commanded());
-        self.stand(dirs);
-        if let Some(queue) = self.queue.axes.first() {
-            self.halts.confirmed(&queue.halt);
-        }
-        Work::More
-    }
-
-    /// Continues from the end of a block's stop, where the interrupt has stopped.
-    fn recover(&mut self, block: usize) {
-        let (Some(stop), Some(out)) = (self.stops.get_mut(block), self.outs.get(block).copied()) else { return };
-        stop.go_on_as(&self.path, out.end);
-        self.path.clone_from(stop);
-        self.end = out.end;
-        self.stand(out.dirs);
-        self.block = 1_usize.wrapping_sub(block);
-    }
-
-    fn stand(&mut self, dirs: [Direction; N]) {
-        self.dirs = dirs;
-        for (made, queue) in self.made.iter_mut().zip(&self.queue.axes) {
-            *made = queue.made.load(Ordering::Acquire);
-        }
-        for out in &mut self.outs {
-            out.valid = false;
-        }
-        self.begin_anew();
-        (self.standing, self.pending, self.asked, self.lost) = (true, false, false, false);
     }
 }

@@ -287,10 +287,8 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: i64) -> Result<(), Error> {
-        self.ready()?;
-        self.mover.ask_move(target, self.commanded())?;
-        self.asked(News::Aim);
-        Ok(())
+        self.mover.check(target)?;
+        self.move_freely(target)
     }
 
     /// Does the same as [`Mover::run`].
@@ -298,10 +296,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
     pub fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
-        self.ready()?;
-        self.mover.ask_run(direction, speed);
-        self.asked(News::Aim);
-        Ok(())
+        self.run_to(direction, speed, self.mover.soft_end(direction))
     }
 
     /// Does the same as [`Mover::set_override`].
@@ -375,15 +370,15 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Moves to a target that may be outside the soft limits.
     pub(super) fn move_freely(&mut self, target: i64) -> Result<(), Error> {
         self.ready()?;
-        self.mover.ask_free_move(target, self.commanded())?;
+        self.mover.ask_move(target, self.commanded())?;
         self.asked(News::Aim);
         Ok(())
     }
 
-    /// Runs, whatever the soft limits are.
-    pub(super) fn run_freely(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
+    /// Runs to a position, if there is one.
+    pub(super) fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>) -> Result<(), Error> {
         self.ready()?;
-        self.mover.ask_free_run(direction, speed);
+        self.mover.ask_run(direction, speed, end);
         self.asked(News::Aim);
         Ok(())
     }

@@ -160,7 +160,7 @@ impl Homing {
         switch: Switch,
         now: u64,
     ) -> Result<Self, Error> {
-        Self::begin(config, &mut OneOf { lines: PathOneByOne { mover, now }, axis }, switch, axis)
+        Self::begin(config, &mut OneOf { path: PathOneByOne { mover, now }, axis }, switch, axis)
     }
 
     /// Does the same as [`start`](Self::start), of one axis (from 0) of a path in two halves.
@@ -173,7 +173,7 @@ impl Homing {
         axis: usize,
         switch: Switch,
     ) -> Result<Self, Error> {
-        Self::begin(config, &mut OneOf { lines: axes, axis }, switch, axis)
+        Self::begin(config, &mut OneOf { path: axes, axis }, switch, axis)
     }
 
     /// The present state.
@@ -209,7 +209,7 @@ impl Homing {
         now: u64,
     ) -> Result<HomingState, Error> {
         let axis = self.axis;
-        self.go_on(&mut OneOf { lines: PathOneByOne { mover, now }, axis }, switch)
+        self.go_on(&mut OneOf { path: PathOneByOne { mover, now }, axis }, switch)
     }
 
     /// Does the same as [`poll_axis`](Self::poll_axis), of the axis of a path.
@@ -222,7 +222,7 @@ impl Homing {
         switch: Switch,
     ) -> Result<HomingState, Error> {
         let axis = self.axis;
-        self.go_on(&mut OneOf { lines: axes, axis }, switch)
+        self.go_on(&mut OneOf { path: axes, axis }, switch)
     }
 
     fn begin(config: HomingConfig, axis: &mut impl Homed, switch: Switch, at: usize) -> Result<Self, Error> {

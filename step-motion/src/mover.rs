@@ -213,10 +213,8 @@ impl Mover {
     /// [`Error::SoftLimit`] outside the soft limits, [`Error::Moving`] during a [`quick_stop`](Self::quick_stop),
     /// [`Error::TooManySteps`] more than 2^31 - 1 steps away.
     pub fn move_to(&mut self, target: i64, now: u64) -> Result<(), Error> {
-        self.ready(self.is_at_rest(now))?;
-        self.ask_move(target, self.commanded)?;
-        self.replan(self.moment(now));
-        Ok(())
+        self.check(target)?;
+        self.move_freely(target, now)
     }
 
     /// Runs at a speed in steps/s until another request or to the soft limit; the speed is at most the greatest one. 0
@@ -225,10 +223,7 @@ impl Mover {
     /// # Errors
     /// [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).
     pub fn run(&mut self, direction: Direction, speed: u32, now: u64) -> Result<(), Error> {
-        self.ready(self.is_at_rest(now))?;
-        self.ask_run(direction, speed);
-        self.replan(self.moment(now));
-        Ok(())
+        self.run_to(direction, speed, self.soft_end(direction), now)
     }
 
     /// Sets the feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); values above 100 count
@@ -320,27 +315,31 @@ impl Mover {
     /// Moves to a target that may be outside the soft limits.
     pub(super) fn move_freely(&mut self, target: i64, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
-        self.ask_free_move(target, self.commanded)?;
+        self.ask_move(target, self.commanded)?;
         self.replan(self.moment(now));
         Ok(())
     }
 
-    /// Runs, whatever the soft limits are.
-    pub(super) fn run_freely(&mut self, direction: Direction, speed: u32, now: u64) -> Result<(), Error> {
+    /// Runs to a position, if there is one.
+    pub(super) fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
-        self.ask_free_run(direction, speed);
+        self.ask_run(direction, speed, end);
         self.replan(self.moment(now));
         Ok(())
+    }
+
+    /// Refuses a target outside the soft limits.
+    pub(super) fn check(&self, target: i64) -> Result<(), Error> {
+        let outside = self.soft.is_some_and(|(low, high)| target < low || target > high);
+        if outside { Err(Error::SoftLimit { target: clamp(target) }) } else { Ok(()) }
+    }
+
+    /// Returns the soft limit in a direction.
+    pub(super) fn soft_end(&self, direction: Direction) -> Option<i64> {
+        self.soft.map(|(low, high)| if direction.dir() { low } else { high })
     }
 
     pub(super) fn ask_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
-        if self.soft.is_some_and(|(low, high)| target < low || target > high) {
-            return Err(Error::SoftLimit { target: clamp(target) });
-        }
-        self.ask_free_move(target, from)
-    }
-
-    pub(super) fn ask_free_move(&mut self, target: i64, from: i64) -> Result<(), Error> {
         let away = target.abs_diff(from);
         if away > u64::from(u32::MAX / 2) {
             return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
@@ -350,16 +349,7 @@ impl Mover {
         Ok(())
     }
 
-    pub(super) fn ask_run(&mut self, direction: Direction, speed: u32) {
-        let end = self.soft.map(|(low, high)| if direction.dir() { low } else { high });
-        self.run_to(direction, speed, end);
-    }
-
-    pub(super) const fn ask_free_run(&mut self, direction: Direction, speed: u32) {
-        self.run_to(direction, speed, None);
-    }
-
-    const fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>) {
+    pub(super) const fn ask_run(&mut self, direction: Direction, speed: u32, end: Option<i64>) {
         if speed == 0 {
             return self.ask_stop();
         }

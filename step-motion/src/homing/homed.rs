@@ -42,7 +42,7 @@ impl Homed for OneByOne<'_> {
     }
 
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
-        self.mover.run_freely(direction, speed, self.now)
+        self.mover.run_to(direction, speed, None, self.now)
     }
 
     fn move_to(&mut self, target: i64) -> Result<(), Error> {
@@ -76,7 +76,7 @@ impl<const N: usize> Homed for Axis<'_, N> {
     }
 
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
-        self.run_freely(direction, speed)
+        self.run_to(direction, speed, None)
     }
 
     fn move_to(&mut self, target: i64) -> Result<(), Error> {
@@ -96,8 +96,8 @@ impl<const N: usize> Homed for Axis<'_, N> {
     }
 }
 
-/// The lines of a path: one by one, or in two halves.
-pub(super) trait Lines<const N: usize> {
+/// The axes of a path: one by one, or in two halves.
+pub(super) trait PathAxes<const N: usize> {
     fn setup(&self) -> &[AxisSetup; N];
     fn commanded(&self) -> [i64; N];
     fn is_at_rest(&self) -> bool;
@@ -109,20 +109,20 @@ pub(super) trait Lines<const N: usize> {
 }
 
 /// One of the axes of a path; the others stay where they are.
-pub(super) struct OneOf<L, const N: usize> {
-    pub(super) lines: L,
+pub(super) struct OneOf<P, const N: usize> {
+    pub(super) path: P,
     pub(super) axis: usize,
 }
 
-impl<L: Lines<N>, const N: usize> OneOf<L, N> {
+impl<P: PathAxes<N>, const N: usize> OneOf<P, N> {
     fn setup(&self) -> Result<AxisSetup, Error> {
         let [axis, axes] = [self.axis, N].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
-        self.lines.setup().get(self.axis).copied().ok_or(Error::NoAxis { axis, axes })
+        self.path.setup().get(self.axis).copied().ok_or(Error::NoAxis { axis, axes })
     }
 
     /// The positions of all axes, with another one of this axis.
     fn with(&self, position: i64) -> [i64; N] {
-        let mut all = self.lines.commanded();
+        let mut all = self.path.commanded();
         if let Some(own) = all.get_mut(self.axis) {
             *own = position;
         }
@@ -130,24 +130,24 @@ impl<L: Lines<N>, const N: usize> OneOf<L, N> {
     }
 }
 
-impl<L: Lines<N>, const N: usize> Homed for OneOf<L, N> {
+impl<P: PathAxes<N>, const N: usize> Homed for OneOf<P, N> {
     fn position(&self) -> i64 {
-        self.lines.commanded().get(self.axis).copied().unwrap_or(0)
+        self.path.commanded().get(self.axis).copied().unwrap_or(0)
     }
 
     fn is_at_rest(&self) -> bool {
-        self.lines.is_at_rest()
+        self.path.is_at_rest()
     }
 
     fn requests(&self) -> Requests {
-        self.lines.requests()
+        self.path.requests()
     }
 
-    /// A line that is longer than any range.
+    /// A line of 2^31 - 1 steps. Behind a longer range the axis comes to rest there, and the homing has failed.
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
         let setup = self.setup()?;
         if speed == 0 {
-            self.lines.stop();
+            self.path.stop();
             return Ok(());
         }
         let feed = (u64::from(speed) * 1_000_000).checked_div(setup.steps_per_m.into()).unwrap_or(0);
@@ -156,28 +156,28 @@ impl<L: Lines<N>, const N: usize> Homed for OneOf<L, N> {
             Direction::Forward => self.position().saturating_add(far),
             Direction::Reverse => self.position().saturating_sub(far),
         };
-        self.lines.move_to(self.with(target), u32::try_from(feed).unwrap_or(u32::MAX))
+        self.path.move_to(self.with(target), u32::try_from(feed).unwrap_or(u32::MAX))
     }
 
     fn move_to(&mut self, target: i64) -> Result<(), Error> {
         self.setup()?;
-        self.lines.move_to(self.with(target), u32::MAX)
+        self.path.move_to(self.with(target), u32::MAX)
     }
 
     fn stop(&mut self) {
-        self.lines.stop();
+        self.path.stop();
     }
 
     fn quick_stop(&mut self, limits: Limits) {
-        let mut all = self.lines.setup().map(|setup| setup.limits);
+        let mut all = self.path.setup().map(|setup| setup.limits);
         if let Some(own) = all.get_mut(self.axis) {
             *own = limits;
         }
-        self.lines.quick_stop(all);
+        self.path.quick_stop(all);
     }
 
     fn set_commanded(&mut self, steps: i64) -> Result<(), Error> {
-        self.lines.set_commanded(self.with(steps))
+        self.path.set_commanded(self.with(steps))
     }
 }
 
@@ -187,7 +187,7 @@ pub(super) struct PathOneByOne<'a, const N: usize, const M: usize> {
     pub(super) now: u64,
 }
 
-impl<const N: usize, const M: usize> Lines<N> for PathOneByOne<'_, N, M> {
+impl<const N: usize, const M: usize> PathAxes<N> for PathOneByOne<'_, N, M> {
     fn setup(&self) -> &[AxisSetup; N] {
         self.mover.axes()
     }
@@ -221,7 +221,7 @@ impl<const N: usize, const M: usize> Lines<N> for PathOneByOne<'_, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize, const S: usize> Lines<N> for &mut Axes<'_, N, M, S> {
+impl<const N: usize, const M: usize, const S: usize> PathAxes<N> for &mut Axes<'_, N, M, S> {
     fn setup(&self) -> &[AxisSetup; N] {
         Axes::setup(self)
     }

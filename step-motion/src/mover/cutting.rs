@@ -138,7 +138,7 @@ mod tests {
     fn a_run_has_no_end() {
         let limits = Limits::new(400_000, 8_000_000).unwrap();
         let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap().cutting();
-        mover.ask_run(Direction::Forward, 400_000);
+        mover.ask_run(Direction::Forward, 400_000, None);
         mover.follow(mover.pursue(News::Aim, 0));
         let demand = Demand { off: Clock::MICROSECONDS.blur(), coarse: None, time: u64::MAX, searches: 2 };
         let (mut last, interval) = (None, 5_i128 << 31);

@@ -138,8 +138,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Some((run, left, (wish.min(fastest_exit(start, left, &run.bounds)), wish)))
     }
 
-    /// Returns the runs for a motion on line `at`, or a distance before it: with the speed that it reaches if it goes on as it is, and its acceleration
-    /// and jerk.
+    /// Returns the runs for a motion on line `at`, or a distance before it: with the speed that it reaches if it goes on as it is, and
+    /// its acceleration and jerk.
     fn under_way(
         &self,
         at: usize,

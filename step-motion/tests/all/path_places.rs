@@ -3,19 +3,9 @@
 use proptest::prelude::*;
 use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
 
-const N: usize = 2;
+use crate::path_queue::Request;
 
-#[derive(Debug, Clone, Copy)]
-enum Ask {
-    Push([i64; N], u32),
-    MoveTo([i64; N], u32),
-    Override(u16),
-    Hold,
-    Resume,
-    Stop,
-    Quick(u32),
-    Halt,
-}
+const N: usize = 2;
 
 /// A machine whose user looks where it is, and where it was when the user last looked.
 struct Seen {
@@ -76,17 +66,17 @@ impl Seen {
         }
     }
 
-    fn ask(&mut self, ask: Ask) {
+    fn ask(&mut self, ask: Request<N>) {
         let (machine, now) = (&mut self.machine, self.now);
         match ask {
-            Ask::Push(to, feed) => _ = machine.push(to, feed, now),
-            Ask::MoveTo(to, feed) => _ = machine.move_to(to, feed, now),
-            Ask::Override(percent) => machine.set_override(percent, now),
-            Ask::Hold => machine.hold(now),
-            Ask::Resume => machine.resume(now),
-            Ask::Stop => machine.stop(now),
-            Ask::Quick(a) => machine.quick_stop([Limits::new(1, a).unwrap(); N], now),
-            Ask::Halt => machine.halt(now),
+            Request::Push(to, feed) => _ = machine.push(to, feed, now),
+            Request::MoveTo(to, feed) => _ = machine.move_to(to, feed, now),
+            Request::Override(percent) => machine.set_override(percent, now),
+            Request::Hold => machine.hold(now),
+            Request::Resume => machine.resume(now),
+            Request::Stop => machine.stop(now),
+            Request::Quick(a) => machine.quick_stop([Limits::new(1, a).unwrap(); N], now),
+            Request::Halt => machine.halt(now),
         }
         self.look();
     }
@@ -96,17 +86,17 @@ fn place() -> impl Strategy<Value = [i64; N]> {
     prop_oneof![[-60..60_i64, -60..60_i64], [-3..3_i64, -3..3_i64]]
 }
 
-fn ask() -> impl Strategy<Value = Ask> {
+fn ask() -> impl Strategy<Value = Request<N>> {
     let feed = prop_oneof![1000..300_000_u32, 10..1000_u32];
     prop_oneof![
-        6 => (place(), feed.clone()).prop_map(|(to, feed)| Ask::Push(to, feed)),
-        2 => (place(), feed).prop_map(|(to, feed)| Ask::MoveTo(to, feed)),
-        3 => (0..150_u16).prop_map(Ask::Override),
-        3 => Just(Ask::Hold),
-        4 => Just(Ask::Resume),
-        2 => Just(Ask::Stop),
-        2 => prop_oneof![1..200_000_u32, 1_000_000..2_000_000_u32].prop_map(Ask::Quick),
-        1 => Just(Ask::Halt),
+        6 => (place(), feed.clone()).prop_map(|(to, feed)| Request::Push(to, feed)),
+        2 => (place(), feed).prop_map(|(to, feed)| Request::MoveTo(to, feed)),
+        3 => (0..150_u16).prop_map(Request::Override),
+        3 => Just(Request::Hold),
+        4 => Just(Request::Resume),
+        2 => Just(Request::Stop),
+        2 => prop_oneof![1..200_000_u32, 1_000_000..2_000_000_u32].prop_map(Request::Quick),
+        1 => Just(Request::Halt),
     ]
 }
 

@@ -94,8 +94,9 @@ proptest! {
     }
 }
 
+/// A request to the axes of a path.
 #[derive(Debug, Clone, Copy)]
-enum Request {
+pub(crate) enum Request<const N: usize> {
     Push([i64; N], u32),
     MoveTo([i64; N], u32),
     Override(u16),
@@ -106,7 +107,7 @@ enum Request {
     Halt,
 }
 
-fn request() -> impl Strategy<Value = Request> {
+fn request() -> impl Strategy<Value = Request<N>> {
     let feed = || spread(100.0, 3e5).prop_map(|feed| feed as u32);
     prop_oneof![
         1 => (-2000..2000_i64, feed()).prop_map(|(x, feed)| Request::Push([0, x, 0], feed)),
@@ -121,7 +122,7 @@ fn request() -> impl Strategy<Value = Request> {
     ]
 }
 
-fn ask(axes: &mut Background, request: Request) {
+fn ask(axes: &mut Background, request: Request<N>) {
     match request {
         Request::Push(to, feed) => _ = axes.push(to, feed),
         Request::MoveTo(to, feed) => _ = axes.move_to(to, feed),
