@@ -43,23 +43,23 @@ library() {
 # The header by itself and the tests, as C99, C11 and C++11, with address and undefined-behaviour sanitizers.
 host() {
     library
-    local standard
+    local standard test
     for standard in c99 c11; do
         gcc -std=$standard -Wstrict-prototypes "${strict[@]}" -fsyntax-only -x c include/servowire.h
     done
     g++ -std=c++11 "${strict[@]}" -fsyntax-only -x c++ include/servowire.h
-    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/border.c "$out/libservowire_c.a" -o "$out/border"
-    "$out/border"
-    gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" tests/c/both_ends.c "$out/libservowire_c.a" -o "$out/both_ends"
-    "$out/both_ends"
+    for test in border motion both_ends; do
+        gcc -std=c99 -Wstrict-prototypes "${strict[@]}" "${sanitized[@]}" "tests/c/$test.c" "$out/libservowire_c.a" -o "$out/$test"
+        "$out/$test"
+        g++ -std=c++11 "${strict[@]}" -x c++ "tests/c/$test.c" -x none "$out/libservowire_c.a" -o "$out/$test++"
+        "$out/$test++"
+    done
     # What the README promises to somebody who has nothing but it, the header and the library.
     python3 tests/readme.py README.md >"$out/made/readme.c"
     gcc -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude "$out/made/readme.c" "$out/libservowire_c.a" -Wl,--gc-sections -o "$out/readme"
     "$out/readme"
     g++ -std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Werror -Iinclude -x c++ "$out/made/readme.c" -x none "$out/libservowire_c.a" -o "$out/readme"
     "$out/readme"
-    g++ -std=c++11 "${strict[@]}" -x c++ tests/c/border.c -x none "$out/libservowire_c.a" -o "$out/border++"
-    "$out/border++"
 }
 
 # All rows of the vectors through the C interface.

@@ -1,17 +1,6 @@
 /* Masters and the modelled devices of this library at one line: a ring of RTEX, and messages of HIPERFACE DSL. */
+#include "check.h"
 #include "servowire.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define CHECK(truth) \
-    do { \
-        if (!(truth)) { \
-            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #truth); \
-            exit(1); \
-        } \
-    } while (0)
 
 enum { AXES = 3, UPDATE_NS = 500000 };
 
