@@ -44,13 +44,15 @@ fn guarded(call: &mut dyn FnMut()) {
 fn read(format: Option<Format>, data: &[u8], size: usize) -> String {
     let pieces = Pieces { bytes: Cursor::new(data.to_vec()), size };
     let input = Input::over("fuzz", pieces.take(MOST));
-    let hints = match format {
-        Some(_) => {
-            Hints { format, sample_rate: Some(20_000_000), unit_size: 2, record_size: Some(16), ..Hints::default() }
-        }
-        None => Hints::default(),
+    let is = |formats: &[Format]| format.is_some_and(|format| formats.contains(&format));
+    let hints = Hints {
+        format,
+        sample_rate: is(&[Format::Raw, Format::Packed, Format::Csv]).then_some(20_000_000),
+        unit_size: is(&[Format::Raw]).then_some(2),
+        record_size: is(&[Format::Records]).then_some(16),
+        guard: Some(guarded),
+        ..Hints::default()
     };
-    let hints = Hints { guard: Some(guarded), ..hints };
     let mut said = String::new();
     match open(input, hints) {
         Ok(Capture::Edges(mut line)) => edges(line.as_mut(), &mut said),

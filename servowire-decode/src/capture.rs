@@ -53,6 +53,9 @@ pub fn open(input: Input, mut hints: Hints) -> Result<Capture, Fault> {
         None if hints.record_size.is_some() => Format::Records,
         None => guess(&mut input, hints.sample_rate.is_some())?,
     };
+    if let Some(what) = hints.misplaced(format) {
+        return Err(input.fault(At::File, what));
+    }
     decoder(input, format, hints)
 }
 
@@ -142,7 +145,11 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
                     input.fault(At::File, "raw samples carry no rate: give it with --rate, for example --rate 24M")
                 );
             };
-            let unit = if format == Format::Packed { raw::Unit::Bit } else { raw::Unit::Bytes(hints.unit_size.max(1)) };
+            let unit = if format == Format::Packed {
+                raw::Unit::Bit
+            } else {
+                raw::Unit::Bytes(hints.unit_size.unwrap_or(1).max(1))
+            };
             Capture::Samples(raw::Raw::new(input, rate, unit))
         }
         Format::ByteTable => Capture::Bytes(ByteLog::Table(byte_table::ByteTable::new(input)?)),

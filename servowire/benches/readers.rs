@@ -262,9 +262,8 @@ fn read(file: &[u8], format: Format) -> String {
     let input = Input::over("memory", Cursor::new(file.to_vec()));
     let hints = Hints {
         format: Some(format),
-        sample_rate: Some(RATE as u64),
-        unit_size: 1,
-        record_size: Some(16),
+        sample_rate: matches!(format, Format::Raw | Format::Packed).then_some(RATE as u64),
+        record_size: (format == Format::Records).then_some(16),
         ..Hints::default()
     };
     match open(input, hints).expect("the file is sound") {

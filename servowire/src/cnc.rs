@@ -55,6 +55,9 @@ const MOST_STEPS: u32 = 250_000;
 /// Steps of a move: a turn at 1/256.
 const STEPS: u32 = 51_200;
 
+/// Cycles in a recording, if nothing else is asked for.
+const RECORDED: u64 = 5000;
+
 /// Runs of more cycles than this have a progress bar.
 const LONG: u64 = 2_000_000;
 
@@ -85,7 +88,7 @@ pub struct Arguments {
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, which suits that machine. In a longer cycle motion is slower in proportion.
-    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = hertz)]
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = hertz, conflicts_with = "dance")]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -176,9 +179,9 @@ pub struct Arguments {
     /// Write the frames at the master for Wireshark.
     #[arg(long, value_name = "OUT")]
     pcapng: Option<PathBuf>,
-    /// Cycles that --vcd and --pcapng record, after the start-up.
-    #[arg(long, value_name = "N", default_value_t = 5000)]
-    record_cycles: u64,
+    /// Cycles that --vcd and --pcapng record, after the start-up; 5000 by default.
+    #[arg(long, value_name = "N")]
+    record_cycles: Option<u64>,
     /// Draw speed and position of the first four axes, or the scaling.
     #[arg(long, value_name = "OUT")]
     svg: Option<PathBuf>,
@@ -275,6 +278,9 @@ impl Arguments {
                 return Err(format!("there is no device {device}: the line has {} (--devices)", self.devices).into());
             }
         }
+        if self.record_cycles.is_some() && self.vcd.is_none() && self.pcapng.is_none() {
+            return Err("--record-cycles is for --vcd and --pcapng".into());
+        }
         if let Some((k, ns)) = self.cables.iter().enumerate().find(|(_, ns)| **ns > LONGEST_CABLE_NS) {
             return Err(format!(
                 "the cable in front of device {} delays by {ns} ns: 100BASE-TX ends at 100 m, which are {LONGEST_CABLE_NS} ns",
@@ -359,8 +365,8 @@ impl Arguments {
         let cycle_ns = line.setup.cycle_ns();
         let program = Power::new(program, axes, self.power_save, cycle_ns);
         let mut host = Host::new(program, axes, self.cycles, self.max_lag);
-        let mut record =
-            Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles, cycle_ns)?;
+        let (vcd, pcapng) = (self.vcd.as_deref(), self.pcapng.as_deref());
+        let mut record = Recorder::new(axes, vcd, pcapng, self.record_cycles.unwrap_or(RECORDED), cycle_ns)?;
         let mut curves = self.svg.is_some().then(|| Curves::new(cycle_ns));
         let mut sound = self.wav.as_deref().map(|path| Sound::create(path, cycle_ns)).transpose()?;
         let bar = self.bar();

@@ -36,16 +36,21 @@ pub(crate) fn open(path: &Path, grows: bool) -> Result<Input, Fault> {
     if path.as_os_str() == "-" {
         return Ok(Input::live(STDIN, Pipe::over(io::stdin(), false)));
     }
-    let fault = |e: &io::Error| Fault::new(&name, At::File, format!("cannot be opened: {}", plain(e)));
-    let file = File::open(path).map_err(|e| fault(&e))?;
-    let data = file.metadata().map_err(|e| fault(&e))?;
-    if data.is_dir() {
-        return Err(Fault::new(&name, At::File, "is a folder; name the capture files in it"));
-    }
-    if grows || !data.is_file() {
+    let file = open_file(path)?;
+    if grows || !file.metadata().is_ok_and(|data| data.is_file()) {
         return Ok(Input::live(&name, Pipe::over(file, grows)));
     }
     Ok(Input::seeking(&name, BufReader::new(file)))
+}
+
+/// Opens a file to read, which is no folder.
+pub(crate) fn open_file(path: &Path) -> Result<File, Fault> {
+    let fault = |what: &str| Fault::new(&path.display().to_string(), At::File, what);
+    let file = File::open(path).map_err(|e| fault(&format!("cannot be opened: {}", plain(&e))))?;
+    if file.metadata().is_ok_and(|data| data.is_dir()) {
+        return Err(fault("is a folder: name a file in it"));
+    }
+    Ok(file)
 }
 
 /// Returns what a standard input is that has ended at once.

@@ -19,6 +19,7 @@ use clap::Args;
 use servowire_decode::fault::{At, Fault};
 use step_motion::{AxisSetup, Limits};
 
+use crate::files;
 use item::Item;
 use program::Program;
 pub(crate) use steps::Steps;
@@ -95,8 +96,7 @@ impl Part {
     }
 
     fn open(&self, path: &Path) -> Result<Program<BufReader<File>>, Fault> {
-        let name = path.display().to_string();
-        let file = File::open(path).map_err(|e| Fault::new(&name, At::File, e.to_string()))?;
-        Ok(Program::new(&name, BufReader::new(file), self.block_delete))
+        let file = files::open_file(path)?;
+        Ok(Program::new(&path.display().to_string(), BufReader::new(file), self.block_delete))
     }
 }

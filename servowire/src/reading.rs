@@ -248,7 +248,6 @@ impl Reading {
             (self.line.channel.is_some(), "--channel", of_levels),
             (self.line.tx.is_some(), "--tx", of_levels),
             (self.line.polarity.is_some(), "--polarity", of_levels),
-            (self.file.threshold.is_some(), "--threshold", of_levels),
             (self.file.fcs.is_some(), "--fcs", of_packets),
             (self.rtex.block_size.is_some(), "--block-size", of_rtex),
             (self.rtex.period.is_some(), "--period", of_rtex),
@@ -269,7 +268,7 @@ impl Reading {
         Hints {
             format,
             sample_rate: self.file.rate,
-            unit_size: usize::from(self.file.unit_size.unwrap_or(1)),
+            unit_size: self.file.unit_size.map(usize::from),
             record_size: self.file.record_size.map(usize::from),
             threshold: self.file.threshold,
             grows: self.file.follow,

@@ -4,7 +4,6 @@ mod ip_core;
 
 use std::error::Error;
 use std::fmt::{self, Display, Write as _};
-use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,7 +12,9 @@ use clap::{Args, ValueEnum};
 use hdsl::message::{Length, ResourceAddress, ResourceError};
 use hdsl::registers::{Online1, Online2, OnlineD, Register, Registers};
 use hdsl::{Dialect, EncoderId, crc16};
+use servowire_decode::fault::{At, Fault};
 
+use crate::files;
 use crate::terminal::say;
 
 /// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
@@ -51,14 +52,26 @@ impl Arguments {
                 ExitCode::FAILURE
             }
             Err(error) => {
-                eprintln!("error: {}: {error}", self.file.display());
+                eprintln!("error: {error}");
                 ExitCode::from(2)
             }
         }
     }
 
-    fn text(&self) -> Result<String, Box<dyn Error>> {
-        let bytes = bytes(&read(&self.file)?)?;
+    fn text(&self) -> Result<String, Fault> {
+        let fault = |what: String| Fault::new(&self.file.display().to_string(), At::File, what);
+        let mut read = Vec::new();
+        let done = if self.file == Path::new("-") {
+            io::stdin().lock().read_to_end(&mut read)
+        } else {
+            files::open_file(&self.file)?.read_to_end(&mut read)
+        };
+        done.map_err(|e| fault(e.to_string()))?;
+        self.words(&read).map_err(|e| fault(e.to_string()))
+    }
+
+    fn words(&self, read: &[u8]) -> Result<String, Box<dyn Error>> {
+        let bytes = bytes(read)?;
         let rest = bytes.get(self.at..).unwrap_or_default();
         let mut text = String::new();
         match self.receiver {
@@ -77,15 +90,6 @@ impl Arguments {
         let short = || format!("{} bytes from {} on, a register map has {N}", rest.len(), self.at);
         rest.first_chunk().ok_or_else(short)
     }
-}
-
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if path != Path::new("-") {
-        return fs::read(path);
-    }
-    let mut bytes = Vec::new();
-    io::stdin().lock().read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// Decodes pairs of hex digits with or without spaces between them; other text is refused, and anything else is taken as it is.

@@ -81,8 +81,8 @@ pub struct Hints {
     pub format: Option<Format>,
     /// Samples per second of a raw file.
     pub sample_rate: Option<u64>,
-    /// Bytes per sample of a raw file.
-    pub unit_size: usize,
+    /// Bytes per sample of a raw file; 1 if unset.
+    pub unit_size: Option<usize>,
     /// Bytes of a record.
     pub record_size: Option<usize>,
     /// The voltage above which a column of a table is high; if unset, half-way between its levels.
@@ -91,4 +91,22 @@ pub struct Hints {
     pub grows: bool,
     /// How to call the library for FST, which panics on some damaged files; by default it is called directly.
     pub guard: Option<Guard>,
+}
+
+impl Hints {
+    /// Returns what to say of a hint that a format has no use for.
+    pub(super) fn misplaced(&self, format: Format) -> Option<&'static str> {
+        use Format::{Csv, Isf, Packed, Raw, Records};
+        let said: [(bool, &[Format], _); 4] = [
+            (
+                self.sample_rate.is_some(),
+                &[Raw, Packed, Csv],
+                "--rate is for raw samples, and for tables without times",
+            ),
+            (self.unit_size.is_some(), &[Raw], "--unit-size is for raw samples: it needs --rate"),
+            (self.record_size.is_some(), &[Records], "--record-size is for binary records"),
+            (self.threshold.is_some(), &[Csv, Isf], "--threshold is for voltages, which only oscilloscopes record"),
+        ];
+        said.into_iter().find(|(is, of, _)| *is && !of.contains(&format)).map(|(.., what)| what)
+    }
 }

@@ -124,6 +124,9 @@ impl Table {
         if channels.is_empty() {
             return Err(Fault::new(&name, At::Line(1), "no column of levels or voltages is in the table"));
         }
+        if hints.threshold.is_some() && columns.iter().all(|column| column.threshold.is_none()) {
+            return Err(Fault::new(&name, At::Line(1), "--threshold is for voltages: this table has none"));
+        }
         if u16::try_from(channels.len()).is_err() {
             return Err(Fault::new(&name, At::Line(1), "more than 65535 columns"));
         }

@@ -284,7 +284,13 @@ impl PushDecoder {
 /// Finds the channels that the user named.
 fn wanted(options: &Options, names: &[String]) -> Result<Option<Vec<u16>>, String> {
     match (&options.pair, &options.channel) {
-        (Some((requests, answers)), _) => Ok(Some(vec![find(requests, names)?, find(answers, names)?])),
+        (Some((requests, answers)), _) => {
+            let pair = vec![find(requests, names)?, find(answers, names)?];
+            if pair.first() == pair.last() {
+                return Err(format!("--tx and --rx are one channel: if it has both, say --channel {requests}"));
+            }
+            Ok(Some(pair))
+        }
         (None, Some(channel)) => Ok(Some(vec![find(channel, names)?])),
         (None, None) => Ok(None),
     }

@@ -78,35 +78,51 @@ impl Default for State {
 /// The group of G80, which post-processors write in one line with G0.
 const CYCLES: usize = 9;
 
+/// For words that go together with any other.
+const ANY: usize = usize::MAX;
+
 const SUBSET: &str = "G0 to G4, G17 to G21, G28, G30, G40, G43, G49, G53 to G59, G61, G64, G80, G90 to G92, G94";
+
+/// Refuses a second word of a modal group in a line.
+fn only_one(groups: &mut [Option<f64>], group: usize, Word { letter, value }: Word) -> Result<(), String> {
+    match groups.get_mut(group).and_then(|place| place.replace(value)) {
+        Some(other) => Err(format!("{letter}{other} and {letter}{value} in one line: only one of them can apply")),
+        None => Ok(()),
+    }
+}
 
 impl State {
     /// Executes a line; returns `true` at the end of the program.
     pub(super) fn block(&mut self, words: &[Word], items: &mut VecDeque<Item>) -> Result<bool, String> {
         let mut numbers = Numbers::default();
         let (mut once, mut over, mut pause, mut smooth) = (None, false, false, false);
-        let mut groups: [Option<f64>; 14] = [None; 14];
+        let (mut groups, mut machine) = ([None; 14], [None; 10]);
         for word in words {
             match word.letter {
                 'G' => {
                     let (group, what) = self.general(word.value, items)?;
-                    let place = groups.get_mut(group).ok_or("no such group")?;
-                    if let Some(other) = place.replace(word.value) {
-                        return Err(format!("G{other} and G{} in one line: only one of them can apply", word.value));
-                    }
+                    only_one(&mut groups, group, *word)?;
                     smooth |= tenths(word.value) == 640;
                     once = what.or(once);
                 }
-                'M' => match tenths(word.value) {
-                    20 | 300 => over = true,
-                    0 | 10 | 60 | 600 => pause = true,
-                    // Spindle, coolant and overrides move no axis.
-                    30 | 40 | 50 | 70 | 80 | 90 | 480 | 490 => {}
-                    _ => {
-                        let number = word.value;
-                        return Err(format!("M{number} is not in the subset: M0 to M9, M30, M48, M49, M60"));
-                    }
-                },
+                'M' => {
+                    let code = tenths(word.value);
+                    let group = match code {
+                        0 | 10 | 20 | 300 | 600 => 4,
+                        60 => 6,
+                        // Spindle, coolant (two may run at once) and overrides move no axis.
+                        30 | 40 | 50 => 7,
+                        70 | 80 | 90 => ANY,
+                        480 | 490 => 9,
+                        _ => {
+                            let number = word.value;
+                            return Err(format!("M{number} is not in the subset: M0 to M9, M30, M48, M49, M60"));
+                        }
+                    };
+                    only_one(&mut machine, group, *word)?;
+                    over |= matches!(code, 20 | 300);
+                    pause |= matches!(code, 0 | 10 | 60 | 600);
+                }
                 _ => numbers.add(*word)?,
             }
         }

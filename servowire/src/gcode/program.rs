@@ -61,11 +61,9 @@ impl<R: BufRead> Program<R> {
 
     /// Reads a line; `None` at the end of the file.
     fn read(&mut self) -> Result<Option<String>, Fault> {
-        let mut line = Vec::new();
-        let fault = |e: io::Error| Fault::new(&self.name, At::File, e.to_string());
-        let got = self.text.read_until(b'\n', &mut line).map_err(fault)?;
+        let line = next_line(&mut self.text).map_err(|e| Fault::new(&self.name, At::File, e.to_string()))?;
         self.number += 1;
-        Ok((got > 0).then(|| String::from_utf8_lossy(&line).into_owned()))
+        Ok(line.map(|line| String::from_utf8_lossy(&line).into_owned()))
     }
 
     /// Where the program has ended before its file: the first line behind M2, M30 or a percent sign that is more than a comment.
@@ -78,6 +76,30 @@ impl<R: BufRead> Program<R> {
             }
         }
         Ok(None)
+    }
+}
+
+/// Reads up to the end of a line, of whatever system: LF, CR LF, or CR alone. `None` at the end of the text.
+fn next_line(text: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
+    let mut line = Vec::new();
+    loop {
+        let some = text.fill_buf()?;
+        let end = some.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        line.extend_from_slice(some.get(..end.unwrap_or(some.len())).unwrap_or_default());
+        match end.and_then(|end| some.get(end).map(|byte| (end + 1, *byte == b'\r'))) {
+            None if some.is_empty() => return Ok((!line.is_empty()).then_some(line)),
+            None => {
+                let all = some.len();
+                text.consume(all);
+            }
+            Some((end, carriage)) => {
+                text.consume(end);
+                if carriage && text.fill_buf()?.first() == Some(&b'\n') {
+                    text.consume(1);
+                }
+                return Ok(Some(line));
+            }
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Tests of part programs in the dialects of five post-processors, and of refusals.
 
+use std::io::BufReader;
+
 use super::AXES;
 use super::item::{Item, Line};
 use super::program::Program;
@@ -224,6 +226,9 @@ fn refusals_name_the_line_and_what_to_do() {
         ("G0 G1 X5 F10", "G0 and G1 in one line"),
         ("G90 G91", "G90 and G91 in one line"),
         ("G28 G92 X0", "G28 and G92 in one line"),
+        ("S900 M3 M4", "M3 and M4 in one line"),
+        ("M0 M30", "M0 and M30 in one line"),
+        ("M48 M49", "M48 and M49 in one line"),
         ("G1 X5 I1 F10", "belong to G2 and G3"),
         ("G1 X5 P1 F10", "P belongs to G4 and G64"),
         ("G4", "G4 needs P"),
@@ -245,6 +250,28 @@ fn refusals_name_the_line_and_what_to_do() {
     ] {
         assert!(refused(text).contains(want), "{text}: {}", refused(text));
     }
+}
+
+/// Lines end as on any system, and keep their numbers.
+#[test]
+fn ends_of_lines() {
+    let text = "G0 X1\nX2\n\nG1 X3 F60\nX9 F0";
+    for (end, last) in [("\n", ""), ("\r\n", ""), ("\r", ""), ("\n", "\n"), ("\r\n", "\r\n"), ("\r", "\r")] {
+        let text = text.replace('\n', end) + last;
+        for size in [1, 2, 3, 100] {
+            let mut program = Program::new("part.nc", BufReader::with_capacity(size, text.as_bytes()), false);
+            let lines = program.by_ref().take_while(Result::is_ok).count();
+            assert_eq!(lines, 3, "{text:?}");
+            let fault = program.refuse(String::new()).to_string();
+            assert!(fault.starts_with("part.nc, line 5"), "{text:?}: {fault}");
+        }
+    }
+}
+
+/// Coolant may be mist and flood, and the spindle may be started in the same line.
+#[test]
+fn machine_words_of_other_groups_go_together() {
+    assert_eq!(ends("S900 M3 M7 M8\nG0 X1 M9 M5 M48").len(), 1);
 }
 
 /// As in RS274/NGC: nothing is run behind M2, M30, or a percent sign behind the first words.

@@ -13,6 +13,12 @@ fn options_that_a_capture_has_no_use_for() {
         (&["--block-size", "16"], "--block-size is for RTEX"),
         (&["--period", "500us", "--gear", "8/1"], "--period is for RTEX"),
         (&["--fcs", "yes"], "--fcs is for captures of a network"),
+        (&["--threshold", "1.5"], "a.vcd: --threshold is for voltages"),
+        (&["--unit-size", "2"], "a.vcd: --unit-size is for raw samples"),
+        (&["--rate", "24M"], "a.vcd: the file has times of its own"),
+        (&["--rate", "24M", "--format", "vcd"], "a.vcd: --rate is for raw samples"),
+        (&["--record-size", "9", "--format", "vcd"], "a.vcd: --record-size is for binary records"),
+        (&["--tx", "0", "--rx", "0"], "--tx and --rx are one channel: if it has both, say --channel 0"),
     ] {
         common::decode(&line, options).fails_with(want);
     }
@@ -22,11 +28,14 @@ fn options_that_a_capture_has_no_use_for() {
         (&["--channel", "3"][..], "--channel is for captures of levels"),
         (&["--tx", "a", "--rx", "b"], "--tx is for captures of levels"),
         (&["--polarity", "inverted"], "--polarity is for captures of levels"),
-        (&["--threshold", "1.5"], "--threshold is for captures of levels"),
+        (&["--threshold", "1.5"], "--threshold is for voltages"),
+        (&["--unit-size", "1"], "--unit-size is for raw samples"),
         (&["--protocol", "tformat", "--mac-id", "3"], "--mac-id is for RTEX"),
     ] {
         common::decode(&log, &[&["--bytes"], options].concat()).fails_with(want);
     }
+    let table = bench.file("a.csv", "Time [s],Channel 0\n0.0,1\n0.1,0\n");
+    common::decode(&table, &["--threshold", "1.5"]).fails_with("a.csv, line 1: --threshold is for voltages");
 }
 
 #[test]
@@ -69,8 +78,28 @@ fn options_that_a_move_has_no_use_for() {
     for option in ["--vcd", "--pcapng", "--wav"] {
         refused(&["cnc", "--scaling", option, out.to_str().unwrap()]);
     }
-    for options in [&["--dance", "--steps", "5"][..], &["--deviation", "5"], &["--scaling", "--axis", "X:speed=5"]] {
+    refused(&["cnc", "--record-cycles", "5"]);
+    for options in [
+        &["--dance", "--steps", "5"][..],
+        &["--dance", "--freq", "1000"],
+        &["--deviation", "5"],
+        &["--scaling", "--axis", "X:speed=5"],
+    ] {
         refused(&[&["cnc"], options].concat());
+    }
+}
+
+/// A file that cannot be opened is named in the same words, whatever it was for.
+#[test]
+fn a_file_that_is_not_there() {
+    let bench = Bench::new();
+    let (nowhere, folder) = (bench.path("nowhere"), bench.path(""));
+    for (file, want) in [(&nowhere, "nowhere: cannot be opened: "), (&folder, ": is a folder: name a file in it")] {
+        let file = file.to_str().unwrap();
+        for arguments in [&["registers"][..], &["profile", "--gcode"], &["cnc", "--gcode"], &["decode"]] {
+            let run = common::servowire(&[arguments, &[file]].concat());
+            assert!(run.code != 0 && run.out.is_empty() && run.err.contains(want), "{arguments:?}: {}", run.err);
+        }
     }
 }
 

@@ -152,7 +152,7 @@ fn decode(file: &str, protocol: &str, rate: &str, output: &str) -> Result<(), Bo
         "stats" => Box::new(Stats::new(out, None)),
         _ => Box::new(Text::new(out)),
     };
-    let raw = Hints { sample_rate: Some(rate.parse()?), unit_size: 1, ..Hints::default() };
+    let raw = Hints { sample_rate: Some(rate.parse()?), ..Hints::default() };
     let hints = match Path::new(file).extension().and_then(|end| end.to_str()) {
         Some("packed") => Hints { format: Some(Format::Packed), ..raw },
         Some("bytes") => Hints { format: Some(Format::Raw), ..raw },
