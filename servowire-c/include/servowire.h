@@ -1,6 +1,20 @@
 /* The C interface of servowire. Made from servowire-c/src by cbindgen; do not edit.
  *
- * Licence: MIT OR Apache-2.0. */
+ * Licence: MIT OR Apache-2.0.
+ *
+ * sw_tformat_  Tamagawa T-Format        sw_aformat_  Nikon A-format           sw_hdsl_    HIPERFACE DSL
+ * sw_rtex_     Panasonic RTEX           sw_sorte_    TI SORTE                 sw_nrz_     start-stop fields of a sampled line
+ * sw_motion_   steps within limits      sw_step_     the step times of TI's CNC router
+ * sw_clock_    nanoseconds from a timer of 32 bits
+ *
+ * - Most calls return sw_result_t: 0 and above (SW_OK, SW_SEND, ...) is good, below 0 is refused; sw_text() has a text for each.
+ * - A call that is refused at the interface (SW_E_NULL to SW_E_NOT_FREE) changes nothing.
+ * - Times are in nanoseconds, of sw_clock_ns() or any other clock that never goes backwards, unless a name says otherwise.
+ * - A state (sw_tformat_t, sw_rtex_axis_t, ...) is memory of yours: static, or zeroed before its first call, and used by one context at a
+ *   time. It may be copied, but for those of sw_motion_.
+ * - Fields of a message are values as received. What may be used now to move a motor comes from a call that takes the time
+ *   (sw_tformat_angle() and its like).
+ * - sw_version() == SERVOWIRE_VERSION if header and library belong together. */
 
 #ifndef SERVOWIRE_H
 #define SERVOWIRE_H
