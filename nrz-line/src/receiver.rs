@@ -30,7 +30,7 @@ pub struct Receiver {
     format: Format,
     /// Level of the last sample: 0 or 1.
     level: u32,
-    /// The content bits taken so far, shifted in from the top behind a mark that reaches bit 0 when only the delimiter is left;
+    /// The content bits taken so far, shifted in from the top after a mark that reaches bit 0 when only the delimiter is left;
     /// or [`IDLE`], or [`START`].
     bits: u32,
     /// Number of samples until the middle of the next bit, 1 or more; on an idle line, until the origin is moved next.

@@ -2842,7 +2842,7 @@ typedef struct {
      */
     uint8_t len;
     /**
-     * The bytes, 0 behind them.
+     * The bytes, 0 after them.
      */
     uint8_t data[8];
 } sw_hdsl_data_t;
@@ -4675,7 +4675,7 @@ sw_result_t sw_hdsl_quality_value(const sw_hdsl_quality_t *quality);
 bool sw_hdsl_quality_is_lost(const sw_hdsl_quality_t *quality);
 
 /**
- * A head with a parameter byte, behind a line of this disparity. `edge` is where the sampling edge stands in the EXTRA window, in eighths of
+ * A head with a parameter byte, after a line of this disparity. `edge` is where the sampling edge stands in the EXTRA window, in eighths of
  * a bit, 24..72; 0 for a free-running frame.
  */
 sw_result_t sw_hdsl_build_head(uint8_t parameter,
@@ -4988,7 +4988,7 @@ uint8_t sw_hdsl_rssi(uint8_t edges);
 uint8_t sw_hdsl_longest_gap(uint8_t edges);
 
 /**
- * The word of a character at a running disparity, -1 or 1, which becomes that behind it. The first bit of the line is bit 0.
+ * The word of a character at a running disparity, -1 or 1, which becomes that after it. The first bit of the line is bit 0.
  */
 sw_result_t sw_hdsl_build_word(const sw_hdsl_character_t *it,
                                int8_t *rd,
@@ -5005,7 +5005,7 @@ sw_result_t sw_hdsl_read_word(uint16_t raw, uint8_t dialect, sw_hdsl_reading_t *
 int8_t sw_hdsl_disparity(uint16_t raw);
 
 /**
- * Whether a word stands in the column of the running disparity `rd` (sw_hdsl_disparity_t), which becomes that behind it.
+ * Whether a word stands in the column of the running disparity `rd` (sw_hdsl_disparity_t), which becomes that after it.
  */
 sw_result_t sw_hdsl_check_disparity(uint16_t raw,
                                     int8_t *rd);

@@ -75,7 +75,7 @@ const COMMON: [(sw_result_t, &CStr); 17] = [
     (sw_rtex_error_t::SW_E_RTEX_BROKEN_OFF as sw_result_t, c"broken_off"),
 ];
 
-/// The names of a crate's classes, each with a NUL behind it, in the order of their numbers from 1; a number that is not given
+/// The names of a crate's classes, each with a NUL after it, in the order of their numbers from 1; a number that is not given
 /// is an empty one. Made when the library is compiled.
 macro_rules! names {
     ($class:ty) => {{

@@ -70,7 +70,7 @@ mod tests {
         assert_eq!(missing::<Fault>(0), Err::Incomplete(Needed::Unknown));
     }
 
-    /// What the decoder said is there behind the combinators of a caller, too.
+    /// What the decoder said is there after the combinators of a caller, too.
     #[test]
     fn a_combinator_keeps_the_refusal() {
         let one = |input| unit::<_, Fault, _>(input, 1, even);

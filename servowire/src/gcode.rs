@@ -57,7 +57,7 @@ impl Part {
     pub(crate) const ACCELERATION: u32 = 400_000;
 
     /// Reads all of a part program for faults, and for lines beyond the soft limits of an axis; how many straight lines it has.
-    /// Says on standard error where the file goes on behind the end of its program.
+    /// Says on standard error where the file goes on after the end of its program.
     pub(crate) fn check(&self, path: &Path) -> Result<usize, Box<dyn std::error::Error>> {
         let (mut lines, mut program) = (0, self.open(path)?);
         // Their speeds play no part.

@@ -112,7 +112,7 @@ enum Stage {
     /// The lines that were added are to be taken into account.
     LookAhead,
     Block,
-    /// The stop behind it is to be planned: from a copy of the path that has still to be made, or from that copy.
+    /// The stop after it is to be planned: from a copy of the path that has still to be made, or from that copy.
     Brake,
     Hold,
     Stop,
@@ -180,7 +180,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         Self { reach: ticks.clamp(4, LONGEST), ..self }
     }
 
-    /// Makes the stop behind each block as exact as all other steps, if the [`AxesQueue`] has slots for it. This takes
+    /// Makes the stop after each block as exact as all other steps, if the [`AxesQueue`] has slots for it. This takes
     /// about three times as many slots and instructions.
     pub fn with_exact_stops(self) -> Self {
         Self { finest: EXACT, ..self }

@@ -97,7 +97,7 @@ pub struct Axis<'q, const N: usize> {
     told: News,
     /// The plan of the block or of its stop, while it is being made.
     planning: Planning,
-    /// The stop behind it, while it is being cut.
+    /// The stop after it, while it is being cut.
     stop: Option<Tail>,
     /// Slots for the steps of a block and the exactness of its stop, adapted to the room that the previous block had; and
     /// the best exactness allowed.
@@ -238,7 +238,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         Self { reach: ticks.clamp(LEAST, LONGEST >> 3), ..self }
     }
 
-    /// Makes the stop behind everything queued as exact as all other steps, if the [`Queue`] has slots for it. This takes
+    /// Makes the stop after everything queued as exact as all other steps, if the [`Queue`] has slots for it. This takes
     /// about three times as many slots and instructions.
     pub fn with_exact_stops(self) -> Self {
         Self { coarse: EXACT, finest: EXACT, ..self }

@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// An approach that takes 40 steps to rest, 2000² / 2 / 50,000: position 0 is where the switch closed, not where it ended. With a
-    /// switch that closes only once, it ends at most the range behind the start of the approach, and those 40 steps and a poll.
+    /// switch that closes only once, it ends at most the range after the start of the approach, and those 40 steps and a poll.
     #[test]
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_fast_approach_is_counted_and_has_its_range() {

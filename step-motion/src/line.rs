@@ -200,7 +200,7 @@ impl<const N: usize> LinePulses<N> {
         (Motion { v, a, up }, at - before, before - at)
     }
 
-    /// Returns whether the machine is on the line, or behind it, at a moment.
+    /// Returns whether the machine is on the line, or after it, at a moment.
     pub(super) fn has_begun(&self, moment: u64) -> bool {
         let Start { place, before, moment: begin, .. } = self.start;
         if before.is_zero() {

@@ -260,7 +260,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let (rest, lines) = (self.rest_of(&plain), self.path.hurry(&limits));
         self.path.exit(self.more, self.path.part());
         let Some(stop) = self.stop_anew(now, true) else { return self.leave(self.tick(now)) };
-        // Who brakes harder before a corner comes to the line behind it later, which may allow more.
+        // Who brakes harder before a corner comes to the line after it later, which may allow more.
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
         if rest < latest || plain.end < stop.end {
             self.path.calm(lines);

@@ -132,7 +132,7 @@ mod tests {
         assert!(chain([NEUTRAL, UP, NEUTRAL, DOWN, NEUTRAL, NEUTRAL]).holds());
     }
 
-    /// Two words in front of the fault, or behind it, tell what is there.
+    /// Two words before the fault, or after it, tell what is there.
     #[test]
     fn a_damaged_answer_tells_its_ends_where_they_are_sound() {
         const NO_WORD: &str = "1111111111";

@@ -59,7 +59,7 @@ fn mistakes_and_their_causes() {
     assert_eq!(report.cause(), Some(Cause::TestPattern));
 }
 
-/// What is shown as the answer behind a mistake is sound, switch bit and disparity included; noise has no cause.
+/// What is shown as the answer after a mistake is sound, switch bit and disparity included; noise has no cause.
 #[test]
 fn no_cause_is_made_up() {
     let good = line(content());

@@ -177,7 +177,7 @@ fn outside_the_range() {
     assert!(Synchroniser::new(864 + 69 + 26 * 48, Es::ONE).is_ok());
     assert!(matches!(Synchroniser::new(864 + 70 + 26 * 48, Es::ONE), Err(Error::ExtraOutOfRange { extra: 161 })));
     let sync = Synchroniser::new(4567, Es::new(4).unwrap()).unwrap();
-    // 1,141 eighths and three quarters a frame: 864, five blocks of 48, and 37 up to the edge behind SYNC and the ones of SAMPLE.
+    // 1,141 eighths and three quarters a frame: 864, five blocks of 48, and 37 up to the edge after SYNC and the ones of SAMPLE.
     assert_eq!((sync.period(), sync.lead(), sync.extra().get()), (4567, 64 + 37, 37));
     let mut window = ExtraWindow::new(Extra::new(72).unwrap(), Stuffing::MAX, 72);
     assert_eq!(window.step(5), Err(Error::ExtraOutOfRange { extra: (72 + 5 - 48) / 8 }));

@@ -77,7 +77,7 @@ impl Hunt {
                 self.broken(expected, &times, at, &mut found);
                 continue;
             };
-            // Frame by frame, what is behind a response comes only now. If that begins one, nothing was lost.
+            // Frame by frame, what is after a response comes only now. If that begins one, nothing was lost.
             if self.given != 0 && self.given == self.got && expected.differs_first(content) == 0 {
                 self.clear();
             }

@@ -247,7 +247,7 @@ fn repeated_arguments() {
     }
 }
 
-/// The whole position with the velocity behind it: 40 bits and 32, least significant first, from bit 16 of the contents on.
+/// The whole position with the velocity after it: 40 bits and 32, least significant first, from bit 16 of the contents on.
 #[test]
 fn velocity_is_behind_the_position() {
     let abs40_vel = Data::Abs40Vel { abs: U40::truncate(0x12_3456_789a), velocity: -0x0102_0304 };

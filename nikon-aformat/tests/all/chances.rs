@@ -84,7 +84,7 @@ fn a_repeated_frame_is_no_part_of_a_response() {
     assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
 }
 
-/// Noise of two frames behind a response, in one block: all that its last frame can be makes some CRC-8 right in which the response
+/// Noise of two frames after a response, in one block: all that its last frame can be makes some CRC-8 right in which the response
 /// would be the rest of another one. It is that only if a response begins there, and is sound then.
 #[test]
 fn noise_behind_a_response_costs_nothing() {

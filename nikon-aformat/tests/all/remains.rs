@@ -51,7 +51,7 @@ fn half_of_a_response_behind_a_glitch_is_as_young_as_its_own_frames() {
     assert_eq!(ended(transaction), Ok(sent));
 }
 
-/// The first frame came too early to be an answer for certain; the pause behind it does not make it younger.
+/// The first frame came too early to be an answer for certain; the pause after it does not make it younger.
 #[test]
 fn a_frame_does_not_get_younger_by_the_pause_behind_it() {
     let contents = response(Command::Abs40, 3, 0x12_3456).emit().contents().to_vec();

@@ -45,7 +45,7 @@ fn extra(edge: u8) -> Result<Option<Extra>, Refused> {
     if edge == 0 { Ok(None) } else { Ok(Some(in_range(Extra::new(edge))?)) }
 }
 
-/// A head with a parameter byte, behind a line of this disparity. `edge` is where the sampling edge stands in the EXTRA window, in eighths of
+/// A head with a parameter byte, after a line of this disparity. `edge` is where the sampling edge stands in the EXTRA window, in eighths of
 /// a bit, 24..72; 0 for a free-running frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_build_head(

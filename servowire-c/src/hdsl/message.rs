@@ -55,7 +55,7 @@ pub struct sw_hdsl_long_t {
 pub struct sw_hdsl_data_t {
     /// Bytes of it.
     pub len: u8,
-    /// The bytes, 0 behind them.
+    /// The bytes, 0 after them.
     pub data: [u8; 8],
 }
 

@@ -61,7 +61,7 @@ fn word(raw: u16) -> Result<Word, Refused> {
     in_range(Word::new(raw))
 }
 
-/// The word of a character at a running disparity, -1 or 1, which becomes that behind it. The first bit of the line is bit 0.
+/// The word of a character at a running disparity, -1 or 1, which becomes that after it. The first bit of the line is bit 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_build_word(
     it: Option<&sw_hdsl_character_t>,
@@ -97,7 +97,7 @@ pub extern "C" fn sw_hdsl_disparity(raw: u16) -> i8 {
     Word::truncate(raw & 0x3ff).disparity()
 }
 
-/// Whether a word stands in the column of the running disparity `rd` (sw_hdsl_disparity_t), which becomes that behind it.
+/// Whether a word stands in the column of the running disparity `rd` (sw_hdsl_disparity_t), which becomes that after it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_hdsl_check_disparity(raw: u16, rd: Option<&mut i8>) -> sw_result_t {
     border(|| {

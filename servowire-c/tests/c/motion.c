@@ -139,7 +139,7 @@ static void requests(void)
     CHECK(!sw_motion_is_halted(NULL));
 }
 
-/* The switch is 700 steps behind where the axis is switched on, and beyond the soft limits as seen from there. */
+/* The switch is 700 steps after where the axis is switched on, and beyond the soft limits as seen from there. */
 static void homing(void)
 {
     static sw_motion_queue_t queue;

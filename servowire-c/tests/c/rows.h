@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A block of exactly its length, so that a sanitizer sees a byte read behind it. */
+/* A block of exactly its length, so that a sanitizer sees a byte read after it. */
 typedef struct {
     uint8_t *at;
     size_t len;
@@ -27,7 +27,7 @@ extern const entry_t tformat_commands[], aformat_commands[], aformat_more_comman
     rtex_commands[], rtex_more_commands[], sorte_commands[];
 
 void say(const char *format, ...);
-uint64_t number(const char *text);       /* decimal, or hexadecimal behind 0x; - is 0 */
+uint64_t number(const char *text);       /* decimal, or hexadecimal after 0x; - is 0 */
 #define U8(text) ((uint8_t)number(text))
 #define U16(text) ((uint16_t)number(text))
 #define U32(text) ((uint32_t)number(text))

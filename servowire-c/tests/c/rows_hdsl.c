@@ -353,7 +353,7 @@ static void sample_edge(char **a, int n)
     say("%u", sw_hdsl_sample_index((uint8_t)strtoul(a[1], NULL, 16), strcmp(a[0], "falling") == 0));
 }
 
-/* DIALECT POS_BITS, then a frame each: ACC (or -), which ends with VPOS, or none at the end of a V-frame, behind a comma */
+/* DIALECT POS_BITS, then a frame each: ACC (or -), which ends with VPOS, or none at the end of a V-frame, after a comma */
 static void tracker(char **a, int n)
 {
     sw_hdsl_tracker_t it;

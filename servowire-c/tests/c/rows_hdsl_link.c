@@ -12,7 +12,7 @@ static void start(bench_t *b, uint8_t dialect)
     (void)sw_hdsl_registers_start(&b->map, dialect);
 }
 
-/* The window of an answer that comes after this delay, in eighths of a bit; the line is high before and behind it. */
+/* The window of an answer that comes after this delay, in eighths of a bit; the line is high before and after it. */
 static void hear(bench_t *b, uint64_t bits, unsigned delay)
 {
     uint8_t samples[SW_HDSL_WINDOW];
@@ -41,7 +41,7 @@ static uint64_t registers(bench_t *b, uint8_t from, int count)
     return all;
 }
 
-/* Six characters, special where the bit in `special` is set, each in column RD-, with the switch bit behind the fifth. */
+/* Six characters, special where the bit in `special` is set, each in column RD-, with the switch bit after the fifth. */
 static uint64_t answer_of(const uint8_t *bytes, unsigned special)
 {
     uint64_t bits = 0;
@@ -238,7 +238,7 @@ static void start_up(char **a, int n)
     }
 }
 
-/* DIALECT POS_BITS NOISE, answers; behind the last one "lost" if it ends the link. */
+/* DIALECT POS_BITS NOISE, answers; after the last one "lost" if it ends the link. */
 static void link_of(char **a, int n)
 {
     static bench_t b;
@@ -270,7 +270,7 @@ static sw_result_t put(bench_t *b, uint8_t address, uint8_t value)
     return sw_hdsl_registers_write(&b->map, &b->m, address, value);
 }
 
-/* "new" or "on", then writes of the application ADDRESS=VALUE up to "|", then the encoder's symbols; they begin behind the first. */
+/* "new" or "on", then writes of the application ADDRESS=VALUE up to "|", then the encoder's symbols; they begin after the first. */
 static void messages(char **a, int n)
 {
     static bench_t b;

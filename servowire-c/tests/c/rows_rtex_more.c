@@ -138,7 +138,7 @@ static void control(char **a, int n)
     say(" %s", sw_text(sw_rtex_parse_command_strict(block, sizeof block, &it)));
 }
 
-/* BEFORE OFF: whether OFF switches the servo off, whether it is the one that is made behind BEFORE, and by how much the counter goes on. */
+/* BEFORE OFF: whether OFF switches the servo off, whether it is the one that is made after BEFORE, and by how much the counter goes on. */
 static void servo_off(char **a, int n)
 {
     block_t before = hex(a[0]), off = hex(a[1]);

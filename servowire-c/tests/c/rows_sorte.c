@@ -251,7 +251,7 @@ static void duration(char **a, int n)
     say(" %llu", (unsigned long long)ns);
 }
 
-/* crc8 of HEX, HEX ...: what it is behind each. */
+/* crc8 of HEX, HEX ...: what it is after each. */
 static void crc8(char **a, int n)
 {
     uint8_t crc = 0;

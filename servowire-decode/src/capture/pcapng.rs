@@ -146,7 +146,7 @@ impl Pcapng {
     }
 
     fn fault(&self, what: &str) -> Fault {
-        Fault::new(&self.name, At::File, format!("behind packet {}: {what}", self.packets))
+        Fault::new(&self.name, At::File, format!("after packet {}: {what}", self.packets))
     }
 }
 

@@ -112,7 +112,7 @@ impl Floating {
                 let idle: Vec<usize> = sure.iter().copied().chain(gap).collect();
                 let edges = raised(&piece, &idle, *way, P::FIRST_LOW, self.bit);
                 let trial = Trial::of(receiver, protocol, weights, &edges, now);
-                // The change of direction is behind a request; anywhere else it is a guess, and a damaged frame might pass
+                // The change of direction is after a request; anywhere else it is a guess, and a damaged frame might pass
                 // by chance.
                 if gap.is_some_and(|gap| !piece.get(gap).is_some_and(|fall| self.ends_request(&trial, fall.time))) {
                     continue;

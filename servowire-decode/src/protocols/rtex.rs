@@ -369,7 +369,7 @@ impl LogDecoder for Decoder {
         let nops = |burst: &Burst| burst.bytes.chunks(rtex_block::LEN).all(is_empty);
         let first = self.held.iter().rposition(nops).map_or(0, |last| last + 1);
         let told = self.held.get(first..).unwrap_or_default();
-        // Nothing but NOPs, or too few blocks behind them to tell by.
+        // Nothing but NOPs, or too few blocks after them to tell by.
         let tells = TELLING.contains(&told.len()) && Blocks::tells(told);
         let waits = !tells && told.len() < ENOUGH && self.held.len() < MOST_HELD;
         if waits { Ok(()) } else { self.let_go(out) }

@@ -116,7 +116,7 @@ impl embedded_hal_async::spi::SpiBus for Spi {
     }
 }
 
-/// The word of a transfer that goes out at a place: ones behind the last.
+/// The word of a transfer that goes out at a place: ones after the last.
 fn sent(words: &[u8], at: usize) -> u8 {
     words.get(at).copied().unwrap_or(0xff)
 }
@@ -149,7 +149,7 @@ impl Direction for Pin {
     }
 }
 
-/// ID 0 is 02h. Cut off behind its sixth bit, on a line that rests at 1, it is C2h: ID 8, which sets the zero.
+/// ID 0 is 02h. Cut off after its sixth bit, on a line that rests at 1, it is C2h: ID 8, which sets the zero.
 #[test]
 fn id_0_is_whole_or_was_not_sent() {
     let (mut whole, mut now_ns) = (0, 0);

@@ -16,7 +16,7 @@ pub(super) struct Program<R> {
     number: u64,
     /// Lines that begin with a slash are skipped.
     block_delete: bool,
-    /// It has words; a percent sign behind them ends it.
+    /// It has words; a percent sign after them ends it.
     begun: bool,
     over: bool,
     state: State,
@@ -66,7 +66,7 @@ impl<R: BufRead> Program<R> {
         Ok(line.map(|line| String::from_utf8_lossy(&line).into_owned()))
     }
 
-    /// Where the program has ended before its file: the first line behind M2, M30 or a percent sign that is more than a comment.
+    /// Where the program has ended before its file: the first line after M2, M30 or a percent sign that is more than a comment.
     pub(super) fn behind_the_end(&mut self) -> Result<Option<Fault>, Fault> {
         let end = self.number;
         while let Some(line) = self.read()? {

@@ -274,7 +274,7 @@ fn machine_words_of_other_groups_go_together() {
     assert_eq!(ends("S900 M3 M7 M8\nG0 X1 M9 M5 M48").len(), 1);
 }
 
-/// As in RS274/NGC: nothing is run behind M2, M30, or a percent sign behind the first words.
+/// As in RS274/NGC: nothing is run after M2, M30, or a percent sign after the first words.
 #[test]
 fn a_program_ends_before_its_file() {
     for (text, lines, behind) in [

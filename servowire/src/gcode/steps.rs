@@ -127,7 +127,7 @@ impl Steps {
                     None => return !self.over,
                 },
                 Work::TooFewSlots => {
-                    let what = "the stop behind a part of the path needs more segments than the queue has";
+                    let what = "the stop after a part of the path needs more segments than the queue has";
                     (self.fault, self.over) = (Some(Fault::new(&self.name, At::File, what)), true);
                     return false;
                 }
@@ -205,7 +205,7 @@ mod tests {
         found
     }
 
-    /// Every step is where the exact search has it, to the 25 ns that a segment may be off; in the stop behind the last
+    /// Every step is where the exact search has it, to the 25 ns that a segment may be off; in the stop after the last
     /// block, to a sixteenth of its interval.
     #[test]
     fn segments_make_the_steps_of_the_exact_search() {

@@ -13,7 +13,7 @@ pub(super) struct Words {
     pub(super) list: Vec<Word>,
     /// Whether it begins with a slash, so that it may be skipped.
     pub(super) optional: bool,
-    /// Whether it is a percent sign, which stands before and behind a program.
+    /// Whether it is a percent sign, which stands before and after a program.
     pub(super) percent: bool,
 }
 

@@ -383,7 +383,7 @@ fn a_damaged_network_capture_is_refused_where_it_breaks() {
     let cut = servowire(&["decode", name]);
     assert_eq!(cut.status.code(), Some(1));
     assert!(
-        String::from_utf8_lossy(&cut.stderr).contains("behind packet")
+        String::from_utf8_lossy(&cut.stderr).contains("after packet")
             || String::from_utf8_lossy(&cut.stderr).contains("after packet"),
         "{cut:?}"
     );

@@ -44,7 +44,7 @@ fn at(changes: &[(i64, String)], time: i64) -> &str {
     changes.iter().rev().find(|(from, _)| *from <= time).map_or("", |(_, value)| value)
 }
 
-/// Each event of a run is seen at its place, and nothing behind it.
+/// Each event of a run is seen at its place, and nothing after it.
 fn holds(run: &common::Run, viewed: &mut Viewed) -> usize {
     let (frames, verdicts) = (viewed.changes("decoded_line", "frame"), viewed.changes("decoded_line", "verdict"));
     let positions = viewed.changes("decoded_line", "ABS");

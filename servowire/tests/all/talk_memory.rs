@@ -149,7 +149,7 @@ fn a_changed_file_is_no_backup() {
                 assert_eq!(read, whole, "{at}: {other:?}");
             }
         }
-        assert!(at + 2 >= text.len() || Backup::parse(&text[..=at]).is_err(), "cut behind {at}");
+        assert!(at + 2 >= text.len() || Backup::parse(&text[..=at]).is_err(), "cut after {at}");
     }
     for wrong in ["", "0: ff ff", "{}", "[]"] {
         assert!(Backup::parse(wrong).is_err(), "{wrong}");

@@ -1,4 +1,4 @@
-//! The stop behind each block.
+//! The stop after each block.
 
 use super::{Axes, Stage};
 use crate::axis::{COARSEST, Work, coarser};
@@ -26,7 +26,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Cuts a segment of the stop behind the block.
+    /// Cuts a segment of the stop after the block.
     pub(super) fn cut_stop(&mut self) -> Work {
         let (Some(writer), Some(queue), Some(stop)) =
             (self.writers.get_mut(self.axis), self.queue.axes.get(self.axis), self.stops.get_mut(self.block))

@@ -194,8 +194,8 @@ impl<const N: usize> Axis<'_, N> {
         u64::from(self.reach).saturating_mul(3) / 5
     }
 
-    /// Begins a block: if there is a request, behind the next segment that is far enough ahead of the interrupt; otherwise
-    /// behind everything handed out. Returns whether there is anything to plan.
+    /// Begins a block: if there is a request, after the next segment that is far enough ahead of the interrupt; otherwise
+    /// after everything handed out. Returns whether there is anything to plan.
     fn begin(&mut self) -> bool {
         self.forget();
         self.told = core::mem::replace(&mut self.news, News::None);
@@ -236,7 +236,7 @@ impl<const N: usize> Axis<'_, N> {
         true
     }
 
-    /// Joins the block behind a segment that is far enough ahead.
+    /// Joins the block after a segment that is far enough ahead.
     fn join(&mut self, block: usize, place: usize) {
         let Some(out) = self.out.get(block).copied() else { return };
         let mark = |at| self.marks.get(Queue::<N>::slot(block, at)).copied().unwrap_or_default();
@@ -360,7 +360,7 @@ impl<const N: usize> Axis<'_, N> {
         self.stage = Stage::Stop;
     }
 
-    /// Cuts a segment of the stop behind the block.
+    /// Cuts a segment of the stop after the block.
     fn cut_stop(&mut self) -> Work {
         let Some(tail) = &mut self.stop else { return self.complete(None) };
         if core::mem::take(&mut tail.moves) {

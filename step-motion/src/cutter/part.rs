@@ -473,7 +473,7 @@ mod tests {
     #[test]
     fn steps_at_constant_speed() {
         let cruise = |(place, pace): (i128, u64), time| {
-            // `place` is how far behind step 7 the piece begins.
+            // `place` is how far after step 7 the piece begins.
             let origin = (15 << (P2 - 1)) + place;
             let part = Part { even: true, begin: 5000, origin, pace: Real::new(pace), ..Part::NONE };
             let Stretch { count, first, differences } = part.cruise((7, 50), time);

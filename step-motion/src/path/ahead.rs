@@ -42,7 +42,7 @@ pub(crate) struct Ahead {
     found: u32,
     open: bool,
     /// The speed at which the run is to end, and the greatest at which it may begin for that. In this edition all lines
-    /// behind the run can slow down in time.
+    /// after the run can slow down in time.
     entry: Option<(Real, Real)>,
     edition: u32,
     /// The greatest entry found in an era.

@@ -48,7 +48,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 continue;
             }
             let pause = Real::new(self.clock.moment(axis.reversal_pause.into()));
-            // It has half of it on either side, or all of it behind the corner.
+            // It has half of it on either side, or all of it after the corner.
             let time = if before == 0 { pause } else { pause.half() };
             let v = Real::ONE.half() / time - (axis.limits.bounds(self.clock).a * time).half();
             for (steps, length) in [(before, long), (after, length)].into_iter().filter(|(steps, _)| *steps != 0) {

@@ -187,7 +187,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
             let way = (place + curve.way()) - before;
             if curve.way() <= ((run.length + before) - place) + SLACK {
-                // Rounding must not let it begin a line behind the run.
+                // Rounding must not let it begin a line after the run.
                 let (end, rest) = self.locate(at, way, at.saturating_add(run.more));
                 let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
                 let more = end.saturating_sub(at);
@@ -262,7 +262,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         runs
     }
 
-    /// Plans in the same way to this speed only; behind a run where a stop leaves a line, to the speed of that stop.
+    /// Plans in the same way to this speed only; after a run where a stop leaves a line, to the speed of that stop.
     fn lead(
         &self,
         at: usize,
@@ -403,7 +403,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.line(at.saturating_add(1)).map_or(Real::ZERO, |line| line.ahead.promised(self.times))
     }
 
-    /// Returns the speed at the start of line `at`, or behind the last one, if it is known.
+    /// Returns the speed at the start of line `at`, or after the last one, if it is known.
     fn known(&self, at: usize) -> Option<Real> {
         self.line(at).map_or(Some(Real::ZERO), |line| line.ahead.entry(self.times))
     }

@@ -27,7 +27,7 @@ pub(super) struct Behind<const N: usize> {
     motion: Piece,
     begin: u64,
     end: u64,
-    /// When all axes are at whole steps behind it; 0 if they are there at its end. No line begins before that.
+    /// When all axes are at whole steps after it; 0 if they are there at its end. No line begins before that.
     pub(super) over: u64,
 }
 
@@ -47,7 +47,7 @@ impl<const N: usize> Behind<N> {
 impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns position, speed, acceleration and jerk of each axis at a tick that is not before the last step. The position does not
     /// jump, whatever is asked for: an axis that a stop or a halt has left between two steps goes on to the last step that was made, at
-    /// its greatest speed, and what follows begins behind that.
+    /// its greatest speed, and what follows begins after that.
     pub fn at(&self, now: u64) -> [Setpoint; N] {
         self.places(self.clock().moment(now))
     }
@@ -89,7 +89,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             self.behind = Behind { from, way, ..Behind::rest(self.commanded) };
             return;
         }
-        // A brake may end behind the last step, in front of the end.
+        // A brake may end after the last step, in front of the end.
         let (whole, end, (way, motion)) = (line.start.whole && !first.cut, line.over(), line.to_the_end(begin));
         self.behind = Behind { from, to: self.positions(end), way, motion, begin, end, over: 0 };
         if !whole {

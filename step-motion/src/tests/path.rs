@@ -371,7 +371,7 @@ fn lines_that_hurry_and_calm_down() {
 }
 
 /// The second axis turns round with a pause of a tenth of a second on either side: from half a step off at 2.5 steps/s it gets there in
-/// that time with its 50 steps/s². Where it stood before, it has all of the pause behind the corner. Nothing turns where it comes to rest.
+/// that time with its 50 steps/s². Where it stood before, it has all of the pause after the corner. Nothing turns where it comes to rest.
 #[test]
 fn the_speed_at_which_an_axis_turns_round() {
     let corner = |pause: u32, lines: &[[i64; N]]| {

@@ -1,4 +1,4 @@
-//! What is asked for counts behind the stop of each block too, where the machine comes to rest if its background is late.
+//! What is asked for counts after the stop of each block too, where the machine comes to rest if its background is late.
 
 use step_motion::{Axes, AxesQueue, AxesTimer, AxisSetup, Clock, Error, Limits, Path, Work};
 
@@ -100,8 +100,8 @@ fn a_full_queue_loses_no_line() {
     assert!(refused > 20 && taken > 20, "{refused} {taken}");
 }
 
-/// Four lines of 650 steps in a queue for four. A block has 200 steps, and 20 of brake behind it: the fourth one passes the end of a
-/// line, which the stop behind the third one does not.
+/// Four lines of 650 steps in a queue for four. A block has 200 steps, and 20 of brake after it: the fourth one passes the end of a
+/// line, which the stop after the third one does not.
 fn four_lines() -> (Axes<'static, 1, 4, 257>, Machine<AxesTimer<'static, 1, 257>, 1>) {
     let axis = AxisSetup::new(Limits::new(20_000, 10_000_000).unwrap(), 80_000);
     let path = Path::new(Clock::MICROSECONDS, [axis], 20).unwrap();

@@ -173,7 +173,7 @@ fn a_stop_forgets_the_path_and_a_quick_one_is_shorter() {
     assert!((340..380).contains(&(ends[0] - ends[2])), "{ends:?}");
 }
 
-/// From rest, or behind another stop, and after any slice of the work: where the stop says, and no farther.
+/// From rest, or after another stop, and after any slice of the work: where the stop says, and no farther.
 #[test]
 fn a_stop_forgets_lines_in_the_making() {
     for (slices, moving) in (0..60).flat_map(|slices| [(slices, false), (slices, true)]) {
@@ -322,7 +322,7 @@ fn a_long_pause_makes_no_request_late() {
     }
 }
 
-/// The second half of the slots begins behind 2^15 of them.
+/// The second half of the slots begins after 2^15 of them.
 #[test]
 fn the_largest_queue() {
     static QUEUE: AxesQueue<1, 65_535> = AxesQueue::new();
@@ -400,7 +400,7 @@ fn a_stop_lasts_until_rest() {
         wants += f64::max(0.0, 1.0 / gap / 80_000.0 - gap / 2.0);
         waits += (bench.machine.now - last.0) as f64 / 1e6;
     }
-    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s behind the last steps, {wants} s are needed");
+    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s after the last steps, {wants} s are needed");
 }
 
 /// A corner of 90 degrees on a machine that is in motion.

@@ -32,7 +32,7 @@ fn dir_has_half_of_the_pause_on_either_side() {
     }
 }
 
-/// A line that is pushed after any slice of the work on the block before, which ends at rest: it begins in that block or behind it, and
+/// A line that is pushed after any slice of the work on the block before, which ends at rest: it begins in that block or after it, and
 /// none of its steps is due before that.
 #[test]
 fn a_line_behind_a_rest_begins_at_rest() {
@@ -58,7 +58,7 @@ fn a_line_behind_a_rest_begins_at_rest() {
     }
 }
 
-/// At full speed and high acceleration, with a way back at once: the first step is a step of 125 us behind the last one, and DIR has half
+/// At full speed and high acceleration, with a way back at once: the first step is a step of 125 us after the last one, and DIR has half
 /// of the pause on either side, although nobody knows how much of what was handed out has been made.
 #[test]
 fn a_way_back_behind_a_halt_keeps_its_distance() {
@@ -83,11 +83,11 @@ fn a_way_back_behind_a_halt_keeps_its_distance() {
         for axis in 0..2 {
             let last = before.iter().rev().find(|step| step.1 == axis).unwrap().0;
             let first = after.iter().find(|step| step.1 == axis).unwrap().0;
-            assert!(first - last >= 124.max(u64::from(pause)), "{} behind a halt at {at}", first - last);
+            assert!(first - last >= 124.max(u64::from(pause)), "{} after a halt at {at}", first - last);
         }
         let half = u64::from(pause / 2).min(2500);
         for (before, after) in &machine.turns {
-            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, behind a halt at {at}");
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, after a halt at {at}");
         }
     }
 }
@@ -126,7 +126,7 @@ fn dir_is_in_time_behind_a_rest() {
 }
 
 /// From rest a way back begins when DIR has had its time, half of the pause or a quarter of the reach, and no later, if 4 ms of
-/// the pause are over: the first step is 354 us behind that at 8,000,000 steps/s². An axis that goes on as it went waits for nothing.
+/// the pause are over: the first step is 354 us after that at 8,000,000 steps/s². An axis that goes on as it went waits for nothing.
 #[test]
 fn a_way_back_from_rest_begins_in_time() {
     for (pause, lead) in [(0, 0), (900, 450), (4000, 2000), (6000, 2500)] {

@@ -30,7 +30,7 @@ impl<const S: usize> Bench<S> {
     }
 }
 
-/// 20 steps/s, and no way to rest: the steps that had been handed out behind the request are not made.
+/// 20 steps/s, and no way to rest: the steps that had been handed out after the request are not made.
 #[test]
 fn a_hold_without_a_step_takes_back_those_behind_it() {
     let mut bench = Bench::<129>::new(20, MOST, 100_000);
@@ -131,12 +131,12 @@ fn a_request_behind_the_last_step_adds_no_time() {
             assert_eq!(bench.machine.slice(&mut bench.axis), Work::Rest);
             (bench.machine.now, bench.axis.is_at_rest())
         });
-        assert_eq!(ends, [ends[0]; 5], "behind step {made}");
+        assert_eq!(ends, [ends[0]; 5], "after step {made}");
         assert!(ends[0].1);
     }
 }
 
-/// 1000 steps/s, and no way to rest: a stop behind what is handed out has nothing to do once the interrupt has made that.
+/// 1000 steps/s, and no way to rest: a stop after what is handed out has nothing to do once the interrupt has made that.
 #[test]
 fn a_stop_of_less_than_a_tick_is_a_rest() {
     for at in (30_000..42_000).step_by(97) {
@@ -220,7 +220,7 @@ fn a_pause_is_for_a_change_of_direction() {
 }
 
 /// A slice takes 100 us, or 150 us: a block is ready too late for the nearest joint, so one farther ahead is taken, without a stop. With
-/// 150 us that takes more than there is behind another request.
+/// 150 us that takes more than there is after another request.
 #[test]
 fn a_slow_background_finds_a_joint_farther_ahead() {
     for (takes, asks) in [(100, &[50, 100, 50, 100][..]), (150, &[50])] {
@@ -297,7 +297,7 @@ fn a_stop_lasts_until_rest() {
         wants += f64::max(0.0, 1.0 / gap / 80_000.0 - gap / 2.0);
         waits += (bench.machine.now - last.0) as f64 / 1e6;
     }
-    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s behind the last steps, {wants} s are needed");
+    assert!(waits > 0.8 * wants && wants > 0.01, "{waits} s after the last steps, {wants} s are needed");
 }
 
 /// A driver needs its time between a step and DIR and between DIR and the next step, wherever a wait or a block ends, whatever is asked
@@ -351,7 +351,7 @@ fn a_quick_stop_behind_a_linked_block_is_quick() {
     }
 }
 
-/// A background that is not called any more: at constant speed the axis stops after eight times the reach, what is linked behind it
+/// A background that is not called any more: at constant speed the axis stops after eight times the reach, what is linked after it
 /// included, and two tenths of a second of brake.
 #[test]
 fn a_late_background_stops_the_axis_in_time() {

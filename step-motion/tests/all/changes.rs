@@ -148,7 +148,7 @@ proptest! {
     }
 }
 
-/// A step that is due in the tick of a request, and so before the stop begins: those behind it are at their ticks.
+/// A step that is due in the tick of a request, and so before the stop begins: those after it are at their ticks.
 #[test]
 fn a_stop_in_the_tick_of_a_step() {
     for target in [-1575, -900] {

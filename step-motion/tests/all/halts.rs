@@ -1,4 +1,4 @@
-//! DIR behind a halt: its level stays what the interrupt last set until the next motion needs the other one, half of the pause away from
+//! DIR after a halt: its level stays what the interrupt last set until the next motion needs the other one, half of the pause away from
 //! the steps on either side.
 
 use step_motion::{Axes, AxesQueue, Axis, AxisSetup, Clock, Limits, Path, Queue, Work};
@@ -82,7 +82,7 @@ fn halts<T: Timer, const N: usize>(
         }
         turns += machine.edges.len();
         for before in machine.edges.drain(..) {
-            assert!(before + 2 >= half, "DIR {before} ticks behind a step, pause {pause}, reach {reach}");
+            assert!(before + 2 >= half, "DIR {before} ticks after a step, pause {pause}, reach {reach}");
         }
         for (_, after) in machine.turns.drain(..) {
             assert!(after + 2 >= half, "DIR {after} ticks before a step, pause {pause}, reach {reach}");

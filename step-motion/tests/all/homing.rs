@@ -59,7 +59,7 @@ fn a_switch_is_found_by_any_axis() {
     all(|bench, name| is_found(bench, name));
 }
 
-/// It runs on for up to 11 steps behind the switch, and in two halves for 4 ms more; all of them are counted.
+/// It runs on for up to 11 steps after the switch, and in two halves for 4 ms more; all of them are counted.
 #[test]
 fn a_fast_approach_knows_where_the_switch_has_closed() {
     all_of(Case { config: config(1500), ..Case::usual() }, |bench, name| is_found(bench, name));

@@ -38,7 +38,7 @@ fn the_last_half_step_of_a_line_belongs_to_it() {
         while let Some(pulse) = machine.pulse() {
             if pulse.axis == 0 {
                 let before = last.replace(pulse.tick).unwrap();
-                assert!(pulse.tick - before >= 9999, "{} us behind {before}", pulse.tick - before);
+                assert!(pulse.tick - before >= 9999, "{} us after {before}", pulse.tick - before);
             }
         }
     }

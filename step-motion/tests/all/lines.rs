@@ -357,7 +357,7 @@ fn lines_that_come_one_by_one_continue_each_other() {
     assert!(ticks.len() == 60 * 97);
 }
 
-/// A line that allows less acceleration or jerk is pushed behind lines in its direction, at any time: the machine comes to its end
+/// A line that allows less acceleration or jerk is pushed after lines in its direction, at any time: the machine comes to its end
 /// as slowly as the acceleration of the first axis lets it come to rest.
 #[test]
 fn a_weak_line_that_is_pushed_late_is_slow_enough_in_time() {

@@ -9,7 +9,7 @@ fn three() -> [AxisSetup; 3] {
     })
 }
 
-/// Takes the steps of 100 steps and 3000 more in one direction, asks for another feed behind some of them, and returns how many
+/// Takes the steps of 100 steps and 3000 more in one direction, asks for another feed after some of them, and returns how many
 /// ticks apart the steps 2000 and 2001 are.
 fn apart(feeds: [u32; 2], behind: i64, percent: u16) -> u64 {
     let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();

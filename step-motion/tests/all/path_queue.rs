@@ -356,7 +356,7 @@ fn few_slots_cost_exactness_and_never_a_step() {
     assert!(!refused_with_slots::<129>(1_000_000, false));
 }
 
-/// Two lines one way or the other that do not fit into `S` slots, and a slow one behind what was made of them: how often each was
+/// Two lines one way or the other that do not fit into `S` slots, and a slow one after what was made of them: how often each was
 /// refused, and whether that was in motion.
 fn given_up<const S: usize>(way: i64) -> [Vec<bool>; 2] {
     let queue: &'static AxesQueue<N, S> = Box::leak(Box::default());

@@ -43,7 +43,7 @@ fn a_rest_lasts_as_long_as_is_asked() {
     };
     let (last, first) = second(0);
     assert!(first > last + 20_000, "{last} {first}");
-    // The first step falls half a step behind the start: (2 / 2 / 5000)^1/2 s.
+    // The first step falls half a step after the start: (2 / 2 / 5000)^1/2 s.
     let (_, first) = second(5_000_000);
     assert!(first.abs_diff(5_014_142) <= 1, "{first}");
 }
@@ -151,7 +151,7 @@ fn a_line_that_was_cut_off_turns_no_axis() {
     assert!(!up && machine.commanded() == [x + 200, y - 20]);
 }
 
-/// 1000 steps/s: the line ends half a step behind its last step, which a halt does not wait for.
+/// 1000 steps/s: the line ends half a step after its last step, which a halt does not wait for.
 #[test]
 fn a_halt_behind_the_last_step_is_a_rest() {
     for after in [1, 100, 400] {
@@ -199,7 +199,7 @@ fn the_last_line_is_remembered_until_it_ends() {
     }
 }
 
-/// At 1000 steps/s, half a step behind the last one, though one curve leads over both lines.
+/// At 1000 steps/s, half a step after the last one, though one curve leads over both lines.
 #[test]
 fn a_line_ends_where_the_next_one_begins() {
     let limits = Limits::new(1000, 5000).unwrap().with_jerk(50_000).unwrap();

@@ -75,7 +75,7 @@ fn a_stop_ends_where_a_hold_does() {
     }
 }
 
-/// At rest on the second line, behind a brake that began on the first one: at 50,000 steps/s³ 4 to 5 steps take 78 to 85 ms.
+/// At rest on the second line, after a brake that began on the first one: at 50,000 steps/s³ 4 to 5 steps take 78 to 85 ms.
 #[test]
 fn a_way_on_begins_at_rest() {
     let mut machine = machine();
@@ -133,7 +133,7 @@ fn a_curve_that_is_planned_again_goes_on_in_the_same_tick() {
     }
 }
 
-/// A brake that does not fit on what is left of a line, because the line behind it may have more jerk, begins at the joint; a hold does
+/// A brake that does not fit on what is left of a line, because the line after it may have more jerk, begins at the joint; a hold does
 /// so no sooner than a stop.
 #[test]
 fn a_stop_that_does_not_fit_is_no_longer_than_a_hold() {
@@ -157,7 +157,7 @@ fn a_stop_that_does_not_fit_is_no_longer_than_a_hold() {
     }
 }
 
-/// Twice the speed, ten times the acceleration and no limit of the jerk: for the stop, and not for the line behind it.
+/// Twice the speed, ten times the acceleration and no limit of the jerk: for the stop, and not for the line after it.
 #[test]
 fn the_limits_of_a_quick_stop_end_with_it() {
     let takes = |machine: &mut Machine, now| {
@@ -177,7 +177,7 @@ fn the_limits_of_a_quick_stop_end_with_it() {
     assert!(stopped.abs_diff(fresh) <= 1, "{stopped} {fresh}");
 }
 
-/// At rest behind a hold, on either line: what is planned next begins where the motion has ended, 150 steps from where it was when the
+/// At rest after a hold, on either line: what is planned next begins where the motion has ended, 150 steps from where it was when the
 /// hold came, half a step before a step.
 #[test]
 fn a_resume_begins_where_the_hold_has_ended() {

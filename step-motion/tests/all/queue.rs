@@ -1,4 +1,4 @@
-//! A background and an interrupt: every step at its tick, a stop behind whatever is out, no step after a halt.
+//! A background and an interrupt: every step at its tick, a stop after whatever is out, no step after a halt.
 
 use proptest::prelude::*;
 use step_motion::{Axis, Clock, Direction, Limits, Mover, Queue, StepTimer, Work};
@@ -209,7 +209,7 @@ fn a_background_that_starves_ends_in_a_stop_at_every_segment() {
     assert!(stalls > 200, "{stalls}");
 }
 
-/// The stop behind the queue as exact as all else: from interval to interval the speed changes by no more than the acceleration and 25 ns
+/// The stop after the queue as exact as all else: from interval to interval the speed changes by no more than the acceleration and 25 ns
 /// at either end of an interval make of it.
 #[test]
 fn a_stop_that_nobody_asked_for_is_exact_if_that_is_asked_for() {

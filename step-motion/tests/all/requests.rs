@@ -187,7 +187,7 @@ fn a_refused_request_does_not_end_a_quick_stop() {
     assert_eq!(mover.run(Direction::Forward, 1, last), Err(Error::Moving));
 }
 
-/// A path takes lines again when an axis takes moves: at rest, half a step behind its last step.
+/// A path takes lines again when an axis takes moves: at rest, half a step after its last step.
 #[test]
 fn a_quick_stop_lasts_until_rest() {
     all(|machine, name| {

@@ -157,7 +157,7 @@ fn the_reversal_pause_is_kept_after_a_halt() {
     assert!(turned && mover.commanded() == 0);
 }
 
-/// A new target a few steps behind the place where a long brake under way would end: it brakes a little less. What it has to go beyond
+/// A new target a few steps after the place where a long brake under way would end: it brakes a little less. What it has to go beyond
 /// that place is a very small part of the way, and is not made up for at the end: neither at once, nor at hardly any speed.
 #[test]
 fn a_target_right_behind_the_end_of_a_long_brake() {

@@ -62,7 +62,7 @@ impl Track {
         Ok(())
     }
 
-    /// The machine is at rest: half a step behind its last step, to which it came no faster than the acceleration takes back. The next
+    /// The machine is at rest: half a step after its last step, to which it came no faster than the acceleration takes back. The next
     /// motion begins at a step.
     fn rest(&mut self) -> Result<(), TestCaseError> {
         if let [.., (before, _), (last, _)] = self.steps[..] {
@@ -276,7 +276,7 @@ fn a_speed_from_which_only_a_stop_is_possible() {
     }
 }
 
-/// A line that comes while such a stop runs: it stays one, and the path goes on behind it.
+/// A line that comes while such a stop runs: it stays one, and the path goes on after it.
 #[test]
 fn a_line_behind_a_stop_that_nobody_asked_for() {
     use Request::{Override, Push};

@@ -60,7 +60,7 @@ fn corner(from: &Stretch, to: &Stretch) -> f64 {
     acceleration * bow.min(arc)
 }
 
-/// Squares of the greatest speeds at the begin of each line, and of 0 behind the last one.
+/// Squares of the greatest speeds at the begin of each line, and of 0 after the last one.
 fn corners(path: &[Stretch]) -> Vec<f64> {
     let mut squares = vec![0.0];
     for pair in path.windows(2) {
@@ -80,7 +80,7 @@ fn time(line: &Stretch, from: f64, to: f64) -> f64 {
     (2.0 * peak.sqrt() - from.sqrt() - to.sqrt()) / a + cruise
 }
 
-/// The optimum: as fast at each corner as it and all lines before and behind allow.
+/// The optimum: as fast at each corner as it and all lines before and after allow.
 fn optimum(path: &[Stretch]) -> f64 {
     let mut squares = corners(path);
     for (k, line) in path.iter().enumerate().rev() {
@@ -92,7 +92,7 @@ fn optimum(path: &[Stretch]) -> f64 {
     path.iter().zip(squares.windows(2)).map(|(line, pair)| time(line, pair[0], pair[1])).sum()
 }
 
-/// As grbl plans: whenever a line begins, from rest behind the last one of its buffer back to it.
+/// As grbl plans: whenever a line begins, from rest after the last one of its buffer back to it.
 fn grbl(path: &[Stretch]) -> f64 {
     let corners = corners(path);
     let (mut entry, mut whole) = (0.0, 0.0);

@@ -32,7 +32,7 @@ impl Driver {
             let half = (self.pause / 2).max(1);
             if turn == Some(next) {
                 let before = self.last.map_or(half, |last| next - last);
-                assert!(before >= half, "DIR {before} ticks behind a step at {next}, pause {}", self.pause);
+                assert!(before >= half, "DIR {before} ticks after a step at {next}, pause {}", self.pause);
                 (self.dir, self.edge) = (self.mover.direction(), Some(next));
             } else {
                 let pulse = self.mover.pulse().unwrap();
@@ -40,7 +40,7 @@ impl Driver {
                 if let Some(edge) = self.edge.take() {
                     assert!(
                         next - edge >= half,
-                        "a step {} ticks behind DIR at {edge}, pause {}",
+                        "a step {} ticks after DIR at {edge}, pause {}",
                         next - edge,
                         self.pause
                     );

@@ -188,7 +188,7 @@ fn the_first_fault_is_told() {
     assert_eq!(outcome(&mut transaction), Err(Error::Crc { got: 0x55, want: 0x02 }));
 }
 
-/// Noise that looks like the start of a refusal, with the response right behind it: it ends with the last field of the response, and
+/// Noise that looks like the start of a refusal, with the response right after it: it ends with the last field of the response, and
 /// not when the time is over.
 #[test]
 fn a_response_behind_what_looks_like_a_refusal_is_not_waited_for() {

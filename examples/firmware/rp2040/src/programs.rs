@@ -38,7 +38,7 @@ pub const START: u8 = 0;
 ///
 /// ```text
 /// begin:  out x, 32     side 0          number of bits - 1
-///         out y, 32     side 0          how many cycles to wait behind the flag
+///         out y, 32     side 0          how many cycles to wait after the flag
 ///         wait 1 irq 0  side 0          what is to be sent is held here, driver off
 /// delay:  jmp y-- delay side 0
 /// bit:    out pins, 1   side 1 [N - 2]

@@ -258,7 +258,7 @@ fn leans(shape: LogShape) -> bool {
     shape.skip == 0 && shape.word > 1
 }
 
-/// Returns the shape that a piece has even if it is not known to begin with a block. Both twins begin later in what is behind its first
+/// Returns the shape that a piece has even if it is not known to begin with a block. Both twins begin later in what is after its first
 /// four bytes, so neither is preferred.
 fn certain(piece: &[u8]) -> Option<LogShape> {
     let shape = LogShape::guess(piece.get(4..)?).ok()?;

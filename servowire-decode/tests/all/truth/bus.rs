@@ -35,7 +35,7 @@ pub(crate) struct Bus {
 pub(crate) enum Bias {
     /// It rests high.
     Good,
-    /// It falls low; the driver is on so many bits before its start bit, and so many behind its last bit.
+    /// It falls low; the driver is on so many bits before its start bit, and so many after its last bit.
     Missing { lead: f64, hold: f64 },
     /// It dips for so many bits when a driver lets go, before it rests high: least and most.
     Weak(f64, f64),

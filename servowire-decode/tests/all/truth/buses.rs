@@ -94,7 +94,7 @@ fn what_was_once_wrong_in_a_format_is_right() {
     let wrong_once = [
         // Requests alone were certain enough on a line whose drivers are on before them, and its polarity was doubted.
         ("floats low, answers missing and bits flipped", 52),
-        // The edges of an answer behind a dip looked like a request to which the answer was missing, and that was told.
+        // The edges of an answer after a dip looked like a request to which the answer was missing, and that was told.
         ("dips when a driver lets go", 54),
     ];
     hold_these(CONDITIONS, &wrong_once, |name, condition, seed| run(name, condition, Kind::Aformat, seed));
@@ -112,7 +112,7 @@ fn what_was_once_wrong_in_t_format_is_right() {
         (floats, 59),
         // And at the beginning, where it is not known how frames begin.
         (floats, 63),
-        // The dip behind a damaged answer was taken for a damaged request, and the next request for its answer.
+        // The dip after a damaged answer was taken for a damaged request, and the next request for its answer.
         (dips, 8),
         (dips, 21),
         (dips, 50),

@@ -35,7 +35,7 @@ fn spikes_are_named_with_the_edges_that_they_are_on() {
                 (true, true, "spikes of 0.2 bit on all edges beside "),
                 (false, false, ""),
             ] {
-                // As part of the edge, and a little behind it.
+                // As part of the edge, and a little after it.
                 for behind in [0.25, 0.45] {
                     let rings = ringing(&wire, bit, falling, rising, behind, 0.2);
                     let (events, notes) = decode(&record(&rings, Recording::EXACT, &mut Rng::new(seed)), end);

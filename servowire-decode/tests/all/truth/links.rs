@@ -105,7 +105,7 @@ fn what_was_once_wrong_is_right() {
         ("messages", 14),
         // A flipped bit at the front of an answer of such an encoder made another word.
         ("bits flipped in answers", 16),
-        // One bit was flipped before, another behind a break between two answers.
+        // One bit was flipped before, another after a break between two answers.
         ("bits flipped in answers", 17),
         // The flipped bit was in a word that no check of the V-frame covers.
         ("bits flipped in answers", 26),

@@ -191,7 +191,7 @@ fn every_value_of_a_log_of_blocks_is_true() {
 
 #[test]
 fn the_shape_of_a_log_is_told_by_sound_blocks() {
-    // Random bytes of NOPs have looked like blocks of 32 bytes, and what was cut off has moved the blocks behind it.
+    // Random bytes of NOPs have looked like blocks of 32 bytes, and what was cut off has moved the blocks after it.
     let seeds = [("NOPs before the start", 59), ("blocks are cut short", 43), ("blocks are cut short", 53)];
     hold_these(CONDITIONS, &seeds, run);
 }

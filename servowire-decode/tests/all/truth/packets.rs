@@ -71,7 +71,7 @@ fn crc8(bytes: &[u8]) -> u8 {
     })
 }
 
-/// What a frame of the start-up holds behind its four bytes, and its fields.
+/// What a frame of the start-up holds after its four bytes, and its fields.
 type Body = (Vec<u8>, Vec<(&'static str, Shown)>);
 
 fn discovery(found: usize, rng: &mut Rng) -> Body {

@@ -168,7 +168,7 @@ impl Encoder {
     }
 }
 
-/// With the exclusive or of all bytes behind them.
+/// With the exclusive or of all bytes after them.
 fn checked(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes.push(bytes.iter().fold(0, |sum, byte| sum ^ byte));
     bytes

@@ -85,8 +85,8 @@ fn the_steps_of_a_stop_under_way() {
     }
 }
 
-/// A hold at 250 steps takes 150, and ends at a joint. Rounding may say that it is on the line behind it, and later that its place is on
-/// the one before. A stop ends there then, and a new line is not the one behind it.
+/// A hold at 250 steps takes 150, and ends at a joint. Rounding may say that it is on the line after it, and later that its place is on
+/// the one before. A stop ends there then, and a new line is not the one after it.
 #[test]
 fn a_stop_at_a_joint_but_for_rounding() {
     for (first, steps) in [(100, 1), (300, 1), (300, 100), (390, 1), (390, 149)] {
@@ -137,7 +137,7 @@ fn a_curve_without_the_steps_that_remain_is_not_begun() {
 }
 
 /// Over lines that differ in their limits: on one curve, or with acceleration 0 at each joint, whichever ends first. How long the second
-/// one takes behind its first curve is known with its end, so it need not be planned again for that.
+/// one takes after its first curve is known with its end, so it need not be planned again for that.
 #[test]
 fn a_quick_stop_is_the_shorter_of_two() {
     let mut shorter = [0, 0];

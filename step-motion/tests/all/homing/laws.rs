@@ -88,7 +88,7 @@ fn follow(bench: &mut dyn Bench, case: Case, asks: &[(u32, Ask)]) -> Result<(), 
 /// A new state is the next one, or it says why not.
 fn changed(watch: &Watch, case: Case, (state, real, called): (HomingState, i64, i64)) -> Result<(), TestCaseError> {
     use HomingState::{Approaching, BackingOff, Done, Failed, Seeking, Settling, Stopping};
-    prop_assert!(!matches!(watch.state, Done | Failed), "{state:?} behind {:?}", watch.state);
+    prop_assert!(!matches!(watch.state, Done | Failed), "{state:?} after {:?}", watch.state);
     if watch.taken {
         prop_assert_eq!(state, Failed);
         return Ok(());
@@ -117,7 +117,7 @@ fn changed(watch: &Watch, case: Case, (state, real, called): (HomingState, i64, 
                 (BackingOff, Approaching),
                 (Approaching, Settling),
             ];
-            prop_assert!(next.contains(&(watch.state, state)), "{state:?} behind {:?}", watch.state);
+            prop_assert!(next.contains(&(watch.state, state)), "{state:?} after {:?}", watch.state);
         }
     }
     Ok(())

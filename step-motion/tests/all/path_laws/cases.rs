@@ -100,7 +100,7 @@ fn soft_limits_of_a_path_refuse_and_change_nothing() {
     assert_eq!((machine.due(), machine.target(), machine.len()), (due, [500, 9000], 1));
     machine.push([-10, 0], 100_000, 0).unwrap();
 }
-/// A stop while the acceleration fades, with a line behind that allows less jerk: with that the speed would rise above the limit.
+/// A stop while the acceleration fades, with a later line that allows less jerk: with that the speed would rise above the limit.
 #[test]
 fn a_stop_takes_no_jerk_of_lines_that_it_does_not_reach() {
     let first = Limits::new(4256, 9321).unwrap().with_jerk(46_714).unwrap();
@@ -137,7 +137,7 @@ fn a_clock_that_is_ahead_does_not_make_a_rest_later() {
     assert!(machine.due().is_none() && machine.is_at_rest(168));
 }
 
-/// A line of a step, and one behind it that allows less where the axes use more: a stop that ends on the first one has nothing to do with that.
+/// A line of a step, and one after it that allows less where the axes use more: a stop that ends on the first one has nothing to do with that.
 #[test]
 fn a_quick_stop_is_no_later_for_a_line_that_it_does_not_reach() {
     let limits = |a, j| Limits::new(49, a).unwrap().with_jerk(j).unwrap();
@@ -274,7 +274,7 @@ fn a_stop_over_a_corner_is_not_later_than_a_hold() {
     assert!(stop.0 == hold.0 && stop.1 <= hold.1 + 7, "{stop:?} {hold:?}");
 }
 
-/// Harder brakes before a corner, and a line behind it that allows more: who comes there later is at rest later, so the quick stop is as the hold.
+/// Harder brakes before a corner, and a line after it that allows more: who comes there later is at rest later, so the quick stop is as the hold.
 #[test]
 fn a_quick_stop_before_a_corner_is_not_later_than_a_hold() {
     let limits = |v, a| Limits::new(v, a).unwrap();

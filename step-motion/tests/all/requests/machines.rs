@@ -10,7 +10,7 @@ use crate::machine::{Background, Machine, Timer};
 pub(super) enum Ask {
     /// To a place, whatever was asked for before.
     To(i64),
-    /// To a place: an axis runs in its direction up to the soft limit, a path goes on behind its last line.
+    /// To a place: an axis runs in its direction up to the soft limit, a path goes on after its last line.
     Along(i64),
     Override(u16),
     Hold,

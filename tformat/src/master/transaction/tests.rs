@@ -396,7 +396,7 @@ fn a_wrong_response_is_refused_at_once() {
     assert_eq!(last, refused);
 }
 
-/// Glitches that look like the begin of all data (ID 3), which has 11 fields: the response behind them has its first field in the last of
+/// Glitches that look like the begin of all data (ID 3), which has 11 fields: the response after them has its first field in the last of
 /// these, or is shorter than they let expect.
 #[test]
 fn a_response_is_found_behind_the_begin_of_a_longer_one() {

@@ -94,7 +94,7 @@ pub(super) fn tells(byte: u8, control: bool) -> bool {
     coded(byte, control, &mut false) != coded(byte, control, &mut true)
 }
 
-/// x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, inverted in its low byte, behind the bytes.
+/// x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, inverted in its low byte, after the bytes.
 pub(super) fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut crc = 0_u32;
     for byte in bytes {

@@ -50,7 +50,7 @@ fn is_checked(sent: &[Sent], v_frame: usize) -> bool {
         && sent.iter().filter(|it| it.v_frame == v_frame).count() == 8
 }
 
-/// Where the running disparity does not go on from one answer to the next, a bit was flipped behind the last word of the one that tells
+/// Where the running disparity does not go on from one answer to the next, a bit was flipped after the last word of the one that tells
 /// it, or in that, or before the first word of the other that does, or in that. The check of the acceleration says that its two
 /// words are sound, that of a V-frame that the first or the last word is; there is none where the V-frame is not there as a
 /// whole, or another bit was flipped that the same check covers, and none at all for the other words. Then both may be

@@ -164,7 +164,7 @@ impl Job {
         Some(path.iter().take((path.len() / PART).max(4)))
     }
 
-    /// The next line; none behind the last one.
+    /// The next line; none after the last one.
     pub(super) fn next(&mut self) -> Option<([i64; 3], u32)> {
         loop {
             if let Some((to, feed)) = Self::path(self.path)?.nth(self.line) {
@@ -229,7 +229,7 @@ impl Job {
         true
     }
 
-    /// Pushes lines as long as there is room, from the first path again behind the last one.
+    /// Pushes lines as long as there is room, from the first path again after the last one.
     pub(super) fn fill(&mut self) {
         if self.path >= TOOLPATHS.len() {
             (self.path, self.line) = (0, 0);
