@@ -152,7 +152,7 @@ impl Receiver {
     #[inline]
     const fn scan(&mut self, word: u32, len: u32) -> u32 {
         let (half, period) = (self.format.middle(), self.format.samples_per_bit());
-        // Bit k: sample k differs from the one before. Behind the last sample there are none.
+        // Bit k: sample k differs from the one before. After the last sample there are none.
         let mut edges = word ^ (word << 1 | self.level);
         let mut level = self.level << 31;
         let mut bits = self.bits;

@@ -97,7 +97,7 @@ fn drawn(kind: Kind, bit_rate: u64, per_bit: u64, count: u64) -> (Vec<bool>, u64
     let period = 1e12 / (bit_rate * per_bit) as f64;
     let mut samples = Vec::new();
     let mut level = true;
-    // Behind an edge, so that the samples lie in the middle of their pieces.
+    // After an edge, so that the samples lie in the middle of their pieces.
     for (time, next) in capture.channels[0].edges.iter().copied().chain([(capture.end, true)]) {
         samples.resize((time as f64 / period).round() as usize, level);
         level = next;

@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn what_can_be_read_in_two_ways_is_not_read() {
-        // Behind a request without an answer, its control field passes for the one of an answer: the check field is 1A.
+        // After a request without an answer, its control field passes for the one of an answer: the check field is 1A.
         let tricky = answer(0x17, 0);
         assert_eq!(tricky.last(), Some(&0x1a));
         let next = [vec![0x1a], answer(2, 0)].concat();

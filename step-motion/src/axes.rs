@@ -243,7 +243,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             self.stage = Stage::Brake;
         }
         if self.stage != Stage::Idle || self.same {
-            // The same lines, or some of them: there is room for this one. Behind the block, if that is complete; and in it an axis
+            // The same lines, or some of them: there is room for this one. After the block, if that is complete; and in it an axis
             // that had nothing to do may have to step now.
             let complete = matches!(self.stage, Stage::Brake | Stage::Hold | Stage::Stop);
             let _: Result<(), Error> = add(&mut self.work, like[0], if complete { self.until } else { self.end });

@@ -273,7 +273,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             _ => return false,
         };
         let new = self.halts.is_pending() || self.news != News::None;
-        // Behind a stop that nobody has asked for, the way on may still have to be planned.
+        // After a stop that nobody has asked for, the way on may still have to be planned.
         !new && running.is_none() && !mover.has_more() && mover.is_at_rest(tick(end.end))
     }
 

@@ -39,7 +39,7 @@ fn vcd_cut_off() {
     let header = &text[..60];
     bench.decode("header.vcd", header, &[]).fails_with("line 3: the file ends in the header: it was cut off");
     bench.decode("header.vcd", &text[..text.find("$enddef").unwrap()], &[]).fails_with("before $enddefinitions");
-    // Behind the value of a change, before its code.
+    // After the value of a change, before its code.
     let middle = text.rfind("1!").unwrap() + 1;
     let run = bench.decode("change.vcd", &text[..middle], &["--json"]);
     run.fails_with("the file ends in the middle of a value change");

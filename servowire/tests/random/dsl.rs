@@ -51,7 +51,7 @@ fn parameter(byte: u8) -> Vec<bool> {
     let six = bits(SIX[if x == 28 { 32 } else { x }]);
     let six = if x == 7 || ones(&six) > 3 { inverse(&six) } else { six };
     let four = bits(FOUR[y]);
-    // Behind a surplus of zeros the block goes out the other way.
+    // After a surplus of zeros the block goes out the other way.
     let behind = ones(&six) < 3;
     let four = match ones(&four) {
         2 if y == 3 => bits("0011"),

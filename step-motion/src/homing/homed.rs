@@ -143,7 +143,7 @@ impl<P: PathAxes<N>, const N: usize> Homed for OneOf<P, N> {
         self.path.requests()
     }
 
-    /// A line of 2^31 - 1 steps. Behind a longer range the axis comes to rest there, and the homing has failed.
+    /// A line of 2^31 - 1 steps. After a longer range the axis comes to rest there, and the homing has failed.
     fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
         let setup = self.setup()?;
         if speed == 0 {

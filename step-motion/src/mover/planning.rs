@@ -26,7 +26,7 @@ impl Mover {
         if !self.is_moving(moment) || !self.requests.is_quick() && !same {
             return Some(self.from(moment));
         }
-        // Behind the last step of the stop nothing else would begin what follows it.
+        // After the last step of the stop nothing else would begin what follows it.
         if self.due.is_none() { self.go_on() } else { None }
     }
 

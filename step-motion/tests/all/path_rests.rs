@@ -166,7 +166,7 @@ fn a_halt_behind_the_last_step_is_a_rest() {
         assert!(machine.is_at_rest(now) && machine.is_halted(), "{after}");
         machine.set_commanded([0], now).unwrap();
         machine.push([1], 1_000_000, now).unwrap();
-        // Behind the last step as soon as speed allows.
+        // After the last step as soon as speed allows.
         let next = machine.due().unwrap();
         assert!((last + 1000..last + 502 + after.max(500)).contains(&next), "{after}: {}", next - last);
     }

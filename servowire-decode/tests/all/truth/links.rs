@@ -126,7 +126,7 @@ fn what_was_once_wrong_is_right() {
         ("bits flipped in heads", 256),
         // A lone nibble, and the head after it was damaged too.
         ("bits flipped in heads", 94),
-        // Behind a damaged head the answers half a bit beside the grid were laid on that of the master.
+        // After a damaged head the answers half a bit beside the grid were laid on that of the master.
         ("bits flipped in heads", 133),
     ];
     hold_these(CONDITIONS, &wrong_once, run);

@@ -79,7 +79,7 @@ fn discovery(found: usize, rng: &mut Rng) -> Body {
     let sum = |at: usize| lengths.iter().map(|it| it[at]).sum::<u16>();
     let words = [found as u16, sum(0), sum(1)].into_iter().chain(lengths.iter().flatten().copied());
     let mut bytes: Vec<u8> = words.flat_map(u16::to_le_bytes).collect();
-    // Behind the entries is a pattern that nobody reads.
+    // After the entries is a pattern that nobody reads.
     while bytes.len() < 1022 {
         bytes.push(rng.next() as u8);
     }

@@ -340,7 +340,7 @@ fn a_refusal_is_received_whole() {
     let refusal = [0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2];
     let outcome = run(Request::ReadSingleTurn, LINE, &at(7_000, &refusal));
     assert_eq!(outcome, Err(Error::Rejected { sf: StatusField::CA0 }));
-    // Behind an echo, in one block.
+    // After an echo, in one block.
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
     let block = [&[0x02], &refusal[..]].concat();
     let _ = transaction.hear(&block, 51_000);
