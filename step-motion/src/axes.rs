@@ -97,6 +97,9 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     pending: bool,
     /// There is a request that the path does not follow yet.
     asked: bool,
+    /// The block being made is for a request, and there is another one that it does not follow.
+    told: bool,
+    later: bool,
     /// The plan cannot be run.
     lost: bool,
     turn: u32,
@@ -167,6 +170,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             standing: true,
             pending: false,
             asked: false,
+            told: false,
+            later: false,
             lost: false,
             turn: 0,
             halts: Halts::NONE,
@@ -268,6 +273,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.ready()?;
         self.path.go_to(target, feed, self.end)?;
         self.begin_anew();
+        self.told = true;
         self.tell_stops(|_, stop, end| stop.go_to(target, feed, end));
         Ok(())
     }
@@ -303,6 +309,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         let same = self.path.requests().are_as(before) && self.path.len() == lines;
         if self.stage == Stage::Idle || !same {
             self.begin_anew();
+            self.told = true;
         }
         self.tell_stops(|_, stop, end| {
             stop.stop(end);
@@ -317,6 +324,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
         self.hard = Some(limits);
         self.begin_anew();
+        self.told = true;
         self.path.quick_stop(limits, self.end);
         self.tell_stops(|_, stop, end| {
             stop.quick_stop(limits, end);
@@ -436,14 +444,26 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// that leaves the machine at rest there is done.
     fn change(&mut self, ask: impl FnOnce(&mut Requests)) {
         let rests = self.is_at_rest();
-        if self.path.ask(ask) {
+        if !self.path.ask(ask) {
+            return;
+        }
+        if self.comes_first() {
+            self.later = true;
+        } else {
             self.begin_anew();
             self.asked = !rests || self.path.has_work();
         }
     }
 
+    /// Returns whether the block being made has to be run before a new request is planned: one for the request before it, or requests
+    /// that follow each other would never be carried out. A stop comes before a motion that has been asked for, but not before a stop.
+    fn comes_first(&self) -> bool {
+        self.stage != Stage::Idle && self.told && (self.work.requests().brakes() || !self.path.requests().brakes())
+    }
+
     /// Forgets what has been cut but not handed out.
     const fn begin_anew(&mut self) {
         (self.stage, self.same) = (Stage::Idle, false);
+        (self.asked, self.later) = (self.asked || self.later, false);
     }
 }

@@ -11,9 +11,9 @@ use crate::cutter::Demand;
 use crate::error::Error;
 use crate::halts::Halts;
 use crate::limits::{Clock, Limits};
-use crate::mover::Mover;
 use crate::mover::cutting::News;
 use crate::mover::planning::Planning;
+use crate::mover::{Mover, Wish};
 use crate::queue::{NONE, Queue};
 use crate::real::Real;
 use crate::requests::Requests;
@@ -32,7 +32,8 @@ pub enum Work {
     Later,
     /// The axis is at rest at its target.
     Rest,
-    /// The stop after the queued motion needs more slots than the [`Queue`] has. The axis comes to rest.
+    /// The stop after the queued motion needs more slots than the [`Queue`] has. An axis comes to rest, and goes on at half of its
+    /// greatest speed from then on, until it gets [other limits](Axis::set_limits); a path comes to rest, and forgets its lines.
     TooFewSlots,
 }
 
@@ -337,7 +338,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             slot.next.store(NONE, Ordering::Relaxed);
         }
         self.halts.ask(&self.queue.halt);
-        self.mover.ask_halt();
+        self.mover.ask_halt(self.was_moving());
         self.seen = UNSEEN;
         (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
@@ -370,24 +371,33 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Moves to a target that may be outside the soft limits.
     pub(super) fn move_freely(&mut self, target: i64) -> Result<(), Error> {
         self.ready()?;
+        let before = self.mover.wish();
         self.mover.ask_move(target, self.commanded())?;
-        self.asked(News::Aim);
+        self.go_another_way(before);
         Ok(())
     }
 
     /// Runs to a position, if there is one.
     pub(super) fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>) -> Result<(), Error> {
         self.ready()?;
+        let before = self.mover.wish();
         self.mover.ask_run(direction, speed, end);
-        self.asked(News::Aim);
+        self.go_another_way(before);
         Ok(())
+    }
+
+    /// Takes a new aim, unless it is the present one.
+    fn go_another_way(&mut self, before: Wish) {
+        if !self.mover.wish().is_as(before) {
+            self.asked(News::Aim);
+        }
     }
 
     /// Takes a request, unless it is for what is so already.
     fn change(&mut self, ask: impl FnOnce(&mut Mover)) {
-        let before = self.requests();
+        let before = self.mover.wish();
         ask(&mut self.mover);
-        if !self.requests().are_as(before) {
+        if !self.mover.wish().is_as(before) {
             self.asked(News::Change);
         }
     }

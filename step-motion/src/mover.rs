@@ -35,6 +35,20 @@ enum Aim {
     Run(Direction, u32, Option<i64>),
 }
 
+/// What has been asked of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wish {
+    aim: Aim,
+    requests: Requests,
+}
+
+impl Wish {
+    /// Returns whether another request has changed nothing.
+    pub(super) fn is_as(self, other: Self) -> bool {
+        self.aim == other.aim && self.requests.are_as(other.requests)
+    }
+}
+
 /// An axis whose target, speed and override may change at any tick.
 ///
 /// Each request is a new plan from the present state: position, speed and, with a jerk limit, acceleration continue without
@@ -229,26 +243,22 @@ impl Mover {
     /// Sets the feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); values above 100 count
     /// as 100. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
-        self.ask_override(percent);
-        self.follow(self.change(now));
+        self.request(now, |mover| mover.ask_override(percent));
     }
 
     /// Slows down to rest and keeps the target (feed hold).
     pub fn hold(&mut self, now: u64) {
-        self.ask_hold();
-        self.follow(self.change(now));
+        self.request(now, Self::ask_hold);
     }
 
     /// Resumes after a [`hold`](Self::hold), even while it is still slowing down.
     pub fn resume(&mut self, now: u64) {
-        self.ask_resume();
-        self.follow(self.change(now));
+        self.request(now, Self::ask_resume);
     }
 
     /// Slows down to rest and forgets the target.
     pub fn stop(&mut self, now: u64) {
-        self.ask_stop();
-        self.follow(self.change(now));
+        self.request(now, Self::ask_stop);
     }
 
     /// Slows down to rest within other limits, for example higher ones for a limit switch, and forgets the target. Moves
@@ -262,7 +272,7 @@ impl Mover {
     /// Makes no further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
         let was_moving = !self.is_at_rest(now);
-        self.ask_halt();
+        self.ask_halt(was_moving);
         // Whatever the caller's clock says, it is not later than the next step.
         self.stand(self.due.map_or(now, |due| now.min(due)), was_moving);
     }
@@ -312,20 +322,42 @@ impl Mover {
         self.requests
     }
 
+    pub(super) const fn wish(&self) -> Wish {
+        Wish { aim: self.aim, requests: self.requests }
+    }
+
     /// Moves to a target that may be outside the soft limits.
     pub(super) fn move_freely(&mut self, target: i64, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
+        let before = self.wish();
         self.ask_move(target, self.commanded)?;
-        self.replan(self.moment(now));
+        self.go_another_way(before, now);
         Ok(())
     }
 
     /// Runs to a position, if there is one.
     pub(super) fn run_to(&mut self, direction: Direction, speed: u32, end: Option<i64>, now: u64) -> Result<(), Error> {
         self.ready(self.is_at_rest(now))?;
+        let before = self.wish();
         self.ask_run(direction, speed, end);
-        self.replan(self.moment(now));
+        self.go_another_way(before, now);
         Ok(())
+    }
+
+    /// Plans what has been asked for, if it is not so already.
+    fn go_another_way(&mut self, before: Wish, now: u64) {
+        if !self.wish().is_as(before) {
+            self.replan(self.moment(now));
+        }
+    }
+
+    /// Takes a request, unless it is for what is so already.
+    fn request(&mut self, now: u64, ask: impl FnOnce(&mut Self)) {
+        let before = self.wish();
+        ask(self);
+        if !self.wish().is_as(before) {
+            self.follow(self.change(now));
+        }
     }
 
     /// Refuses a target outside the soft limits.
@@ -381,8 +413,9 @@ impl Mover {
         self.requests.quick_stop();
     }
 
-    pub(super) const fn ask_halt(&mut self) {
+    pub(super) const fn ask_halt(&mut self, was_moving: bool) {
         self.aim = Aim::Rest;
         self.requests.halt();
+        self.requests.halted(was_moving);
     }
 }

@@ -26,6 +26,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         }
         (self.until, self.put_off) = (self.end.saturating_add(reach.into()), 0);
         (self.stage, self.axis, self.quiet, self.coarse) = (Stage::LookAhead, 0, 0, self.finest);
+        self.told |= self.asked;
         Work::More
     }
 
@@ -39,8 +40,8 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             self.work.replan(self.end);
             if self.work.due().is_none() {
                 // It leads to no step.
-                self.path.clone_from(&self.work);
-                (self.stage, self.asked) = (Stage::Idle, false);
+                self.go_along();
+                self.stage = Stage::Idle;
             }
         } else {
             self.work.look_ahead(self.end);
@@ -114,6 +115,15 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         at
     }
 
+    /// Has the path go where the block leads; a request that came meanwhile is still to be planned.
+    fn go_along(&mut self) {
+        if self.later {
+            self.work.hold_as(self.path.requests());
+        }
+        self.path.clone_from(&self.work);
+        (self.asked, self.told, self.later) = (self.later, false, false);
+    }
+
     /// Lets the interrupt into the block, after the previous block or from rest.
     pub(super) fn publish(&mut self, end: u64) {
         let dirs = |writers: [Writer; N]| writers.map(|writer| writer.dir);
@@ -125,8 +135,8 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             let steps = after.wrapping_sub(before) as u32;
             *made = made.wrapping_add(steps);
         }
-        self.path.clone_from(&self.work);
-        (self.same, self.asked) = (true, false);
+        self.go_along();
+        self.same = true;
         (self.end, self.dirs) = (self.until, dirs(self.joint));
         self.turn = self.turn.wrapping_add(1) & TURNS.wrapping_sub(1);
         let from = if self.standing { REST } else { 0 };

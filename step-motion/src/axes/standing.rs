@@ -63,6 +63,6 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             out.valid = false;
         }
         self.begin_anew();
-        (self.standing, self.pending, self.asked, self.lost) = (true, false, false, false);
+        (self.standing, self.pending, self.asked, self.told, self.lost) = (true, false, false, false, false);
     }
 }

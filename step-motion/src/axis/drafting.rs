@@ -69,7 +69,7 @@ impl<const N: usize> Axis<'_, N> {
                 if more && self.begin() { Work::More } else { waits }
             }
             Stage::Plan => {
-                if self.plan() {
+                if self.plan() || self.news != News::None {
                     Work::More
                 } else {
                     waits
@@ -91,10 +91,16 @@ impl<const N: usize> Axis<'_, N> {
             return;
         }
         self.news = self.news.max(news);
-        if self.stage != Stage::Linked {
+        if self.stage != Stage::Linked && !self.comes_first() {
             // In place of the block being made.
             self.forget();
         }
+    }
+
+    /// Returns whether the block being made has to be run before a new request is planned: one for the request before it, or requests
+    /// that follow each other would never be carried out. A stop comes before a motion that has been asked for, but not before a stop.
+    fn comes_first(&self) -> bool {
+        self.told != News::None && (self.work.requests().brakes() || !self.requests().brakes())
     }
 
     /// Returns where the interrupt is: the block and the place in it, or `None` if it is stopped; and the slot.
@@ -165,14 +171,18 @@ impl<const N: usize> Axis<'_, N> {
         self.mover.rest_at(out.position, tick(self.end.end));
     }
 
+    /// Returns whether a halt stops a motion, as far as the interrupt has been seen.
+    pub(super) fn was_moving(&self) -> bool {
+        let now = tick(self.end.end).max(self.mover.free());
+        self.position != self.mover.commanded() || !self.mover.is_at_rest(now)
+    }
+
     /// Confirms a halt once the interrupt has stopped for it.
     fn confirm(&mut self) -> Work {
         let Some(dir) = self.halts.dir(self.queue.current.load(Ordering::Acquire)) else { return Work::Start };
         self.look();
-        let now = tick(self.end.end).max(self.mover.free());
-        let was_moving = self.position != self.mover.commanded() || !self.mover.is_at_rest(now);
-        let now = now.saturating_add(1);
-        self.mover.halt_at(self.position, now, was_moving);
+        let now = tick(self.end.end).max(self.mover.free()).saturating_add(1);
+        self.mover.halt_at(self.position, now, self.was_moving());
         (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
         self.end = Writer::new(i128::from(now) << 32, dir);
         self.halts.confirmed(&self.queue.halt);
@@ -422,11 +432,14 @@ impl<const N: usize> Axis<'_, N> {
         self.give_up()
     }
 
-    /// Discards a block that cannot be run: the axis comes to rest where the interrupt stops.
+    /// Discards a block that cannot be run: the axis comes to rest where the interrupt stops, and goes on more slowly.
     fn give_up(&mut self) -> Work {
         self.forget();
-        self.mover.ask_stop();
-        (self.lost, self.news) = (true, News::None);
+        if !self.mover.slow_down() {
+            self.mover.ask_stop();
+            self.news = News::None;
+        }
+        self.lost = true;
         Work::TooFewSlots
     }
 

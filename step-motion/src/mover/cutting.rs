@@ -2,6 +2,7 @@
 
 use crate::cutter::{Cut, Demand, Slice};
 use crate::phases::Phases;
+use crate::real::Real;
 use crate::stepper::tick;
 use servowire_core::Direction;
 
@@ -105,6 +106,16 @@ impl Mover {
         self.commanded = self.commanded.saturating_add(back);
         (self.free, self.dir) = (free, dir);
         self.due = Some(now.saturating_add(1).max(free));
+    }
+
+    /// Halves the greatest speed until there are other limits. Returns whether a step a second is left of it.
+    pub(crate) fn slow_down(&mut self) -> bool {
+        let least = Real::ONE / Real::new(self.clock.moments().into());
+        let enough = self.bounds.v.half() >= least;
+        if enough {
+            self.bounds = self.bounds.slower(self.bounds.v.half());
+        }
+        enough
     }
 
     /// Takes over the requests made to another mover.

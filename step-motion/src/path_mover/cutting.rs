@@ -144,6 +144,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.path.find_exit(at, part, 1).is_none()
     }
 
+    /// Takes over the requests to hold, or to go on, of another mover.
+    pub(crate) const fn hold_as(&mut self, other: Requests) {
+        self.requests.hold_as(other);
+    }
+
     /// Continues as another mover would, from a rest after a stop that was not requested.
     pub(crate) fn go_on_as(&mut self, other: &Self, now: u64) {
         self.requests.hold_as(other.requests);

@@ -365,3 +365,39 @@ fn a_late_background_stops_the_axis_in_time() {
         assert!(stopped <= 290_000, "{stopped} us after {at}");
     }
 }
+
+/// From 100,000 steps/s an S-curve of 1.3 s has more segments than half of 129 slots, so the axis goes there at half of that speed, or a
+/// quarter. It says so, and does not forget its target.
+#[test]
+fn limits_for_which_there_are_too_few_slots() {
+    fn go<const N: usize>(limits: Limits, target: i64) -> (i64, u64, usize) {
+        let queue = Queue::<N>::new();
+        let (mut axis, mut timer) = Axis::new(&queue, Clock::new(168_000_000).unwrap(), limits).unwrap();
+        axis.move_to(target).unwrap();
+        let (mut time, mut refused) = (0, 0);
+        loop {
+            match axis.poll() {
+                Work::Rest => return (axis.commanded(), time / 168_000, refused),
+                Work::TooFewSlots => refused += 1,
+                Work::More => {}
+                _ => time += u64::from(timer.fire().wait()),
+            }
+        }
+    }
+    // 2.2 s at full speed, and 1.33 s for the ramps.
+    let slow = Limits::new(100_000, 100_000).unwrap().with_jerk(300_000).unwrap();
+    let (place, ms, refused) = go::<257>(slow, 220_000);
+    assert!(place == 220_000 && ms.abs_diff(3533) < 3 && refused == 0, "{place} after {ms} ms, {refused}");
+    for target in [220_000, -220_000] {
+        let (place, ms, refused) = go::<129>(slow, target);
+        assert!(place == target && (3533..9000).contains(&ms) && refused > 0, "{place} after {ms} ms, {refused}");
+        let (place, _, refused) = go::<33>(slow, target);
+        assert!(place == target && refused > 1, "{place}, {refused}");
+    }
+    // As the README says.
+    let trapezoid = Limits::new(100_000, 200_000).unwrap();
+    let s_curve = Limits::new(100_000, 1_500_000).unwrap().with_jerk(45_000_000).unwrap();
+    for limits in [trapezoid, s_curve] {
+        assert_eq!(go::<129>(limits, 220_000).2, 0);
+    }
+}

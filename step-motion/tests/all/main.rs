@@ -32,5 +32,6 @@ mod requests;
 mod serde;
 mod stops;
 mod straight;
+mod streams;
 mod toolpaths;
 mod turns;
