@@ -60,10 +60,10 @@ impl<R: BufRead> Program<R> {
     }
 
     /// Reads a line; `None` at the end of the file.
-    fn read(&mut self) -> Result<Option<String>, Fault> {
+    fn read(&mut self) -> Result<Option<Vec<u8>>, Fault> {
         let line = next_line(&mut self.text).map_err(|e| Fault::new(&self.name, At::File, e.to_string()))?;
         self.number += 1;
-        Ok(line.map(|line| String::from_utf8_lossy(&line).into_owned()))
+        Ok(line)
     }
 
     /// Where the program has ended before its file: the first line after M2, M30 or a percent sign that is more than a comment.

@@ -179,6 +179,12 @@ fn a_post_with_checksums() {
         .collect();
     assert_eq!(follow(&text), ([15.0, 5.0, 0.0], vec![]));
     assert!(refused(&text.replace("Y5", "Y6")).contains("part.nc, line 4: its checksum"));
+    // As a host sends the lines of a slicer, and as a slicer writes them.
+    let noted = text.replace('\n', " ; at 50*2\n") + "; sizes: 10*20\n";
+    assert_eq!(follow(&noted), follow(&text));
+    let mut program = Program::new("part.nc", noted.as_bytes(), false);
+    assert_eq!(program.by_ref().map(Result::unwrap).count(), items(&text).len());
+    assert_eq!(program.behind_the_end(), Ok(None));
 }
 
 /// With a spiral down in relative mode, lower case and no blanks.

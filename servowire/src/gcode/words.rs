@@ -1,5 +1,8 @@
 //! Splits a line of a part program into words.
 
+use std::iter::Peekable;
+use std::str::Chars;
+
 /// A letter and its number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Word {
@@ -18,19 +21,32 @@ pub(super) struct Words {
 }
 
 /// Returns the words of a line, without its number, its comments and its checksum.
-pub(super) fn words(line: &str) -> Result<Words, String> {
-    let text = checked(line.trim_start_matches('\u{feff}').trim())?;
+pub(super) fn words(line: &[u8]) -> Result<Words, String> {
+    let line = line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line).trim_ascii();
+    let (text, comment) = checked(line)?;
+    let (text, comment) = (String::from_utf8_lossy(text), String::from_utf8_lossy(comment));
     let mut out = Words::default();
-    if text.starts_with('%') {
+    let mut left = text.trim().chars().peekable();
+    if left.peek() == Some(&'%') {
         out.percent = true;
         return Ok(out);
     }
-    let mut left = text.chars().peekable();
-    if let Some('/') = left.peek() {
+    if left.next_if_eq(&'/').is_some() {
         out.optional = true;
-        left.next();
         while left.next_if(char::is_ascii_digit).is_some() {}
     }
+    out.list = list(left)?;
+    if !list(comment.chars().peekable())?.is_empty() {
+        return Err("a word after the checksum: only a comment may follow it".to_owned());
+    }
+    // The number of a line, and of a program.
+    out.list.retain(|word| !matches!(word.letter, 'N' | 'O'));
+    Ok(out)
+}
+
+/// Returns all words of a text, without its comments.
+fn list(mut left: Peekable<Chars<'_>>) -> Result<Vec<Word>, String> {
+    let mut list = Vec::new();
     while let Some(letter) = left.next() {
         match letter {
             ';' => break,
@@ -53,7 +69,7 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
                     (Err(_), _) if digits.is_empty() => return Err(format!("{letter} has no number")),
                     (Err(_), _) => return Err(format!("{letter}{digits}: \"{digits}\" is not a number")),
                 };
-                out.list.push(Word { letter, value });
+                list.push(Word { letter, value });
             }
             '#' | '[' => return Err("values are numbers, not variables or sums; write the number".to_owned()),
             '\0' | char::REPLACEMENT_CHARACTER => {
@@ -62,22 +78,47 @@ pub(super) fn words(line: &str) -> Result<Words, String> {
             _ => return Err(format!("\"{letter}\" is not G-code: a word is a letter and a number")),
         }
     }
-    // The number of a line, and of a program.
-    out.list.retain(|word| !matches!(word.letter, 'N' | 'O'));
-    Ok(out)
+    Ok(list)
 }
 
-/// Returns the part of a line before its checksum, which is the exclusive or of its bytes, after an asterisk.
-fn checked(line: &str) -> Result<&str, String> {
-    let Some((text, sum)) = line.rsplit_once('*') else { return Ok(line) };
-    let Ok(want) = sum.trim().parse::<u8>() else { return Ok(line) };
-    let got = text.bytes().fold(0, |sum, byte| sum ^ byte);
-    if got == want { Ok(text) } else { Err(format!("its checksum is {got}, not {want}: the line is damaged")) }
+/// Splits a line at its checksum, which is the exclusive or of all bytes before its asterisk; what follows is a comment.
+fn checked(line: &[u8]) -> Result<(&[u8], &[u8]), String> {
+    let Some((text, end)) = asterisk(line).and_then(|at| line.split_at_checked(at)) else { return Ok((line, &[])) };
+    let comment = end.iter().position(|byte| matches!(byte, b'(' | b';')).unwrap_or(end.len());
+    let (sum, comment) = end.split_at_checked(comment).unwrap_or((end, &[]));
+    let sum = String::from_utf8_lossy(sum.trim_ascii());
+    let want = sum.strip_prefix('*').and_then(|sum| sum.trim().parse::<u8>().ok());
+    let want = want.ok_or_else(|| format!("\"{sum}\" is not a checksum, which is 0 to 255"))?;
+    let got = text.iter().fold(0, |sum, byte| sum ^ byte);
+    if got == want {
+        Ok((text, comment))
+    } else {
+        Err(format!("its checksum is {got}, not {want}: the line is damaged"))
+    }
+}
+
+/// Where the first asterisk outside comments is.
+fn asterisk(line: &[u8]) -> Option<usize> {
+    let mut inside = false;
+    for (at, byte) in line.iter().enumerate() {
+        match byte {
+            b'(' => inside = true,
+            b')' => inside = false,
+            b';' if !inside => return None,
+            b'*' if !inside => return Some(at),
+            _ => {}
+        }
+    }
+    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn words(line: &str) -> Result<Words, String> {
+        super::words(line.as_bytes())
+    }
 
     fn pairs(line: &str) -> Vec<(char, f64)> {
         words(line).unwrap().list.iter().map(|word| (word.letter, word.value)).collect()
@@ -98,8 +139,37 @@ mod tests {
     /// 'N' ^ '3' ^ ' ' ^ 'G' ^ '2' ^ '8' is 78 ^ 51 ^ 32 ^ 71 ^ 50 ^ 56 = 16.
     #[test]
     fn a_checksum_is_looked_at() {
-        assert_eq!(pairs("N3 G28*16"), [('G', 28.0)]);
-        assert!(words("N3 G28*17").unwrap_err().contains("its checksum is 16, not 17"));
+        for line in ["N3 G28*16", " N3 G28* 16 ", "N3 G28*16 ; home 10*20", "N3 G28*16;*17", "N3 G28*16 (home) (2*3)"] {
+            assert_eq!(pairs(line), [('G', 28.0)], "{line}");
+            assert!(words(&line.replace("16", "17")).unwrap_err().contains("its checksum is 16, not 17"), "{line}");
+        }
+        for (line, want) in [
+            ("N3 G28*", "\"*\" is not a checksum, which is 0 to 255"),
+            ("N3 G28*272", "\"*272\" is not a checksum, which is 0 to 255"),
+            ("N3 G28*-1 (home)", "\"*-1\" is not a checksum"),
+            ("N3 G28*16*0", "\"*16*0\" is not a checksum"),
+            ("N3 G28*16 X5", "\"*16 X5\" is not a checksum"),
+            ("N3 G28*16 (home", "unterminated comment"),
+            ("N3 G28*16 (home) X5", "a word after the checksum"),
+            ("%*36", "its checksum is 37, not 36"),
+        ] {
+            let error = words(line).unwrap_err();
+            assert!(error.contains(want), "{line}: {error}");
+        }
+    }
+
+    /// A comment may end as a checksum does, and stand before one, in whatever text: 'G' ^ '2' ^ '8' ^ '(' ^ '2' ^ '*' ^ '3' ^ ')'
+    /// is 71 ^ 50 ^ 56 ^ 40 ^ 50 ^ 42 ^ 51 ^ 41 = 103, and with 0xe9 in place of '*' 164.
+    #[test]
+    fn an_asterisk_in_a_comment_begins_no_checksum() {
+        for line in ["; pocket 10*20", ";*", "(10*20)", "(10*20", "% ; 10*20"] {
+            assert!(!words(line).is_err_and(|error| error.contains("checksum")), "{line}");
+        }
+        for line in ["G28 ; 2*3", "G28;(2*3", "G28 (2*3)", "G28 (a;2*3) (b) ; c*4", "G28(2*3)*103"] {
+            assert_eq!(pairs(line), [('G', 28.0)], "{line}");
+        }
+        assert!(words("G28(2*3)*102").unwrap_err().contains("its checksum is 103, not 102"));
+        assert_eq!(super::words(b"G28(2\xe93)*164").unwrap().list, words("G28").unwrap().list);
     }
 
     #[test]
