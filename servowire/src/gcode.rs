@@ -31,16 +31,17 @@ pub(crate) const AXES: usize = 3;
 #[derive(Debug, Args)]
 pub(crate) struct Part {
     /// Run a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), dwells (G4), references (G28, G30), G53 to
-    /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min; arcs are chords
-    /// within 2 um. M0, M1, M6 and M60 come to rest, M2 and M30 end it, and spindle, coolant and tool words move nothing. Anything
-    /// else is refused with its line.
+    /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min, to the nearest
+    /// um/s; arcs are chords within 2 um. M0, M1, M6 and M60 come to rest, M2 and M30 end it, and spindle, coolant and tool words
+    /// move nothing. Anything else is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
     /// Steps per millimetre of each axis of a part program.
     #[arg(long, value_name = "N", requires = "gcode", default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     steps_per_mm: u32,
     /// An axis of its own: X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000,low=0,high=300,pause=0.5, in mm/min, mm/s²,
-    /// mm/s³, soft limits in mm, and ms of rest before each change of direction; repeat it for each axis.
+    /// mm/s³, soft limits in mm, and ms of rest before each change of direction; repeat it for each axis. Its speed,
+    /// acceleration and jerk are rounded down to whole steps, at least 1.
     #[arg(long, value_name = "AXIS", requires = "gcode")]
     axis: Vec<setup::Setup>,
     /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P override it.

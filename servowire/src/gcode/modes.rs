@@ -7,6 +7,7 @@ use step_motion::Turning;
 use super::AXES;
 use super::item::{Item, Line};
 use super::numbers::Numbers;
+use super::setup::down;
 use super::words::Word;
 
 /// Largest distance of an axis from 0, in mm.
@@ -141,7 +142,7 @@ impl State {
             if let Some(most) = most.filter(|most| !(0.0..=1000.0).contains(most)) {
                 return Err(format!("G64 P: corners rounded by {most} mm: from 0 to 1000"));
             }
-            let most = most.map(|most| (most * 1000.0).round() as u32);
+            let most = most.map(|most| down(most * 1000.0) as u32);
             items.push_back(Item::Deviation(most));
         } else if numbers.p.is_some() && once != Some(Once::Dwell) {
             return Err("P belongs to G4 and G64".to_owned());

@@ -140,6 +140,14 @@ fn rests_stops_and_modes_of_the_path() {
     assert_eq!((with(false), with(true)), (2, 1));
 }
 
+/// No corner is rounded by more than it says, in whole um; 1.001 mm are as many, though a little less in floating point.
+#[test]
+fn corners_are_rounded_by_no_more_than_asked() {
+    for (text, um) in [("G64 P0.0015", 1), ("G20 G64 P0.00011", 2), ("G64 P0.0009", 0), ("G64 P1.001", 1001)] {
+        assert_eq!(items(text), [Item::Deviation(Some(um))], "{text}");
+    }
+}
+
 /// With the metric headers and footers of a hobby router's post-processor.
 #[test]
 fn a_post_of_a_hobby_router() {

@@ -54,13 +54,18 @@ impl Least {
 const FARTHEST: f64 = 100_000.0;
 const LONGEST: f64 = 1000.0;
 
+/// What a few products may be off: 4.35 times 100 is a little less than 435.
+const LAST_BITS: f64 = 4.0 * f64::EPSILON;
+
+const AXIS_NAMES: [&str; AXES] = ["X", "Y", "Z"];
+
 impl FromStr for Setup {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, settings) =
             text.split_once(':').ok_or("X, Y or Z, a colon, and settings: X:steps-per-mm=80,speed=6000")?;
-        let axis = ["X", "Y", "Z"].iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()));
+        let axis = AXIS_NAMES.iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()));
         let axis = axis.ok_or_else(|| format!("\"{name}\" is not an axis: X, Y or Z"))?;
         let mut new = Self { axis, ..Self::default() };
         for setting in settings.split(',') {
@@ -114,27 +119,43 @@ impl Setup {
 
     /// Returns an axis that takes what is not given here from `other`; ticks are ns.
     pub(super) fn over(&self, other: AxisSetup) -> Result<AxisSetup, String> {
-        let steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
-        let per_mm = f64::from(steps_per_m) / 1000.0;
-        let steps = |mm: f64| (mm * per_mm).round().max(1.0);
-        let speed = self.speed.map_or(other.limits.speed(), |speed| steps(speed / 60.0) as u32);
-        let acceleration = self.acceleration.map_or(other.limits.acceleration(), |a| steps(a) as u32);
-        let limits = Limits::new(speed, acceleration).map_err(|e| e.to_string())?;
-        let jerk = self.jerk.map(|jerk| steps(jerk) as u64).or(other.limits.jerk());
-        let limits = jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk)).map_err(|e| e.to_string())?;
         let mut axis = other;
-        (axis.limits, axis.steps_per_m) = (limits, steps_per_m);
+        axis.steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
+        let steps = |mm: f64| mm * f64::from(axis.steps_per_m) / 1000.0;
+        let speed = self.limit("speed", self.speed, "step/s", |mm| steps(mm) / 60.0)?;
+        let acceleration = self.limit("acceleration", self.acceleration, "step/s²", steps)?;
+        let jerk = self.limit("jerk", self.jerk, "step/s³", steps)?.map(|jerk| jerk as u64).or(other.limits.jerk());
+        let speed = speed.map_or(other.limits.speed(), |speed| speed as u32);
+        let acceleration = acceleration.map_or(other.limits.acceleration(), |a| a as u32);
+        let limits = Limits::new(speed, acceleration).map_err(|e| e.to_string())?;
+        axis.limits = jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk)).map_err(|e| e.to_string())?;
         if self.low.is_some() || self.high.is_some() {
             // A limit is the last step that is within it.
-            let low = self.low.map_or(i64::MIN, |mm| (mm * per_mm).ceil() as i64);
-            let high = self.high.map_or(i64::MAX, |mm| (mm * per_mm).floor() as i64);
+            let low = self.low.map_or(i64::MIN, |mm| -down(steps(-mm)) as i64);
+            let high = self.high.map_or(i64::MAX, |mm| down(steps(mm)) as i64);
             axis = axis.with_soft_limits(low, high);
         }
         if let Some(ms) = self.pause {
-            axis = axis.with_reversal_pause((ms * 1e6).round() as u32);
+            axis = axis.with_reversal_pause((ms * 1e6 * (1.0 - LAST_BITS)).ceil() as u32);
         }
         Ok(axis)
     }
+
+    /// Returns a limit in whole steps, none of which is beyond it.
+    fn limit(&self, key: &str, mm: Option<f64>, unit: &str, steps: impl Fn(f64) -> f64) -> Result<Option<f64>, String> {
+        let Some(mm) = mm else { return Ok(None) };
+        let whole = down(steps(mm));
+        if whole < 1.0 {
+            let name = AXIS_NAMES.get(self.axis).copied().unwrap_or_default();
+            return Err(format!("{name}:{key}={mm} is below 1 {unit}, the least for an axis"));
+        }
+        Ok(Some(whole))
+    }
+}
+
+/// Rounds down what is not negative.
+pub(super) fn down(value: f64) -> f64 {
+    (value * (1.0 + LAST_BITS)).floor()
 }
 
 /// The position of an axis in steps.
@@ -144,7 +165,7 @@ pub(super) fn in_steps(mm: f64, axis: &AxisSetup) -> i64 {
 
 /// The first axis of a place in mm that is beyond its soft limits.
 pub(super) fn outside(to: [f64; AXES], axes: &[AxisSetup; AXES]) -> Option<String> {
-    for ((name, mm), axis) in ["X", "Y", "Z"].into_iter().zip(to).zip(axes) {
+    for ((name, mm), axis) in AXIS_NAMES.into_iter().zip(to).zip(axes) {
         let Some((low, high)) = axis.soft_limits else { continue };
         let (at, per_mm) = (in_steps(mm, axis), f64::from(axis.steps_per_m) / 1000.0);
         let (side, limit) = match at {
@@ -160,6 +181,55 @@ pub(super) fn outside(to: [f64; AXES], axes: &[AxisSetup; AXES]) -> Option<Strin
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An axis of X with 1 step/mm, a limit on its own.
+    fn limits(text: &str) -> Result<Limits, String> {
+        let machine = AxisSetup::new(Limits::new(100_000, 400_000).unwrap(), 1000);
+        text.parse::<Setup>().and_then(|setup| setup.over(machine)).map(|axis| axis.limits)
+    }
+
+    /// 90 mm/min are 1.5 steps/s, and at 240 steps/mm 4.35 mm/min are 17.4. What is whole stays so, though 4.35 times 100 is
+    /// below 435 in floating point.
+    #[test]
+    fn an_axis_never_exceeds_its_limits() {
+        let new = |speed, acceleration| Limits::new(speed, acceleration).unwrap();
+        for (text, want) in [
+            ("X:speed=90", new(1, 400_000)),
+            ("X:speed=119.999", new(1, 400_000)),
+            ("X:speed=120", new(2, 400_000)),
+            ("X:acceleration=1.5", new(100_000, 1)),
+            ("X:acceleration=2.999", new(100_000, 2)),
+            ("X:steps-per-mm=100,acceleration=4.35", new(100_000, 435)),
+            ("X:steps-per-mm=240,speed=4.35", new(17, 400_000)),
+            ("X:jerk=1.5", new(100_000, 400_000).with_jerk(1).unwrap()),
+            ("X:steps-per-mm=100,jerk=4.35", new(100_000, 400_000).with_jerk(435).unwrap()),
+        ] {
+            assert_eq!(limits(text), Ok(want), "{text}");
+        }
+        for (text, want) in [
+            ("X:speed=59", "X:speed=59 is below 1 step/s, the least for an axis"),
+            ("Y:speed=0.001", "Y:speed=0.001 is below 1 step/s, the least for an axis"),
+            ("X:steps-per-mm=80,acceleration=0.001", "X:acceleration=0.001 is below 1 step/s², the least"),
+            ("X:jerk=0.5", "X:jerk=0.5 is below 1 step/s³, the least for an axis"),
+        ] {
+            let error = limits(text).unwrap_err();
+            assert!(error.contains(want), "{text}: {error}");
+        }
+    }
+
+    /// A soft limit is reached, though 4.35 times 100 is below 435 in floating point; a pause is at least as long as asked for.
+    #[test]
+    fn soft_limits_and_pauses_are_what_they_say() {
+        let machine = AxisSetup::new(Limits::new(100_000, 400_000).unwrap(), 100_000);
+        let axis = |text: &str| text.parse::<Setup>().unwrap().over(machine).unwrap();
+        assert_eq!(axis("X:low=-4.35,high=4.35").soft_limits, Some((-435, 435)));
+        assert_eq!(axis("X:low=-4.359,high=4.359").soft_limits, Some((-435, 435)));
+        for (text, ns) in
+            [("0.0000001", 1), ("0.0000011", 2), ("0.00435", 4350), ("0.0011", 1100), ("1000", 1_000_000_000)]
+        {
+            assert_eq!(axis(&format!("X:pause={text}")).reversal_pause, ns, "{text}");
+        }
+    }
 
     #[test]
     fn an_axis_in_its_own_units() {
