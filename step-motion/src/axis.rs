@@ -13,7 +13,7 @@ use crate::halts::Halts;
 use crate::limits::{Clock, Limits};
 use crate::mover::cutting::News;
 use crate::mover::planning::Planning;
-use crate::mover::{Mover, Wish};
+use crate::mover::runner::{Runner, Wish};
 use crate::queue::{NONE, Queue};
 use crate::real::Real;
 use crate::requests::Requests;
@@ -39,7 +39,7 @@ pub enum Work {
 
 /// An axis whose steps are made in an interrupt.
 ///
-/// It takes the requests of a [`Mover`] and cuts the plan into segments, ahead of the [`StepTimer`] that runs them. A
+/// It takes the requests of a [`Mover`](crate::Mover) and cuts the plan into segments, ahead of the [`StepTimer`] that runs them. A
 /// request takes effect between two segments already handed out: after at most twice the [reach](Self::with_reach). Only
 /// [`halt`](Self::halt) takes effect at once: no step follows it. Each step is made within 3/4 of a tick of its exact time,
 /// or within 25 ns if that is more. All segments handed out are followed by a stop, unless they end at rest: if
@@ -84,7 +84,7 @@ pub struct Axis<'q, const N: usize> {
     made: u32,
     /// All requests, on the plan of the block that the interrupt is in; the end of that block's steps, and the last slot of
     /// them. Each block has a single plan.
-    mover: Mover,
+    mover: Runner,
     end: Writer,
     last: usize,
     news: News,
@@ -92,7 +92,7 @@ pub struct Axis<'q, const N: usize> {
     stage: Stage,
     block: usize,
     joint: usize,
-    work: Mover,
+    work: Runner,
     writer: Writer,
     until: u64,
     told: News,
@@ -169,7 +169,7 @@ struct Mark {
 /// A stop while it is being cut.
 #[derive(Debug)]
 struct Tail {
-    mover: Mover,
+    mover: Runner,
     /// The mover still has the motion that is to be stopped.
     moves: bool,
     demand: Demand,
@@ -197,7 +197,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock.
     pub fn new(queue: &'q Queue<N>, clock: Clock, limits: Limits) -> Result<(Self, StepTimer<'q, N>), Error> {
-        let mover = Mover::new(clock, limits)?.cutting();
+        let mover = Runner::new(clock, limits)?.cutting();
         let (work, timer) = (mover.clone(), StepTimer::new(queue));
         let axis = Self {
             queue,
@@ -245,14 +245,14 @@ impl<'q, const N: usize> Axis<'q, N> {
         Self { coarse: EXACT, finest: EXACT, ..self }
     }
 
-    /// Does the same as [`Mover::with_reversal_pause`]. DIR changes at least half of the pause after a step, and at least half of it
-    /// before the next one.
+    /// Does the same as [`Mover::with_reversal_pause`](crate::Mover::with_reversal_pause). DIR changes at least half of the pause after a
+    /// step, and at least half of it before the next one.
     pub fn with_reversal_pause(mut self, ticks: u32) -> Self {
         self.mover = self.mover.with_reversal_pause(ticks);
         self
     }
 
-    /// Does the same as [`Mover::with_soft_limits`].
+    /// Does the same as [`Mover::with_soft_limits`](crate::Mover::with_soft_limits).
     pub fn with_soft_limits(mut self, low: i64, high: i64) -> Self {
         self.mover = self.mover.with_soft_limits(low, high);
         self
@@ -283,7 +283,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.is_halted()
     }
 
-    /// Does the same as [`Mover::move_to`].
+    /// Does the same as [`Mover::move_to`](crate::Mover::move_to).
     ///
     /// # Errors
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -292,7 +292,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.move_freely(target)
     }
 
-    /// Does the same as [`Mover::run`].
+    /// Does the same as [`Mover::run`](crate::Mover::run).
     ///
     /// # Errors
     /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
@@ -300,27 +300,27 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.run_to(direction, speed, self.mover.soft_end(direction))
     }
 
-    /// Does the same as [`Mover::set_override`].
+    /// Does the same as [`Mover::set_override`](crate::Mover::set_override).
     pub fn set_override(&mut self, percent: u16) {
         self.change(|mover| mover.ask_override(percent));
     }
 
-    /// Does the same as [`Mover::hold`].
+    /// Does the same as [`Mover::hold`](crate::Mover::hold).
     pub fn hold(&mut self) {
-        self.change(Mover::ask_hold);
+        self.change(Runner::ask_hold);
     }
 
-    /// Does the same as [`Mover::resume`].
+    /// Does the same as [`Mover::resume`](crate::Mover::resume).
     pub fn resume(&mut self) {
-        self.change(Mover::ask_resume);
+        self.change(Runner::ask_resume);
     }
 
-    /// Does the same as [`Mover::stop`].
+    /// Does the same as [`Mover::stop`](crate::Mover::stop).
     pub fn stop(&mut self) {
-        self.change(Mover::ask_stop);
+        self.change(Runner::ask_stop);
     }
 
-    /// Does the same as [`Mover::quick_stop`].
+    /// Does the same as [`Mover::quick_stop`](crate::Mover::quick_stop).
     pub fn quick_stop(&mut self, limits: Limits) {
         let again = self.requests().is_quick() && limits == self.hard;
         if !again {
@@ -343,7 +343,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
 
-    /// Does the same as [`Mover::set_commanded`].
+    /// Does the same as [`Mover::set_commanded`](crate::Mover::set_commanded).
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
@@ -356,7 +356,7 @@ impl<'q, const N: usize> Axis<'q, N> {
         self.mover.set_commanded(steps, tick(self.end.end))
     }
 
-    /// Does the same as [`Mover::set_limits`].
+    /// Does the same as [`Mover::set_limits`](crate::Mover::set_limits).
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest, [`Error::SpeedAboveClock`] above half the clock.
@@ -394,7 +394,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     }
 
     /// Takes a request, unless it is for what is so already.
-    fn change(&mut self, ask: impl FnOnce(&mut Mover)) {
+    fn change(&mut self, ask: impl FnOnce(&mut Runner)) {
         let before = self.mover.wish();
         ask(&mut self.mover);
         if !self.mover.wish().is_as(before) {

@@ -22,6 +22,7 @@ mod path;
 mod path_mover;
 mod peak;
 mod phases;
+mod places;
 mod plan;
 mod planner;
 mod queue;

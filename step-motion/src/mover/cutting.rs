@@ -6,8 +6,8 @@ use crate::real::Real;
 use crate::stepper::tick;
 use servowire_core::Direction;
 
-use super::Mover;
 use super::planning::Begin;
+use super::runner::Runner;
 
 /// A request that is not planned yet; of two, the greater one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,7 +21,7 @@ pub(crate) enum News {
     Quick,
 }
 
-impl Mover {
+impl Runner {
     /// Prepares the mover for [`cut`](Self::cut) in place of [`pulse`](Self::pulse).
     pub(crate) const fn cutting(self) -> Self {
         Self { cuts: true, ..self }
@@ -141,6 +141,7 @@ impl Mover {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Mover;
     use crate::limits::{Clock, Limits};
 
     /// More steps than 32 bits count, without a stop or a change of speed.
@@ -148,14 +149,15 @@ mod tests {
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_run_has_no_end() {
         let limits = Limits::new(400_000, 8_000_000).unwrap();
-        let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap().cutting();
-        mover.ask_run(Direction::Forward, 400_000, None);
-        mover.follow(mover.pursue(News::Aim, 0));
+        let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+        mover.runner = mover.runner.cutting();
+        mover.runner.ask_run(Direction::Forward, 400_000, None);
+        mover.follow(mover.runner.pursue(News::Aim, 0));
         let demand = Demand { off: Clock::MICROSECONDS.blur(), coarse: None, time: u64::MAX, searches: 2 };
         let (mut last, interval) = (None, 5_i128 << 31);
         while mover.commanded() < 3 << 32 {
-            mover.follow(mover.pursue(News::None, 0));
-            match mover.cut(&demand, u64::MAX) {
+            mover.follow(mover.runner.pursue(News::None, 0));
+            match mover.runner.cut(&demand, u64::MAX) {
                 Cut::Steps(stretch, direction) => {
                     let gap = last.map(|last: i128| stretch.first - last);
                     assert!(gap.is_none_or(|gap| mover.commanded() < 20_000 || gap.abs_diff(interval) < 1 << 32));

@@ -7,9 +7,9 @@ use crate::real::Real;
 use crate::stepper::Stepper;
 use servowire_core::Direction;
 
-use super::{Aim, Mover};
+use super::runner::{Aim, Runner};
 
-impl Mover {
+impl Runner {
     /// Returns the moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the
     /// caller's clock says: an earlier time would plan steps that have already been made, and a later one would make the missing
     /// steps in a burst.
@@ -38,15 +38,6 @@ impl Mover {
         }
         // To the caller the motion has ended: the caller's clock may be ahead.
         self.change(now)
-    }
-
-    /// Plans to the end.
-    pub(super) fn follow(&mut self, begin: Option<Begin>) {
-        if let Some(begin) = begin {
-            let mut planning = Planning::OVER;
-            planning.begin(begin);
-            while self.plan(&mut planning) {}
-        }
     }
 
     pub(super) fn is_moving(&self, moment: u64) -> bool {
@@ -82,12 +73,7 @@ impl Mover {
             }
     }
 
-    /// Plans from a moment to the aim.
-    pub(super) fn replan(&mut self, moment: u64) {
-        self.follow(Some(self.from(moment)));
-    }
-
-    /// Returns how that begins.
+    /// Returns how a plan from a moment to the aim begins.
     pub(super) fn from(&self, moment: u64) -> Begin {
         let moment = moment.max(self.phases.frame.begin);
         let stage = if self.is_moving(moment) { Stage::Onward(moment) } else { Stage::Anew(moment) };
@@ -300,6 +286,11 @@ impl Planning {
         (self.stage, self.quick) = (stage, quick);
     }
 
+    /// Returns the moment from which on a plan from rest is to be made next.
+    pub(super) const fn anew(&mut self) -> Option<&mut u64> {
+        if let Stage::Anew(moment) = &mut self.stage { Some(moment) } else { None }
+    }
+
     pub(crate) const fn is_over(&self) -> bool {
         matches!(self.stage, Stage::Over)
     }
@@ -341,15 +332,15 @@ enum Want {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::Mover;
     use crate::limits::{Clock, Limits};
 
     /// Where no step of a plan is in time, nothing follows that plan.
     #[test]
     fn an_axis_at_the_end_of_time_stands() {
         let mut mover = Mover::new(Clock::MICROSECONDS, Limits::new(1, 1).unwrap()).unwrap();
-        mover.ask_move(10, 0).unwrap();
-        mover.rest(u64::MAX - 5);
+        mover.runner.ask_move(10, 0).unwrap();
+        mover.runner.rest(u64::MAX - 5);
         mover.replan(u64::MAX - 5);
         assert_eq!((mover.due(), mover.commanded()), (None, 0));
     }

@@ -16,6 +16,7 @@ mod joints;
 mod laws;
 mod lines;
 mod machine;
+mod mover_places;
 mod nearly;
 mod overrides;
 mod path_laws;
