@@ -19,7 +19,7 @@ use crate::gcode::{AXES, Steps};
 
 const NAMES: [&str; AXES] = ["X", "Y", "Z"];
 
-/// Length of a STEP pulse in a VCD, in ns.
+/// Length of a STEP pulse in a VCD, in ns, unless the next step of the axis comes before twice that.
 const PULSE_NS: u64 = 1000;
 
 /// Time from DIR to STEP, in ns, unless the axis reverses faster than that.
@@ -131,16 +131,16 @@ struct Wire {
     step: IdCode,
     dir: IdCode,
     direction: Direction,
-    /// When the last pulse began, and when the present one ends.
+    /// When the last pulse began, and whether its end is still open.
     last: u64,
-    falls: Option<u64>,
+    open: bool,
 }
 
-/// What happens to a wire.
+/// What happens to a wire, in the order in which it does at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Change {
+    Step(bool),
     Dir(bool),
-    Step,
 }
 
 /// Writes STEP and DIR of each axis.
@@ -149,6 +149,8 @@ struct Wires {
     axes: Vec<Wire>,
     /// Events not yet written: when, what, and on which axis.
     changes: BinaryHeap<Reverse<(u64, Change, usize)>>,
+    /// The time written last.
+    written: u64,
 }
 
 impl Wires {
@@ -159,7 +161,7 @@ impl Wires {
         let mut axes = Vec::new();
         for name in NAMES {
             let (step, dir) = (to.add_wire(1, &format!("{name}_step"))?, to.add_wire(1, &format!("{name}_dir"))?);
-            axes.push(Wire { step, dir, direction: Direction::Forward, last: 0, falls: None });
+            axes.push(Wire { step, dir, direction: Direction::Forward, last: 0, open: false });
         }
         to.upscope()?;
         to.enddefinitions()?;
@@ -168,57 +170,60 @@ impl Wires {
             to.change_scalar(wire.step, Value::V0)?;
             to.change_scalar(wire.dir, Value::V0)?;
         }
-        Ok(Self { to, axes, changes: BinaryHeap::new() })
+        Ok(Self { to, axes, changes: BinaryHeap::new(), written: 0 })
     }
 
-    /// Ends the pulses that end before a time.
-    fn until(&mut self, time: u64) -> io::Result<()> {
-        while let Some(wire) = self.axes.iter_mut().min_by_key(|wire| wire.falls.unwrap_or(u64::MAX)) {
-            let Some(falls) = wire.falls.filter(|falls| *falls <= time) else { break };
-            self.to.timestamp(falls)?;
-            self.to.change_scalar(wire.step, Value::V0)?;
-            wire.falls = None;
+    /// Ends each pulse after which no step can come any more in less than twice its length.
+    fn settle(&mut self, time: u64) {
+        for (at, wire) in self.axes.iter_mut().enumerate().filter(|(_, wire)| wire.open) {
+            if time.saturating_sub(wire.last) >= 2 * PULSE_NS {
+                wire.open = false;
+                self.changes.push(Reverse((wire.last.saturating_add(PULSE_NS), Change::Step(false), at)));
+            }
         }
-        Ok(())
     }
 
-    /// Nothing that comes later precedes this pulse by more than the lead of DIR.
+    /// Nothing that comes later precedes this pulse by more than a lead of DIR, or ends one that began earlier than two
+    /// lengths before it.
     fn add(&mut self, pulse: &AxisPulse) -> io::Result<()> {
         let (at, time) = (usize::from(pulse.axis), pulse.tick);
-        let begun = time.saturating_sub(LEAD_NS);
+        self.settle(time);
         let Some(wire) = self.axes.get_mut(at) else { return Ok(()) };
+        let half = wire.last.midpoint(time);
+        if wire.open {
+            self.changes.push(Reverse((half, Change::Step(false), at)));
+        }
         if wire.direction != pulse.direction {
             wire.direction = pulse.direction;
             // In the middle of the rest where that is shorter than twice the lead.
-            let turn = begun.max(wire.last.midpoint(time));
+            let turn = time.saturating_sub(LEAD_NS).max(half);
             self.changes.push(Reverse((turn, Change::Dir(pulse.direction.dir()), at)));
         }
-        wire.last = time;
-        self.changes.push(Reverse((time, Change::Step, at)));
-        self.write(begun)
+        (wire.last, wire.open) = (time, true);
+        self.changes.push(Reverse((time, Change::Step(true), at)));
+        self.write(time.saturating_sub(LEAD_NS.max(2 * PULSE_NS)))
     }
 
     /// Writes all events before a time.
     fn write(&mut self, before: u64) -> io::Result<()> {
         while self.changes.peek().is_some_and(|Reverse((time, ..))| *time < before) {
             let Some(Reverse((time, change, at))) = self.changes.pop() else { break };
-            self.until(time)?;
-            let Some(wire) = self.axes.get_mut(at) else { continue };
-            self.to.timestamp(time)?;
+            let Some(wire) = self.axes.get(at) else { continue };
+            if time != self.written {
+                self.to.timestamp(time)?;
+                self.written = time;
+            }
             match change {
+                Change::Step(high) => self.to.change_scalar(wire.step, Value::from(high))?,
                 Change::Dir(high) => self.to.change_scalar(wire.dir, Value::from(high))?,
-                Change::Step => {
-                    self.to.change_scalar(wire.step, Value::V1)?;
-                    wire.falls = Some(time + PULSE_NS);
-                }
             }
         }
         Ok(())
     }
 
     fn finish(mut self) -> io::Result<()> {
+        self.settle(u64::MAX);
         self.write(u64::MAX)?;
-        self.until(u64::MAX)?;
         self.to.flush()
     }
 }
@@ -295,27 +300,65 @@ mod tests {
     use super::*;
     use crate::drawing::geometry::nothing_is_covered;
 
-    /// DIR leads STEP by a microsecond, or by half of the time since the pulse before; each axis by itself.
-    #[test]
-    fn dir_changes_between_pulses() {
+    /// The changes in a VCD of these pulses after its header, each with its time.
+    fn changes(pulses: &[(u8, u64, Direction)]) -> Vec<(u64, String)> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps.vcd");
         let mut wires = Wires::new(&path).unwrap();
-        let pulse = |axis, tick, direction| AxisPulse { axis, tick, direction };
-        for (axis, tick, direction) in [
-            (0, 5000, Direction::Reverse),
-            (1, 5500, Direction::Forward),
-            (0, 9000, Direction::Reverse),
-            (0, 10_400, Direction::Forward),
-            (1, 10_500, Direction::Reverse),
-        ] {
-            wires.add(&pulse(axis, tick, direction)).unwrap();
+        for (axis, tick, direction) in pulses.iter().copied() {
+            wires.add(&AxisPulse { axis, tick, direction }).unwrap();
         }
         wires.finish().unwrap();
-        let text = fs::read_to_string(path).unwrap();
-        let times: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
-        let want = [0, 4000, 5000, 5500, 6000, 6500, 9000, 9500, 9700, 10_000, 10_400, 10_500, 11_400, 11_500];
-        assert_eq!(times, want.map(|time: u64| format!("#{time}")));
+        let (mut changes, mut now) = (Vec::new(), None);
+        for line in fs::read_to_string(path).unwrap().lines().skip_while(|line| !line.starts_with('#')) {
+            match line.strip_prefix('#').map(|time| time.parse::<u64>().unwrap()) {
+                Some(time) => {
+                    assert!(now < Some(time), "{time} after {now:?}");
+                    now = Some(time);
+                }
+                None => changes.push((now.unwrap(), line.to_owned())),
+            }
+        }
+        changes
+    }
+
+    /// DIR leads STEP by a microsecond, or by half of the time since the pulse before; each axis by itself.
+    #[test]
+    fn dir_changes_between_pulses() {
+        let (up, down) = (Direction::Forward, Direction::Reverse);
+        let changes = changes(&[
+            (0, 5000, down),
+            (1, 5500, up),
+            (0, 9000, down),
+            (0, 10_400, up),
+            (1, 10_500, down),
+            (2, 10_500, up),
+        ]);
+        let mut times: Vec<u64> = changes.iter().map(|(time, _)| *time).collect();
+        times.dedup();
+        let want = [0, 4000, 5000, 5500, 6000, 6500, 9000, 9500, 9700, 10_400, 10_500, 11_400, 11_500];
+        assert_eq!(times, want);
+    }
+
+    /// Intervals of 250 ns to 2 us: a pulse is 1 us long, or half of the time to the next one; the one at the end is 1 us.
+    #[test]
+    fn every_step_has_its_edge() {
+        let up = Direction::Forward;
+        let pulses = [5000, 5250, 6250, 7749, 9749, 11_750];
+        let all: Vec<_> = pulses.iter().flat_map(|time| [(0, *time, up), (1, time + 100, up)]).collect();
+        let changes = changes(&all);
+        for (wire, late) in [('!', 0), ('#', 100)] {
+            let of = |level: char| -> Vec<u64> {
+                let text = format!("{level}{wire}");
+                changes
+                    .iter()
+                    .filter(|(time, change)| *time > 0 && *change == text)
+                    .map(|(time, _)| *time - late)
+                    .collect()
+            };
+            assert_eq!(of('1'), pulses);
+            assert_eq!(of('0'), [5125, 5750, 6999, 8749, 10_749, 12_750]);
+        }
     }
 
     /// A long path keeps as much as a picture needs, and its end.
