@@ -44,7 +44,7 @@ pub(crate) struct Part {
     /// acceleration and jerk are rounded down to whole steps, at least 1.
     #[arg(long, value_name = "AXIS", requires = "gcode")]
     axis: Vec<setup::Setup>,
-    /// How far a part program may round a corner, in um; 0 stops at each one. G61 and G64 P override it.
+    /// How far a part program may round a corner, in um; 0 stops at each one. An arc has none. G61 and G64 P override it.
     #[arg(long, value_name = "UM", requires = "gcode", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     deviation: u32,
     /// Leave out the lines of a part program that begin with a slash.

@@ -9,8 +9,8 @@ use super::item::{Item, Line};
 use super::modes::State;
 use super::numbers::Numbers;
 
-/// Chords of arcs are computed in 0.1 um, and are off by this many at most.
-const CHORD: u32 = 20;
+/// How far chords are from their arc at most, in um; they are computed in 0.1 um.
+pub(super) const CHORD_UM: u32 = 2;
 
 impl State {
     /// Returns a place in the axes of the plane.
@@ -62,7 +62,7 @@ impl State {
     ) -> Result<(), String> {
         let (from, end) = (self.flat(self.at), self.flat(to));
         let units = |place: [f64; 2]| place.map(|mm| (mm * 1e4).round() as i32);
-        let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, CHORD)
+        let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, CHORD_UM * 10)
             .map_err(|e| {
                 format!("{e}, in 0.1 um: start and end are not on one circle around the center, or its radius is 0")
             })?
@@ -72,7 +72,7 @@ impl State {
         let angles: Vec<f64> =
             chords.iter().map(|chord| angle(std::mem::replace(&mut before, *chord), *chord, center)).collect();
         let (whole, mut swept) = (angles.iter().sum::<f64>(), 0.0);
-        let begin = self.at;
+        let (begin, mut bends) = (self.at, false);
         for (chord, angle) in chords.iter().zip(&angles).take(chords.len().saturating_sub(1)) {
             swept += angle;
             let mut place = begin;
@@ -88,9 +88,10 @@ impl State {
                     *place = from + (to - from) * swept / whole;
                 }
             }
-            items.push_back(Item::Line(Line { to: place, feed }));
+            items.push_back(Item::Line(Line { to: place, feed, bends }));
+            bends = true;
         }
-        self.go(to, feed, items);
+        self.end(Line { to, feed, bends }, items);
         Ok(())
     }
 }

@@ -9,6 +9,8 @@ pub(crate) struct Line {
     pub(super) to: [f64; AXES],
     /// Feed in um/s; `None` for as fast as the machine can.
     pub(super) feed: Option<u32>,
+    /// It continues an arc, of which the line before it is another chord.
+    pub(super) bends: bool,
 }
 
 /// What a machine has to do next.

@@ -315,12 +315,17 @@ impl State {
         self.arc(to, center, turning, feed, items)
     }
 
-    pub(super) fn go(&mut self, to: [f64; AXES], feed: Option<u32>, items: &mut VecDeque<Item>) {
-        items.push_back(Item::Line(Line { to, feed }));
+    fn go(&mut self, to: [f64; AXES], feed: Option<u32>, items: &mut VecDeque<Item>) {
+        self.end(Line { to, feed, bends: false }, items);
+    }
+
+    /// Adds the last line of a block.
+    pub(super) fn end(&mut self, line: Line, items: &mut VecDeque<Item>) {
+        items.push_back(Item::Line(line));
         if self.stops {
             items.push_back(Item::Rest(0));
         }
-        self.at = to;
+        self.at = line.to;
     }
 }
 

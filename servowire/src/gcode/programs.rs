@@ -43,7 +43,7 @@ fn straight_lines_in_all_modes() {
         [[10.0, -5.5, 0.0], [10.0, -5.5, -1.0], [20.0, -5.5, -1.0], [21.0, -4.5, -1.0], [46.4, -4.5, -1.0]]
     );
     assert_eq!(lines("G1 X2 F60")[0].feed, Some(1000));
-    assert_eq!(lines("G0 X1234.56789")[0], Line { to: [1234.56789, 0.0, 0.0], feed: None });
+    assert_eq!(lines("G0 X1234.56789")[0], Line { to: [1234.56789, 0.0, 0.0], feed: None, bends: false });
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn references_shifts_and_machine_coordinates() {
 #[test]
 fn rests_stops_and_modes_of_the_path() {
     let rest = items("G0 X1\nG4 P0.25\nM0\nG61.1 X2\nG64 P0.05\nX3\nG61\nG64");
-    let line = |x| Item::Line(Line { to: [x, 0.0, 0.0], feed: None });
+    let line = |x| Item::Line(Line { to: [x, 0.0, 0.0], feed: None, bends: false });
     assert_eq!(
         rest,
         [

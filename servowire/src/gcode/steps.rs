@@ -8,6 +8,7 @@ use servowire_decode::fault::{At, Fault};
 use step_motion::{Axes, AxesQueue, AxesTimer, AxisPulse, AxisSetup, Clock, Direction, Path, Work};
 
 use super::AXES;
+use super::arcs::CHORD_UM;
 use super::item::{Item, Line};
 use super::program::Program;
 use super::setup;
@@ -27,6 +28,10 @@ pub(crate) struct Steps {
     timer: AxesTimer<'static, AXES, SLOTS>,
     setups: [AxisSetup; AXES],
     deviation: u32,
+    /// How far corners may be rounded at present, in um.
+    present: u32,
+    /// A chord of the present arc has steps: what follows begins at a joint of the arc.
+    bent: bool,
     /// Nothing moves before a rest of this many ns has ended.
     rest: Option<u64>,
     /// The program has ended.
@@ -60,6 +65,8 @@ impl Steps {
             timer,
             setups,
             deviation,
+            present: deviation,
+            bent: false,
             rest: None,
             over: false,
             lines: 0,
@@ -91,19 +98,23 @@ impl Steps {
             match self.program.next() {
                 Some(Ok(Item::Line(line))) => self.push(line),
                 Some(Ok(Item::Rest(ns))) => self.rest = Some(ns),
-                Some(Ok(Item::Deviation(um))) => self.axes.set_deviation(um.unwrap_or(self.deviation)),
+                Some(Ok(Item::Deviation(um))) => self.present = um.unwrap_or(self.deviation),
                 Some(Err(fault)) => (self.fault, self.over) = (Some(fault), true),
                 None => self.over = true,
             }
         }
     }
 
-    fn push(&mut self, Line { to, feed }: Line) {
+    /// Between the chords of an arc is no corner: the machine may pass where they meet as far off as they are anyway.
+    fn push(&mut self, Line { to, feed, bends }: Line) {
         let mut target = [0; AXES];
         for ((target, mm), axis) in target.iter_mut().zip(to).zip(&self.setups) {
             *target = setup::in_steps(mm, axis);
         }
         self.lines += 1;
+        self.bent &= bends;
+        self.axes.set_deviation(if self.bent { self.present.max(CHORD_UM) } else { self.present });
+        self.bent |= self.axes.target() != target;
         // It is not full, and 100 m of 10000 steps/mm are fewer than 2^31.
         if self.axes.push(target, feed.unwrap_or(u32::MAX)).is_err() {
             let what = setup::outside(to, &self.setups).unwrap_or_default();
@@ -193,7 +204,7 @@ mod tests {
     fn searched(text: &str) -> [Vec<(u64, Direction)>; AXES] {
         let mut path = Path::<AXES, 1024>::new(Clock::NANOSECONDS, axes(), 20).unwrap();
         for item in program(text) {
-            let Ok(Item::Line(Line { to, feed })) = item else { panic!("{item:?}") };
+            let Ok(Item::Line(Line { to, feed, .. })) = item else { panic!("{item:?}") };
             path.push(to.map(|mm| (mm * 80.0).round() as i64), feed.unwrap_or(u32::MAX)).unwrap();
         }
         let mut found = [const { Vec::new() }; AXES];
@@ -243,6 +254,38 @@ mod tests {
         assert!(still("G1 X1 F6000\nX2\n") < 2_000_000);
         assert!(still("G1 X1 F6000\nM0\nX2\n") > 3_000_000);
         assert!(still("G61 G1 X1 F6000\nX1 Y1\n") > still("G64 P0.5 G1 X1 F6000\nX1 Y1\n"));
+    }
+
+    /// How long a program takes, in s.
+    fn seconds(text: &str, scale: u32, deviation: u32) -> f64 {
+        let axes = axes().map(|axis| AxisSetup::new(axis.limits, scale * 1000));
+        let mut steps = Steps::new(program(text), "part.nc".to_owned(), axes, deviation).unwrap();
+        steps.by_ref().for_each(drop);
+        assert!(steps.fault().is_none());
+        steps.end() as f64 / 1e9
+    }
+
+    /// A half circle of 20 mm at 100 mm/s and 5 m/s², with a corner at either end: as if it said G4 P0 there. A stop at each
+    /// of its chords would take twice as long.
+    #[test]
+    fn an_arc_stops_at_its_ends_only() {
+        let text = "G1 X20 F6000\nG3 X-20 I-20 J0\nG1 X-40\n";
+        let rests = seconds(&text.replace('\n', "\nG4 P0\n"), 80, 20);
+        for mode in ["G61", "G61.1", "G64 P0", "G64 P0.001"] {
+            let took = seconds(&format!("{mode}\n{text}"), 80, 20);
+            assert!((took - rests).abs() < 0.010, "{mode}: {took} s, {rests} s");
+        }
+        assert!((seconds(text, 80, 0) - rests).abs() < 0.010);
+    }
+
+    /// The first chords of an arc may have no steps: the corner before it stays one.
+    #[test]
+    fn a_corner_before_an_arc_stays_one() {
+        // Into the arc at a right angle, at 5 steps/mm.
+        let text = "G1 X20 F6000\nG3 X18 Y0 I-1 J0\n";
+        let rest = "G1 X20 F6000\nG4 P0\nG3 X18 Y0 I-1 J0\n";
+        let (stops, rests) = (seconds(&format!("G61 {text}"), 5, 20), seconds(&format!("G61 {rest}"), 5, 20));
+        assert!((stops - rests).abs() < 0.005, "{stops} s, {rests} s");
     }
 
     /// A line beyond a soft limit ends the program before it, at rest; an axis that turns has its pause.
