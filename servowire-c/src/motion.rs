@@ -6,7 +6,7 @@ pub use homing::*;
 
 use core::mem::MaybeUninit;
 
-use step_motion::{Axis, Clock, Direction, Error, Limits, Queue, StepTimer, Work};
+use step_motion::{Axis, Clock, Direction, Error, Limits, Mover, Queue, StepTimer, Work};
 
 use crate::border::{OK, Refused, border, in_range, state, there};
 use crate::result::{Protocol, refused, sw_result_t};
@@ -143,6 +143,8 @@ pub extern "C" fn sw_motion_start(
         let setup = there(setup)?;
         let (clock, limits) = (in_range(Clock::new(setup.clock_hz))?, limits(&setup.limits)?);
         let soft = in_range((setup.soft_low <= setup.soft_high).then_some((setup.soft_low, setup.soft_high)))?;
+        // What is refused leaves an axis as it was that has been started.
+        Mover::new(clock, limits).map_err(error)?;
         // SAFETY: large enough and aligned, as asserted above; nobody uses it.
         unsafe { place.write(Queue::new()) };
         // SAFETY: it was written, and the caller leaves it where it is for ever; from now on it is only shared.

@@ -256,10 +256,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     pub fn quick_stop(&mut self, limits: [Limits; N], now: u64) {
         let plain = self.stop_from(now);
         self.requests.quick_stop();
-        let Some(plain) = plain else { return self.leave(self.tick(now)) };
+        let Some(plain) = plain else { return self.stay(now) };
         let (rest, lines) = (self.rest_of(&plain), self.path.hurry(&limits));
         self.path.exit(self.more, self.path.part());
-        let Some(stop) = self.stop_anew(now, true) else { return self.leave(self.tick(now)) };
+        let Some(stop) = self.stop_anew(now, true) else { return self.stay(now) };
         // Who brakes harder before a corner comes to the line after it later, which may allow more.
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
         if rest < latest || plain.end < stop.end {
@@ -375,7 +375,16 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.requests.stop();
         match stop {
             Some(stop) => self.leave_at(stop, now),
-            None => self.leave(self.tick(now)),
+            None => self.stay(now),
+        }
+    }
+
+    /// Forgets the lines, if there are any, and stays at rest or where a stop comes to rest that has no more steps.
+    fn stay(&mut self, now: u64) {
+        if self.path.is_empty() && self.line.is_none() {
+            self.requests.stopped();
+        } else {
+            self.leave(self.tick(now));
         }
     }
 

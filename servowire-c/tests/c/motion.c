@@ -71,6 +71,10 @@ static void moves(void)
     CHECK(sw_motion_commanded(&a, NULL) == SW_E_NULL && sw_motion_run(&a, 2, 100) == SW_E_ARGUMENT);
     for (way = 0; way < 2; way++) {
         CHECK(sw_motion_move_to(&a, way == 0 ? 3000 : -500) == SW_OK);
+        machine_event(&m);
+        /* A refusal changes nothing: the axis goes on. */
+        setup.limits.speed = 500001;
+        CHECK(sw_motion_start(&a, &timer, &queue, &setup) == SW_E_MOTION_SPEED_ABOVE_CLOCK);
         machine_rest(&m);
         CHECK(sw_motion_commanded(&a, &commanded) == SW_OK && commanded == m.at && m.at == (way == 0 ? 3000 : -500));
     }

@@ -170,3 +170,64 @@ fn a_joint_straight_on_is_not_seen() {
         assert!(seen > 5 && odd <= 4, "{joint} {from}: {seen} {odd}");
     }
 }
+
+/// At 16.7 steps/s the last step of a brake has been made, and 0.06 steps are left. What is asked for again in every tick is the same stop
+/// to a cyclic master too.
+#[test]
+fn a_stop_without_a_step_is_the_same_stop() {
+    let limits = Limits::new(514, 1437).unwrap();
+    type Ask = fn(&mut PathMover<1, 4>, u64);
+    let asks: [Ask; 4] = [
+        |_, _| (),
+        |machine, now| machine.stop(now),
+        |machine, now| machine.quick_stop([Limits::new(514, 1437).unwrap()], now),
+        |machine, now| machine.hold(now),
+    ];
+    let places = |ask: Ask| {
+        let path = Path::new(Clock::new(32_768).unwrap(), [AxisSetup::new(limits, 4309)], 20).unwrap();
+        let mut machine = PathMover::<1, 4>::new(path);
+        machine.move_to([-4], 3885, 0).unwrap();
+        machine.push([15], 29_573, 0).unwrap();
+        while machine.due().is_some_and(|due| due <= 3526) {
+            machine.pulse();
+        }
+        machine.stop(3528);
+        (3528..4500)
+            .map(|now| {
+                ask(&mut machine, now);
+                machine.at(now)[0]
+            })
+            .collect::<Vec<_>>()
+    };
+    let alone = places(asks[0]);
+    assert!(alone[0].speed < 0 && alone[0].speed.abs() >> 16 < 20, "{:?}", alone[0]);
+    for (other, ask) in asks.iter().enumerate() {
+        assert!(places(*ask) == alone, "{other}");
+    }
+}
+
+/// Nor does it put off the next line, which waits for the pause after the last step only.
+#[test]
+fn a_stop_at_rest_does_not_begin_the_pause_anew() {
+    let begins = |again: bool| {
+        let axis = AxisSetup::new(Limits::new(20_000, 200_000).unwrap(), 80_000).with_reversal_pause(5000);
+        let mut machine = PathMover::<1, 4>::new(Path::new(Clock::MICROSECONDS, [axis], 20).unwrap());
+        machine.push([10], 100_000, 0).unwrap();
+        let mut now = 0;
+        for _ in 0..6 {
+            now = machine.pulse().unwrap().tick;
+        }
+        machine.stop(now);
+        while let Some(pulse) = machine.pulse() {
+            now = pulse.tick;
+        }
+        now += 4000;
+        if again {
+            machine.stop(now);
+            machine.quick_stop([Limits::new(20_000, 200_000).unwrap()], now);
+        }
+        machine.push([0], 100_000, now).unwrap();
+        machine.due()
+    };
+    assert_eq!(begins(true), begins(false));
+}
