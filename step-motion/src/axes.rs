@@ -326,6 +326,8 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         self.begin_anew();
         self.told = true;
         self.path.quick_stop(limits, self.end);
+        // Without a step of its own, it still takes the place of the stop after the last block.
+        self.asked |= self.path.due().is_none() && self.runs_on();
         self.tell_stops(|_, stop, end| {
             stop.quick_stop(limits, end);
             Ok(())

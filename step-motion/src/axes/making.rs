@@ -38,7 +38,9 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         self.stage = Stage::Block;
         if self.asked {
             self.work.replan(self.end);
-            if self.work.due().is_none() {
+            if self.work.due().is_none() && self.runs_on() {
+                self.until = self.end;
+            } else if self.work.due().is_none() {
                 // It leads to no step.
                 self.go_along();
                 self.stage = Stage::Idle;
@@ -47,6 +49,12 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
             self.work.look_ahead(self.end);
         }
         Work::More
+    }
+
+    /// Returns whether the stop after the last block that was handed out has steps.
+    pub(super) fn runs_on(&self) -> bool {
+        let stop = self.stops.get(1_usize.wrapping_sub(self.block));
+        (self.pending || !self.standing) && stop.is_some_and(|stop| stop.commanded() != self.path.commanded())
     }
 
     /// Goes on to the next axis, or back to the first one; returns whether no axis has had anything to cut.

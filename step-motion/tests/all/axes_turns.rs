@@ -146,3 +146,47 @@ fn a_way_back_from_rest_begins_in_time() {
         }
     }
 }
+
+/// A quick stop that takes less than half a step from the end of what is handed out: no step follows that, neither those of the stop that
+/// was handed out with it nor any other, also behind another quick stop that would have had some.
+#[test]
+fn a_quick_stop_without_a_step_of_its_own() {
+    // Steps/s, quick steps/s², and those of a first quick stop.
+    for (feed, quick, first) in [(16_000, 401_000_000, None), (1000, 1_200_000, None), (1000, 1_200_000, Some(250_000))] {
+        for asked in (300_000..320_000).step_by(1111) {
+            let queue = AxesQueue::<1, 257>::new();
+            let axis = AxisSetup::new(Limits::new(20_000, 200_000).unwrap(), 1_000_000);
+            let (mut axes, mut timer) = Axes::new(&queue, Path::<1, 4>::new(Clock::MICROSECONDS, [axis], 20).unwrap());
+            axes.push([80_000], feed).unwrap();
+            let (mut now, mut next, mut last, mut target) = (0_u64, None, 0, None);
+            while target.is_none() || !axes.is_at_rest() {
+                while let Some(tick) = next.filter(|tick| *tick <= now) {
+                    let fired = timer.fire();
+                    last = if fired.steps() > 0 { tick } else { last };
+                    next = Some(tick + u64::from(fired.wait())).filter(|_| fired.wait() > 0);
+                }
+                if now >= asked && target.is_none() {
+                    let limits = |quick| [Limits::new(20_000, quick).unwrap()];
+                    first.into_iter().for_each(|first| axes.quick_stop(limits(first)));
+                    axes.quick_stop(limits(quick));
+                    target = Some(axes.target()[0]);
+                }
+                while axes.poll() == Work::More {}
+                if axes.poll() == Work::Start {
+                    next = Some(now + u64::from(timer.fire().wait()));
+                }
+                now += 101;
+                assert!(now < 2_000_000, "{feed} at {asked}: {:?} {last} {target:?}", axes.commanded());
+            }
+            assert_eq!(Some(axes.commanded()[0]), target, "{feed} at {asked}");
+            assert!(last <= asked + 20_000 && now < asked + 25_000, "{feed} at {asked}: {last}, at rest at {now}");
+            // And on from there.
+            axes.push([0], feed).unwrap();
+            while !axes.is_at_rest() {
+                while axes.poll() == Work::More {}
+                timer.fire();
+            }
+            assert_eq!(axes.commanded(), [0]);
+        }
+    }
+}
