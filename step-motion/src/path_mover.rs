@@ -401,8 +401,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// Returns the tick of a request. A moving machine is somewhere between its last step and the next one, whatever the
     /// caller's clock says.
     fn tick(&self, now: u64) -> u64 {
-        let now = self.clock().within_reach(now).max(self.last());
-        self.due().map_or(now, |due| now.min(due))
+        let last = self.last();
+        let now = self.clock().within_reach(now).max(last);
+        // Of an axis whose steps are cut, it is only known that the next one comes after its own last one.
+        self.due().map_or(now, |due| now.min(due.max(last)))
     }
 
     /// The tick of the last step.

@@ -152,7 +152,8 @@ fn a_way_back_from_rest_begins_in_time() {
 #[test]
 fn a_quick_stop_without_a_step_of_its_own() {
     // Steps/s, quick steps/s², and those of a first quick stop.
-    for (feed, quick, first) in [(16_000, 401_000_000, None), (1000, 1_200_000, None), (1000, 1_200_000, Some(250_000))] {
+    for (feed, quick, first) in [(16_000, 401_000_000, None), (1000, 1_200_000, None), (1000, 1_200_000, Some(250_000))]
+    {
         for asked in (300_000..320_000).step_by(1111) {
             let queue = AxesQueue::<1, 257>::new();
             let axis = AxisSetup::new(Limits::new(20_000, 200_000).unwrap(), 1_000_000);
