@@ -98,6 +98,10 @@ impl Part {
 
     fn open(&self, path: &Path) -> Result<Program<BufReader<File>>, Fault> {
         let file = files::open_file(path)?;
+        if !file.metadata().is_ok_and(|data| data.is_file()) {
+            let what = "cannot be read twice, to be checked and to be run: copy it into a file";
+            return Err(Fault::new(&path.display().to_string(), At::File, what));
+        }
         Ok(Program::new(&path.display().to_string(), BufReader::new(file), self.block_delete))
     }
 }

@@ -1,5 +1,6 @@
 //! Switches motor drivers off while their axis has nothing to do, and wakes them in time.
 
+use servowire_decode::fault::Fault;
 use sorte_proto::drv8711::WAKE_NS;
 use sorte_proto::{Direction, Pto};
 
@@ -28,6 +29,11 @@ impl Power {
     pub(super) fn new(program: Program, axes: usize, after: Option<u32>, cycle_ns: u32) -> Self {
         let wake = WAKE_NS.div_ceil(cycle_ns) + MARGIN;
         Self { program, after, wake, waking: 0, idle: vec![0; axes], held: vec![Pto::default(); axes], off: 0 }
+    }
+
+    /// Why the program ended early.
+    pub(super) fn fault(&self) -> Option<&Fault> {
+        self.program.fault()
     }
 
     /// Notes that the axis has work unknown to the program.

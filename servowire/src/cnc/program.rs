@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use servowire_decode::fault::Fault;
 use sorte_proto::{Direction, Pto};
 use step_motion::AxisPulse;
 use step_profile::{Axis, Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
@@ -101,6 +102,11 @@ impl Program {
         for (to, command) in words.iter_mut().zip(commands.into_iter().cycle()) {
             *to = word(command);
         }
+    }
+
+    /// Why it ended early.
+    pub(super) fn fault(&self) -> Option<&Fault> {
+        if let Self::Part(part) = self { part.steps.fault() } else { None }
     }
 
     pub(super) fn is_over(&self) -> bool {

@@ -192,6 +192,9 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
     if let Some(why) = &host.ended {
         return Some(format!("the motion was stopped: {why}"));
     }
+    if let Some(fault) = host.program.fault() {
+        return Some(fault.to_string());
+    }
     if !host.is_done() {
         let last = line.why.as_deref().unwrap_or("the master waits for ever");
         return Some(format!("the motion was not finished: {last}"));

@@ -16,7 +16,7 @@ use super::setup;
 /// Number of lines in the look-ahead.
 const AHEAD: usize = 64;
 /// Slots per axis in the queue.
-const SLOTS: usize = 513;
+const SLOTS: usize = 2049;
 /// Motion in each half of the queue, in ns: this much later the machine knows that it has come to rest.
 const REACH_NS: u32 = 1_000_000;
 
@@ -139,8 +139,8 @@ impl Steps {
                 },
                 Work::TooFewSlots => {
                     let what = "the stop after a part of the path needs more segments than the queue has";
+                    // It comes to rest first.
                     (self.fault, self.over) = (Some(Fault::new(&self.name, At::File, what)), true);
-                    return false;
                 }
             }
         }

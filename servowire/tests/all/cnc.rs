@@ -420,3 +420,24 @@ fn wrong_use_is_explained() {
         assert!(String::from_utf8_lossy(&output.stderr).contains(word), "{arguments:?}");
     }
 }
+
+/// 1.5 m of 1000 steps/mm: the ramps to the speed of the machine last for 5 s, and to 1 m/s for 1 s. The whole way is made.
+#[test]
+fn long_ramps_of_small_steps() {
+    let folder = TempDir::new().unwrap();
+    let part = folder.path().join("long.nc");
+    fs::write(&part, "G0 X1500\n").unwrap();
+    let part = part.to_str().unwrap();
+    let axis = "X:steps-per-mm=1000,speed=15000,acceleration=50";
+    let run = servowire(&["cnc", "--gcode", part, "--axis", axis]);
+    let out = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success() && out.contains(" 1500000     1500000     1500000 "), "{out}");
+    for axis in
+        ["speed=60000,acceleration=1000", "speed=30000,acceleration=300,jerk=1000", "speed=60000,acceleration=100"]
+    {
+        let axis = format!("X:steps-per-mm=1000,{axis}");
+        let run = servowire(&["profile", "--gcode", part, "--axis", &axis]);
+        let (out, err) = (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+        assert!(run.status.success() && out.contains("1500000 steps, at 1500000 in the end"), "{axis}: {out} {err}");
+    }
+}

@@ -103,6 +103,18 @@ fn a_file_that_is_not_there() {
     }
 }
 
+/// A part program is read twice, which a pipe cannot be: its second reading is empty.
+#[cfg(unix)]
+#[test]
+fn a_part_program_comes_from_no_pipe() {
+    for command in ["profile", "cnc"] {
+        let mut run = Command::new(env!("CARGO_BIN_EXE_servowire"));
+        let run = run.args([command, "--gcode", "/dev/stdin"]).stdin(Stdio::piped()).output().unwrap();
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.code() == Some(2) && said.contains("/dev/stdin: cannot be read twice"), "{said}");
+    }
+}
+
 /// A file that is no register map is not shown as one.
 #[test]
 fn a_text_is_no_register_map() {
