@@ -168,7 +168,9 @@ fn a_quick_stop_without_a_step_of_its_own() {
                 }
                 if now >= asked && target.is_none() {
                     let limits = |quick| [Limits::new(20_000, quick).unwrap()];
-                    first.into_iter().for_each(|first| axes.quick_stop(limits(first)));
+                    if let Some(first) = first {
+                        axes.quick_stop(limits(first));
+                    }
                     axes.quick_stop(limits(quick));
                     target = Some(axes.target()[0]);
                 }
