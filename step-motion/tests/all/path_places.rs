@@ -175,8 +175,8 @@ fn a_joint_straight_on_is_not_seen() {
 /// to a cyclic master too.
 #[test]
 fn a_stop_without_a_step_is_the_same_stop() {
-    let limits = Limits::new(514, 1437).unwrap();
     type Ask = fn(&mut PathMover<1, 4>, u64);
+    let limits = Limits::new(514, 1437).unwrap();
     let asks: [Ask; 4] = [
         |_, _| (),
         |machine, now| machine.stop(now),
