@@ -10,6 +10,11 @@ fn limits() -> Limits {
 /// Two seconds of slices, with a request to an axis at 5000 steps/s in each ms from `from` us on. Returns where it is after each of the
 /// two, and when it made its last step, in us.
 fn jog(from: u64, again: impl Fn(&mut Axis<'_, 129>, u64)) -> ([i64; 2], u64) {
+    jog_each(from, 1000, |axis, now| again(axis, now / 1000))
+}
+
+/// The same with a request every so many us.
+fn jog_each(from: u64, every: u64, again: impl Fn(&mut Axis<'_, 129>, u64)) -> ([i64; 2], u64) {
     let queue = Queue::<129>::new();
     let (mut axis, mut timer) = Axis::new(&queue, Clock::MICROSECONDS, limits()).unwrap();
     let (mut next, mut places, mut last) = (None, [0; 2], 0);
@@ -20,8 +25,8 @@ fn jog(from: u64, again: impl Fn(&mut Axis<'_, 129>, u64)) -> ([i64; 2], u64) {
             last = if fired.is_step() { tick } else { last };
             next = Some(tick + u64::from(fired.wait())).filter(|_| fired.wait() > 0);
         }
-        if now % 1000 == 0 && now >= from {
-            again(&mut axis, now / 1000);
+        if now % every == 0 && now >= from {
+            again(&mut axis, now);
         }
         if axis.poll() == Work::Start {
             next = Some(now + u64::from(timer.fire().wait()));
@@ -128,6 +133,10 @@ fn a_request_again_changes_no_step() {
 
 /// The same for a path: 20,000 steps at 5 mm/s of 1000 steps/mm, in slices of 100 us, 16,800 instructions.
 fn follow(from: u64, again: impl Fn(&mut Axes<'_, 1, 4, 129>, u64)) -> ([i64; 2], u64) {
+    follow_each(from, 1000, |axes, now| again(axes, now / 1000))
+}
+
+fn follow_each(from: u64, every: u64, again: impl Fn(&mut Axes<'_, 1, 4, 129>, u64)) -> ([i64; 2], u64) {
     let queue = AxesQueue::<1, 129>::new();
     let axis = AxisSetup::new(limits(), 1_000_000);
     let (mut axes, mut timer) = Axes::new(&queue, Path::new(Clock::MICROSECONDS, [axis], 20).unwrap());
@@ -139,8 +148,8 @@ fn follow(from: u64, again: impl Fn(&mut Axes<'_, 1, 4, 129>, u64)) -> ([i64; 2]
             last = if fired.steps() > 0 { tick } else { last };
             next = Some(tick + u64::from(fired.wait())).filter(|_| fired.wait() > 0);
         }
-        if now % 1000 == 0 && now >= from {
-            again(&mut axes, now / 1000);
+        if now % every == 0 && now >= from {
+            again(&mut axes, now);
         }
         if axes.poll() == Work::Start {
             next = Some(now + u64::from(timer.fire().wait()));
@@ -237,4 +246,34 @@ fn a_feed_that_changes_on_short_lines_brings_no_step_forward() {
         assert_eq!(axes.commanded(), target);
     }
     assert!(shortest < 400, "{shortest}");
+}
+
+/// A motion gives way to a stop while its block is being made, after whichever slice: the stop comes at most a segment of 2.5 ms later than
+/// without the motion.
+#[test]
+fn a_stop_comes_before_a_motion() {
+    let mut worst = [0; 2];
+    for slices in 1..60 {
+        let at = 500_000 + slices * 25;
+        let axis = |faster: bool| {
+            let rest = jog_each(500_000, 25, |axis, now| match now {
+                500_000 if faster => axis.run(Direction::Forward, 5600).unwrap(),
+                _ if now == at => axis.stop(),
+                _ => {}
+            });
+            rest.1
+        };
+        worst[0] = worst[0].max(axis(true).saturating_sub(axis(false)));
+        let at = 500_000 + slices * 100;
+        let path = |slower: bool| {
+            let rest = follow_each(500_000, 100, |axes, now| match now {
+                500_000 if slower => axes.set_override(90),
+                _ if now == at => axes.hold(),
+                _ => {}
+            });
+            rest.1
+        };
+        worst[1] = worst[1].max(path(true).saturating_sub(path(false)));
+    }
+    assert!(worst[0] <= 2600 && worst[1] == 0, "{worst:?}");
 }
