@@ -967,7 +967,8 @@ enum sw_motion_work_t
      */
     SW_MOTION_LATER = 3,
     /**
-     * The stop needs more slots than the queue has: the axis comes to rest.
+     * The stop needs more slots than the queue has: the axis comes to rest, and goes on at half of its greatest speed until
+     * sw_motion_set_limits().
      */
     SW_MOTION_TOO_FEW_SLOTS = 4,
 };
