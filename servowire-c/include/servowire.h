@@ -5093,7 +5093,7 @@ sw_result_t sw_motion_set_override(sw_motion_axis_t *axis, uint16_t percent);
 sw_result_t sw_motion_set_limits(sw_motion_axis_t *axis, const sw_motion_limits_t *limit);
 
 /**
- * Says, at rest, which position this is, in steps: 0 at a reference.
+ * Says, at rest, which position this is, in steps: 0 at a reference. The target is forgotten, on hold too.
  */
 sw_result_t sw_motion_set_commanded(sw_motion_axis_t *axis, int64_t position);
 

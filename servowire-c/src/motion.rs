@@ -281,7 +281,7 @@ pub extern "C" fn sw_motion_set_limits(
     })
 }
 
-/// Says, at rest, which position this is, in steps: 0 at a reference.
+/// Says, at rest, which position this is, in steps: 0 at a reference. The target is forgotten, on hold too.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_set_commanded(axis: Option<&mut sw_motion_axis_t>, position: i64) -> sw_result_t {
     border(|| {

@@ -187,7 +187,7 @@ impl Mover {
         self.runner.stand(self.runner.due.map_or(now, |due| now.min(due)), was_moving);
     }
 
-    /// Sets, at rest, the step count of the present position, for instance 0 at a reference.
+    /// Sets, at rest, the step count of the present position, for instance 0 at a reference, and forgets the target, on hold too.
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
