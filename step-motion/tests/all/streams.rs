@@ -214,7 +214,7 @@ fn a_feed_that_changes_on_short_lines_brings_no_step_forward() {
         let (mut now, mut next, mut last, mut lines, mut target, mut held) = (0_u64, None, [None; 2], 0, [0; 2], 0_i32);
         while lines < 400 || held > 0 || !axes.is_at_rest() {
             while lines < 400 && !axes.is_full() {
-                let (angle, length) = (lines as f64 / 40.0, (1 + below(60)) as f64);
+                let (angle, length) = (f64::from(lines) / 40.0, (1 + below(60)) as f64);
                 target = [target[0] + (length * angle.cos()) as i64, target[1] + (length * angle.sin()) as i64];
                 lines += 1;
                 axes.push(target, 63_000).unwrap();
