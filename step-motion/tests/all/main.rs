@@ -15,6 +15,7 @@ mod homing;
 mod joints;
 mod laws;
 mod lines;
+mod looks;
 mod machine;
 mod mover_places;
 mod nearly;

@@ -3,6 +3,8 @@
 use proptest::prelude::*;
 use step_motion::{Clock, Direction, Limits, Mover, Setpoint};
 
+use crate::looks::Watched;
+
 const ONE: f64 = 4_294_967_296.0;
 
 /// An axis whose user looks where it is, and where it was when the user last looked.
@@ -16,11 +18,17 @@ struct Seen {
     last: (u64, i64),
 }
 
-impl Seen {
-    fn new(hz: u32, limits: Limits) -> Self {
-        let mover = Mover::new(Clock::new(hz).unwrap(), limits).unwrap();
-        let (speed, acceleration) = (limits.speed().into(), limits.acceleration().into());
-        Self { mover, hz: hz.into(), speed, acceleration, now: 0, last: (0, 0) }
+impl Watched for Seen {
+    fn due(&self) -> Option<u64> {
+        self.mover.due()
+    }
+
+    fn pulse(&mut self) {
+        self.mover.pulse();
+    }
+
+    fn now(&mut self) -> &mut u64 {
+        &mut self.now
     }
 
     /// The axis has gone no further since then than its speed allows: half of a tick of rounding, and 2^-13 steps. And it is within half
@@ -38,30 +46,13 @@ impl Seen {
         assert!(off <= most, "it is {off} off at {}, {most} at the most", self.now);
         self.last = (self.now, there.position);
     }
+}
 
-    /// Looks before and after each step, and in the ticks around.
-    fn until(&mut self, time: u64) {
-        while let Some(due) = self.mover.due().filter(|due| *due <= time) {
-            for early in [50, 1, 0] {
-                self.now = self.now.max(due.saturating_sub(early));
-                self.look();
-            }
-            self.mover.pulse();
-            self.look();
-            for _ in 0..2 {
-                let next = self.now + 1;
-                if next <= time && self.mover.due().is_none_or(|due| due > next) {
-                    self.now = next;
-                    self.look();
-                }
-            }
-        }
-        // Whatever ends, or begins, without a step.
-        let step = (time.saturating_sub(self.now) / 64).max(1);
-        while self.now < time {
-            self.now = (self.now + step).min(time);
-            self.look();
-        }
+impl Seen {
+    fn new(hz: u32, limits: Limits) -> Self {
+        let mover = Mover::new(Clock::new(hz).unwrap(), limits).unwrap();
+        let (speed, acceleration) = (limits.speed().into(), limits.acceleration().into());
+        Self { mover, hz: hz.into(), speed, acceleration, now: 0, last: (0, 0) }
     }
 
     /// At a request position and speed are those before it, unless it is a halt or the axis comes to rest within a tick.

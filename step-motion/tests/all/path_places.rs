@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
 
+use crate::looks::Watched;
 use crate::path_queue::Request;
 
 const N: usize = 2;
@@ -17,12 +18,17 @@ struct Seen {
     looks: u32,
 }
 
-impl Seen {
-    fn new(hz: u32, limits: [Limits; N]) -> Self {
-        let axes = [AxisSetup::new(limits[0], 80_000), AxisSetup::new(limits[1], 50_000)];
-        let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, 50).unwrap());
-        let speeds = limits.map(|limits| limits.speed().into());
-        Self { machine, hz: hz.into(), speeds, now: 0, last: (0, [0; N]), looks: 0 }
+impl Watched for Seen {
+    fn due(&self) -> Option<u64> {
+        self.machine.due()
+    }
+
+    fn pulse(&mut self) {
+        self.machine.pulse();
+    }
+
+    fn now(&mut self) -> &mut u64 {
+        &mut self.now
     }
 
     /// No axis has gone further since then than its speed allows: half of a tick of rounding, and 2^-13 steps. And it is within half
@@ -40,30 +46,14 @@ impl Seen {
         }
         (self.last, self.looks) = ((self.now, there), self.looks + 1);
     }
+}
 
-    /// Looks before and after each step, and in the ticks around.
-    fn until(&mut self, time: u64) {
-        while let Some(due) = self.machine.due().filter(|due| *due <= time) {
-            for early in [50, 1, 0] {
-                self.now = self.now.max(due.saturating_sub(early));
-                self.look();
-            }
-            self.machine.pulse();
-            self.look();
-            for _ in 0..2 {
-                let next = self.now + 1;
-                if next <= time && self.machine.due().is_none_or(|due| due > next) {
-                    self.now = next;
-                    self.look();
-                }
-            }
-        }
-        // Whatever ends, or begins, without a step.
-        let step = (time.saturating_sub(self.now) / 64).max(1);
-        while self.now < time {
-            self.now = (self.now + step).min(time);
-            self.look();
-        }
+impl Seen {
+    fn new(hz: u32, limits: [Limits; N]) -> Self {
+        let axes = [AxisSetup::new(limits[0], 80_000), AxisSetup::new(limits[1], 50_000)];
+        let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, 50).unwrap());
+        let speeds = limits.map(|limits| limits.speed().into());
+        Self { machine, hz: hz.into(), speeds, now: 0, last: (0, [0; N]), looks: 0 }
     }
 
     fn ask(&mut self, ask: Request<N>) {
