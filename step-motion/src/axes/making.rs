@@ -9,11 +9,14 @@ use crate::cutter::{Cut, Demand};
 use crate::queue::{Joint, Queue, REST};
 use crate::writer::{Writer, tick};
 
+/// How many of the shortest blocks are in a second, unless the reach is shorter still: no background makes them any faster.
+const SHORTEST: u32 = 2000;
+
 impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     /// Begins a block where the blocks already handed out end.
     pub(super) fn begin(&mut self) -> Work {
         let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
-        if reach < 4 {
+        if self.shorter > 0 && reach < (self.path.clock().hz() / SHORTEST).max(4) {
             return self.give_up();
         }
         self.path.set_lead(self.reach / 4);

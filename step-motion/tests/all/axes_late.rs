@@ -266,3 +266,32 @@ fn the_reach_is_what_it_was_behind_lines_that_take_many_slots() {
         assert_eq!(pair[1].0 - pair[0].0, 50, "{pair:?}");
     }
 }
+
+/// Two lines with `S` slots and slices of 25 us: whether they were given up. If not, they have been run after three seconds.
+fn given_up<const S: usize>(reach: u32) -> bool {
+    let axis = AxisSetup::new(Limits::new(20_000, 200_000).unwrap().with_jerk(4_000_000).unwrap(), 80_000);
+    let path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+    let queue: &'static AxesQueue<2, S> = Box::leak(Box::default());
+    let (axes, timer) = Axes::new(queue, path);
+    let (mut axes, mut machine) = (axes.with_reach(reach), Machine::<_, 2>::new(timer));
+    axes.push([3000, 211], 250_000).unwrap();
+    axes.push([3000, 900], 250_000).unwrap();
+    let mut few = false;
+    for now in (0..3_000_000).step_by(25) {
+        machine.until(now);
+        few |= machine.slice(&mut axes) == Work::TooFewSlots;
+    }
+    assert_eq!((axes.is_at_rest(), axes.commanded()), (true, axes.target()), "{S} slots, {reach}");
+    assert_eq!(few, axes.commanded() != [3000, 900], "{S} slots, {reach}");
+    few
+}
+
+/// Where the slots hold so little that no background would make it in time, the path is given up: it does not stand still without a word.
+#[test]
+fn a_queue_that_is_too_short_says_so() {
+    for reach in [2000, 10_000, 50_000] {
+        let short = [given_up::<9>(reach), given_up::<13>(reach), given_up::<17>(reach), given_up::<21>(reach)];
+        assert_eq!((short, given_up::<129>(reach)), ([true; 4], false), "{reach}");
+    }
+    assert_eq!([given_up::<65>(2000), given_up::<65>(10_000)], [false; 2]);
+}
