@@ -23,12 +23,15 @@ use crate::writer::{LONGEST, Writer};
 ///
 /// It takes the requests of a [`PathMover`] and cuts the plan into segments, a little ahead of the [`AxesTimer`] that runs
 /// them. A request takes effect at the end of the blocks already handed out: after at most twice the
-/// [reach](Self::with_reach). Only [`halt`](Self::halt) takes effect at once: no step follows it. Each block is followed by
-/// a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to rest on its lines, and
-/// continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or [as exact as
-/// all others](Self::with_exact_stops); every other step is exact to 3/4 of a tick, or 25 ns if that is more. If a block
+/// [reach](Self::with_reach), and 32 ticks because a block does not end at a step. Only [`halt`](Self::halt) takes effect at once: no
+/// step follows it. Each block is followed by a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to
+/// rest on its lines, and continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or
+/// [as exact as all others](Self::with_exact_stops); every other step is exact to 3/4 of a tick, or 25 ns if that is more. If a block
 /// ends within two ticks of a step, or DIR changes, a step may be a tick or two late. DIR of an axis changes at least half of its
 /// reversal pause after a step and before the next one, or a quarter of the reach if that is less.
+///
+/// A [`move_to`](Self::move_to), or a quick stop within other limits, takes the place of a block that is still being made: do not ask for
+/// them faster than blocks are made.
 ///
 /// It contains four copies of the [`PathMover`], so keep it in a `static` or on a large stack.
 ///

@@ -322,6 +322,26 @@ fn a_long_pause_makes_no_request_late() {
     }
 }
 
+/// Twice the reach, and 16 ticks for either block, which does not end where a step is: all three axes are at up to half of the clock, and
+/// come to rest at once.
+#[test]
+fn a_hold_is_in_time_at_any_clock() {
+    for (hz, seed) in [1000, 2000, 10_000, 25_000].into_iter().flat_map(|hz| (0..60).map(move |seed| (hz, seed))) {
+        let axis = AxisSetup::new(Limits::new(hz / (2 + seed % 5), 1 << 30).unwrap(), 80_000);
+        let path = Path::<3, 4>::new(Clock::new(hz).unwrap(), [axis; 3], 20).unwrap();
+        let queue: &'static AxesQueue<3, SLOTS> = Box::leak(Box::default());
+        let (mut axes, timer) = Axes::new(queue, path);
+        let mut machine = Machine::<_, 3>::new(timer);
+        axes.push([300_000, 172_110 + 999 * i64::from(seed), 99_999], u32::MAX).unwrap();
+        let asked = u64::from(hz / 2 + seed);
+        machine.run(&mut axes, 1, asked);
+        axes.hold();
+        machine.run(&mut axes, 1, u64::MAX);
+        let waits = machine.steps.last().unwrap().0 - asked;
+        assert!(waits <= u64::from(hz) / 50 + 32 && machine.steps.len() > 100, "{waits} ticks at {hz} Hz, {seed}");
+    }
+}
+
 /// The second half of the slots begins after 2^15 of them.
 #[test]
 fn the_largest_queue() {
