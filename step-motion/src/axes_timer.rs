@@ -7,8 +7,8 @@ use crate::step_timer::StepTimer;
 use crate::word::Word;
 
 /// Segments between [`Axes`](crate::Axes) in the background and an [`AxesTimer`] in an interrupt: a [`Queue`] of `S` slots for each of
-/// `N` axes, 1 to 16. With fewer than 65 slots a path may come to rest again and again. Where the slots do not hold 0.5 ms of it, it is
-/// given up as [`Work::TooFewSlots`](crate::Work::TooFewSlots) says.
+/// `N` axes, 1 to 16. With fewer than 65 slots a path may come to rest again and again. Where the slots do not hold 0.5 ms of it, or
+/// a 16th of the reach if that is less, it is given up as [`Work::TooFewSlots`](crate::Work::TooFewSlots) says.
 ///
 /// Put it into a `static`; [`Axes::new`](crate::Axes::new) returns both ends.
 #[derive(Debug)]

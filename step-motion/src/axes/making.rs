@@ -9,14 +9,15 @@ use crate::cutter::{Cut, Demand};
 use crate::queue::{Joint, Queue, REST};
 use crate::writer::{Writer, tick};
 
-/// How many of the shortest blocks are in a second, unless the reach is shorter still: no background makes them any faster.
+/// A block is at least this part of a second, or a 16th of the reach: no background makes it any faster.
 const SHORTEST: u32 = 2000;
 
 impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     /// Begins a block where the blocks already handed out end.
     pub(super) fn begin(&mut self) -> Work {
         let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
-        if self.shorter > 0 && reach < (self.path.clock().hz() / SHORTEST).max(4) {
+        let shortest = (self.path.clock().hz() / SHORTEST).min(self.reach / 16).max(4);
+        if self.shorter > 0 && reach < shortest {
             return self.give_up();
         }
         self.path.set_lead(self.reach / 4);
