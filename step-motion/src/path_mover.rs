@@ -259,7 +259,8 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let Some(plain) = plain else { return self.stay(now) };
         let (rest, lines) = (self.rest_of(&plain), self.path.hurry(&limits));
         self.path.exit(self.more, self.path.part());
-        let Some(stop) = self.stop_anew(now, true) else { return self.stay(now) };
+        let bounds = plain.left.bounds.or(self.bounds).unwrap_or(Bounds::NONE);
+        let Some(stop) = self.stop_anew(now, Some(bounds)) else { return self.stay(now) };
         // Who brakes harder before a corner comes to the line after it later, which may allow more.
         let latest = self.rest_of(&stop).saturating_sub(self.clock().moment(1));
         if rest < latest || plain.end < stop.end {

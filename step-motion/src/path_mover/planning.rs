@@ -58,11 +58,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             let end = self.path.end_of_cut()?;
             return Some(Stop { end, left: self.leaving(), cut: true, first: None, after: None });
         }
-        self.stop_anew(now, false)
+        self.stop_anew(now, None)
     }
 
-    /// Returns how a stop runs that begins now, plain or quick, whatever stop is under way; `None` at rest.
-    pub(super) fn stop_anew(&self, now: u64, quick: bool) -> Option<Stop<N>> {
+    /// Returns how a stop runs that begins now, plain or quick, whatever stop is under way; `None` at rest. `plain`: the limits within
+    /// which the plain one begins that is there instead of a quick one.
+    pub(super) fn stop_anew(&self, now: u64, plain: Option<Bounds>) -> Option<Stop<N>> {
         let present = |end| Stop { end, left: self.leaving(), cut: false, first: None, after: None };
         let here = self.here(now);
         // Without speed the distance to rest is 0: a step that is due, its tick being the nearest one, is no longer made.
@@ -72,7 +73,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         let Some((motion, start)) = here else {
             return Some(present((self.more, self.path.line(self.more)?.length)));
         };
-        if self.braking && !quick {
+        if self.braking && plain.is_none() {
             // A stop under way stays the same.
             let line = self.line.as_ref()?;
             let end = if self.exit.is_zero() {
@@ -101,9 +102,12 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         }
         let (end, after) = self.path.end_of_stop(more.saturating_add(1), exit);
         let stop = Stop { end, after: Some(after), ..stop };
-        // At each joint it would have acceleration 0; on one curve it may be shorter.
-        let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok).map(planned);
-        once.filter(|once| quick && once.end < stop.end).or(Some(stop))
+        // At each joint it would have acceleration 0; on one curve it may be shorter. Within lower limits, those of a later line, it would
+        // be faster at first.
+        let Some(plain) = plain else { return Some(stop) };
+        let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok);
+        let once = once.filter(|(_, bounds)| !plain.allows_more(bounds)).map(planned);
+        once.filter(|once| once.end < stop.end).or(Some(stop))
     }
 
     /// Returns where a stop ends: with the steps of a stop under way, or no more than these.

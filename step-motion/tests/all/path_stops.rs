@@ -191,3 +191,45 @@ fn a_resume_begins_where_the_hold_has_ended() {
         assert!(begin.abs_diff(want) < 1 << 12, "{at}: {} / 2^32 steps from there", begin - want);
     }
 }
+
+/// On one curve over all lines a quick stop keeps the jerk of the weakest of them. Where the plain one has more on its first line, that
+/// curve would be faster at first, though shorter: the interval before the fifth step of Y would be 8 % less.
+#[test]
+fn a_quick_stop_is_not_faster_where_it_begins() {
+    let limits = |speed, jerk| Limits::new(speed, 40_000).unwrap().with_jerk(jerk).unwrap();
+    let axes = [limits(14_917, 440_000), limits(3153, 8_000_000)];
+    let path = axes.map(|limits| AxisSetup::new(limits, 80_000));
+    let mut plain = PathMover::new(Path::<2, 16>::new(Clock::new(25_000_000).unwrap(), path, 13).unwrap());
+    let lines = [
+        ([-5, -4], 58_687),
+        ([-6, -7], 136_121),
+        ([-4, -9], 176_911),
+        ([-2, -12], 293_028),
+        ([0, -12], 291_141),
+        ([9, -15], 108_346),
+        ([5, -19], 111_673),
+    ];
+    for (to, feed) in lines {
+        plain.push(to, feed, 0).unwrap();
+    }
+    for _ in 0..7 {
+        plain.pulse().unwrap();
+    }
+    let (now, mut quick) = (1_047_716, plain.clone());
+    plain.stop(now);
+    quick.quick_stop(axes, now);
+    let [plain, quick] = [plain, quick].map(|mut mover| {
+        let mut ticks: [Vec<u64>; 2] = Default::default();
+        while let Some(pulse) = mover.pulse() {
+            ticks[usize::from(pulse.axis)].push(pulse.tick);
+        }
+        ticks
+    });
+    for (plain, quick) in plain.iter().zip(&quick) {
+        assert!(quick.len() <= plain.len());
+        for (plain, quick) in plain.windows(2).zip(quick.windows(2)) {
+            let [plain, quick] = [plain, quick].map(|pair| pair[1] - pair[0]);
+            assert!(quick + quick / 100 >= plain, "{quick} ticks in place of {plain}");
+        }
+    }
+}

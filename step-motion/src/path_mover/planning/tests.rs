@@ -153,7 +153,7 @@ fn a_quick_stop_is_the_shorter_of_two() {
             let (Some((once, _)), false) = (once, course.exit.is_zero()) else { continue };
             let (joints, time) = mover.path.end_of_stop(course.more + 1, course.exit);
             let once = mover.path.locate(0, (from.0 + once.curve.way()) - from.1, once.more);
-            let Stop { end, after, .. } = mover.stop_anew(now, true).unwrap();
+            let Stop { end, after, .. } = mover.stop_anew(now, Some(Bounds::NONE)).unwrap();
             let want = if once < joints { (once, None) } else { (joints, Some(time)) };
             assert!((end, after) == want, "{steps}: {end:?} {after:?} of {once:?} and {joints:?}");
             shorter[usize::from(once < joints)] += 1;
