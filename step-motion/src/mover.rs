@@ -140,8 +140,8 @@ impl Mover {
         self.move_freely(target, now)
     }
 
-    /// Runs at a speed in steps/s until another request or to the soft limit; the speed is at most the greatest one. 0
-    /// stops. On the way to a soft limit it comes to rest for a moment every 2^31 - 1 steps.
+    /// Runs at a speed in steps/s until another request or to the soft limit, or the last position that an `i64` has; the speed is at most
+    /// the greatest one. 0 stops. On the way to a soft limit it comes to rest for a moment every 2^31 - 1 steps.
     ///
     /// # Errors
     /// [`Error::Moving`] during a [`quick_stop`](Self::quick_stop).

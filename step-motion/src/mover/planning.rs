@@ -68,8 +68,10 @@ impl Runner {
             && match self.aim {
                 Aim::Rest => false,
                 Aim::At(target) => target != self.commanded,
-                Aim::Run(direction, _, Some(end)) => self.ahead(end, direction).is_some_and(|steps| steps > 0),
-                Aim::Run(..) => true,
+                Aim::Run(direction, _, end) => {
+                    let end = self.end_of_run(direction, end);
+                    end.is_none_or(|end| self.ahead(end, direction).is_some_and(|steps| steps > 0))
+                }
             }
     }
 
@@ -162,6 +164,12 @@ impl Runner {
         u32::try_from(steps).ok().filter(|_| ahead)
     }
 
+    /// Returns where a run ends: at its own end, or at the last position that there is, once a plan may get there.
+    fn end_of_run(&self, direction: Direction, end: Option<i64>) -> Option<i64> {
+        let last = if direction.dir() { i64::MIN } else { i64::MAX };
+        end.or_else(|| (last.abs_diff(self.commanded) <= u64::from(u32::MAX / 2)).then_some(last))
+    }
+
     /// Plans a stop, from a motion that cannot reach the aim; from rest, nothing.
     fn beyond_reach(&mut self, planning: &mut Planning) {
         let Origin { rest, motion, frame, bounds, .. } = planning.origin;
@@ -232,7 +240,7 @@ impl Runner {
             Aim::Run(_, speed, end) => {
                 let v = Real::new(speed.into()) / Real::new(self.clock.moments().into());
                 let v = v.min(bounds.v) * part;
-                match end {
+                match self.end_of_run(direction, end) {
                     Some(end) => Some((Want::At(end), bounds.slower(v))),
                     None => Some((Want::Speed(v), *bounds)),
                 }

@@ -1,6 +1,8 @@
 //! The bounds that a caller may ask for before a call refuses.
 
-use step_motion::{Arc, AxisSetup, Clock, Limits, Mover, Path, PathMover, Turning};
+use step_motion::{Arc, Axis, AxisSetup, Clock, Direction, Limits, Mover, Path, PathMover, Queue, Turning, Work};
+
+use crate::machine::Machine;
 
 #[test]
 fn the_bounds_that_are_said_are_those_that_are_checked() {
@@ -56,6 +58,36 @@ fn no_time_is_too_late_to_begin() {
             assert!(axis.is_at_rest(u64::MAX) && path.is_at_rest(u64::MAX));
             axis.halt(now);
             path.halt(now);
+        }
+    }
+}
+
+/// A run ends at the last position, at rest, and there is a way back. At 1000 steps/s no step is sooner than 1 ms after the one before.
+#[test]
+fn a_run_ends_at_the_last_position() {
+    let limits = Limits::new(1000, 10_000).unwrap();
+    let both = [limits, limits.with_jerk(1_000_000).unwrap()];
+    for (limits, away) in both.into_iter().flat_map(|limits| [0, 1, 2, 60, 400].map(|away| (limits, away))) {
+        for (way, end, back) in [(Direction::Forward, i64::MAX, -away), (Direction::Reverse, i64::MIN, away)] {
+            let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+            mover.set_commanded(end + back, 0).unwrap();
+            mover.run(way, 1000, 0).unwrap();
+            let ticks: Vec<_> = core::iter::from_fn(|| mover.pulse()).take(1000).map(|pulse| pulse.tick).collect();
+            assert!(apart(&ticks, 990) && ticks.len() as u64 == away.unsigned_abs(), "{away} {way:?}: {ticks:?}");
+            assert!(mover.is_at_rest(ticks.last().map_or(0, |tick| tick + 20_000)) && mover.commanded() == end);
+
+            let queue: &'static Queue<129> = Box::leak(Box::default());
+            let (mut axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits).unwrap();
+            let mut machine = Machine::<_, 1>::new(timer);
+            axis.set_commanded(end + back).unwrap();
+            machine.position[0] = end + back;
+            axis.run(way, 1000).unwrap();
+            assert_eq!(machine.run(&mut axis, 5000, 4_000_000), Work::Rest);
+            let ticks: Vec<_> = machine.steps.iter().map(|step| step.0).collect();
+            assert!(apart(&ticks, 990) && axis.commanded() == end, "{away} {way:?}: {ticks:?}");
+            axis.move_to(end + back.signum() * 3).unwrap();
+            assert_eq!(machine.run(&mut axis, 5000, u64::MAX), Work::Rest);
+            assert_eq!(axis.commanded(), end + back.signum() * 3);
         }
     }
 }
