@@ -173,8 +173,19 @@ struct Signals {
     position: IdCode,
 }
 
+/// A wire of the master, and the frames on it: a duplicate may overlap with its frame.
+struct Line {
+    id: IdCode,
+    frames: u32,
+}
+
 #[derive(Clone, Copy)]
 enum Level {
+    /// A frame begins or ends on `rx`, or on `tx`.
+    Frame {
+        rx: bool,
+        begins: bool,
+    },
     Wire(IdCode, bool),
     Number(IdCode, i64),
     Text(IdCode, &'static str),
@@ -182,8 +193,8 @@ enum Level {
 
 struct Trace {
     writer: Writer<BufWriter<Written>>,
-    tx: IdCode,
-    rx: IdCode,
+    tx: Line,
+    rx: Line,
     frame: IdCode,
     devices: Vec<Signals>,
     waiting: Vec<(u64, Level)>,
@@ -213,7 +224,9 @@ impl Trace {
         }
         writer.upscope()?;
         writer.enddefinitions()?;
-        let mut trace = Self { writer, tx, rx, frame, devices: signals, waiting: Vec::new(), written: None };
+        let [tx_line, rx_line] = [tx, rx].map(|id| Line { id, frames: 0 });
+        let mut trace =
+            Self { writer, tx: tx_line, rx: rx_line, frame, devices: signals, waiting: Vec::new(), written: None };
         trace.waiting.extend([(0, Level::Wire(tx, false)), (0, Level::Wire(rx, false)), (0, Level::Text(frame, "-"))]);
         for k in &trace.devices {
             let start = [Level::Wire(k.sync0, false), Level::Wire(k.dir, false), Level::Wire(k.enable, true)];
@@ -224,9 +237,8 @@ impl Trace {
     }
 
     fn frame(&mut self, at_ns: u64, wire_ns: u64, answer: bool, name: &'static str) {
-        let wire = if answer { self.rx } else { self.tx };
-        self.waiting.push((at_ns, Level::Wire(wire, true)));
-        self.waiting.push((at_ns + wire_ns, Level::Wire(wire, false)));
+        self.waiting.push((at_ns, Level::Frame { rx: answer, begins: true }));
+        self.waiting.push((at_ns + wire_ns, Level::Frame { rx: answer, begins: false }));
         if !answer {
             self.waiting.push((at_ns, Level::Text(self.frame, name)));
         }
@@ -255,6 +267,14 @@ impl Trace {
                 self.written = Some(ns);
             }
             match level {
+                Level::Frame { rx, begins } => {
+                    let line = if rx { &mut self.rx } else { &mut self.tx };
+                    let before = line.frames;
+                    line.frames = if begins { before + 1 } else { before.saturating_sub(1) };
+                    if before == 0 || line.frames == 0 {
+                        self.writer.change_scalar(line.id, begins)?;
+                    }
+                }
                 Level::Wire(id, high) => self.writer.change_scalar(id, high)?,
                 Level::Number(id, value) => {
                     let bits = (0..64).rev().map(|bit| vcd::Value::from(value >> bit & 1 == 1));
