@@ -10,7 +10,8 @@ use crate::real::Real;
 ///
 /// 1 MHz is a common timer; [`NANOSECONDS`](Self::NANOSECONDS) suits the 4 µs cycle of TIDEP0061, whose PTO words are in ns.
 ///
-/// Time ends 272 years or more after tick 0: no step that would be later is ever due.
+/// Time ends 272 years or more after tick 0: no step that would be later is ever due. A request in the second half of that time counts as
+/// one at its beginning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
