@@ -115,13 +115,15 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         }
     }
 
-    /// Changes DIR of the axes that are to turn as soon as half of their pause is over: a request may make the next step sooner.
+    /// Changes DIR of the axes that are to turn: a request may make the next step as soon as the block and the pause are over. Without a
+    /// pause the steps are as far apart as at the greatest speed.
     fn put_turns(&mut self) {
-        let before = i128::from(self.until) << 32;
+        let (before, hz) = (i128::from(self.until) << 32, self.work.clock().hz());
         let own = self.writers.iter_mut().zip(&self.queue.axes).zip(self.work.axes());
         for (at, ((writer, queue), axis)) in own.enumerate() {
             if let Some(direction) = self.work.direction(at) {
-                let next = writer.last.saturating_add(i128::from(axis.reversal_pause) << 32);
+                let apart = axis.reversal_pause.max(hz.checked_div(axis.limits.speed()).unwrap_or(0));
+                let next = writer.last.saturating_add(i128::from(apart) << 32).max(before);
                 writer.put_turn((queue, self.block), next, direction, before);
             }
         }

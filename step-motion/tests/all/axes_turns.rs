@@ -229,6 +229,31 @@ fn dir_is_in_time_whatever_is_asked_for() {
     }
 }
 
+/// Without a pause DIR is in the middle between two steps, or between a step and the end of a block, wherever that is: for an axis of up
+/// to 400 steps/s it is 1.25 ms from either step, or two ticks less.
+#[test]
+fn dir_is_not_beside_a_step_without_a_pause() {
+    for (feed, reach) in [(250, 10_000), (2000, 9999), (5000, 7777), (5000, 1234), (5000, 3001)] {
+        let axis = AxisSetup::new(Limits::new(400, 80_000).unwrap(), 80_000);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (axes, timer) = Axes::new(&queue, path);
+        let (mut axes, mut machine) = (axes.with_reach(reach), Machine::<_, 2>::new(timer));
+        for i in 1..120_i64 {
+            while axes.is_full() {
+                let soon = machine.now + 1000;
+                machine.run(&mut axes, u64::from(reach / 2), soon);
+            }
+            axes.push([i, i % 2 * 3], feed).unwrap();
+        }
+        machine.run(&mut axes, u64::from(reach / 2), u64::MAX);
+        assert!(machine.turns.len() > 90, "{}", machine.turns.len());
+        for (before, after) in machine.turns {
+            assert!(before >= 1248 && after >= 1248, "{before} and {after} at {feed} um/s, {reach}");
+        }
+    }
+}
+
 /// A stop just behind a corner, before the first step of the way back; and then that way at once: the pause is not shorter.
 #[test]
 fn a_stop_before_a_way_back_does_not_shorten_the_pause() {
