@@ -205,8 +205,10 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// The end of the last line, in steps; after a [`stop`](Self::stop), the place where it will end.
-    pub const fn target(&self) -> [i64; N] {
-        self.path.target()
+    pub fn target(&self) -> [i64; N] {
+        let (place, _) = self.place();
+        let stop = self.stop_at(place).and_then(|block| self.stops.get(block));
+        stop.map_or_else(|| self.path.target(), PathMover::target)
     }
 
     /// Returns whether no line can be pushed: the queue is full, or would be if the machine came to rest because the
@@ -382,15 +384,12 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
         }
         // Read after that: the interrupt may come at any time, and where it has been before the block is no rest in it.
         let (place, idle) = self.place();
-        if let Some((block, place)) = place.filter(|_| !self.standing) {
-            if self.outs.get(block).is_some_and(|out| place >= out.len) {
-                // The interrupt has found nothing but the stop.
-                if idle {
-                    self.recover(block);
-                    return Work::More;
-                }
-                return Work::Later;
+        if let Some(block) = self.stop_at(place) {
+            if idle {
+                self.recover(block);
+                return Work::More;
             }
+            return Work::Later;
         }
         if self.pending {
             return if idle { Work::Start } else { Work::Later };

@@ -17,6 +17,12 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         (Queue::<S>::place((first & 0xffff) as usize), idle)
     }
 
+    /// Returns the block in whose stop a place is: the interrupt has found nothing else there.
+    pub(super) fn stop_at(&self, place: Option<(usize, usize)>) -> Option<usize> {
+        let (block, place) = place.filter(|_| !self.standing)?;
+        self.outs.get(block).is_some_and(|out| place >= out.len).then_some(block)
+    }
+
     /// Returns whether all axes have entered a block.
     pub(super) fn is_in(&self, block: usize) -> bool {
         self.queue.axes.iter().all(|queue| {

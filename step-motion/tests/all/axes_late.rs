@@ -21,6 +21,23 @@ fn a_new_target_counts_behind_a_stop() {
     assert_eq!((bench.axes.commanded(), bench.axes.target()), ([0, 100], [0, 100]));
 }
 
+/// Also one that is asked for in the stop after the last block, which stays as it is.
+#[test]
+fn the_target_is_where_a_stop_ends() {
+    let quick = |bench: &mut Bench| bench.axes.quick_stop([Limits::new(8000, 2_000_000).unwrap(); 2]);
+    let asks: [fn(&mut Bench); 3] = [|bench| bench.axes.stop(), quick, |bench| bench.axes.hold()];
+    for (ask, after) in asks.into_iter().flat_map(|ask| (0..160_000).step_by(1111).map(move |after| (ask, after))) {
+        let mut bench = Bench::running();
+        bench.until(300_000 + after, false);
+        ask(&mut bench);
+        let target = bench.axes.target();
+        bench.until(3_000_000, true);
+        assert!(bench.axes.is_at_rest() && bench.machine.compare.is_none());
+        let want = if target == [8000, 0] { target } else { bench.axes.commanded() };
+        assert_eq!((bench.axes.target(), target), (want, want), "{after}");
+    }
+}
+
 #[test]
 fn a_path_is_forgotten_behind_a_stop() {
     let quick = |bench: &mut Bench| bench.axes.quick_stop([Limits::new(8000, 80_000).unwrap(); 2]);
