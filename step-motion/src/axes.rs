@@ -231,7 +231,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Does the same as [`PathMover::push`].
     ///
     /// # Errors
-    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before [`poll`](Self::poll) has seen the interrupt confirm a [`halt`](Self::halt).
     pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.ready()?;
         if self.is_full() {
@@ -266,7 +266,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     /// Does the same as [`PathMover::move_to`].
     ///
     /// # Errors
-    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before [`poll`](Self::poll) has seen the interrupt confirm a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
         self.path.check(&target)?;
         self.move_freely(target, feed)
@@ -339,7 +339,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
     }
 
     /// Makes no further step from now on: the interrupt sees this without the queue. Lines are refused until the interrupt
-    /// has been called once more, which [`poll`](Self::poll) asks for; other requests count from then on.
+    /// has been called once more, which [`poll`](Self::poll) asks for, and `poll` has seen it; other requests count from then on.
     pub fn halt(&mut self) {
         if let Some(queue) = self.queue.axes.first() {
             self.halts.ask(&queue.halt);

@@ -286,7 +286,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Does the same as [`Mover::move_to`](crate::Mover::move_to).
     ///
     /// # Errors
-    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before [`poll`](Self::poll) has seen the interrupt confirm a [`halt`](Self::halt).
     pub fn move_to(&mut self, target: i64) -> Result<(), Error> {
         self.mover.check(target)?;
         self.move_freely(target)
@@ -295,7 +295,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     /// Does the same as [`Mover::run`](crate::Mover::run).
     ///
     /// # Errors
-    /// The same, and [`Error::Moving`] before the interrupt has confirmed a [`halt`](Self::halt).
+    /// The same, and [`Error::Moving`] before [`poll`](Self::poll) has seen the interrupt confirm a [`halt`](Self::halt).
     pub fn run(&mut self, direction: Direction, speed: u32) -> Result<(), Error> {
         self.run_to(direction, speed, self.mover.soft_end(direction))
     }
@@ -331,7 +331,7 @@ impl<'q, const N: usize> Axis<'q, N> {
     }
 
     /// Makes no further step from now on: the interrupt sees this without the queue. Moves are refused until the interrupt
-    /// has been called once more, which [`poll`](Self::poll) asks for; other requests count from then on.
+    /// has been called once more, which [`poll`](Self::poll) asks for, and `poll` has seen it; other requests count from then on.
     pub fn halt(&mut self) {
         self.look();
         if let Some(slot) = self.queue.slots.first() {
