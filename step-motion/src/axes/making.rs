@@ -17,7 +17,7 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     pub(super) fn begin(&mut self) -> Work {
         let reach = self.reach.checked_shr(self.shorter).unwrap_or(0);
         let shortest = (self.path.clock().hz() / SHORTEST).min(self.reach / 16).max(4);
-        if self.shorter > 0 && reach < shortest {
+        if reach < shortest {
             return self.give_up();
         }
         self.path.set_lead(self.reach / 4);

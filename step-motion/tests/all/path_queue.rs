@@ -342,7 +342,9 @@ fn refused_with_slots<const S: usize>(reach: u32, exact: bool) -> bool {
 
 #[test]
 fn few_slots_cost_exactness_and_never_a_step() {
-    // Halved until it is less than 4 ticks: 6000 becomes 5 and 2, 10,000 becomes 4.
+    // Halved until it is less than a 16th, 500 ticks or 4: 4 becomes 2, 20 becomes 5 and 2.
+    assert!(refused_with_slots::<9>(4, false) && refused_with_slots::<9>(20, false));
+    // 6000 becomes 375 and 187, 10,000 becomes 625 and 312.
     for reach in [6000, 10_000] {
         assert!(refused_with_slots::<9>(reach, false));
         assert!(refused_with_slots::<17>(reach, false));
