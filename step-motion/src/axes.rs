@@ -93,8 +93,9 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     /// The stop after each of the two blocks, with all later requests.
     stops: [PathMover<N, M>; 2],
     outs: [Out<N>; 2],
-    /// The interrupt is stopped, and the following motion begins there.
+    /// The interrupt is stopped, and the following motion begins there; and the tick of that since the last step.
     standing: bool,
+    stood: u64,
     /// The interrupt has not entered the last block yet.
     pending: bool,
     /// There is a request that the path does not follow yet.
@@ -170,6 +171,7 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
             finest: COARSE,
             outs: [out; 2],
             standing: true,
+            stood: 0,
             pending: false,
             asked: false,
             told: false,

@@ -50,18 +50,25 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Continues from the end of a block's stop, where the interrupt has stopped.
+    /// Continues from the end of a block's stop, where the interrupt has stopped. If it has made no step since it stood there before, the
+    /// motion goes on from the end of the block: it would otherwise begin anew after each block that is too short for a step.
     pub(super) fn recover(&mut self, block: usize) {
         let (Some(stop), Some(out)) = (self.stops.get_mut(block), self.outs.get(block).copied()) else { return };
-        stop.go_on_as(&self.path, out.end);
-        self.path.clone_from(stop);
-        self.end = out.end;
-        self.stand(out.dirs);
+        if !self.pending && stop.last_steps().into_iter().all(|last| last <= self.stood) {
+            let asked = self.asked || self.later;
+            self.stand(self.dirs);
+            self.asked = asked;
+        } else {
+            stop.go_on_as(&self.path, out.end);
+            self.path.clone_from(stop);
+            self.end = out.end;
+            self.stand(out.dirs);
+        }
         self.block = 1_usize.wrapping_sub(block);
     }
 
     fn stand(&mut self, dirs: [Direction; N]) {
-        self.dirs = dirs;
+        (self.dirs, self.stood) = (dirs, self.end);
         for (made, queue) in self.made.iter_mut().zip(&self.queue.axes) {
             *made = queue.made.load(Ordering::Acquire);
         }

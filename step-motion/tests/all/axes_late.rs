@@ -312,3 +312,29 @@ fn a_queue_that_is_too_short_says_so() {
     }
     assert_eq!([given_up::<65>(2000), given_up::<65>(10_000)], [false; 2]);
 }
+
+/// Slots that hold no more than an eighth of the reach, and DIR that waits for a quarter of it, while a block takes longer to make than it
+/// lasts: what has been waited for from a rest on is not waited for again, so the machine gets on.
+#[test]
+fn a_slow_background_gets_there() {
+    for slice in [1000, 10_000, 20_000, 40_000, 70_000, 150_000] {
+        let axes = [(9086, 6_406_634, Some(22_313_646_525), 1150), (2032, 1_165_948, None, 257)];
+        let axes = [axes[0], axes[1], (26_588, 114_995_103, Some(2_456_724_608_975), 3366)].map(|(v, a, j, scale)| {
+            let limits = Limits::new(v, a).unwrap();
+            let limits = j.map_or(limits, |j| limits.with_jerk(j).unwrap());
+            AxisSetup::new(limits, scale)
+        });
+        let axes = [axes[0].with_reversal_pause(3_277_490), axes[1].with_reversal_pause(3_277_490), axes[2]];
+        let path = Path::<3, 16>::new(Clock::NANOSECONDS, axes, 20).unwrap();
+        let queue: &'static AxesQueue<3, 65> = Box::leak(Box::default());
+        let (mut axes, timer) = Axes::new(queue, path);
+        let mut machine = Machine::<_, 3>::new(timer);
+        axes.push([128, -12, 426], u32::MAX).unwrap();
+        while !axes.is_at_rest() {
+            machine.until(machine.now + slice);
+            machine.slice(&mut axes);
+            assert!(machine.now < 3_000_000_000, "{slice}: {:?}", axes.commanded());
+        }
+        assert_eq!(axes.commanded(), [128, -12, 426], "{slice}");
+    }
+}
