@@ -1,6 +1,7 @@
 //! The background half of a motion: it plans, and hands segments to the interrupt.
 
 mod drafting;
+mod standing;
 
 use core::sync::atomic::Ordering;
 
@@ -33,7 +34,8 @@ pub enum Work {
     /// The axis is at rest at its target.
     Rest,
     /// The stop after the queued motion needs more slots than the [`Queue`] has. An axis comes to rest, and goes on at half of its
-    /// greatest speed from then on, until it gets [other limits](Axis::set_limits); a path comes to rest, and forgets its lines.
+    /// greatest speed from then on, until it gets [other limits](Axis::set_limits); if that is less than a step a second, it forgets its
+    /// target. A path comes to rest, and forgets its lines.
     TooFewSlots,
 }
 
@@ -87,6 +89,8 @@ pub struct Axis<'q, const N: usize> {
     mover: Runner,
     end: Writer,
     last: usize,
+    /// When the interrupt stood for the last time, or before the present motion.
+    stood: u64,
     news: News,
     /// The block being made, or linked, to follow: the slot that it is joined to, its plan, and the request in it.
     stage: Stage,
@@ -211,6 +215,7 @@ impl<'q, const N: usize> Axis<'q, N> {
             mover,
             end: Writer::new(0, Direction::Forward),
             last: 0,
+            stood: 0,
             news: News::None,
             stage: Stage::Idle,
             block: 0,
@@ -338,9 +343,10 @@ impl<'q, const N: usize> Axis<'q, N> {
             slot.next.store(NONE, Ordering::Relaxed);
         }
         self.halts.ask(&self.queue.halt);
+        (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
+        self.stay();
         self.mover.ask_halt(self.was_moving());
         self.seen = UNSEEN;
-        (self.stop, self.stage, self.news) = (None, Stage::Idle, News::None);
     }
 
     /// Does the same as [`Mover::set_commanded`](crate::Mover::set_commanded).

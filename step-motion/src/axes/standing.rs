@@ -53,8 +53,9 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
     /// Continues from the end of a block's stop, where the interrupt has stopped. If it has made no step since it stood there before, the
     /// motion goes on from the end of the block: it would otherwise begin anew after each block that is too short for a step.
     pub(super) fn recover(&mut self, block: usize) {
+        let goes_on = self.goes_on() && !self.pending;
         let (Some(stop), Some(out)) = (self.stops.get_mut(block), self.outs.get(block).copied()) else { return };
-        if !self.pending && stop.last_steps().into_iter().all(|last| last <= self.stood) {
+        if goes_on && stop.last_steps().into_iter().all(|last| last <= self.stood) {
             let asked = self.asked || self.later;
             self.stand(self.dirs);
             self.asked = asked;

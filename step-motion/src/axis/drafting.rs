@@ -6,7 +6,7 @@ use core::sync::atomic::Ordering;
 use crate::cutter::{Cut, Demand};
 use crate::mover::cutting::News;
 use crate::mover::planning::Begin;
-use crate::queue::{IDLE, Queue};
+use crate::queue::Queue;
 use crate::writer::{TICK, Writer, tick};
 
 use super::{Axis, COARSE, COARSEST, Mark, Out, Stage, Tail, Work, coarser};
@@ -87,6 +87,9 @@ impl<const N: usize> Axis<'_, N> {
     pub(super) fn asked(&mut self, news: News) {
         self.seen = UNSEEN;
         self.look();
+        if !self.mover.has_work() {
+            self.stay();
+        }
         if self.is_at_rest() {
             return;
         }
@@ -103,44 +106,8 @@ impl<const N: usize> Axis<'_, N> {
         self.told != News::None && (self.work.requests().brakes() || !self.requests().brakes())
     }
 
-    /// Returns where the interrupt is: the block and the place in it, or `None` if it is stopped; and the slot.
-    pub(super) fn current(&self) -> (Option<(usize, usize)>, usize) {
-        let current = self.queue.current.load(Ordering::Acquire);
-        let slot = (current & 0xffff) as usize;
-        (Queue::<N>::place(slot).filter(|_| current & IDLE == 0), slot)
-    }
-
-    /// Returns whether a slot belongs to the block that was linked last.
-    pub(super) fn is_in(&self, slot: usize) -> bool {
-        Queue::<N>::place(slot).is_some_and(|(block, _)| block == self.block)
-    }
-
-    /// Reads where the interrupt is. Returns whether the interrupt is in a stop that was not requested.
-    pub(super) fn look(&mut self) -> bool {
-        let made = self.queue.made.load(Ordering::Acquire);
-        #[expect(clippy::cast_possible_wrap, reason = "a difference in two's complement")]
-        let since = made.wrapping_sub(self.made) as i32;
-        (self.position, self.made) = (self.position.wrapping_add(since.into()), made);
-        let (running, slot) = self.current();
-        let Some((block, place)) = Queue::<N>::place(slot) else { return false };
-        if self.stage == Stage::Linked {
-            if block == self.block {
-                self.go_over();
-            } else if slot > self.joint {
-                self.miss();
-            }
-        }
-        if self.out.get(block).is_some_and(|out| place >= out.len) {
-            if running.is_some() {
-                return true;
-            }
-            self.recover(block, slot);
-        }
-        false
-    }
-
     /// Takes over the linked block: the interrupt has entered it.
-    fn go_over(&mut self) {
+    pub(super) fn go_over(&mut self) {
         self.work.wish_as(&self.mover);
         self.mover.clone_from(&self.work);
         let len = self.out.get(self.block).map_or(0, |out| out.len);
@@ -150,44 +117,15 @@ impl<const N: usize> Axis<'_, N> {
     }
 
     /// Discards a block that the interrupt has missed, to be made again further ahead.
-    fn miss(&mut self) {
+    pub(super) fn miss(&mut self) {
         self.missed = self.missed.saturating_add(1);
         self.forget();
     }
 
     /// Discards the block; its requests still have to be carried out.
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.news = self.news.max(self.told);
         (self.stage, self.told, self.stop) = (Stage::Idle, News::None, None);
-    }
-
-    /// Continues from the end of a block's stop, where the interrupt has stopped.
-    fn recover(&mut self, block: usize, slot: usize) {
-        self.forget();
-        let Some(out) = self.out.get_mut(block) else { return };
-        // The slot at which it has stopped now counts as one before the stop.
-        out.len = usize::MAX;
-        (self.end, self.last) = (out.rest, slot);
-        self.mover.rest_at(out.position, tick(self.end.end));
-    }
-
-    /// Returns whether a halt stops a motion, as far as the interrupt has been seen.
-    pub(super) fn was_moving(&self) -> bool {
-        let now = tick(self.end.end).max(self.mover.free());
-        self.position != self.mover.commanded() || !self.mover.is_at_rest(now)
-    }
-
-    /// Confirms a halt once the interrupt has stopped for it.
-    fn confirm(&mut self) -> Work {
-        let Some(dir) = self.halts.dir(self.queue.current.load(Ordering::Acquire)) else { return Work::Start };
-        self.look();
-        let now = tick(self.end.end).max(self.mover.free()).saturating_add(1);
-        self.mover.halt_at(self.position, now, self.was_moving());
-        (self.last, self.missed, self.news, self.told) = (0, 0, News::None, News::None);
-        self.end = Writer::new(i128::from(now) << 32, dir);
-        self.halts.confirmed(&self.queue.halt);
-        self.lost = false;
-        Work::More
     }
 
     /// Longest duration of a segment. A block is joined at least half of that ahead of the interrupt.
@@ -210,6 +148,9 @@ impl<const N: usize> Axis<'_, N> {
         self.forget();
         self.told = core::mem::replace(&mut self.news, News::None);
         let (running, _) = self.current();
+        if running.is_none() {
+            self.stood = tick(self.end.end);
+        }
         self.work.clone_from(&self.mover);
         (self.joint, self.writer) = (self.last, Writer { len: 0, ..self.end });
         if let Some((block, place)) = running.filter(|_| self.told != News::None) {
@@ -236,6 +177,7 @@ impl<const N: usize> Axis<'_, N> {
         let brakes = self.out.get(1_usize.wrapping_sub(self.block)).is_some_and(|out| out.brakes);
         let ends_here = self.joint == self.last && (running.is_none() || !brakes);
         if ends_here && !self.work.has_steps() {
+            self.stay();
             (self.stage, self.told) = (Stage::Idle, News::None);
             return false;
         }

@@ -63,7 +63,8 @@ impl Runner {
         self.has_work().then(|| self.from(self.phases.end()))
     }
 
-    pub(super) fn has_work(&self) -> bool {
+    /// Returns whether the axis is to go on to its aim.
+    pub(crate) fn has_work(&self) -> bool {
         !self.requests.brakes()
             && match self.aim {
                 Aim::Rest => false,

@@ -91,6 +91,67 @@ fn a_stop_after_a_stop_is_a_rest() {
     }
 }
 
+/// A background that comes 1.5 to 100 times too seldom, in blocks of 8 reaches, where the first step takes 5.6 ms, 220 ms or 144 ms: what has
+/// been waited for from a rest on is not waited for again. Each step is as late as the background, and no more.
+#[test]
+fn a_seldom_background_gets_there() {
+    let slow = Limits::new(20, 20).unwrap();
+    let fast = Limits::new(14_471, 537_890).unwrap().with_jerk(17_431_354).unwrap();
+    let jerky = Limits::new(100, 100).unwrap().with_jerk(500).unwrap();
+    let all = [
+        (fast, 210, 300),
+        (fast, 210, 1000),
+        (fast, 400, 500),
+        (slow, 10_000, 11_000),
+        (slow, 10_000, 30_000),
+        (jerky, 10_000, 15_000),
+    ];
+    for (limits, reach, every) in all {
+        let queue: &'static Queue<129> = Box::leak(Box::default());
+        let (axis, timer) = Axis::new(queue, Clock::MICROSECONDS, limits).unwrap();
+        let mut bench = Bench { axis: axis.with_reach(reach), machine: machine::Machine::new(timer) };
+        for to in [20, 17] {
+            bench.axis.move_to(to).unwrap();
+            bench.until(every, bench.machine.now + 20_000_000);
+            assert_eq!((bench.at(), bench.axis.is_at_rest()), (to, true), "{limits}, {reach} us, every {every} us");
+        }
+    }
+}
+
+/// The same axis is at rest there as soon as a stop or a hold is asked for, and a halt stops no motion. A way to the other side, and one to
+/// where it is, are done.
+#[test]
+fn an_axis_that_stands_before_its_first_step_is_at_rest() {
+    let asks: [(fn(&mut Axis<'static, 129>), i64, bool); 7] = [
+        (|axis| axis.stop(), 0, true),
+        (|axis| axis.hold(), 0, true),
+        (|axis| axis.set_override(0), 0, true),
+        (|axis| axis.quick_stop(Limits::new(20, 40).unwrap()), 0, true),
+        (|axis| axis.halt(), 0, false),
+        (|axis| axis.move_to(-3).unwrap(), -3, false),
+        (|axis| axis.move_to(0).unwrap(), 0, false),
+    ];
+    for ((ask, to, at_once), polls) in asks.into_iter().flat_map(|ask| (0..40).map(move |polls| (ask, polls))) {
+        let mut bench = Bench::<129>::new(20, 20, 10_000);
+        bench.axis.move_to(20).unwrap();
+        bench.until(5000, 50_000);
+        bench.machine.drain();
+        for _ in 0..polls {
+            let _: Work = bench.axis.poll();
+        }
+        ask(&mut bench.axis);
+        // Until the next block has been linked.
+        assert!(!at_once || polls > 30 || bench.axis.is_at_rest(), "{to} after {polls}");
+        bench.until(5000, 10_000_000);
+        assert_eq!((bench.at(), bench.axis.is_at_rest(), bench.axis.is_halted()), (to, true, false), "{polls}");
+        bench.axis.resume();
+        bench.axis.set_override(100);
+        bench.axis.move_to(2).unwrap();
+        bench.until(5000, 20_000_000);
+        assert_eq!((bench.at(), bench.axis.is_at_rest()), (2, true), "{to} after {polls}");
+    }
+}
+
 /// In the pause before a way back too, where such a stop has nothing to do: what is asked for then is done at once.
 #[test]
 fn a_stop_in_a_pause_is_a_rest() {
