@@ -26,7 +26,7 @@ pub struct Reloads<I> {
 
 impl<I: Iterator<Item = u64>> Reloads<I> {
     /// Creates the reloads from the ticks of steps, counted from the start; `longest` is the maximum of the timer, 65535
-    /// for 16 bits (0 counts as 1).
+    /// for 16 bits (0 counts as 1). A step that is not due after the one before, or at tick 0, comes a tick later.
     pub fn new(ticks: I, longest: u32) -> Self {
         Self { ticks, longest: longest.max(1), last: 0, next: None }
     }
@@ -40,10 +40,10 @@ impl<I: Iterator<Item = u64>> Iterator for Reloads<I> {
             Some(next) => next,
             None => self.ticks.next()?,
         };
-        let wait = next.saturating_sub(self.last);
+        let wait = next.saturating_sub(self.last).max(1);
         match u32::try_from(wait) {
             Ok(ticks) if ticks <= self.longest => {
-                self.last = next;
+                self.last = self.last.saturating_add(wait);
                 Some(Reload { ticks, step: true })
             }
             _ => {
@@ -80,6 +80,14 @@ mod tests {
         // At 61 kHz a step lasts 16.39 ticks: 16 and 17 take turns.
         let cruise = &ticks[20_000..21_000];
         assert!((cruise[999] - cruise[0]).abs_diff(999 * 1_000_000 / 61_000) <= 1);
+    }
+
+    #[test]
+    fn no_reload_is_0() {
+        let reloads =
+            |ticks: &[u64]| Reloads::new(ticks.iter().copied(), 10).map(|reload| reload.ticks).collect::<Vec<_>>();
+        assert_eq!(reloads(&[0, 5]), [1, 4]);
+        assert_eq!(reloads(&[5, 5, 3, 20]), [5, 1, 1, 10, 3]);
     }
 
     #[test]
