@@ -84,6 +84,8 @@ const ANY: usize = usize::MAX;
 
 const SUBSET: &str = "G0 to G4, G17 to G21, G28, G30, G40, G43, G49, G53 to G59, G61, G64, G80, G90 to G92, G94";
 
+const ARCS: &str = "I, J, K and R belong to G2 and G3";
+
 /// Refuses a second word of a modal group in a line.
 fn only_one(groups: &mut [Option<f64>], group: usize, Word { letter, value }: Word) -> Result<(), String> {
     match groups.get_mut(group).and_then(|place| place.replace(value)) {
@@ -223,7 +225,13 @@ impl State {
     /// Executes a motion, or what takes its place.
     fn act(&mut self, once: Option<Once>, numbers: &Numbers, items: &mut VecDeque<Item>) -> Result<(), String> {
         let moves = numbers.axes.iter().any(Option::is_some);
+        if numbers.bend() && !matches!(once, None | Some(Once::Machine)) {
+            return Err(ARCS.to_owned());
+        }
         match once {
+            Some(Once::Keep(_) | Once::Unshift) if moves => {
+                return Err("X, Y and Z do not belong to G28.1, G30.1, G92.1 and G92.2".to_owned());
+            }
             Some(Once::Dwell) => {
                 let seconds = numbers.p.ok_or("G4 needs P, in seconds")?;
                 if moves || !(0.0..=86_400.0).contains(&seconds) {
@@ -263,7 +271,7 @@ impl State {
             }
             Some(Once::Unshift) => self.shift = [0.0; AXES],
             None | Some(Once::Machine) => {
-                if moves || numbers.center.iter().any(Option::is_some) || numbers.radius.is_some() {
+                if moves || numbers.bend() {
                     return self.run(numbers, once.is_some(), items);
                 }
             }
@@ -302,8 +310,8 @@ impl State {
             _ => return Err("no feed yet: add F, in mm/min".to_owned()),
         };
         let Motion::Arc(turning) = self.motion else {
-            if numbers.center.iter().any(Option::is_some) || numbers.radius.is_some() {
-                return Err("I, J, K and R belong to G2 and G3".to_owned());
+            if numbers.bend() {
+                return Err(ARCS.to_owned());
             }
             self.go(to, feed, items);
             return Ok(());

@@ -14,6 +14,11 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
+    /// Returns whether there are words of an arc.
+    pub(super) fn bend(&self) -> bool {
+        self.center.iter().any(Option::is_some) || self.radius.is_some()
+    }
+
     pub(super) fn add(&mut self, word: Word) -> Result<(), String> {
         let place = match word.letter {
             'X' => &mut self.axes[0],
