@@ -73,7 +73,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         (place, before): (Real, Real),
         how: (Option<Bounds>, bool),
     ) -> Option<(Course, Bounds)> {
-        let (run, own) = match self.stop(at, start, (place, before), how, false)? {
+        let (run, own) = match self.stop(at, start, (place, before), how, None)? {
             Ok(course) => return Some(course),
             Err(run) => run,
         };
@@ -167,23 +167,26 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if bounds.v > most && reached > most.squared() { most } else { Real::HUGE }
     }
 
-    /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with `any`, lines that may
-    /// allow other accelerations, within the least of all of them. If it does not fit, returns the longest run that there is,
-    /// with the limits on it.
+    /// Plans a stop on one curve, over as many lines as it takes: lines that allow about the same or, with limits `any`, lines that may
+    /// allow other accelerations, within the least of all of them but not within less than those. If it does not fit, returns the longest
+    /// run that there is, with the limits on it.
     pub(crate) fn stop(
         &self,
         at: usize,
         start: Motion,
         (place, before): (Real, Real),
         how: (Option<Bounds>, bool),
-        any: bool,
+        any: Option<Bounds>,
     ) -> Option<Result<(Course, Bounds), (Run, Bounds)>> {
-        let kind = Kind { any, ..self.under_way(at, (start, before), (None, how.0))? };
+        let kind = Kind { any: any.is_some(), ..self.under_way(at, (start, before), (None, how.0))? };
         // With the limits of no more lines than the stop takes.
         let mut run = self.single(at, kind)?;
         let mut own = run.bounds;
         for _ in 0..M {
             own = Self::own(&run, how);
+            if any.is_some_and(|least| least.allows_more(&own)) {
+                break;
+            }
             let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
             let way = (place + curve.way()) - before;
             if curve.way() <= ((run.length + before) - place) + SLACK {

@@ -105,8 +105,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         // At each joint it would have acceleration 0; on one curve it may be shorter. Within lower limits, those of a later line, it would
         // be faster at first.
         let Some(plain) = plain else { return Some(stop) };
-        let once = self.path.stop(0, motion, from, how, true).and_then(Result::ok);
-        let once = once.filter(|(_, bounds)| !plain.allows_more(bounds)).map(planned);
+        let once = self.path.stop(0, motion, from, how, Some(plain)).and_then(Result::ok).map(planned);
         once.filter(|once| once.end < stop.end).or(Some(stop))
     }
 

@@ -161,7 +161,7 @@ proptest! {
         let most: f64 = 2.0 * first.j.unwrap() * room;
         let a = a * most.sqrt().min(first.a);
         let at = [place, -place].map(|x: f64| real(x.max(0.0)));
-        let Some(stop) = path.stop(0, motion([v, a]), (at[0], at[1]), (None, false), any) else { return Ok(()) };
+        let Some(stop) = path.stop(0, motion([v, a]), (at[0], at[1]), (None, false), any.then_some(Bounds::NONE)) else { return Ok(()) };
         // The longest run that the motion may take, whatever was asked for as its speed.
         let alike = |a: f64, b: f64| a.max(b) / a.min(b) < 1.499_999;
         let Ok((course, bounds)) = stop else {
@@ -267,8 +267,9 @@ fn a_stop_leads_over_no_corner_that_is_too_slow() {
     let path = path(&[([1000, 10, 200], 1000), ([1000, 200, 200], 1000)]);
     let corner = float(path.line(1).unwrap().corner) * second();
     assert!((100.0..600.0).contains(&corner), "{corner}");
-    let stops =
-        |v: f64| path.stop(0, motion([v, 250.0]), (real(1000.0), Real::ZERO), (None, false), true).unwrap().is_ok();
+    let stops = |v: f64| {
+        path.stop(0, motion([v, 250.0]), (real(1000.0), Real::ZERO), (None, false), Some(Bounds::NONE)).unwrap().is_ok()
+    };
     assert_eq!([corner - 7.0, corner - 5.0].map(stops), [true, false]);
 }
 
@@ -281,7 +282,7 @@ fn steady(v: f64) -> Motion {
 fn a_stop_right_at_the_end_of_a_line() {
     let path = four([[10, 10]; 4]);
     let stop =
-        |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), false).unwrap().unwrap().0;
+        |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), None).unwrap().unwrap().0;
     let (way, ..) = outcome(&stop(0.0));
     let (length, slack) = (float(path.line(0).unwrap().length), 16_f64.exp2().recip());
     for (short, more, whole) in [

@@ -61,7 +61,7 @@ fn behind_the_joint_the_line_before_does_not_count() {
 fn a_quick_stop_has_its_own_limits_on_what_is_left_of_the_line_before() {
     let mut path = path();
     let way = |path: &Path<2, 4>| {
-        let stop = path.stop(0, steady(90.0), (Real::ZERO, real(BEFORE)), (None, false), false);
+        let stop = path.stop(0, steady(90.0), (Real::ZERO, real(BEFORE)), (None, false), None);
         outcome(&stop.unwrap().unwrap().0).0
     };
     let quick = Most { v: 100.0, a: 8000.0, j: Some(800_000.0) };

@@ -184,7 +184,7 @@ fn a_stop_that_fits_takes_no_limits_of_the_next_line() {
     let way = change([4500.0, 0.0], 0.0, most).1;
     for (before, room) in [(0.0, 1e-3), (0.4, 1e-3), (0.4, 0.7)] {
         let from = (real(length + before - way - room), real(before));
-        let stop = path.stop(0, steady(4500.0), from, (None, false), false).unwrap();
+        let stop = path.stop(0, steady(4500.0), from, (None, false), None).unwrap();
         let (course, bounds) = stop.unwrap();
         let (got, _, exit) = outcome(&course);
         assert!(near(got, way) && exit == 0.0 && course.more == 0, "{got} for {way}, {exit}");

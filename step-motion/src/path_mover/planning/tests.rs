@@ -149,7 +149,7 @@ fn a_quick_stop_is_the_shorter_of_two() {
             let (Some((motion, start)), how) = (mover.here(now), (mover.bounds, false)) else { continue };
             let from = (start.place, start.before);
             let Some((course, _)) = mover.path.brake(0, motion, from, how) else { continue };
-            let once = mover.path.stop(0, motion, from, how, true).and_then(Result::ok);
+            let once = mover.path.stop(0, motion, from, how, Some(Bounds::NONE)).and_then(Result::ok);
             let (Some((once, _)), false) = (once, course.exit.is_zero()) else { continue };
             let (joints, time) = mover.path.end_of_stop(course.more + 1, course.exit);
             let once = mover.path.locate(0, (from.0 + once.curve.way()) - from.1, once.more);
