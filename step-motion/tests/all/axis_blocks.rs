@@ -122,7 +122,8 @@ fn a_seldom_background_gets_there() {
 /// where it is, are done.
 #[test]
 fn an_axis_that_stands_before_its_first_step_is_at_rest() {
-    let asks: [(fn(&mut Axis<'static, 129>), i64, bool); 7] = [
+    type Ask = fn(&mut Axis<'static, 129>);
+    let asks: [(Ask, i64, bool); 7] = [
         (|axis| axis.stop(), 0, true),
         (|axis| axis.hold(), 0, true),
         (|axis| axis.set_override(0), 0, true),

@@ -218,13 +218,14 @@ fn a_quick_stop_is_not_faster_where_it_begins() {
     let (now, mut quick) = (1_047_716, plain.clone());
     plain.stop(now);
     quick.quick_stop(axes, now);
-    let [plain, quick] = [plain, quick].map(|mut mover| {
+    let ticks = |mover: &mut PathMover<2, 16>| {
         let mut ticks: [Vec<u64>; 2] = Default::default();
         while let Some(pulse) = mover.pulse() {
             ticks[usize::from(pulse.axis)].push(pulse.tick);
         }
         ticks
-    });
+    };
+    let [plain, quick] = [ticks(&mut plain), ticks(&mut quick)];
     for (plain, quick) in plain.iter().zip(&quick) {
         assert!(quick.len() <= plain.len());
         for (plain, quick) in plain.windows(2).zip(quick.windows(2)) {
