@@ -53,7 +53,7 @@ impl<const N: usize> Axis<'_, N> {
         // The slot at which it has stopped now counts as one before the stop.
         (out.len, self.last) = (usize::MAX, slot);
         let moved = out.position != self.mover.commanded() || self.mover.free() > self.stood.saturating_add(1);
-        if moved || !self.mover.has_steps() || !self.mover.has_work() {
+        if moved || !self.mover.has_steps() {
             self.end = out.rest;
             self.mover.rest_at(out.position, tick(self.end.end));
         }
