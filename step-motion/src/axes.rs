@@ -93,7 +93,7 @@ pub struct Axes<'q, const N: usize, const M: usize, const S: usize> {
     /// The stop after each of the two blocks, with all later requests.
     stops: [PathMover<N, M>; 2],
     outs: [Out<N>; 2],
-    /// The interrupt is stopped, and the following motion begins there; and the tick of that since the last step.
+    /// The interrupt is stopped, and the following motion begins there; and the tick at which it last stood.
     standing: bool,
     stood: u64,
     /// The interrupt has not entered the last block yet.

@@ -89,7 +89,7 @@ pub struct Axis<'q, const N: usize> {
     mover: Runner,
     end: Writer,
     last: usize,
-    /// When the interrupt stood for the last time, or before the present motion.
+    /// The tick at which the interrupt last stood.
     stood: u64,
     news: News,
     /// The block being made, or linked, to follow: the slot that it is joined to, its plan, and the request in it.

@@ -30,7 +30,7 @@ pub(crate) struct Steps {
     deviation: u32,
     /// How far corners may be rounded at present, in um.
     present: u32,
-    /// How far off the chords of an arc may be: where they meet, they are rounded to half a step of the coarsest axis.
+    /// How far off the chords of an arc may be where they meet, in um: they are rounded there to half a step of the coarsest axis.
     chord: u32,
     /// A chord of the present arc has steps: what follows begins at a joint of the arc.
     bent: bool,

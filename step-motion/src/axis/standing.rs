@@ -47,7 +47,7 @@ impl<const N: usize> Axis<'_, N> {
 
     /// Continues from the end of a block's stop, where the interrupt has stopped. If it has made no step since it stood before, the motion
     /// goes on from the end of the block: it would otherwise begin anew after each block that is too short for a step.
-    pub(super) fn recover(&mut self, block: usize, slot: usize) {
+    fn recover(&mut self, block: usize, slot: usize) {
         self.forget();
         let Some(out) = self.out.get_mut(block) else { return };
         // The slot at which it has stopped now counts as one before the stop.
