@@ -8,6 +8,7 @@
 // Not modelled: joined FIFOs, the second core, misses of the flash cache, contention on the bus. Claim no processor times.
 import { readFileSync } from 'node:fs';
 import { RP2040, ConsoleLogger, LogLevel } from 'rp2040js';
+import { mend } from './processor.mjs';
 
 const FLASH = 0x10000000;
 const BOOT2_RAM = 0x20041f00;
@@ -140,6 +141,7 @@ export class Chip {
     this.typing = 0; // clocks until the next one is there
     const chip = (this.chip = new RP2040());
     chip.logger = new ConsoleLogger(LogLevel.Error, true);
+    mend(chip.core);
     load(chip.flash, path);
     if (before) {
       chip.sram.set(before.chip.sram);
