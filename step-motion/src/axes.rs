@@ -27,8 +27,8 @@ use crate::writer::{LONGEST, Writer};
 /// step follows it. Each block is followed by a stop along the path: if [`poll`](Self::poll) is not called in time, the machine comes to
 /// rest on its lines, and continues from there at the next call. Each step of that stop is exact to a sixteenth of an interval, or
 /// [as exact as all others](Self::with_exact_stops); every other step is exact to 3/4 of a tick, or 25 ns if that is more. If a block
-/// ends within two ticks of a step, or DIR changes, a step may be a tick or two late. DIR of an axis changes half of its reversal
-/// pause before the step, or a quarter of the reach if that is less.
+/// ends within two ticks of a step, or DIR changes, a step may be a tick or two late. DIR of an axis changes at least half of its
+/// reversal pause after a step and before the next one, or a quarter of the reach if that is less.
 ///
 /// A [`move_to`](Self::move_to), or a quick stop within other limits, takes the place of a block that is still being made: do not ask for
 /// them faster than blocks are made.

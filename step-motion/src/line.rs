@@ -54,13 +54,15 @@ impl<const N: usize> Line<N> {
         self.steps.map(|steps| phases::steps(self.place(steps, place)).min(steps.unsigned_abs()))
     }
 
-    /// Returns the steps that each axis makes on it before the path leaves it; none that is 0 there.
-    pub(super) fn made(&self) -> [i32; N] {
-        let mut made = self.steps;
-        for (made, _) in made.iter_mut().zip(self.ends).filter(|(_, end)| *end == 0) {
-            *made = 0;
+    /// Returns the last direction of each axis where the path leaves the line, from those at its start. It is unknown if the axis was to
+    /// turn and has not made a step, because DIR may have changed for that.
+    pub(super) fn ways_after(&self, mut ways: [Option<Direction>; N]) -> [Option<Direction>; N] {
+        for ((way, steps), end) in ways.iter_mut().zip(self.steps).zip(self.ends).filter(|((_, steps), _)| *steps != 0)
+        {
+            let own = Some(Direction::of(steps.into()));
+            *way = own.filter(|_| end > 0 || *way == own);
         }
-        made
+        ways
     }
 
     /// Returns the position of an axis at a place on the line, in 2^-32 steps.
@@ -285,5 +287,32 @@ impl<const N: usize> Iterator for LinePulses<N> {
         let first = self.first()?;
         self.advance(first.1);
         Some(self.pulse(first))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use servowire_core::Direction::{Forward, Reverse};
+
+    /// Steps of the line, those made before a stop, and the last direction before it and after it.
+    #[test]
+    fn an_axis_that_was_to_turn_may_have_turned() {
+        let bounds = Bounds::new(Real::ONE, Real::ONE, None);
+        for (steps, end, before, after) in [
+            (5, 3, Some(Reverse), Some(Forward)),
+            (5, 0, Some(Reverse), None),
+            (-5, 0, Some(Forward), None),
+            (5, 0, Some(Forward), Some(Forward)),
+            (-5, 0, Some(Reverse), Some(Reverse)),
+            (5, 0, None, None),
+            (-5, 1, None, Some(Reverse)),
+            (0, 0, Some(Forward), Some(Forward)),
+            (0, 0, None, None),
+        ] {
+            let line = Line::new([steps], Real::new(5), bounds, (Real::ONE, Real::ZERO));
+            let line = Line { ends: [end], ..line };
+            assert_eq!(line.ways_after([before]), [after], "{steps} {end} {before:?}");
+        }
     }
 }

@@ -382,7 +382,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     pub(super) fn pass(&mut self) {
         if let Some(place) = self.lines.get_mut(self.first) {
             if let Some(line) = place.take() {
-                gone_along(&mut self.gone, &line.made());
+                self.gone = line.ways_after(self.gone);
                 self.passed = Some(Passed::new(&line));
             }
         }

@@ -94,12 +94,9 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
         Work::More
     }
 
-    /// Returns whether a step falls into the tick in which the block is to end, or into the next one, or so soon after it that
-    /// DIR would change too late.
+    /// Returns whether a step falls into the tick in which the block is to end, or into the next one.
     pub(super) fn waits_for_a_step(&mut self) -> bool {
-        let dirs = self.writers.map(|writer| writer.dir);
         let next = self.work.due().filter(|due| *due <= self.until.saturating_add(1));
-        let next = next.or_else(|| self.work.turns_before(self.until, dirs));
         if let Some(due) = next.filter(|_| self.put_off < PUT_OFF) {
             (self.until, self.quiet) = (due.saturating_add(1), 0);
             self.put_off = self.put_off.saturating_add(1);
@@ -109,11 +106,26 @@ impl<const N: usize, const M: usize, const S: usize> Axes<'_, N, M, S> {
 
     /// Ends the block at the same tick for all axes.
     pub(super) fn join(&mut self) {
+        self.put_turns();
         self.until = self.put_joint(self.until, Joint::Block);
         self.joint = self.writers;
         self.stage = Stage::Brake;
         if let (Some(out), Some(first)) = (self.outs.get_mut(self.block), self.writers.first()) {
             out.len = first.len;
+        }
+    }
+
+    /// Changes DIR of the axes that are to turn: a request may make the next step as soon as the block and the pause are over. Without a
+    /// pause the steps are as far apart as at the greatest speed.
+    fn put_turns(&mut self) {
+        let (before, hz) = (i128::from(self.until) << 32, self.work.clock().hz());
+        let own = self.writers.iter_mut().zip(&self.queue.axes).zip(self.work.axes());
+        for (at, ((writer, queue), axis)) in own.enumerate() {
+            if let Some(direction) = self.work.direction(at) {
+                let apart = axis.reversal_pause.max(hz.checked_div(axis.limits.speed()).unwrap_or(0));
+                let next = writer.last.saturating_add(i128::from(apart) << 32).max(before);
+                writer.put_turn((queue, self.block), next, direction, before);
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Where a stop cuts a path off.
 
-use super::{Path, gone_along};
+use super::Path;
 use crate::limits::Bounds;
 use crate::line::Line;
 use crate::real::Real;
@@ -95,7 +95,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         // Lines that were cut off turn no axis.
         let mut ways = self.gone;
         for line in (0..self.len).filter_map(|at| self.line(at)) {
-            gone_along(&mut ways, &line.made());
+            ways = line.ways_after(ways);
         }
         self.ways = ways;
     }

@@ -74,16 +74,10 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.free.map(|free| free.saturating_sub(1))
     }
 
-    /// The tick of a step before which an axis changes DIR, if its lead begins within two ticks after `now`.
-    pub(crate) fn turns_before(&self, now: u64, dirs: [Direction; N]) -> Option<u64> {
+    /// The direction of the next step of an axis, if that is on the present line.
+    pub(crate) fn direction(&self, at: usize) -> Option<Direction> {
         let line = self.line.as_ref()?;
-        let turns = line.due.iter().zip(line.directions).zip(dirs).zip(self.path.axes());
-        let late = turns.filter_map(|(((due, direction), dir), axis)| {
-            let due = due.filter(|_| dir != direction)?;
-            let pause = u64::from((axis.reversal_pause / 2).min(self.lead));
-            (due <= now.saturating_add(pause).saturating_add(2)).then_some(due)
-        });
-        late.max()
+        line.due.get(at)?.and(line.directions.get(at).copied())
     }
 
     /// The tick at which the present plan ends.

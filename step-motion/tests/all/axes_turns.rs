@@ -2,6 +2,7 @@
 
 use step_motion::{Axes, AxesQueue, AxisSetup, Clock, Limits, Path, Work};
 
+use crate::halts::Dice;
 use crate::machine::Machine;
 
 const SLOTS: usize = 513;
@@ -192,4 +193,92 @@ fn a_quick_stop_without_a_step_of_its_own() {
             assert_eq!(axes.commanded(), [0]);
         }
     }
+}
+
+/// An override, a hold, a resume, a stop and a way to somewhere else, whenever they come: before the first step of a way back too, which
+/// may be sooner then.
+#[test]
+fn dir_is_in_time_whatever_is_asked_for() {
+    for (seed, pause) in (0..400).flat_map(|seed| [40, 300, 900, 20_000].map(|pause| (seed, pause))) {
+        let mut dice = Dice(seed << 20 | u64::from(pause));
+        let limits = Limits::new(8000, 80_000 << dice.below(8)).unwrap();
+        let axis = AxisSetup::new(limits, 80_000).with_reversal_pause(pause);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (mut axes, timer) = Axes::new(&queue, path);
+        let mut machine = Machine::<_, 2>::new(timer);
+        for _ in 0..60 {
+            let mut place = || i64::try_from(dice.below(80)).unwrap() - 40;
+            let to = [place(), place()];
+            match dice.below(9) {
+                0 => axes.hold(),
+                1 => axes.set_override(dice.below(200) as u16),
+                2 => axes.stop(),
+                3 => _ = axes.move_to(to, 100_000),
+                4 | 5 => axes.resume(),
+                _ => _ = axes.push(to, 1000 << dice.below(8)),
+            }
+            let until = machine.now + dice.below(40_000);
+            machine.run(&mut axes, 2500, until);
+            machine.until(until);
+        }
+        let half = u64::from(pause / 2).min(2500);
+        for (before, after) in &machine.turns {
+            assert!(before + 2 >= half && after + 2 >= half, "{before} and {after} of {pause}, seed {seed}");
+        }
+    }
+}
+
+/// Without a pause DIR is in the middle between two steps, or between a step and the end of a block, wherever that is: for an axis of up
+/// to 400 steps/s it is 1.25 ms from either step, or two ticks less.
+#[test]
+fn dir_is_not_beside_a_step_without_a_pause() {
+    for (feed, reach) in [(250, 10_000), (2000, 9999), (5000, 7777), (5000, 1234), (5000, 3001)] {
+        let axis = AxisSetup::new(Limits::new(400, 80_000).unwrap(), 80_000);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (axes, timer) = Axes::new(&queue, path);
+        let (mut axes, mut machine) = (axes.with_reach(reach), Machine::<_, 2>::new(timer));
+        for i in 1..120_i64 {
+            while axes.is_full() {
+                let soon = machine.now + 1000;
+                machine.run(&mut axes, u64::from(reach / 2), soon);
+            }
+            axes.push([i, i % 2 * 3], feed).unwrap();
+        }
+        machine.run(&mut axes, u64::from(reach / 2), u64::MAX);
+        assert!(machine.turns.len() > 90, "{}", machine.turns.len());
+        for (before, after) in machine.turns {
+            assert!(before >= 1248 && after >= 1248, "{before} and {after} at {feed} um/s, {reach}");
+        }
+    }
+}
+
+/// A stop just behind a corner, before the first step of the way back; and then that way at once: the pause is not shorter.
+#[test]
+fn a_stop_before_a_way_back_does_not_shorten_the_pause() {
+    let mut short = 0;
+    for at in (10_000..60_000).step_by(211) {
+        let axis = AxisSetup::new(Limits::new(8000, 8_000_000).unwrap(), 80_000).with_reversal_pause(20_000);
+        let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 2000).unwrap();
+        let queue = AxesQueue::<2, SLOTS>::new();
+        let (axes, timer) = Axes::new(&queue, path);
+        let (mut axes, mut machine) = (axes.with_reach(1000), Machine::<_, 2>::new(timer));
+        // A step of Y at 100 of X, and another one back at 300, 25 ms later.
+        axes.push([200, 1], 100_000).unwrap();
+        axes.push([400, 0], 100_000).unwrap();
+        machine.run(&mut axes, 500, at);
+        machine.until(at);
+        axes.stop();
+        machine.run(&mut axes, 500, u64::MAX);
+        let [x, y] = machine.position;
+        axes.push([x + 20, y - 20], 100_000).unwrap();
+        machine.run(&mut axes, 500, u64::MAX);
+        let ways: Vec<_> = machine.steps.iter().filter(|(_, axis, _)| *axis == 1).collect();
+        let Some(turn) = ways.windows(2).find(|pair| pair[0].2 > pair[1].2) else { continue };
+        let gap = turn[1].0 - turn[0].0;
+        assert!(gap + 2 >= 20_000, "{gap} after a stop at {at}");
+        short += u32::from(gap < 24_000 && y == 1);
+    }
+    assert!(short > 5, "{short}");
 }

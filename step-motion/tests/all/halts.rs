@@ -6,10 +6,10 @@ use step_motion::{Axes, AxesQueue, Axis, AxisSetup, Clock, Limits, Path, Queue, 
 use crate::machine::{Background, Machine, Timer};
 
 /// Numbers in any order.
-struct Dice(u64);
+pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    fn below(&mut self, most: u64) -> u64 {
+    pub(crate) fn below(&mut self, most: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % most
     }
