@@ -10,14 +10,14 @@ use servowire_core::Direction;
 /// Twice of what rounding may leave of a line, in 2^-32 steps.
 const ROUNDED: u64 = 1 << 17;
 
-/// Converts steps to a position.
+/// Converts steps to a position, modulo 2^32 steps.
 pub(super) const fn fine(steps: i64) -> i64 {
-    steps.saturating_mul(1 << P)
+    steps.wrapping_mul(1 << P)
 }
 
 /// Returns the distance between two positions in steps; none if it is one of rounding.
 pub(super) fn gap(from: i64, to: i64) -> Real {
-    let off = from.abs_diff(to);
+    let off = to.wrapping_sub(from).unsigned_abs();
     if off < ROUNDED { Real::ZERO } else { Real::fixed(off, P) }
 }
 
@@ -31,12 +31,12 @@ pub(super) fn between(clock: Clock, (from, to): (i64, i64), way: Real, there: &P
     if p >= way {
         return Setpoint::at_rest(to);
     }
-    let scale = Real::fixed(to.abs_diff(from), P) / way;
+    let whole = to.wrapping_sub(from);
+    let scale = Real::fixed(whole.unsigned_abs(), P) / way;
     let p = i64::try_from((p * scale).to_fixed(P)).unwrap_or(i64::MAX);
     let state = State { p, v: v * scale, a: (a * scale, up), j: (j * scale, up == (bend != Bend::Fading)) };
-    let direction = if to < from { Direction::Reverse } else { Direction::Forward };
-    let state = Setpoint::new(clock, state).on_axis(0, direction);
-    Setpoint { position: from.saturating_add(state.position), ..state }
+    let state = Setpoint::new(clock, state).on_axis(0, Direction::of(whole));
+    Setpoint { position: from.wrapping_add(state.position), ..state }
 }
 
 #[cfg(test)]

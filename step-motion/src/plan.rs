@@ -6,6 +6,7 @@ use core::iter::FusedIterator;
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
 use crate::phases::{self, Phases, steps};
+use crate::places::fine;
 use crate::planner::{Goal, Motion, plan_into};
 use crate::real::Real;
 use crate::stepper::Stepper;
@@ -144,7 +145,7 @@ impl FusedIterator for Pulses<'_> {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Setpoint {
-    /// In 2^-32 steps.
+    /// In 2^-32 steps. Beyond 2^31 steps from 0 it is counted modulo 2^32 steps, as a counter does: differences stay right.
     pub position: i64,
     /// In 2^-16 steps/s.
     pub speed: i64,
@@ -162,11 +163,11 @@ impl Setpoint {
 
     /// Converts it to an axis that moves in a direction from a position in steps.
     pub(super) const fn on_axis(self, origin: i64, direction: Direction) -> Self {
-        let origin = origin.saturating_mul(1 << 32);
+        let origin = fine(origin);
         match direction {
-            Direction::Forward => Self { position: origin.saturating_add(self.position), ..self },
+            Direction::Forward => Self { position: origin.wrapping_add(self.position), ..self },
             Direction::Reverse => Self {
-                position: origin.saturating_sub(self.position),
+                position: origin.wrapping_sub(self.position),
                 speed: self.speed.wrapping_neg(),
                 acceleration: self.acceleration.wrapping_neg(),
                 jerk: self.jerk.wrapping_neg(),

@@ -113,7 +113,7 @@ impl Mover {
     pub(super) fn stay_behind(&mut self, now: u64) {
         let moment = self.runner.moment(now);
         let Runner { clock, commanded, .. } = self.runner;
-        let off = self.place(moment).position.saturating_sub(fine(commanded));
+        let off = self.place(moment).position.wrapping_sub(fine(commanded));
         let phases = Phases::rest(clock.shift(), moment, off);
         self.behind = Behind { phases, origin: commanded, direction: Direction::Forward, ..Behind::new(&self.runner) };
     }

@@ -16,6 +16,8 @@ struct Seen {
     acceleration: f64,
     now: u64,
     last: (u64, i64),
+    /// Where its places are counted from.
+    from: i64,
 }
 
 impl Watched for Seen {
@@ -36,12 +38,12 @@ impl Watched for Seen {
     fn look(&mut self) {
         let there = self.mover.at(self.now);
         let (then, before) = self.last;
-        let way = (there.position - before).abs() as f64 / ONE;
+        let way = there.position.wrapping_sub(before).abs() as f64 / ONE;
         let most = self.speed * ((self.now - then) as f64 + 0.5) / self.hz + 1.0 / 8192.0;
         assert!(way <= most, "it goes {way} from {then} to {}, {most} at the most", self.now);
         let speed = there.speed.abs() as f64 / 65_536.0;
         assert!(speed <= self.speed * 1.0001 + 0.01, "{speed} steps/s at {}", self.now);
-        let off = (there.position - (self.mover.commanded() << 32)).abs() as f64 / ONE;
+        let off = there.position.wrapping_sub(self.mover.commanded() << 32).abs() as f64 / ONE;
         let most = 0.5 + self.speed / self.hz + 1.0 / 8192.0;
         assert!(off <= most, "it is {off} off at {}, {most} at the most", self.now);
         self.last = (self.now, there.position);
@@ -52,7 +54,7 @@ impl Seen {
     fn new(hz: u32, limits: Limits) -> Self {
         let mover = Mover::new(Clock::new(hz).unwrap(), limits).unwrap();
         let (speed, acceleration) = (limits.speed().into(), limits.acceleration().into());
-        Self { mover, hz: hz.into(), speed, acceleration, now: 0, last: (0, 0) }
+        Self { mover, hz: hz.into(), speed, acceleration, now: 0, last: (0, 0), from: 0 }
     }
 
     /// At a request position and speed are those before it, unless it is a halt or the axis comes to rest within a tick.
@@ -60,7 +62,7 @@ impl Seen {
         let before = self.mover.at(self.now);
         let (mover, now) = (&mut self.mover, self.now);
         match ask {
-            Request::MoveTo(to) => _ = mover.move_to(to, now),
+            Request::MoveTo(to) => _ = mover.move_to(self.from + to, now),
             Request::Run(direction, speed) => _ = mover.run(direction, speed, now),
             Request::Override(percent) => mover.set_override(percent, now),
             Request::Hold => mover.hold(now),
@@ -72,9 +74,9 @@ impl Seen {
             }
             Request::Halt => mover.halt(now),
             Request::Number(steps) => {
-                let before = mover.commanded();
+                let (steps, before) = (self.from + steps, mover.commanded());
                 if mover.set_commanded(steps, now).is_ok() {
-                    self.last.1 += (steps - before) << 32;
+                    self.last.1 = self.last.1.wrapping_add((steps - before) << 32);
                 }
             }
             Request::Slower => _ = mover.set_limits(mover.limits().with_speed(1).unwrap(), now),
@@ -137,9 +139,12 @@ proptest! {
         hz in prop_oneof![Just(1_000_000_u32), 100_000..72_000_000_u32], limits in limits(),
         pause in prop_oneof![Just(0_u32), 0..10_000_u32],
         asks in prop::collection::vec((ask(), prop_oneof![0..3_000_u64, 0..300_000_u64]), 1..20),
+        from in prop_oneof![2 => Just(0), 1 => Just(1 << 31), 1 => Just(-(1 << 31)), 1 => Just(5 << 32), 1 => Just(1 << 62)],
     ) {
         let mut seen = Seen::new(hz, limits);
         seen.mover = seen.mover.with_reversal_pause(pause);
+        seen.from = from;
+        seen.ask(Request::Number(0));
         for (ask, micros) in asks {
             seen.ask(ask);
             seen.until(seen.now + micros * u64::from(hz) / 1_000_000);

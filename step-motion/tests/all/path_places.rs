@@ -16,6 +16,8 @@ struct Seen {
     now: u64,
     last: (u64, [i64; N]),
     looks: u32,
+    /// Where its places are counted from.
+    from: i64,
 }
 
 impl Watched for Seen {
@@ -37,10 +39,10 @@ impl Watched for Seen {
         let there = self.machine.at(self.now).map(|state| state.position);
         let (then, before) = self.last;
         for axis in 0..N {
-            let way = (there[axis] - before[axis]).abs() as f64 / 2_f64.powi(32);
+            let way = there[axis].wrapping_sub(before[axis]).abs() as f64 / 2_f64.powi(32);
             let most = self.speeds[axis] * ((self.now - then) as f64 + 0.5) / self.hz + 1.0 / 8192.0;
             assert!(way <= most, "axis {axis} goes {way} from {then} to {}, {most} at the most", self.now);
-            let off = ((there[axis] - (self.machine.commanded()[axis] << 32)) as f64 / 2_f64.powi(32)).abs();
+            let off = there[axis].wrapping_sub(self.machine.commanded()[axis] << 32).abs() as f64 / 2_f64.powi(32);
             let most = 0.5 + self.speeds[axis] / self.hz + 1.0 / 8192.0;
             assert!(off <= most, "axis {axis} is {off} off at {}, {most} at the most", self.now);
         }
@@ -53,14 +55,15 @@ impl Seen {
         let axes = [AxisSetup::new(limits[0], 80_000), AxisSetup::new(limits[1], 50_000)];
         let machine = PathMover::new(Path::new(Clock::new(hz).unwrap(), axes, 50).unwrap());
         let speeds = limits.map(|limits| limits.speed().into());
-        Self { machine, hz: hz.into(), speeds, now: 0, last: (0, [0; N]), looks: 0 }
+        Self { machine, hz: hz.into(), speeds, now: 0, last: (0, [0; N]), looks: 0, from: 0 }
     }
 
     fn ask(&mut self, ask: Request<N>) {
         let (machine, now) = (&mut self.machine, self.now);
+        let there = |to: [i64; N]| to.map(|to| self.from + to);
         match ask {
-            Request::Push(to, feed) => _ = machine.push(to, feed, now),
-            Request::MoveTo(to, feed) => _ = machine.move_to(to, feed, now),
+            Request::Push(to, feed) => _ = machine.push(there(to), feed, now),
+            Request::MoveTo(to, feed) => _ = machine.move_to(there(to), feed, now),
             Request::Override(percent) => machine.set_override(percent, now),
             Request::Hold => machine.hold(now),
             Request::Resume => machine.resume(now),
@@ -106,8 +109,11 @@ proptest! {
     fn a_place_does_not_jump(
         hz in prop_oneof![Just(1_000_000_u32), 100_000..72_000_000_u32], limits in [limits(), limits()],
         asks in prop::collection::vec((ask(), prop_oneof![0..3_000_u64, 0..300_000_u64]), 1..20),
+        from in prop_oneof![2 => Just(0), 1 => Just(1 << 31), 1 => Just(-(1 << 31)), 1 => Just(5 << 32), 1 => Just(1 << 62)],
     ) {
         let mut seen = Seen::new(hz, limits);
+        seen.machine.set_commanded([from; N], 0).unwrap();
+        (seen.from, seen.last.1) = (from, [from << 32; N]);
         for (ask, micros) in asks {
             seen.ask(ask);
             seen.until(seen.now + micros * u64::from(hz) / 1_000_000);
