@@ -468,7 +468,6 @@ impl<'q, const N: usize, const M: usize, const S: usize> Axes<'q, N, M, S> {
 
     /// Forgets what has been cut but not handed out.
     const fn begin_anew(&mut self) {
-        (self.stage, self.same) = (Stage::Idle, false);
-        (self.asked, self.later) = (self.asked || self.later, false);
+        (self.stage, self.same, self.asked, self.later) = (Stage::Idle, false, false, false);
     }
 }
