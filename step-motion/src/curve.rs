@@ -123,8 +123,8 @@ impl Curve {
     /// Returns the state after a distance from the point where the curve was joined.
     pub(super) fn after(&self, way: Real) -> Option<Piece> {
         let p = self.skipped.1 + way;
-        let piece = self.pieces().iter().rev().find(|piece| piece.p <= p).or(self.pieces().first())?;
-        let (mut low, mut high) = (Real::ZERO, self.time - piece.time);
+        let (piece, (end, _)) = self.piece(self.pieces().iter().rposition(|piece| piece.p <= p).unwrap_or(0))?;
+        let (mut low, mut high) = (Real::ZERO, end - piece.time);
         // By halves: it is needed once a line, by a caller that goes from line to line.
         for _ in 0..64 {
             let middle = (low + high).half();

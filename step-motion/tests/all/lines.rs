@@ -387,3 +387,40 @@ fn a_weak_line_that_is_pushed_late_is_slow_enough_in_time() {
         }
     }
 }
+
+/// Equal lines in one direction, whose joint is in the middle of a curve, where a piece of it begins: each begins where and when the one
+/// before ends, whether all are known from the start or one is pushed under way. In a symmetric move the joint is at its peak.
+#[test]
+fn a_line_begins_when_the_one_before_ends() {
+    let limits = |v, a, j| Limits::new(v, a).unwrap().with_jerk(j).unwrap();
+    let slow = (10_000, limits(10_000, 100, 100_000), 1000, vec![(2, 100), (4, 10_000), (6, 10_000)], 1_000_000, 300);
+    let fast = vec![(12, 5000), (244, 100_000), (476, 100_000), (708, 100_000)];
+    let fast = (80_000, limits(100_000, 12_468, 3_520_137), 1000, fast, 168_000_000, 300);
+    for (scale, limits, deviation, lines, hz, times) in [slow, fast] {
+        for late in 0..=lines.len() {
+            for longer in 0..times {
+                let axis = AxisSetup::new(limits, scale);
+                let mut path = Path::<1, 8>::new(Clock::new(hz).unwrap(), [axis], deviation).unwrap();
+                let mut left = lines.iter().map(|(to, feed)| (to + longer * (to - 1), *feed));
+                let (mut end, mut last, mut interval) = (0, 0, u64::MAX);
+                for taken in 0..lines.len() {
+                    let known = if taken >= late { lines.len() } else { late };
+                    while path.len() + taken < known.max(taken + 1) {
+                        let (to, feed) = left.next().unwrap();
+                        path.push([to], feed).unwrap();
+                    }
+                    let line = path.next_line().unwrap();
+                    let (begin, over) = (end, line.end());
+                    for pulse in line {
+                        let now = pulse.tick - last;
+                        assert!(pulse.tick + 1 >= begin && pulse.tick <= over + 1, "{} in {begin}..{over}", pulse.tick);
+                        let stands = last == 0 || begin == last;
+                        assert!(stands || now < 8 * interval.max(1000), "{now} after {interval}, {late} {longer}");
+                        (last, interval) = (pulse.tick, now);
+                    }
+                    end = over;
+                }
+            }
+        }
+    }
+}
