@@ -66,6 +66,8 @@ pub(super) struct Course {
     pub(super) whole: bool,
     /// Number of lines that it covers after the first one.
     pub(super) more: usize,
+    /// It covers lines that allow more speed than it has there.
+    pub(super) slow: bool,
 }
 
 /// A queue of up to `M` straight lines in `N` axes.
@@ -140,7 +142,8 @@ impl<const N: usize, const M: usize> Clone for Path<N, M> {
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {
-    /// Creates a path at rest at position 0 of all axes. `deviation` at corners in µm; 0 stops at each corner.
+    /// Creates a path at rest at position 0 of all axes. `deviation` at corners in µm, as in
+    /// [`set_deviation`](Self::set_deviation).
     ///
     /// # Errors
     /// [`Error::SpeedAboveClock`] above half the clock, [`Error::NoScale`] for an axis with 0 steps per metre.
@@ -179,7 +182,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
         Ok(new)
     }
 
-    /// Sets the deviation at corners in µm, for the start of lines pushed from now on.
+    /// Sets the deviation at corners in µm, for the start of lines pushed from now on; 0 stops at each corner. Lines that differ by less
+    /// than 1.4 mrad count as one line whose ends are rounded to steps: the deviation there is half a step, if that is more.
     pub fn set_deviation(&mut self, deviation: u32) {
         self.deviation = self.unit * Real::new(deviation.into()) / Real::new(1_000_000);
     }

@@ -59,8 +59,8 @@ pub struct PathMover<const N: usize, const M: usize> {
     whole: bool,
     /// The limits that its curve keeps.
     bounds: Option<Bounds>,
-    /// The speed that was asked for last does not fit on the rest of the present line: it is planned on the next one. A brake that does
-    /// not fit is not, or a hold would be shorter than a stop.
+    /// The speed that was asked for last does not fit on the rest of the present line, or is more on the next one: it is planned
+    /// there. A brake that does not fit is not, or a hold would be shorter than a stop.
     late: bool,
     /// What is left of the line before the first one.
     behind: Behind<N>,
@@ -222,6 +222,11 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         self.ready(self.is_at_rest(now))?;
         self.path.check(&target)?;
         self.add(target, feed, now)
+    }
+
+    /// Does the same as [`Path::set_deviation`].
+    pub fn set_deviation(&mut self, deviation: u32) {
+        self.path.set_deviation(deviation);
     }
 
     /// Sets the feed override, in percent of the speeds with which the lines were pushed. The axes' limits and the speeds

@@ -5,7 +5,7 @@ use crate::limits::Bounds;
 use crate::real::Real;
 use servowire_core::Direction;
 
-/// 1 less the cosine of an angle too small to count as a corner.
+/// 1 less the cosine of an angle so small that the ends of one line, rounded to steps, may have it: 1.4 mrad.
 const STRAIGHT: Real = Real::fixed(1, 20);
 
 impl<const N: usize, const M: usize> Path<N, M> {
@@ -62,6 +62,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// straight on. 1 - s is computed as (1 - s²) / (1 + s), which avoids cancellation. a is the acceleration that the axes
     /// allow in the direction in which the corner turns.
     ///
+    /// A smaller angle than [`STRAIGHT`] may come from rounding: there the deviation is at least half a step, of each axis as far as it
+    /// takes part in the turn.
+    ///
     /// Chords of a circle are bounded by its radius, however small they are: with l the shorter line, v² = a l/2 s / sqrt(1 - s²), which
     /// is a r.
     pub(super) fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real)) -> Real {
@@ -86,16 +89,18 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         // The speed turns along the difference of both directions, which is as long as this; an axis takes its part of that.
         let whole = shut.scaled(1).sqrt();
-        let mut most = Real::HUGE;
+        let (mut most, mut rounded) = (Real::HUGE, Real::ZERO);
         for (axis, (setup, (&before, &after))) in self.axes.iter().zip(from.iter().zip(to)).enumerate() {
             let (part, next) = parts(axis, before, after);
             let turn = if (before < 0) == (after < 0) { part.distance(next) } else { part + next };
-            let own = setup.limits.bounds(self.clock).a * self.way(axis, 1);
-            most = most.min(own * whole / turn);
+            let step = self.way(axis, 1);
+            most = most.min(setup.limits.bounds(self.clock).a * step * whole / turn);
+            rounded = rounded + turn * step.half() / whole;
         }
         let (s, rest) = (open.half().sqrt(), shut.half());
         let chord = long.min(length).half() * s / rest.sqrt();
-        let bow = if shut < STRAIGHT { Real::HUGE } else { self.deviation * s * (one + s) / rest };
+        let deviation = if shut < STRAIGHT { self.deviation.max(rounded) } else { self.deviation };
+        let bow = deviation * s * (one + s) / rest;
         (most * bow.min(chord)).sqrt()
     }
 }

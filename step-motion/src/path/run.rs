@@ -36,7 +36,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     fn single(&self, at: usize, Kind { part, early, .. }: Kind) -> Option<Run> {
         let line = self.line(at)?;
         let bounds = Bounds { v: allowed(line, part), ..line.bounds };
-        let mut run = Run { more: 0, length: line.length, bounds };
+        let mut run = Run::of(line.length, bounds);
         if !early.is_zero() {
             self.slow_before(&mut run, early);
         }
@@ -47,7 +47,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     #[cold]
     fn slow_before(&self, run: &mut Run, most: Real) {
         if let Some(passed) = &self.passed {
-            run.bounds = passed.lower(&run.bounds, most);
+            *run = Run::of(run.length, passed.lower(&run.bounds, most));
         }
     }
 
@@ -156,7 +156,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 speed = start.v + (start.a.squared() / j).half();
             }
         }
-        Some(Kind { part, speed, held, any: false, early: self.early(start, before, &first.bounds) })
+        Some(Kind { part, speed, held, any: false, feeds: false, early: self.early(start, before, &first.bounds) })
     }
 
     /// Returns the greatest speed of a motion a distance before a line, if that is less than it can reach there; 0 on the line.
@@ -194,7 +194,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 let (end, rest) = self.locate(at, way, at.saturating_add(run.more));
                 let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
                 let more = end.saturating_sub(at);
-                return Some(Ok((Course { curve, exit: Real::ZERO, wish: Real::ZERO, whole, more }, own)));
+                return Some(Ok((Course { curve, exit: Real::ZERO, wish: Real::ZERO, whole, more, slow: false }, own)));
             }
             let (end, _) = self.locate(at, way, self.len);
             let most = end.saturating_sub(at).max(run.more.saturating_add(1));
@@ -244,12 +244,34 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 self.lead(at, start, left, (run, own, bounds), (exit, wish))
             };
             let keeps = known.and_then(|known| to(slowest.min(known)));
+            let longer = || self.longer(at, start, left, (full, shorter.kind));
             let shorter = || self.shorter(at, shorter.kind, full.more);
-            keeps.or_else(|| shorter().iter().rev().flatten().find_map(without)).or_else(|| {
+            keeps.or_else(|| shorter().iter().rev().flatten().find_map(without)).or_else(longer).or_else(|| {
                 let most = self.most(last);
                 [slowest.min(most), most, Real::ZERO].into_iter().find_map(to)
             })
         })
+    }
+
+    /// Plans over a run of more lines, as few as possible, at whatever speed they are requested: within the least of them, because the
+    /// next line can only be slow enough if the motion slows down over all of these.
+    fn longer(&self, at: usize, start: Motion, left: Real, (full, kind): (&Run, Kind)) -> Option<(Course, Bounds)> {
+        kind.part?;
+        let kind = Kind { feeds: true, ..kind };
+        let mut run = self.single(at, kind)?;
+        for more in full.more.saturating_add(1)..M {
+            self.lengthen(at, &mut run, kind, more);
+            if run.more < more {
+                return None;
+            }
+            let left = (left + run.length) - full.length;
+            let exit = self.known_exit(at.saturating_add(more)).unwrap_or(Real::ZERO).min(run.bounds.v);
+            let to = |exit| self.lead(at, start, left, (&run, run.bounds, run.bounds), (exit, exit));
+            if let Some((course, bounds)) = to(exit).or_else(|| to(Real::ZERO)) {
+                return Some((Course { slow: true, ..course }, bounds));
+            }
+        }
+        None
     }
 
     /// Returns the runs of fewer lines, the shortest first.
@@ -276,7 +298,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     ) -> Option<(Course, Bounds)> {
         let exit = self.line(at.saturating_add(run.more))?.leave.unwrap_or(speed);
         let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
-        Some((Course { curve, exit, wish, whole: true, more: run.more }, own))
+        Some((Course { curve, exit, wish, whole: true, more: run.more, slow: false }, own))
     }
 
     /// Returns the line that lies a distance beyond the start of line `at`, at most line `last`, and the place on it.
@@ -318,7 +340,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             },
             |curve| (curve, exit),
         );
-        Some((Course { curve, exit, wish: exit, whole: true, more: 0 }, line.bounds))
+        Some((Course { curve, exit, wish: exit, whole: true, more: 0, slow: false }, line.bounds))
     }
 
     /// Returns the line, and the place on it, where a stop ends that has a given speed at the start of line `at`; and how long
@@ -444,7 +466,14 @@ impl<const N: usize, const M: usize> Path<N, M> {
     fn run_from(&self, at: usize, part: Real) -> Option<Run> {
         self.run(
             at,
-            Kind { part: Some(part), speed: Real::ZERO, held: [Real::ZERO; 2], any: false, early: Real::ZERO },
+            Kind {
+                part: Some(part),
+                speed: Real::ZERO,
+                held: [Real::ZERO; 2],
+                any: false,
+                feeds: false,
+                early: Real::ZERO,
+            },
             M,
         )
     }

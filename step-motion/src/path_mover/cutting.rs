@@ -120,11 +120,6 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         !self.path.is_empty() && !self.requests.brakes()
     }
 
-    /// Sets the deviation at corners, for lines appended from now on.
-    pub(crate) fn set_deviation(&mut self, deviation: u32) {
-        self.path.set_deviation(deviation);
-    }
-
     /// Does a slice of the work for [`look_ahead`](Self::look_ahead), and for a stop on these lines; or, `asked` at a tick, for
     /// [`replan`](Self::replan). Returns whether there is more of it.
     pub(crate) fn has_to_find(&mut self, asked: Option<u64>) -> bool {

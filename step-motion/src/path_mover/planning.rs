@@ -261,7 +261,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         (self.exit, self.origin) = (course.exit, self.commanded);
         (self.more, self.whole, self.wish, self.bounds) = (course.more, course.whole, course.wish, Some(bounds));
         // A curve that ends before its lines is one to rest.
-        (self.braking, self.late) = (self.requests.brakes() || !course.whole, false);
+        (self.braking, self.late) = (self.requests.brakes() || !course.whole, course.slow);
         self.left = [None; N];
         true
     }

@@ -130,3 +130,49 @@ fn a_brake_that_nobody_asked_for_goes_on_to_the_end() {
         }
     }
 }
+
+/// An axis runs two lines as fast as it can, which are asked for at more than that; what follows is slow. A lower override, wherever it
+/// is asked for, makes the feeds of both differ. The slow line has its own feed at each step.
+#[test]
+fn a_lower_override_does_not_run_into_a_slow_line() {
+    let machine = |scale: u32, limits: Limits, lines: &[(i64, u32)]| {
+        let mut machine =
+            PathMover::new(Path::<1, 8>::new(Clock::MICROSECONDS, [AxisSetup::new(limits, scale)], 20).unwrap());
+        for (to, feed) in lines {
+            machine.push([*to], *feed, 0).unwrap();
+        }
+        machine
+    };
+    let limits = |v, a, j| Limits::new(v, a).unwrap().with_jerk(j).unwrap();
+    let one = (80_000, limits(3000, 27_200, 168_560), [(654, 40_000), (985, 60_000), (1100, 1000)]);
+    let two = (80_000, limits(7071, 141_454, 3_804_488), [(329, 101_616), (765, 266_158), (1296, 353)]);
+    for (scale, limits, lines) in [one, two] {
+        let slowest = 1e9 / f64::from(lines[2].1) / f64::from(scale) * 1e3;
+        for at in (5..lines[1].0 - 5).step_by(7) {
+            for (first, then) in [(50, 50), (90, 30), (50, 100), (1, 100), (0, 60)] {
+                let mut own = machine(scale, limits, &lines);
+                let (mut last, mut asked) = (0, 0);
+                while let Some(pulse) = own.pulse().or_else(|| {
+                    // On hold.
+                    own.set_override(then, last + 1_000_000);
+                    own.pulse()
+                }) {
+                    let behind = own.commanded()[0] - lines[1].0;
+                    let apart = (pulse.tick - last) as f64;
+                    assert!(
+                        behind < 2 || apart > slowest * 0.98,
+                        "{apart} us, {behind} steps behind it: {at} {first} {then}"
+                    );
+                    last = pulse.tick;
+                    if own.commanded() == [at] {
+                        own.set_override(first, last);
+                        asked = last;
+                    } else if own.commanded() == [at + 3] {
+                        own.set_override(then, last);
+                    }
+                }
+                assert!(own.commanded() == [lines[2].0] && asked > 0);
+            }
+        }
+    }
+}

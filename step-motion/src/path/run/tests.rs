@@ -34,6 +34,7 @@ fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
             speed: real(v / second()),
             held: [Real::ZERO; 2],
             any: true,
+            feeds: false,
             early: Real::ZERO,
         };
         path.run(0, kind, 8).unwrap().more

@@ -130,7 +130,7 @@ fn a_curve_without_the_steps_that_remain_is_not_begun() {
     let mut mover = mover([(5000, 50_000); 2], 1000, &[[100, 0]]);
     take(&mut mover, 10);
     let (start, bounds) = (mover.line.as_ref().unwrap().start, mover.bounds.unwrap());
-    let course = Course { curve: Curve::new(), exit: Real::ZERO, wish: Real::ZERO, whole: true, more: 0 };
+    let course = Course { curve: Curve::new(), exit: Real::ZERO, wish: Real::ZERO, whole: true, more: 0, slow: false };
     assert!(!mover.adopt(&course, start, bounds));
     take(&mut mover, 90);
     assert_eq!((mover.commanded(), mover.due()), ([100, 0], None));
