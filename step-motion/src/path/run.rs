@@ -152,8 +152,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
             let j = present.and_then(|bounds| bounds.jerk).map_or(jerk.j, |own| own.j.min(jerk.j));
             held = [start.a - start.a.scaled(-20), j - j.scaled(-20)];
             if start.up {
-                // When the acceleration is back at 0.
+                // When the acceleration is back at 0; rounding makes it no faster than the lines.
                 speed = start.v + (start.a.squared() / j).half();
+                speed = speed - speed.scaled(-40);
             }
         }
         Some(Kind { part, speed, held, any: false, feeds: false, early: self.early(start, before, &first.bounds) })
@@ -265,7 +266,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 return None;
             }
             let left = (left + run.length) - full.length;
-            let exit = self.known_exit(at.saturating_add(more)).unwrap_or(Real::ZERO).min(run.bounds.v);
+            let last = at.saturating_add(more);
+            let known = self.known_exit(last).unwrap_or(Real::ZERO);
+            let exit = slowest_exit(start, left, known, &run.bounds).min(known.max(self.promised(last)));
             let to = |exit| self.lead(at, start, left, (&run, run.bounds, run.bounds), (exit, exit));
             if let Some((course, bounds)) = to(exit).or_else(|| to(Real::ZERO)) {
                 return Some((Course { slow: true, ..course }, bounds));

@@ -65,7 +65,7 @@ impl Run {
         let (own, most) = (line.bounds.a, allowed(line, part));
         let alike = |a: Real, b: Real, by: Real| a == b || a <= b * by && b <= a * by;
         // What is too fast slows down at once, however many lines that takes.
-        if !(most >= speed || speed > bounds.v && line.bounds.v >= speed) {
+        if !(most >= speed || (feeds || speed > bounds.v) && line.bounds.v >= speed) {
             return false;
         }
         let (a, j) = (bounds.a.min(own), jerk.j.min(other.j));
