@@ -5042,7 +5042,9 @@ sw_result_t sw_motion_start(sw_motion_axis_t *axis,
 sw_result_t sw_motion_fire(sw_motion_timer_t *timer, sw_motion_fired_t *fired);
 
 /**
- * Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal.
+ * Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal. Call it until it returns anything but
+ * SW_MOTION_MORE, again after each request, and every half of the reach: less often, the axis comes to rest again and again. Each
+ * step of the stop that it makes then is within a sixteenth of an interval.
  */
 sw_result_t sw_motion_poll(sw_motion_axis_t *axis);
 

@@ -176,7 +176,9 @@ pub extern "C" fn sw_motion_fire(
     })
 }
 
-/// Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal.
+/// Does a slice of planning, in the background. Returns sw_motion_work_t, or a refusal. Call it until it returns anything but
+/// SW_MOTION_MORE, again after each request, and every half of the reach: less often, the axis comes to rest again and again. Each
+/// step of the stop that it makes then is within a sixteenth of an interval.
 #[unsafe(no_mangle)]
 pub extern "C" fn sw_motion_poll(axis: Option<&mut sw_motion_axis_t>) -> sw_result_t {
     border(|| {

@@ -28,7 +28,8 @@ pub struct HomingConfig {
     /// After this many steps without a switch the search is abandoned.
     pub range: u32,
     /// Limits for the stop at the switch. Beyond the switch there must be room to come to rest: v² / 2a, or (v /
-    /// 2)(v / a + a / j) with a jerk limit.
+    /// 2)(v / a + a / j) with a jerk limit. If the axis may still accelerate there, its jerk limit takes up to v a / j more, or v √(2v / j) if
+    /// that is less.
     pub stop: Limits,
 }
 
@@ -86,7 +87,7 @@ pub enum HomingState {
 /// Soft limits are positions, so they do not count before there is a reference: a homing may leave them.
 ///
 /// A hold and an override act on it as on any motion: it waits, and goes on. A move, a stop or a halt that somebody else
-/// asks for ends it.
+/// asks for ends it, and so does another position, at the latest when it goes on.
 ///
 /// ```
 /// use step_motion::{

@@ -9,8 +9,10 @@ use super::item::{Item, Line};
 use super::modes::State;
 use super::numbers::Numbers;
 
-/// How far chords are from their arc at most, in um; they are computed in 0.1 um.
+/// How far chords are from their arc at most, in um, or half a step if that is more; they are computed in 0.1 um.
 pub(super) const CHORD_UM: u32 = 2;
+/// No more than this, however coarse the steps are.
+const COARSEST_UM: u32 = 50;
 
 impl State {
     /// Returns a place in the axes of the plane.
@@ -61,8 +63,11 @@ impl State {
         items: &mut VecDeque<Item>,
     ) -> Result<(), String> {
         let (from, end) = (self.flat(self.at), self.flat(to));
+        // The ends of finer chords would lie on few of the finer axis's steps, and their corners would be those of the rounding.
+        let [a, b, _] = self.plane.map(|axis| self.half_steps.get(axis).copied().unwrap_or_default());
+        let off = a.min(b).clamp(CHORD_UM * 10, COARSEST_UM * 10);
         let units = |place: [f64; 2]| place.map(|mm| (mm * 1e4).round() as i32);
-        let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, CHORD_UM * 10)
+        let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, off)
             .map_err(|e| {
                 format!("{e}, in 0.1 um: start and end are not on one circle around the center, or its radius is 0")
             })?

@@ -58,6 +58,8 @@ pub(super) struct State {
     relative: bool,
     /// G61.1: stop after each line.
     stops: bool,
+    /// Half a step of each axis, in 0.1 um.
+    pub(super) half_steps: [u32; AXES],
 }
 
 impl Default for State {
@@ -72,6 +74,7 @@ impl Default for State {
             unit: 1.0,
             relative: false,
             stops: false,
+            half_steps: [0; AXES],
         }
     }
 }

@@ -29,6 +29,12 @@ impl<R: BufRead> Program<R> {
         Self { name: name.to_owned(), text, number: 0, block_delete, begun: false, over: false, state, items }
     }
 
+    /// Takes the steps of the axes per metre into account, below which arcs need not be cut.
+    pub(super) fn with_scales(mut self, steps_per_m: [u32; AXES]) -> Self {
+        self.state.half_steps = steps_per_m.map(|steps| 5_000_000 / steps.max(1));
+        self
+    }
+
     /// A fault of the line that was read last, which ends the program.
     pub(super) fn refuse(&mut self, what: String) -> Fault {
         self.over = true;

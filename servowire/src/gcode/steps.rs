@@ -62,14 +62,14 @@ impl Steps {
         let (axes, timer) = Axes::new(queue, Path::new(Clock::NANOSECONDS, axes, deviation)?);
         let axes = Box::new(axes.with_reach(REACH_NS));
         Ok(Self {
-            program,
+            program: program.with_scales(setups.map(|axis| axis.steps_per_m)),
             name,
             axes,
             timer,
             setups,
             deviation,
             present: deviation,
-            chord: CHORD_UM.saturating_add(half_step),
+            chord: CHORD_UM.max(half_step).saturating_add(half_step),
             bent: false,
             rest: None,
             over: false,
@@ -292,6 +292,19 @@ mod tests {
         for scale in [5, 10, 20] {
             let took = ["G61", "G64"].map(|mode| seconds(&format!("{mode}\n{text}"), (scale, 5000), 20));
             assert!(took[0] < fine * 1.1 && took[0] < took[1] + 0.060, "{scale} steps/mm: {took:?} s, {fine} s");
+        }
+    }
+
+    /// A circle of 200 mm at 316 mm/s, where all of 500 mm/s² is needed to stay on it, at 25 steps/mm: chords so fine that their corners are
+    /// those of rounding would take twice the time of a straight line.
+    #[test]
+    fn a_circle_of_coarse_steps_is_cut_coarsely() {
+        let (a, r) = (500.0, 200.0_f64);
+        let v = (a * r).sqrt();
+        let least = v / a + std::f64::consts::TAU * r / v;
+        for feed in [v, 10.0 * v] {
+            let took = seconds(&format!("G1 F{}\nG3 X0 Y0 I{r}\n", feed * 60.0), (25, 500), 20);
+            assert!(took < least * 1.15, "{took} s, {least} s at {feed} mm/s");
         }
     }
 
