@@ -36,6 +36,7 @@ use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
 use crate::drawing::Drawn;
 use crate::gcode::{AXES, Part};
+use crate::overwrite::refusal;
 use servowire_decode::time;
 
 use axis::Build;
@@ -240,8 +241,9 @@ impl Arguments {
     /// use.
     pub(crate) fn run(&self) -> ExitCode {
         let mut out = BufWriter::new(io::stdout().lock());
-        if self.scaling && self.part.gcode.is_some() {
-            eprintln!("error: --scaling runs no part program");
+        let scaling = (self.scaling && self.part.gcode.is_some()).then(|| "--scaling runs no part program".to_owned());
+        if let Some(what) = scaling.or_else(|| self.overwrites()) {
+            eprintln!("error: {what}");
             return ExitCode::from(2);
         }
         if self.scaling {
@@ -269,6 +271,12 @@ impl Arguments {
             }
             Err(error) => failed(error.as_ref()),
         }
+    }
+
+    /// Returns what to say if an output is the part program, or the same file as another output.
+    fn overwrites(&self) -> Option<String> {
+        let outputs = [("--vcd", &self.vcd), ("--pcapng", &self.pcapng), ("--svg", &self.svg), ("--wav", &self.wav)];
+        refusal(self.part.source().as_slice(), &outputs.map(|(option, path)| (option, path.as_deref())))
     }
 
     fn program(&self) -> Result<Program, Box<dyn Error>> {

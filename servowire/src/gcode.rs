@@ -20,6 +20,7 @@ use servowire_decode::fault::{At, Fault};
 use step_motion::{AxisSetup, Limits};
 
 use crate::files;
+use crate::overwrite::Source;
 use item::Item;
 use program::Program;
 pub(crate) use steps::Steps;
@@ -56,6 +57,11 @@ impl Part {
     /// Greatest step frequency and acceleration of an axis where nothing else is asked for.
     pub(crate) const SPEED: u32 = 100_000;
     pub(crate) const ACCELERATION: u32 = 400_000;
+
+    /// The part program among the files of a command.
+    pub(crate) fn source(&self) -> Option<Source<'_>> {
+        self.gcode.as_deref().map(|path| ("the part program", path))
+    }
 
     /// Reads all of a part program for faults, and for lines beyond the soft limits of an axis; how many straight lines it has.
     /// Says on standard error where the file goes on after the end of its program.

@@ -20,6 +20,7 @@ use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
 use crate::gcode::Part;
+use crate::overwrite::refusal;
 use servowire_decode::fault::Fault;
 use servowire_decode::time;
 
@@ -105,7 +106,7 @@ impl Arguments {
     /// Runs the command. 0: done; 1: it ended early, or the output cannot be written; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
         let out = &mut BufWriter::new(io::stdout().lock());
-        if let Some(what) = self.misplaced() {
+        if let Some(what) = self.misplaced().or_else(|| self.overwrites()) {
             return wrong_use(&what);
         }
         if let Some(path) = &self.part.gcode {
@@ -148,6 +149,12 @@ impl Arguments {
             return Some("--jerk is for --shape s-curve, --compare and --gcode".to_owned());
         }
         first(&of_the_ramp).filter(|_| !ramp).map(|option| format!("{option} is for the published ramp, --shape sin2"))
+    }
+
+    /// Returns what to say if an output is the part program.
+    fn overwrites(&self) -> Option<String> {
+        let outputs = [("--svg", self.svg.as_deref()), ("--vcd", self.vcd.as_deref())];
+        refusal(self.part.source().as_slice(), &outputs)
     }
 
     /// A part program.
