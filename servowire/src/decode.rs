@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use servowire_decode::capture::{self, Capture, Format, Hints, Input};
 use servowire_decode::codec::Codec;
-use servowire_decode::fault::{At, Fault, Stop};
+use servowire_decode::fault::{At, Fault, Stop, printable};
 use servowire_decode::output::Output;
 use servowire_decode::output::json::JsonLines;
 use servowire_decode::output::printer::Printer;
@@ -360,7 +360,7 @@ impl Bar {
 
     /// Writes a line to standard error, above the bar.
     fn say(&self, text: &str) {
-        let print = || drop(writeln!(io::stderr(), "{text}"));
+        let print = || drop(writeln!(io::stderr(), "{}", printable(text)));
         match &self.bar {
             Some(bar) => bar.suspend(print),
             None => print(),
