@@ -266,6 +266,21 @@ fn refusals_name_the_line_and_what_to_do() {
         ("G0 X1\nM30.04", "line 2: M30.04 is not in the subset"),
         ("G64 P-1", "corners rounded by -1 mm"),
         ("G64 P1001", "from 0 to 1000"),
+        ("G28 G1 X5", "line 1: G28 and G1 in one line: both take X, Y and Z"),
+        ("G0 X1\nG2 G30 X5", "line 2: G30 and G2 in one line: both take X, Y and Z"),
+        ("G92 G0 X1", "line 1: G92 and G0 in one line: both take X, Y and Z"),
+        ("G0 X1 G80", "line 1: X, Y and Z in one line with G80"),
+        ("M8 M9", "line 1: M8 and M9 in one line"),
+        ("M9 M7", "line 1: M9 and M7 in one line"),
+        ("S1 M3 S2", "line 1: S is there twice"),
+        ("T1 T1 M6", "line 1: T is there twice"),
+        ("N1 N2 G0 X1", "line 1: N is there twice"),
+        ("G1 F1 X1 F1", "line 1: F is there twice"),
+        ("S-900 M3", "line 1: S-900: a number from 0 on"),
+        ("T-1 M6", "line 1: T-1: a whole number from 0 on"),
+        ("T1.5 M6", "line 1: T1.5: a whole number from 0 on"),
+        ("N-1 G0 X1", "line 1: N-1: a whole number from 0 on"),
+        ("N1.5 G0 X1", "line 1: N1.5: a whole number from 0 on"),
     ] {
         assert!(refused(text).contains(want), "{text}: {}", refused(text));
     }
