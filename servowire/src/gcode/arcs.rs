@@ -36,6 +36,7 @@ impl State {
         if numbers.center.iter().any(Option::is_some) {
             return Err("R together with I, J or K: an arc takes one or the other".to_owned());
         }
+        within_reach(radius)?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let chord = x.hypot(y);
         if chord < 1e-4 {
@@ -61,6 +62,9 @@ impl State {
         items: &mut VecDeque<Item>,
     ) -> Result<(), String> {
         let (from, end) = (self.flat(self.at), self.flat(to));
+        for [x, y] in [from, end] {
+            within_reach((x - center[0]).hypot(y - center[1]))?;
+        }
         let units = |place: [f64; 2]| place.map(|mm| (mm * 1e4).round() as i32);
         let chords: Vec<_> = Arc::new(units(from), units(end), units(center), turning, CHORD_UM * 10)
             .map_err(|e| {
@@ -94,6 +98,15 @@ impl State {
         self.end(Line { to, feed, bends }, items);
         Ok(())
     }
+}
+
+/// Refuses a radius that the chords cannot have.
+fn within_reach(radius: f64) -> Result<(), String> {
+    let most = f64::from(Arc::MAX_RADIUS) / 1e4;
+    if radius.abs() <= most {
+        return Ok(());
+    }
+    Err(format!("a radius of {radius:.0} mm is too large: at most {most:.0} mm"))
 }
 
 /// Returns the angle between two points, seen from a center.

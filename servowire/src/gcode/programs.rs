@@ -281,6 +281,8 @@ fn refusals_name_the_line_and_what_to_do() {
         ("T1.5 M6", "line 1: T1.5: a whole number from 0 on"),
         ("N-1 G0 X1", "line 1: N-1: a whole number from 0 on"),
         ("N1.5 G0 X1", "line 1: N1.5: a whole number from 0 on"),
+        ("G2 X10 R1000000 F10", "line 1: a radius of 1000000 mm is too large: at most 107374 mm"),
+        ("G3 I-200000 F10", "line 1: a radius of 200000 mm is too large"),
     ] {
         assert!(refused(text).contains(want), "{text}: {}", refused(text));
     }
