@@ -1,11 +1,12 @@
 //! Faults of an input file, each as a sentence that a person can act on.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 
-/// A file that could not be read, or only in part.
+/// A file that could not be read, or only in part. What its message quotes of the file is [`printable`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}{at}: {what}")]
+#[error("{}{at}: {}", printable(file), printable(what))]
 pub struct Fault {
     /// The name of the file as given by the user.
     pub file: String,
@@ -34,6 +35,16 @@ impl fmt::Display for At {
             Self::Byte(byte) => write!(f, ", byte {byte}"),
         }
     }
+}
+
+/// Returns a text with `\x1b` and the like for control characters, which a terminal would obey; lines and tabs stay.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c| if obeyed(c) { format!("\\x{:02x}", u32::from(c)) } else { c.to_string() };
+    text.chars().map(shown).collect::<String>().into()
 }
 
 impl Fault {
@@ -78,6 +89,25 @@ impl fmt::Display for Stop {
         match self {
             Self::Fault(fault) | Self::Trouble { fault, .. } => fault.fmt(f),
             Self::Output(error) => write!(f, "cannot write: {error}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_a_terminal_obeys() {
+        for (text, want) in [
+            ("a\tb\nc", "a\tb\nc"),
+            ("\x1b[31m", "\\x1b[31m"),
+            ("\r\0\x7f\u{9b}", "\\x0d\\x00\\x7f\\x9b"),
+            ("s², °", "s², °"),
+        ] {
+            assert_eq!(printable(text), want);
+            let fault = Fault::new(text, At::Line(3), text).to_string();
+            assert_eq!(fault, format!("{want}, line 3: {want}"));
         }
     }
 }

@@ -16,23 +16,16 @@ pub struct Cli {
     command: Command,
 }
 
+/// Commands whose arguments are a type are described there: a comment here would take the place of their description.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Decode captures of a line.
     Decode(Decode),
-    /// Write a report on a capture, for a browser or a printer.
     Report(report::Arguments),
-    /// Show one frame of a capture, bit by bit.
     Explain(explain::Arguments),
-    /// Compute the times of the steps of a move or a part program.
     Profile(profile::Arguments),
-    /// Run the reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),
-    /// Talk to a T-Format encoder through a USB-RS485 adapter, or act as one.
     Talk(talk::Arguments),
-    /// Show the timing of an encoder's line: who sends when, shortest cycle, worst fault.
     Timing(timing::Arguments),
-    /// Describe the register map of a HIPERFACE DSL receiver in words.
     Registers(registers::Arguments),
     /// Print completions for a shell; save them where the shell looks for them.
     Completions {
@@ -124,6 +117,29 @@ mod tests {
             assert_eq!(page.ends_with("\n.TP\n5\nBoth 1 and 4.\n"), name == "decode", "{page}");
             assert!(page.contains(&format!(".SH EXAMPLES\n.nf\n  servowire {name} ")), "{page}");
             assert!(page.contains("\n.fi\n.SH \"EXIT STATUS\"\n") && !page.contains("EXTRA"), "{page}");
+        }
+    }
+
+    /// The description of a command is longer than its line in the list of commands, with --help and in its manual page.
+    #[test]
+    fn commands_describe_themselves() {
+        let mut whole = Cli::command();
+        whole.build();
+        for (name, want) in [
+            ("decode", "Prints one transaction per line"),
+            ("report", "SHA-256 of the capture"),
+            ("explain", "Exit code 0: the frame holds"),
+            ("profile", "(100 kHz, 400000 steps/s² and none)"),
+            ("cnc", "The same seed gives the same run"),
+            ("talk", "Exit code 0: done"),
+            ("registers", "Exit code 0: the map could be read"),
+        ] {
+            let command = whole.find_subcommand_mut(name).unwrap();
+            let mut text = Vec::new();
+            clap_mangen::Man::new(command.clone()).render(&mut text).unwrap();
+            let page = String::from_utf8(text).unwrap().replace('\n', " ").replace("\\-", "-");
+            let help = command.render_long_help().to_string().replace('\n', " ");
+            assert!(help.contains(want) && page.contains(want), "{help}");
         }
     }
 

@@ -36,6 +36,8 @@ use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
 use crate::drawing::Drawn;
 use crate::gcode::{AXES, Part};
+use crate::overwrite::refusal;
+use crate::units::{acceleration, jerk, of_frequency};
 use servowire_decode::time;
 
 use axis::Build;
@@ -108,10 +110,10 @@ pub struct Arguments {
     #[command(flatten)]
     part: Part,
     /// Greatest acceleration of an axis of a part program, in steps/s².
-    #[arg(long, value_name = "A", requires = "gcode", default_value_t = Part::ACCELERATION, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "A", requires = "gcode", default_value_t = Part::ACCELERATION, value_parser = acceleration)]
     accel: u32,
     /// Its greatest jerk, in steps/s³; without it the profile is a trapezoid.
-    #[arg(long, value_name = "J", requires = "gcode")]
+    #[arg(long, value_name = "J", requires = "gcode", value_parser = jerk)]
     jerk: Option<u64>,
     /// Use the devices as published: their SYNC0 generator loses steps, and they repeat the last word when a frame is lost.
     #[arg(long)]
@@ -240,8 +242,9 @@ impl Arguments {
     /// use.
     pub(crate) fn run(&self) -> ExitCode {
         let mut out = BufWriter::new(io::stdout().lock());
-        if self.scaling && self.part.gcode.is_some() {
-            eprintln!("error: --scaling runs no part program");
+        let scaling = (self.scaling && self.part.gcode.is_some()).then(|| "--scaling runs no part program".to_owned());
+        if let Some(what) = scaling.or_else(|| self.overwrites()) {
+            eprintln!("error: {what}");
             return ExitCode::from(2);
         }
         if self.scaling {
@@ -269,6 +272,12 @@ impl Arguments {
             }
             Err(error) => failed(error.as_ref()),
         }
+    }
+
+    /// Returns what to say if an output is the part program, or the same file as another output.
+    fn overwrites(&self) -> Option<String> {
+        let outputs = [("--vcd", &self.vcd), ("--pcapng", &self.pcapng), ("--svg", &self.svg), ("--wav", &self.wav)];
+        refusal(self.part.source().as_slice(), &outputs.map(|(option, path)| (option, path.as_deref())))
     }
 
     fn program(&self) -> Result<Program, Box<dyn Error>> {
@@ -301,12 +310,7 @@ impl Arguments {
             self.part.check(path)?;
             let limits = Limits::new(self.freq.first().copied().unwrap_or(Part::SPEED), self.accel)?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
-            let fastest = self.part.axes(limits)?.iter().map(|axis| axis.limits.speed()).max().unwrap_or(0);
-            if fastest > MOST_STEPS {
-                return Err(
-                    format!("{fastest} steps/s: an axis makes a step in each cycle of 4 us at most, 250000").into()
-                );
-            }
+            self.part.within(limits, MOST_STEPS).map_err(|what| format!("{what}: a step in each cycle of 4 us"))?;
             return Ok(Program::part(self.part.steps(path, limits)?));
         }
         // Programs of four motors repeat them for the axes after the fourth.
@@ -317,8 +321,11 @@ impl Arguments {
         }
         let default = if self.published_sync0 { 249_000 } else { 250_000 };
         let freq = if self.freq.is_empty() { core::slice::from_ref(&default) } else { self.freq.as_slice() };
-        let speeds = freq.iter().map(|hz| Speed::from_frequency(Frequency::from_hz(*hz)));
-        let profiles: Result<Vec<_>, _> = speeds.map(|speed| Profile::new(parameters(speed?))).collect();
+        let profile = |hz: &u32| {
+            let speed = Speed::from_frequency(Frequency::from_hz(*hz));
+            speed.and_then(|speed| Profile::new(parameters(speed))).map_err(|error| of_frequency(error, (*hz).into()))
+        };
+        let profiles: Result<Vec<_>, _> = freq.iter().map(profile).collect();
         let moves = if self.cycles.is_some() { u64::MAX } else { self.moves };
         if self.independent {
             return Ok(Program::independent(self.devices.into(), &profiles?, self.steps, moves));

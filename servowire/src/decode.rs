@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use servowire_decode::capture::{self, Capture, Format, Hints, Input};
 use servowire_decode::codec::Codec;
-use servowire_decode::fault::{At, Fault, Stop};
+use servowire_decode::fault::{At, Fault, Stop, printable};
 use servowire_decode::output::Output;
 use servowire_decode::output::json::JsonLines;
 use servowire_decode::output::printer::Printer;
@@ -31,6 +31,7 @@ pub(crate) use arguments::Decode;
 use crate::files::{self, Piped};
 use crate::interrupt;
 use crate::live::{Live, Shown};
+use crate::overwrite::refusal;
 use crate::picture::Picture;
 use crate::units::tformat_rate;
 use crate::{serial, terminal};
@@ -65,7 +66,7 @@ impl End {
 /// Decodes all files. 0: all frames good; 1: not all; 4: something needs attention; 5: both; 2: the options do not go
 /// together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
-    if let Some(what) = arguments.contradiction() {
+    if let Some(what) = arguments.contradiction().map(str::to_owned).or_else(|| overwrites(arguments)) {
         eprintln!("error: {what}");
         return ExitCode::from(2);
     }
@@ -100,15 +101,8 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         return ExitCode::from(2);
     }
     for (out, option) in [(&arguments.vcd, "--vcd"), (&arguments.svg, "--svg")] {
-        let Some(out) = out else { continue };
-        if files + usize::from(piped.is_some()) != 1 {
+        if out.is_some() && files + usize::from(piped.is_some()) != 1 {
             eprintln!("error: {option} writes one capture: name one file, not {files}");
-            return ExitCode::from(2);
-        }
-        let same =
-            |file: &PathBuf| file.canonicalize().is_ok_and(|file| out.canonicalize().is_ok_and(|out| out == file));
-        if arguments.files.iter().any(same) {
-            eprintln!("error: {option} would overwrite the capture {}", out.display());
             return ExitCode::from(2);
         }
     }
@@ -118,6 +112,14 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         eprintln!("standard input was empty: these are the bundled captures");
     }
     code
+}
+
+/// Returns what to say if an output is a capture, or the same file as another output.
+fn overwrites(arguments: &Decode) -> Option<String> {
+    let piped = arguments.files.is_empty().then_some(Path::new("-"));
+    let captures = arguments.files.iter().map(PathBuf::as_path).chain(piped);
+    let captures: Vec<_> = captures.map(|file| ("the capture", file)).collect();
+    refusal(&captures, &[("--vcd", arguments.vcd.as_deref()), ("--svg", arguments.svg.as_deref())])
 }
 
 /// Decodes the bytes heard by a serial port.
@@ -358,7 +360,7 @@ impl Bar {
 
     /// Writes a line to standard error, above the bar.
     fn say(&self, text: &str) {
-        let print = || drop(writeln!(io::stderr(), "{text}"));
+        let print = || drop(writeln!(io::stderr(), "{}", printable(text)));
         match &self.bar {
             Some(bar) => bar.suspend(print),
             None => print(),

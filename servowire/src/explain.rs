@@ -14,6 +14,7 @@ use servowire_decode::time::Time;
 
 use crate::clip::Clip;
 use crate::drawing::{Sheet, Wave};
+use crate::overwrite::refusal;
 use crate::reading::Reading;
 use crate::scope::{Scope, Wanted};
 use crate::terminal::say;
@@ -48,6 +49,10 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(&self) -> ExitCode {
+        if let Some(what) = refusal(&[("the capture", &self.file)], &[("--svg", self.svg.as_deref())]) {
+            eprintln!("error: {what}");
+            return ExitCode::from(2);
+        }
         match self.explain() {
             Ok(true) => ExitCode::SUCCESS,
             Ok(false) => ExitCode::FAILURE,

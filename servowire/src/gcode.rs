@@ -20,6 +20,7 @@ use servowire_decode::fault::{At, Fault};
 use step_motion::{AxisSetup, Limits};
 
 use crate::files;
+use crate::overwrite::Source;
 use item::Item;
 use program::Program;
 pub(crate) use steps::Steps;
@@ -32,7 +33,8 @@ pub(crate) const AXES: usize = 3;
 pub(crate) struct Part {
     /// Run a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), dwells (G4), references (G28, G30), G53 to
     /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min, to the nearest
-    /// um/s; arcs are chords within 2 um, or half a step of the finer axis. M0, M1, M6 and M60 come to rest, M2 and M30 end it, and spindle, coolant and tool words
+    /// um/s; arcs are chords within 2 um, or half a step of the finer axis. M0, M1, M6 and M60 come to rest, M2, M30, a second percent
+    /// sign and ^Z end it, and spindle, coolant and tool words
     /// move nothing. Anything else is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
@@ -47,7 +49,7 @@ pub(crate) struct Part {
     /// How far a part program may round a corner, in um; 0 stops at each one. An arc has none. G61 and G64 P override it.
     #[arg(long, value_name = "UM", requires = "gcode", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     deviation: u32,
-    /// Leave out the lines of a part program that begin with a slash.
+    /// Leave out the lines of a part program that begin with a slash, whatever follows it.
     #[arg(long, requires = "gcode")]
     block_delete: bool,
 }
@@ -56,6 +58,11 @@ impl Part {
     /// Greatest step frequency and acceleration of an axis where nothing else is asked for.
     pub(crate) const SPEED: u32 = 100_000;
     pub(crate) const ACCELERATION: u32 = 400_000;
+
+    /// The part program among the files of a command.
+    pub(crate) fn source(&self) -> Option<Source<'_>> {
+        self.gcode.as_deref().map(|path| ("the part program", path))
+    }
 
     /// Reads all of a part program for faults, and for lines beyond the soft limits of an axis; how many straight lines it has.
     /// Says on standard error where the file goes on after the end of its program.
@@ -88,12 +95,32 @@ impl Part {
     /// The axes of the machine.
     pub(crate) fn axes(&self, limits: Limits) -> Result<[AxisSetup; AXES], String> {
         let mut axes = [AxisSetup::new(limits, self.steps_per_mm * 1000); AXES];
-        for setup in &self.axis {
-            if let Some(axis) = axes.get_mut(setup.axis) {
-                *axis = setup.over(*axis)?;
-            }
+        for (axis, setup) in axes.iter_mut().zip(self.setups()?) {
+            *axis = setup.over(*axis)?;
         }
         Ok(axes)
+    }
+
+    /// Refuses an axis of more than this many steps/s.
+    pub(crate) fn within(&self, limits: Limits, most: u32) -> Result<(), String> {
+        for (axis, setup) in self.axes(limits)?.iter().zip(self.setups()?) {
+            setup.within(axis, most)?;
+            if axis.limits.speed() > most {
+                return Err(format!("--freq {} is above {most}, the greatest", axis.limits.speed()));
+            }
+        }
+        Ok(())
+    }
+
+    /// What all options say of each axis.
+    fn setups(&self) -> Result<[setup::Setup; AXES], String> {
+        let mut setups = [0, 1, 2].map(setup::Setup::new);
+        for setup in &self.axis {
+            if let Some(place) = setups.get_mut(setup.axis) {
+                *place = place.join(*setup)?;
+            }
+        }
+        Ok(setups)
     }
 
     fn open(&self, path: &Path) -> Result<Program<BufReader<File>>, Fault> {

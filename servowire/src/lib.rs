@@ -18,6 +18,7 @@ mod files;
 mod gcode;
 mod interrupt;
 mod live;
+mod overwrite;
 mod picture;
 mod pipe;
 pub mod profile;

@@ -20,6 +20,8 @@ use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
 use crate::gcode::Part;
+use crate::overwrite::refusal;
+use crate::units::{acceleration, jerk, of_frequency};
 use servowire_decode::fault::Fault;
 use servowire_decode::time;
 
@@ -49,10 +51,10 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = Shape::Sin2)]
     shape: Shape,
     /// Greatest acceleration in steps/s².
-    #[arg(long, value_name = "A", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "A", value_parser = acceleration)]
     accel: Option<u32>,
     /// Greatest jerk in steps/s³, for the S-curve; by default ten times A² / V.
-    #[arg(long, value_name = "J", requires = "accel", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "J", requires = "accel", value_parser = jerk)]
     jerk: Option<u64>,
     /// Show all shapes side by side, within --accel and --jerk.
     #[arg(long, requires = "accel", conflicts_with_all = ["csv", "json"])]
@@ -105,7 +107,7 @@ impl Arguments {
     /// Runs the command. 0: done; 1: it ended early, or the output cannot be written; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
         let out = &mut BufWriter::new(io::stdout().lock());
-        if let Some(what) = self.misplaced() {
+        if let Some(what) = self.misplaced().or_else(|| self.overwrites()) {
             return wrong_use(&what);
         }
         if let Some(path) = &self.part.gcode {
@@ -150,6 +152,12 @@ impl Arguments {
         first(&of_the_ramp).filter(|_| !ramp).map(|option| format!("{option} is for the published ramp, --shape sin2"))
     }
 
+    /// Returns what to say if an output is the part program.
+    fn overwrites(&self) -> Option<String> {
+        let outputs = [("--svg", self.svg.as_deref()), ("--vcd", self.vcd.as_deref())];
+        refusal(self.part.source().as_slice(), &outputs)
+    }
+
     /// A part program.
     fn follow(&self, path: &Path, out: &mut dyn Write) -> ExitCode {
         let planned = || -> Result<_, Box<dyn Error>> {
@@ -165,7 +173,12 @@ impl Arguments {
         }
     }
 
-    fn profile(&self) -> Result<Profile<'static>, step_profile::Error> {
+    fn profile(&self) -> Result<Profile<'static>, String> {
+        let hertz = self.freq.map_or(0.0, |freq| f64::from(freq.numerator()) / f64::from(freq.denominator()));
+        self.ramp().map_err(|error| of_frequency(error, hertz))
+    }
+
+    fn ramp(&self) -> Result<Profile<'static>, step_profile::Error> {
         let speed = match (self.tone, self.freq) {
             (Some(tone), _) => tone.speed(),
             (None, frequency) => Speed::from_frequency(frequency.unwrap_or(Frequency::from_hz(0)))?,
@@ -430,13 +443,13 @@ mod tests {
         assert!(Line::try_parse_from(["profile", "--steps", "5", "--tone", "h"]).is_err());
         assert!(Line::try_parse_from("profile --freq 1k --steps 5 --csv --json".split(' ')).is_err());
         for (line, want) in [
-            ("--freq 250001 --steps 5", "above 250 kHz"),
-            ("--freq 96 --steps 5", "longer than 2^32 ns"),
+            ("--freq 250001 --steps 5", "250001 Hz is above 250 kHz"),
+            ("--freq 96.7 --steps 5", "at 96.7 Hz the first step of the ramp is longer than 2^32 ns"),
             ("--freq 10 --steps 5", "below 15.26 Hz"),
             ("--freq 1k --steps 5 --k 0", "at least 1"),
             ("--freq 1k --steps 5 --init-sync 4000", "at most 3999"),
         ] {
-            let error = arguments(&format!("profile {line}")).profile().unwrap_err().to_string();
+            let error = arguments(&format!("profile {line}")).profile().unwrap_err();
             assert!(error.contains(want), "{line}: {error}");
         }
     }

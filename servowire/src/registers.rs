@@ -17,7 +17,7 @@ use servowire_decode::fault::{At, Fault};
 use crate::files;
 use crate::terminal::say;
 
-/// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
+/// Describe the register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
 ///
 /// Exit code 0: the map could be read, whatever its content; 1: it could not be printed; 2: it could not be read.
 #[derive(Debug, Args)]

@@ -15,6 +15,7 @@ use servowire_decode::output::stats::{Gathered, Table};
 use servowire_decode::time::Time;
 use sha2::{Digest, Sha256};
 
+use crate::overwrite::refusal;
 use crate::picture::Picture;
 use crate::reading::{Read, Reading};
 use crate::scope::{Scope, Wanted};
@@ -100,9 +101,8 @@ impl Printer for Gatherer {
 
 impl Arguments {
     pub(crate) fn run(&self) -> ExitCode {
-        let same = |path: &Path| path.canonicalize().ok();
-        if same(&self.output).is_some_and(|output| same(&self.file) == Some(output)) {
-            eprintln!("error: --output would overwrite the capture {}", self.output.display());
+        if let Some(what) = refusal(&[("the capture", &self.file)], &[("--output", Some(&self.output))]) {
+            eprintln!("error: {what}");
             return ExitCode::from(2);
         }
         if self.file.as_os_str() == "-" {

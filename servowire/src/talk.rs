@@ -22,6 +22,7 @@ use encoder::Encoder;
 use link::Link;
 use record::Recorded;
 
+use crate::overwrite::refusal;
 use crate::units::tformat_rate;
 
 /// Talk to a T-Format encoder through a USB-RS485 adapter, or act as one.
@@ -162,6 +163,10 @@ fn encoder_id(text: &str) -> Result<u8, String> {
 impl Arguments {
     /// Runs the command.
     pub fn run(&self) -> ExitCode {
+        if let Some(what) = self.overwrites() {
+            eprintln!("error: {what}");
+            return ExitCode::from(2);
+        }
         match self.perform() {
             Ok(code) => code,
             Err(fault) => {
@@ -170,6 +175,18 @@ impl Arguments {
                 ExitCode::FAILURE
             }
         }
+    }
+
+    /// Returns what to say if an output is the backup, or the same file as another output.
+    fn overwrites(&self) -> Option<String> {
+        let (backup, output) = match &self.what {
+            What::Watch(Watch { csv, .. }) | What::Simulate(Simulate { csv, .. }) => (None, ("--csv", csv.as_deref())),
+            What::Eeprom(Eeprom::Backup { file, .. }) => (None, ("the backup", file.as_deref())),
+            What::Eeprom(Eeprom::Restore { file, before, .. }) => (Some(file), ("--before", before.as_deref())),
+            _ => (None, ("", None)),
+        };
+        let backup = backup.map(|file| ("the backup", file.as_path()));
+        refusal(backup.as_slice(), &[("--log", self.log.as_deref()), output])
     }
 
     /// Returns the encoder at an open port.

@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
+use crate::overwrite::refusal;
 use crate::terminal::say;
 
 /// Show the timing of a line with encoders: who sends when, the shortest cycle and the worst fault of an exchange.
@@ -35,6 +36,10 @@ enum Protocol {
 impl Arguments {
     /// Prints the plan, or draws it. 1: it could not be written; 2: it could not be made.
     pub fn run(&self) -> ExitCode {
+        if let Some(what) = refusal(&[], &[("--svg", self.svg.as_deref())]) {
+            eprintln!("error: {what}");
+            return ExitCode::from(2);
+        }
         let plan = match &self.protocol {
             Protocol::Tformat(arguments) => arguments.plan(),
             Protocol::Nikon(arguments) => arguments.plan(),

@@ -1,6 +1,8 @@
 //! Frequencies and times on the command line.
 
 use servowire_decode::time::{self, Time};
+use step_motion::Limits;
+use step_profile::Error;
 use tformat::BitRate;
 
 /// Frequencies as people write them: `24000000`, `24M`, `2.5MHz`, `100 kHz`.
@@ -8,6 +10,30 @@ pub(crate) fn frequency(text: &str) -> Result<u64, String> {
     match time::frequency(text) {
         Some(hertz) if (1.0..=1e12).contains(&hertz.round()) => Ok(hertz.round() as u64),
         _ => Err(format!("\"{text}\" is not a frequency from 1 to 10^12 Hz, such as 24M or 2500000")),
+    }
+}
+
+/// Parses the greatest acceleration of an axis, in steps/s².
+pub(crate) fn acceleration(text: &str) -> Result<u32, String> {
+    Ok(limit(text, Limits::MAX_ACCELERATION.into())? as u32)
+}
+
+/// Parses the greatest jerk of an axis, in steps/s³.
+pub(crate) fn jerk(text: &str) -> Result<u64, String> {
+    limit(text, Limits::MAX_JERK)
+}
+
+fn limit(text: &str, most: u64) -> Result<u64, String> {
+    let limit = text.parse().ok().filter(|limit| (1..=most).contains(limit));
+    limit.ok_or_else(|| format!("it is a whole number, at least 1 and at most {most}"))
+}
+
+/// Says what is wrong with a profile of this frequency: its errors name the frequency of a rounded speed constant.
+pub(crate) fn of_frequency(error: Error, hertz: f64) -> String {
+    match error {
+        Error::StepRateTooHigh { .. } => format!("{hertz} Hz is above 250 kHz"),
+        Error::StepTimeOverflow { .. } => format!("at {hertz} Hz the first step of the ramp is longer than 2^32 ns"),
+        other => other.to_string(),
     }
 }
 
@@ -56,6 +82,20 @@ mod tests {
         }
         for text in ["", "M", "fast", "-1", "0", "1e13", "inf", "NaN"] {
             assert!(frequency(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn limits_of_an_axis() {
+        assert_eq!((acceleration("1"), acceleration("2147483647")), (Ok(1), Ok(2_147_483_647)));
+        assert_eq!((jerk("1"), jerk("17592186044415")), (Ok(1), Ok(17_592_186_044_415)));
+        for text in ["0", "2147483648", "-1", "1.5", ""] {
+            let error = acceleration(text).unwrap_err();
+            assert_eq!(error, "it is a whole number, at least 1 and at most 2147483647", "{text}");
+        }
+        for text in ["0", "17592186044416", "1e30"] {
+            let error = jerk(text).unwrap_err();
+            assert_eq!(error, "it is a whole number, at least 1 and at most 17592186044415", "{text}");
         }
     }
 

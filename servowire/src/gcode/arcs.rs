@@ -38,6 +38,7 @@ impl State {
         if numbers.center.iter().any(Option::is_some) {
             return Err("R together with I, J or K: an arc takes one or the other".to_owned());
         }
+        within_reach(radius)?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let chord = x.hypot(y);
         if chord < 1e-4 {
@@ -63,6 +64,9 @@ impl State {
         items: &mut VecDeque<Item>,
     ) -> Result<(), String> {
         let (from, end) = (self.flat(self.at), self.flat(to));
+        for [x, y] in [from, end] {
+            within_reach((x - center[0]).hypot(y - center[1]))?;
+        }
         // The ends of finer chords would lie on few of the finer axis's steps, and their corners would be those of the rounding.
         let [a, b, _] = self.plane.map(|axis| self.half_steps.get(axis).copied().unwrap_or_default());
         let off = a.min(b).clamp(CHORD_UM * 10, COARSEST_UM * 10);
@@ -99,6 +103,15 @@ impl State {
         self.end(Line { to, feed, bends }, items);
         Ok(())
     }
+}
+
+/// Refuses a radius that the chords cannot have.
+fn within_reach(radius: f64) -> Result<(), String> {
+    let most = f64::from(Arc::MAX_RADIUS) / 1e4;
+    if radius.abs() <= most {
+        return Ok(());
+    }
+    Err(format!("a radius of {radius:.0} mm is too large: at most {most:.0} mm"))
 }
 
 /// Returns the angle between two points, seen from a center.

@@ -82,9 +82,6 @@ impl Default for State {
 /// The group of G80, which post-processors write in one line with G0.
 const CYCLES: usize = 9;
 
-/// For words that go together with any other.
-const ANY: usize = usize::MAX;
-
 const SUBSET: &str = "G0 to G4, G17 to G21, G28, G30, G40, G43, G49, G53 to G59, G61, G64, G80, G90 to G92, G94";
 
 const ARCS: &str = "I, J, K and R belong to G2 and G3";
@@ -94,6 +91,35 @@ fn only_one(groups: &mut [Option<f64>], group: usize, Word { letter, value }: Wo
     match groups.get_mut(group).and_then(|place| place.replace(value)) {
         Some(other) => Err(format!("{letter}{other} and {letter}{value} in one line: only one of them can apply")),
         None => Ok(()),
+    }
+}
+
+/// The groups of an M word, of each of which a line may have one.
+fn machine_groups(code: i64, number: f64) -> Result<&'static [usize], String> {
+    Ok(match code {
+        0 | 10 | 20 | 300 | 600 => &[4],
+        60 => &[6],
+        // Spindle, coolant (mist and flood may run at once) and overrides move no axis.
+        30 | 40 | 50 => &[7],
+        70 => &[8],
+        80 => &[5],
+        90 => &[8, 5],
+        480 | 490 => &[9],
+        _ => return Err(format!("M{number} is not in the subset: M0 to M9, M30, M48, M49, M60")),
+    })
+}
+
+/// Refuses a motion that is not alone in taking the axes of its line. G0 before G28 or G30 is usual: a reference is approached as fast.
+fn one_taker(once: Option<(Once, f64)>, motion: f64, cancels: bool) -> Result<(), String> {
+    match once {
+        Some((Once::Reference(_), _)) if tenths(motion) == 0 => Ok(()),
+        Some((Once::Reference(_) | Once::Shift, word)) => {
+            Err(format!("G{word} and G{motion} in one line: both take X, Y and Z"))
+        }
+        None | Some((Once::Machine, _)) if cancels => {
+            Err(format!("X, Y and Z in one line with G80, which ends G{motion}: give each a line"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -113,19 +139,9 @@ impl State {
                 }
                 'M' => {
                     let code = tenths(word.value);
-                    let group = match code {
-                        0 | 10 | 20 | 300 | 600 => 4,
-                        60 => 6,
-                        // Spindle, coolant (two may run at once) and overrides move no axis.
-                        30 | 40 | 50 => 7,
-                        70 | 80 | 90 => ANY,
-                        480 | 490 => 9,
-                        _ => {
-                            let number = word.value;
-                            return Err(format!("M{number} is not in the subset: M0 to M9, M30, M48, M49, M60"));
-                        }
-                    };
-                    only_one(&mut machine, group, *word)?;
+                    for group in machine_groups(code, word.value)? {
+                        only_one(&mut machine, *group, *word)?;
+                    }
                     over |= matches!(code, 20 | 300);
                     pause |= matches!(code, 0 | 10 | 60 | 600);
                 }
@@ -134,6 +150,10 @@ impl State {
         }
         if groups[1].is_none() && groups[CYCLES].is_some() {
             self.motion = Motion::Cancelled;
+        }
+        if let Some(motion) = groups[1] {
+            let cancels = groups[CYCLES].is_some() && (numbers.moves() || numbers.bend());
+            one_taker(once.zip(groups[0]), motion, cancels)?;
         }
         if let Some(feed) = numbers.feed {
             let feed = feed * self.unit;
@@ -227,7 +247,7 @@ impl State {
 
     /// Executes a motion, or what takes its place.
     fn act(&mut self, once: Option<Once>, numbers: &Numbers, items: &mut VecDeque<Item>) -> Result<(), String> {
-        let moves = numbers.axes.iter().any(Option::is_some);
+        let moves = numbers.moves();
         if numbers.bend() && !matches!(once, None | Some(Once::Machine)) {
             return Err(ARCS.to_owned());
         }

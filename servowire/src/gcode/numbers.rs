@@ -11,9 +11,16 @@ pub(super) struct Numbers {
     pub(super) radius: Option<f64>,
     pub(super) feed: Option<f64>,
     pub(super) p: Option<f64>,
+    /// Spindle and tool move no axis: S, T, H and D.
+    others: [Option<f64>; 4],
 }
 
 impl Numbers {
+    /// Returns whether there is X, Y or Z.
+    pub(super) fn moves(&self) -> bool {
+        self.axes.iter().any(Option::is_some)
+    }
+
     /// Returns whether there are words of an arc.
     pub(super) fn bend(&self) -> bool {
         self.center.iter().any(Option::is_some) || self.radius.is_some()
@@ -30,8 +37,14 @@ impl Numbers {
             'R' => &mut self.radius,
             'F' => &mut self.feed,
             'P' => &mut self.p,
-            // Spindle and tool move no axis.
-            'S' | 'T' | 'H' | 'D' => return Ok(()),
+            'S' if word.value < 0.0 => return Err(format!("S{}: a number from 0 on", word.value)),
+            'S' => &mut self.others[0],
+            'T' => {
+                word.whole()?;
+                &mut self.others[1]
+            }
+            'H' => &mut self.others[2],
+            'D' => &mut self.others[3],
             other => return Err(format!("{other} is not in the subset: X, Y, Z, I, J, K, R, F and P")),
         };
         match place.replace(word.value) {

@@ -7,7 +7,7 @@ use servowire_decode::fault::{At, Fault};
 
 use super::item::Item;
 use super::modes::State;
-use super::words::words;
+use super::words::{before_the_end, is_optional, words};
 
 /// A part program that is read line by line.
 pub(super) struct Program<R> {
@@ -53,16 +53,31 @@ impl<R: BufRead> Program<R> {
             self.over = true;
             return Ok(());
         };
-        let done = words(&line).and_then(|words| {
-            if words.optional && self.block_delete {
-                return Ok(false);
-            }
-            self.begun |= !words.list.is_empty();
-            let over = self.state.block(&words.list, &mut self.items)?;
-            Ok(over || (words.percent && self.begun))
-        });
+        let done = self.execute(&line);
         self.over = done.map_err(|what| Fault::new(&self.name, At::Line(self.number), what))?;
         Ok(())
+    }
+
+    /// Executes a line; returns `true` at the end of the program.
+    fn execute(&mut self, line: &[u8]) -> Result<bool, String> {
+        let (line, last) = before_the_end(line)?;
+        if self.leaves_out(line) {
+            return Ok(last);
+        }
+        let words = words(line)?;
+        self.begun |= !words.list.is_empty();
+        let over = self.state.block(&words.list, &mut self.items)?;
+        Ok(over || last || (words.percent && self.begun))
+    }
+
+    fn leaves_out(&self, line: &[u8]) -> bool {
+        self.block_delete && is_optional(line)
+    }
+
+    /// Whether a line is no more than a comment.
+    fn is_empty(&self, line: &[u8]) -> bool {
+        let words = before_the_end(line).and_then(|(line, _)| words(line));
+        self.leaves_out(line) || words.is_ok_and(|words| words.list.is_empty())
     }
 
     /// Reads a line; `None` at the end of the file.
@@ -72,11 +87,11 @@ impl<R: BufRead> Program<R> {
         Ok(line)
     }
 
-    /// Where the program has ended before its file: the first line after M2, M30 or a percent sign that is more than a comment.
+    /// Where the program has ended before its file: the first line after M2, M30, a percent sign or ^Z that is more than a comment.
     pub(super) fn behind_the_end(&mut self) -> Result<Option<Fault>, Fault> {
         let end = self.number;
         while let Some(line) = self.read()? {
-            if !words(&line).is_ok_and(|words| words.list.is_empty()) {
+            if !self.is_empty(&line) {
                 let what = format!("not run, nor is what follows: the program ends in line {end}");
                 return Ok(Some(Fault::new(&self.name, At::Line(self.number), what)));
             }

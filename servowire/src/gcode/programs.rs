@@ -266,6 +266,23 @@ fn refusals_name_the_line_and_what_to_do() {
         ("G0 X1\nM30.04", "line 2: M30.04 is not in the subset"),
         ("G64 P-1", "corners rounded by -1 mm"),
         ("G64 P1001", "from 0 to 1000"),
+        ("G28 G1 X5", "line 1: G28 and G1 in one line: both take X, Y and Z"),
+        ("G0 X1\nG2 G30 X5", "line 2: G30 and G2 in one line: both take X, Y and Z"),
+        ("G92 G0 X1", "line 1: G92 and G0 in one line: both take X, Y and Z"),
+        ("G0 X1 G80", "line 1: X, Y and Z in one line with G80"),
+        ("M8 M9", "line 1: M8 and M9 in one line"),
+        ("M9 M7", "line 1: M9 and M7 in one line"),
+        ("S1 M3 S2", "line 1: S is there twice"),
+        ("T1 T1 M6", "line 1: T is there twice"),
+        ("N1 N2 G0 X1", "line 1: N is there twice"),
+        ("G1 F1 X1 F1", "line 1: F is there twice"),
+        ("S-900 M3", "line 1: S-900: a number from 0 on"),
+        ("T-1 M6", "line 1: T-1: a whole number from 0 on"),
+        ("T1.5 M6", "line 1: T1.5: a whole number from 0 on"),
+        ("N-1 G0 X1", "line 1: N-1: a whole number from 0 on"),
+        ("N1.5 G0 X1", "line 1: N1.5: a whole number from 0 on"),
+        ("G2 X10 R1000000 F10", "line 1: a radius of 1000000 mm is too large: at most 107374 mm"),
+        ("G3 I-200000 F10", "line 1: a radius of 200000 mm is too large"),
     ] {
         assert!(refused(text).contains(want), "{text}: {}", refused(text));
     }
@@ -291,6 +308,60 @@ fn ends_of_lines() {
 #[test]
 fn machine_words_of_other_groups_go_together() {
     assert_eq!(ends("S900 M3 M7 M8\nG0 X1 M9 M5 M48").len(), 1);
+}
+
+/// A reference is approached as by G0, and G80 stands among other modes; both are what posts write.
+#[test]
+fn words_that_go_together() {
+    for text in
+        ["G91 G28 Z0", "G0 G91 G28 Z0", "G0 G17 G80 G90\nX1", "G80 G91 G28 Z0", "G53 G0 X1", "N7 T2 S0 M6\nG0 X1"]
+    {
+        assert!(!ends(text).is_empty(), "{text}");
+    }
+}
+
+/// Whatever is in a line that is left out.
+#[test]
+fn a_line_that_is_left_out_is_not_read() {
+    for line in ["/G0 X[#1]", "/garbage #@!", "/ (c", "/N3 G28*17", "/\0\x1b", " /2 G99", "\u{feff}/?"] {
+        let program = |block_delete, text: &str| {
+            Program::new("part.nc", text.as_bytes(), block_delete).collect::<Result<Vec<_>, _>>()
+        };
+        let text = format!("{line}\nG0 X1\n");
+        assert_eq!(program(true, &text).map(|items| items.len()), Ok(1), "{line:?}");
+        assert!(program(false, &text).is_err(), "{line:?}");
+    }
+    let mut program = Program::new("part.nc", "G0 X1\nM2\n/G0 X2\n".as_bytes(), true);
+    assert_eq!((program.by_ref().count(), program.behind_the_end()), (1, Ok(None)));
+}
+
+/// ^Z ends a file, as under DOS, and fills its last block.
+#[test]
+fn the_mark_at_the_end_of_a_file() {
+    for (text, lines, behind) in [
+        ("G0 X1\r\nG0 X2\r\n\x1a", 2, None),
+        ("G0 X1\nG0 X2 \x1a\x1a \n\x1a", 2, None),
+        ("G0 X1\nM2\n\x1a", 1, None),
+        ("/G0 X9\x1a", 0, None),
+        ("G0 X1\n\x1a\nG0 X2", 1, Some("part.nc, line 3: not run, nor is what follows: the program ends in line 2")),
+    ] {
+        let mut program = Program::new("part.nc", text.as_bytes(), true);
+        assert_eq!(program.by_ref().map(Result::unwrap).count(), lines, "{text:?}");
+        let said = program.behind_the_end().unwrap().map(|fault| fault.to_string());
+        assert_eq!(said.as_deref(), behind, "{text:?}");
+    }
+    assert!(refused("G0 X1\n\x1aG0 X2").contains("line 2: text after ^Z (\\x1a)"), "{}", refused("G0 X1\n\x1aG0 X2"));
+}
+
+/// What a terminal would obey is shown as its number.
+#[test]
+fn control_characters_are_named() {
+    for (text, want) in
+        [("G0 \x1b[31mX1", "\"\\x1b\" is not G-code"), ("G0 X1*\x07", "\\x07"), ("G0 \u{9b}", "\"\\x9b\"")]
+    {
+        let said = refused(text);
+        assert!(said.contains(want) && !said.contains(char::is_control), "{said:?}");
+    }
 }
 
 /// As in RS274/NGC: nothing is run after M2, M30, or a percent sign after the first words.

@@ -67,7 +67,7 @@ impl FromStr for Setup {
             text.split_once(':').ok_or("X, Y or Z, a colon, and settings: X:steps-per-mm=80,speed=6000")?;
         let axis = AXIS_NAMES.iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()));
         let axis = axis.ok_or_else(|| format!("\"{name}\" is not an axis: X, Y or Z"))?;
-        let mut new = Self { axis, ..Self::default() };
+        let mut new = Self::new(axis);
         for setting in settings.split(',') {
             let (key, value) =
                 setting.split_once('=').ok_or_else(|| format!("\"{setting}\" is not a setting, such as speed=6000"))?;
@@ -83,6 +83,11 @@ impl FromStr for Setup {
 }
 
 impl Setup {
+    /// An axis of which nothing is said.
+    pub(super) fn new(axis: usize) -> Self {
+        Self { axis, ..Self::default() }
+    }
+
     fn place(&mut self, key: &str) -> Result<Place<'_>, String> {
         Ok(match key {
             "steps-per-mm" => (&mut self.steps_per_mm, Least::Above0),
@@ -98,6 +103,35 @@ impl Setup {
                 ));
             }
         })
+    }
+
+    /// Returns what two options say of one axis.
+    pub(super) fn join(self, other: Self) -> Result<Self, String> {
+        let mut both = self;
+        for (key, value) in other.settings() {
+            let Some(value) = value else { continue };
+            let (place, _) = both.place(key)?;
+            if place.replace(value).is_some() {
+                return Err(format!("{}: {key} is there twice", self.name()));
+            }
+        }
+        Ok(both)
+    }
+
+    const fn settings(&self) -> [(&'static str, Option<f64>); 7] {
+        [
+            ("steps-per-mm", self.steps_per_mm),
+            ("speed", self.speed),
+            ("acceleration", self.acceleration),
+            ("jerk", self.jerk),
+            ("low", self.low),
+            ("high", self.high),
+            ("pause", self.pause),
+        ]
+    }
+
+    fn name(&self) -> &'static str {
+        AXIS_NAMES.get(self.axis).copied().unwrap_or_default()
     }
 
     fn check(&self) -> Result<(), String> {
@@ -121,10 +155,11 @@ impl Setup {
     pub(super) fn over(&self, other: AxisSetup) -> Result<AxisSetup, String> {
         let mut axis = other;
         axis.steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
-        let steps = |mm: f64| mm * f64::from(axis.steps_per_m) / 1000.0;
-        let speed = self.limit("speed", self.speed, "step/s", |mm| steps(mm) / 60.0)?;
-        let acceleration = self.limit("acceleration", self.acceleration, "step/s²", steps)?;
-        let jerk = self.limit("jerk", self.jerk, "step/s³", steps)?.map(|jerk| jerk as u64).or(other.limits.jerk());
+        let per_mm = f64::from(axis.steps_per_m) / 1000.0;
+        let steps = |mm: f64| mm * per_mm;
+        let speed = self.limit(&SPEED, self.speed, per_mm)?;
+        let acceleration = self.limit(&ACCELERATION, self.acceleration, per_mm)?;
+        let jerk = self.limit(&JERK, self.jerk, per_mm)?.map(|jerk| jerk as u64).or(other.limits.jerk());
         let speed = speed.map_or(other.limits.speed(), |speed| speed as u32);
         let acceleration = acceleration.map_or(other.limits.acceleration(), |a| a as u32);
         let limits = Limits::new(speed, acceleration).map_err(|e| e.to_string())?;
@@ -142,15 +177,50 @@ impl Setup {
     }
 
     /// Returns a limit in whole steps, none of which is beyond it.
-    fn limit(&self, key: &str, mm: Option<f64>, unit: &str, steps: impl Fn(f64) -> f64) -> Result<Option<f64>, String> {
-        let Some(mm) = mm else { return Ok(None) };
-        let whole = down(steps(mm));
+    fn limit(&self, kind: &Kind, said: Option<f64>, per_mm: f64) -> Result<Option<f64>, String> {
+        let Some(said) = said else { return Ok(None) };
+        let whole = down(said * per_mm / kind.seconds);
+        let Kind { key, unit, steps, most, seconds } = kind;
+        let name = format!("{}:{key}={}", self.name(), short(said));
         if whole < 1.0 {
-            let name = AXIS_NAMES.get(self.axis).copied().unwrap_or_default();
-            return Err(format!("{name}:{key}={mm} is below 1 {unit}, the least for an axis"));
+            return Err(format!("{name} is below 1 {steps}, the least for an axis"));
+        }
+        if whole > *most {
+            // Rounded down, so that it is accepted.
+            let most = (most * seconds / per_mm * 1000.0).floor() / 1000.0;
+            return Err(format!("{name} is above {most} {unit}, the greatest at {per_mm} steps/mm"));
         }
         Ok(Some(whole))
     }
+
+    /// Refuses a speed of more than this many steps/s.
+    pub(super) fn within(&self, axis: &AxisSetup, most: u32) -> Result<(), String> {
+        let kind = Kind { most: most.into(), ..SPEED };
+        self.limit(&kind, self.speed, f64::from(axis.steps_per_m) / 1000.0).map(|_| ())
+    }
+}
+
+/// A limit of an axis.
+struct Kind {
+    key: &'static str,
+    /// The unit of the user, how many seconds its time has, and the unit in steps.
+    unit: &'static str,
+    seconds: f64,
+    steps: &'static str,
+    /// The greatest, in steps.
+    most: f64,
+}
+
+const SPEED: Kind = Kind { key: "speed", unit: "mm/min", seconds: 60.0, steps: "step/s", most: u32::MAX as f64 };
+const ACCELERATION: Kind =
+    Kind {
+        key: "acceleration", unit: "mm/s²", seconds: 1.0, steps: "step/s²", most: Limits::MAX_ACCELERATION as f64
+    };
+const JERK: Kind = Kind { key: "jerk", unit: "mm/s³", seconds: 1.0, steps: "step/s³", most: Limits::MAX_JERK as f64 };
+
+/// A number as short as people write it.
+fn short(number: f64) -> String {
+    if number < 1e15 { number.to_string() } else { format!("{number:e}") }
 }
 
 /// Rounds down what is not negative.
@@ -215,6 +285,36 @@ mod tests {
             let error = limits(text).unwrap_err();
             assert!(error.contains(want), "{text}: {error}");
         }
+    }
+
+    /// In the user's units: 2^31 - 1 steps/s² at 10000 steps/mm are 214748.3647 mm/s².
+    #[test]
+    fn what_is_above_the_greatest_limit() {
+        for (text, want) in [
+            (
+                "X:steps-per-mm=10000,acceleration=2000000",
+                "X:acceleration=2000000 is above 214748.364 mm/s², the greatest",
+            ),
+            ("Y:steps-per-mm=80,jerk=1e30", "Y:jerk=1e30 is above 219902325555.187 mm/s³, the greatest"),
+            ("Z:steps-per-mm=10000,speed=1e8", "Z:speed=100000000 is above 25769803.77 mm/min, the greatest"),
+        ] {
+            let error = limits(text).unwrap_err();
+            assert!(error.contains(want), "{text}: {error}");
+        }
+        assert!(limits("X:steps-per-mm=10000,acceleration=214748.364,speed=25769803.77").is_ok());
+    }
+
+    /// Over all that is said of an axis, in whatever order.
+    #[test]
+    fn an_axis_in_several_options() {
+        let join = |texts: [&str; 2]| {
+            let [first, second] = texts.map(|text| text.parse::<Setup>().unwrap());
+            first.join(second)
+        };
+        let whole = "X:steps-per-mm=160,speed=6000,low=-1".parse();
+        assert_eq!(join(["X:speed=6000", "X:low=-1,steps-per-mm=160"]), whole);
+        assert_eq!(join(["X:low=-1,steps-per-mm=160", "X:speed=6000"]), whole);
+        assert_eq!(join(["X:speed=100", "X:low=0,speed=200"]), Err("X: speed is there twice".to_owned()));
     }
 
     /// A soft limit is reached, though 4.35 times 100 is below 435 in floating point; a pause is at least as long as asked for.

@@ -10,20 +10,49 @@ pub(super) struct Word {
     pub(super) value: f64,
 }
 
+impl Word {
+    /// Refuses what counts nothing.
+    pub(super) fn whole(self) -> Result<(), String> {
+        let Self { letter, value } = self;
+        let whole = value >= 0.0 && value.fract() == 0.0;
+        if whole { Ok(()) } else { Err(format!("{letter}{value}: a whole number from 0 on")) }
+    }
+}
+
 /// The content of a line.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Words {
     pub(super) list: Vec<Word>,
-    /// Whether it begins with a slash, so that it may be skipped.
-    pub(super) optional: bool,
     /// Whether it is a percent sign, which stands before and after a program.
     pub(super) percent: bool,
 }
 
+/// ^Z, which ended the files of CP/M and DOS.
+const END: u8 = 0x1a;
+
+/// Returns what is before ^Z in a line, and whether there is one. More of them may follow, as they fill a block.
+pub(super) fn before_the_end(line: &[u8]) -> Result<(&[u8], bool), String> {
+    let at = line.iter().position(|byte| *byte == END);
+    let Some((text, rest)) = at.and_then(|at| line.split_at_checked(at)) else { return Ok((line, false)) };
+    if rest.iter().any(|byte| *byte != END && !byte.is_ascii_whitespace()) {
+        return Err("text after ^Z (\\x1a), which ends a file".to_owned());
+    }
+    Ok((text, true))
+}
+
+/// Whether a line begins with a slash, so that it may be left out.
+pub(super) fn is_optional(line: &[u8]) -> bool {
+    trimmed(line).starts_with(b"/")
+}
+
+/// A line without the mark of UTF-8 and the blanks around it.
+fn trimmed(line: &[u8]) -> &[u8] {
+    line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line).trim_ascii()
+}
+
 /// Returns the words of a line, without its number, its comments and its checksum.
 pub(super) fn words(line: &[u8]) -> Result<Words, String> {
-    let line = line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line).trim_ascii();
-    let (text, comment) = checked(line)?;
+    let (text, comment) = checked(trimmed(line))?;
     let (text, comment) = (String::from_utf8_lossy(text), String::from_utf8_lossy(comment));
     let mut out = Words::default();
     let mut left = text.trim().chars().peekable();
@@ -32,16 +61,25 @@ pub(super) fn words(line: &[u8]) -> Result<Words, String> {
         return Ok(out);
     }
     if left.next_if_eq(&'/').is_some() {
-        out.optional = true;
         while left.next_if(char::is_ascii_digit).is_some() {}
     }
     out.list = list(left)?;
     if !list(comment.chars().peekable())?.is_empty() {
         return Err("a word after the checksum: only a comment may follow it".to_owned());
     }
+    number(&out.list)?;
     // The number of a line, and of a program.
     out.list.retain(|word| !matches!(word.letter, 'N' | 'O'));
     Ok(out)
+}
+
+/// Refuses what is no number of a line.
+fn number(list: &[Word]) -> Result<(), String> {
+    let mut numbers = list.iter().filter(|word| word.letter == 'N');
+    if let Some(word) = numbers.next() {
+        word.whole()?;
+    }
+    if numbers.next().is_some() { Err("N is there twice".to_owned()) } else { Ok(()) }
 }
 
 /// Returns all words of a text, without its comments.
@@ -133,7 +171,8 @@ mod tests {
         assert_eq!(pairs("O1001 (PLATE)"), []);
         assert_eq!(pairs("%"), []);
         assert!(words("x 12 3").unwrap_err().contains("\"3\" is not G-code"));
-        assert!(words("/2 G0 X1").unwrap().optional && !words("G0 X1").unwrap().optional);
+        assert_eq!(pairs("/2 G0 X1"), pairs("G0 X1"));
+        assert!(is_optional(b" /2 G0 X1") && is_optional("\u{feff}/".as_bytes()) && !is_optional(b"G0 X1 /"));
     }
 
     /// 'N' ^ '3' ^ ' ' ^ 'G' ^ '2' ^ '8' is 78 ^ 51 ^ 32 ^ 71 ^ 50 ^ 56 = 16.

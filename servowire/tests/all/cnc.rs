@@ -454,3 +454,31 @@ fn long_ramps_of_small_steps() {
         assert!(run.status.success() && out.contains("1500000 steps, at 1500000 in the end"), "{axis}: {out} {err}");
     }
 }
+
+/// Each limit with the user's number, its unit and the greatest.
+#[test]
+fn limits_that_are_too_high_are_named() {
+    let bench = TempDir::new().unwrap();
+    let program = bench.path().join("a.nc");
+    fs::write(&program, "G0 X1\n").unwrap();
+    let program = program.to_str().unwrap();
+    for (call, want) in [
+        (
+            &["profile", "--gcode", program, "--axis", "X:steps-per-mm=10000,acceleration=2000000"][..],
+            "X:acceleration=2000000 is above 214748.364 mm/s², the greatest at 10000 steps/mm",
+        ),
+        (
+            &["cnc", "--gcode", program, "--axis", "Y:speed=200000"],
+            "Y:speed=200000 is above 187500 mm/min, the greatest at 80 steps/mm: a step in each cycle of 4 us",
+        ),
+        (&["cnc", "--gcode", program, "--freq", "250001"], "--freq 250001 is above 250000, the greatest: a step in"),
+        (&["cnc", "--gcode", program, "--jerk", "0"], "at least 1 and at most 17592186044415"),
+        (&["cnc", "--gcode", program, "--accel", "2147483648"], "at least 1 and at most 2147483647"),
+        (&["cnc", "--freq", "250001"], "error: 250001 Hz is above 250 kHz"),
+        (&["profile", "--gcode", program, "--axis", "X:speed=100", "--axis", "X:speed=200"], "X: speed is there twice"),
+    ] {
+        let output = servowire(call);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains(want), "{call:?}: {said}");
+    }
+}

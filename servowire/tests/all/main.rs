@@ -36,6 +36,7 @@ mod live;
 mod misplaced;
 mod nikon;
 mod outputs;
+mod overwrite;
 mod packed;
 #[path = "../random/mod.rs"]
 mod random;
