@@ -2,6 +2,7 @@
 
 mod arcs;
 mod item;
+mod limit;
 mod modes;
 mod numbers;
 mod program;

@@ -15,6 +15,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use servowire_decode::fault::printable;
 use tformat::BitRate;
 
 use act::Print;
@@ -171,7 +172,7 @@ impl Arguments {
             Ok(code) => code,
             Err(fault) => {
                 let name = if fault.names_itself() { String::new() } else { format!("{}: ", self.port) };
-                eprintln!("error: {name}{fault}");
+                eprintln!("error: {}", printable(&format!("{name}{fault}")));
                 ExitCode::FAILURE
             }
         }

@@ -6,8 +6,8 @@ use step_motion::Turning;
 
 use super::AXES;
 use super::item::{Item, Line};
+use super::limit::down;
 use super::numbers::Numbers;
-use super::setup::down;
 use super::words::Word;
 
 /// Largest distance of an axis from 0, in mm.

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use step_motion::{AxisSetup, Limits};
 
 use super::AXES;
+use super::limit::{ACCELERATION, JERK, LAST_BITS, SPEED, down};
 
 /// `X:steps-per-mm=80,speed=6000,acceleration=500,jerk=10000,low=0,high=300,pause=0.5`: the settings of one axis, in mm, with
 /// minutes for the speed, milliseconds for the pause and seconds for the rest.
@@ -53,9 +54,6 @@ impl Least {
 /// The farthest soft limit, in mm, and the longest pause, in ms.
 const FARTHEST: f64 = 100_000.0;
 const LONGEST: f64 = 1000.0;
-
-/// What a few products may be off: 4.35 times 100 is a little less than 435.
-const LAST_BITS: f64 = 4.0 * f64::EPSILON;
 
 const AXIS_NAMES: [&str; AXES] = ["X", "Y", "Z"];
 
@@ -156,10 +154,10 @@ impl Setup {
         let mut axis = other;
         axis.steps_per_m = self.steps_per_mm.map_or(other.steps_per_m, |n| (n * 1000.0).round() as u32);
         let per_mm = f64::from(axis.steps_per_m) / 1000.0;
-        let steps = |mm: f64| mm * per_mm;
-        let speed = self.limit(&SPEED, self.speed, per_mm)?;
-        let acceleration = self.limit(&ACCELERATION, self.acceleration, per_mm)?;
-        let jerk = self.limit(&JERK, self.jerk, per_mm)?.map(|jerk| jerk as u64).or(other.limits.jerk());
+        let (steps, name) = (|mm: f64| mm * per_mm, self.name());
+        let speed = SPEED.steps(name, self.speed, per_mm)?;
+        let acceleration = ACCELERATION.steps(name, self.acceleration, per_mm)?;
+        let jerk = JERK.steps(name, self.jerk, per_mm)?.map(|jerk| jerk as u64).or(other.limits.jerk());
         let speed = speed.map_or(other.limits.speed(), |speed| speed as u32);
         let acceleration = acceleration.map_or(other.limits.acceleration(), |a| a as u32);
         let limits = Limits::new(speed, acceleration).map_err(|e| e.to_string())?;
@@ -176,56 +174,11 @@ impl Setup {
         Ok(axis)
     }
 
-    /// Returns a limit in whole steps, none of which is beyond it.
-    fn limit(&self, kind: &Kind, said: Option<f64>, per_mm: f64) -> Result<Option<f64>, String> {
-        let Some(said) = said else { return Ok(None) };
-        let whole = down(said * per_mm / kind.seconds);
-        let Kind { key, unit, steps, most, seconds } = kind;
-        let name = format!("{}:{key}={}", self.name(), short(said));
-        if whole < 1.0 {
-            return Err(format!("{name} is below 1 {steps}, the least for an axis"));
-        }
-        if whole > *most {
-            // Rounded down, so that it is accepted.
-            let most = (most * seconds / per_mm * 1000.0).floor() / 1000.0;
-            return Err(format!("{name} is above {most} {unit}, the greatest at {per_mm} steps/mm"));
-        }
-        Ok(Some(whole))
-    }
-
     /// Refuses a speed of more than this many steps/s.
     pub(super) fn within(&self, axis: &AxisSetup, most: u32) -> Result<(), String> {
-        let kind = Kind { most: most.into(), ..SPEED };
-        self.limit(&kind, self.speed, f64::from(axis.steps_per_m) / 1000.0).map(|_| ())
+        let per_mm = f64::from(axis.steps_per_m) / 1000.0;
+        SPEED.up_to(most.into()).steps(self.name(), self.speed, per_mm).map(|_| ())
     }
-}
-
-/// A limit of an axis.
-struct Kind {
-    key: &'static str,
-    /// The unit of the user, how many seconds its time has, and the unit in steps.
-    unit: &'static str,
-    seconds: f64,
-    steps: &'static str,
-    /// The greatest, in steps.
-    most: f64,
-}
-
-const SPEED: Kind = Kind { key: "speed", unit: "mm/min", seconds: 60.0, steps: "step/s", most: u32::MAX as f64 };
-const ACCELERATION: Kind =
-    Kind {
-        key: "acceleration", unit: "mm/s²", seconds: 1.0, steps: "step/s²", most: Limits::MAX_ACCELERATION as f64
-    };
-const JERK: Kind = Kind { key: "jerk", unit: "mm/s³", seconds: 1.0, steps: "step/s³", most: Limits::MAX_JERK as f64 };
-
-/// A number as short as people write it.
-fn short(number: f64) -> String {
-    if number < 1e15 { number.to_string() } else { format!("{number:e}") }
-}
-
-/// Rounds down what is not negative.
-pub(super) fn down(value: f64) -> f64 {
-    (value * (1.0 + LAST_BITS)).floor()
 }
 
 /// The position of an axis in steps.

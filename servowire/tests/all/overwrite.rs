@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
 
 use crate::common::{Bench, Run, servowire};
 
@@ -62,7 +61,7 @@ fn a_capture_at_the_standard_input_is_not_overwritten() {
     let bench = Bench::new();
     let file = bench.file("a.vcd", "as it was");
     for more in [&["-"][..], &[]] {
-        let mut call = Command::new(env!("CARGO_BIN_EXE_servowire"));
+        let mut call = std::process::Command::new(env!("CARGO_BIN_EXE_servowire"));
         call.arg("decode").args(more).arg("-o").arg(&file).stdin(fs::File::open(&file).unwrap());
         let output = call.output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{output:?}");

@@ -325,6 +325,9 @@ fn what_is_wrong_is_said() {
     let empty = empty.to_str().unwrap();
     let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
     assert!(said.starts_with(&format!("{empty}: this is not a backup: ")), "{said}");
+    std::fs::write(empty, "{\"\\u001b[31m\": 1}").unwrap();
+    let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
+    assert!(said.contains("`\\x1b[31m`") && !said.contains('\x1b'), "{said:?}");
     // Six pages are read before: a thousand exchanges, which take as long as the machine lets them.
     let output = bench.talk(&["eeprom", "dump", "--pages", "7"]);
     let said = text(&output);
