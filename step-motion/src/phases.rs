@@ -150,6 +150,11 @@ impl Phases {
     }
 }
 
+/// Converts steps to a position, modulo 2^32 steps.
+pub(super) const fn fine(steps: i64) -> i64 {
+    steps.wrapping_mul(1 << P)
+}
+
 /// Returns the steps made at a position: step k falls where the position is k - 1/2.
 pub(super) fn steps(p: i64) -> u32 {
     u32::try_from(p.saturating_add(1 << 31) >> P).unwrap_or(if p < 0 { 0 } else { u32::MAX })

@@ -10,11 +10,6 @@ use servowire_core::Direction;
 /// Twice of what rounding may leave of a line, in 2^-32 steps.
 const ROUNDED: u64 = 1 << 17;
 
-/// Converts steps to a position, modulo 2^32 steps.
-pub(super) const fn fine(steps: i64) -> i64 {
-    steps.wrapping_mul(1 << P)
-}
-
 /// Returns the distance between two positions in steps; none if it is one of rounding.
 pub(super) fn gap(from: i64, to: i64) -> Real {
     let off = to.wrapping_sub(from).unsigned_abs();

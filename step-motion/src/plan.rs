@@ -5,8 +5,7 @@ use core::iter::FusedIterator;
 
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::phases::{self, Phases, steps};
-use crate::places::fine;
+use crate::phases::{self, Phases, fine, steps};
 use crate::planner::{Goal, Motion, plan_into};
 use crate::real::Real;
 use crate::stepper::Stepper;

@@ -3,8 +3,8 @@
 
 use crate::curve::Piece;
 use crate::limits::Clock;
-use crate::phases::Phases;
-use crate::places::{between, fine, gap, since};
+use crate::phases::{Phases, fine};
+use crate::places::{between, gap, since};
 use crate::plan::Setpoint;
 use crate::real::Real;
 use servowire_core::Direction;

@@ -4,7 +4,8 @@
 use crate::curve::Piece;
 use crate::line::Steps;
 use crate::path::AxisSetup;
-use crate::places::{between, fine, gap, since};
+use crate::phases::fine;
+use crate::places::{between, gap, since};
 use crate::plan::Setpoint;
 use crate::real::Real;
 
