@@ -5,6 +5,7 @@ use std::io::{self, BufRead};
 
 use servowire_decode::fault::{At, Fault};
 
+use super::AXES;
 use super::item::Item;
 use super::modes::State;
 use super::words::{before_the_end, is_optional, words};
