@@ -433,7 +433,7 @@ fn circle(feed: f64) -> f64 {
     let path = Path::<2, 64>::new(Clock::MICROSECONDS, [AxisSetup::new(limits, 400_000); 2], 20).unwrap();
     let mut machine = PathMover::new(path);
     let place = |k: i32| {
-        let angle = std::f64::consts::TAU * f64::from(k) / 512.0;
+        let angle = core::f64::consts::TAU * f64::from(k) / 512.0;
         [1.0 - angle.cos(), angle.sin()].map(|part| (50.0 * scale * part).round() as i64)
     };
     let mut left = (1..=512).map(place).peekable();
@@ -462,7 +462,7 @@ fn a_circle_is_as_fast_as_its_corners() {
     // To 158 mm/s: 500 mm/s² are reached in 50 ms.
     let speed = (500.0 * 50.0_f64).sqrt();
     let ramp = speed / 500.0 + 0.05;
-    let least = 2.0 * ramp + (std::f64::consts::TAU * 50.0 - speed * ramp) / speed;
+    let least = 2.0 * ramp + (core::f64::consts::TAU * 50.0 - speed * ramp) / speed;
     let [half, whole, more, most] = [0.5, 1.0, 2.0, 10.0].map(|part| circle(speed * part));
     assert!(whole < least * 1.16 && more < least * 1.16 && most < least * 1.16, "{whole} {more} {most} for {least}");
     assert!(most <= whole && whole < half, "{half} {whole} {most}");
