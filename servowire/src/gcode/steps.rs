@@ -207,7 +207,7 @@ mod tests {
     /// The steps of each axis, as the exact search of `Path` has them.
     fn searched(text: &str) -> [Vec<(u64, Direction)>; AXES] {
         let mut path = Path::<AXES, 1024>::new(Clock::NANOSECONDS, axes(), 20).unwrap();
-        for item in program(text) {
+        for item in program(text).with_scales(axes().map(|axis| axis.steps_per_m)) {
             let Ok(Item::Line(Line { to, feed, .. })) = item else { panic!("{item:?}") };
             path.push(to.map(|mm| (mm * 80.0).round() as i64), feed.unwrap_or(u32::MAX)).unwrap();
         }
