@@ -176,11 +176,11 @@ kernels_on_states! {
         Job::new(&PATHS[0]).map_or(0, |mut own| tenths_of(Job::steps(), &mut own, step_motion_axes_job, &[()]))
     }
 
-    /// A millisecond of that motion with all of its background and the interrupt.
+    /// A millisecond of that motion with all of its background and the interrupt: the first 50 s of it.
     fn step_motion_axes_millisecond(job: &mut Job, _input: &i8) -> bool {
         job.millisecond()
     } as {
-        Job::new(&PATHS[4]).map_or(0, |mut own| tenths_of(75_000 / PART, &mut own, step_motion_axes_millisecond, &[0]))
+        Job::new(&PATHS[4]).map_or(0, |mut own| tenths_of(50_000 / PART, &mut own, step_motion_axes_millisecond, &[0]))
     }
 
     /// The worst slice of the background of these axes, to 40 instructions, with requests at random moments.
