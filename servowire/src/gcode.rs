@@ -35,8 +35,7 @@ pub(crate) struct Part {
     /// Run a part program: lines and arcs in three planes (G0 to G3, G17 to G21, I, J, K or R), dwells (G4), references (G28, G30), G53 to
     /// G59, G61 and G64, G90 to G92; a tool of length 0 (G43), offsets of 0 (G54 to G59). Feeds are in mm/min, to the nearest
     /// um/s; arcs are chords within 2 um, or half a step of the finer axis. M0, M1, M6 and M60 come to rest, M2, M30, a second percent
-    /// sign and ^Z end it, and spindle, coolant and tool words
-    /// move nothing. Anything else is refused with its line.
+    /// sign and ^Z end it, and spindle, coolant and tool words move nothing. Anything else is refused with its line.
     #[arg(long, value_name = "FILE")]
     pub(crate) gcode: Option<PathBuf>,
     /// Steps per millimetre of each axis of a part program.

@@ -103,16 +103,24 @@ fn run(path: &Lines, lines: &[(f64, Most)], [v, a]: [f64; 2], fastest: f64) -> O
     };
     let alike = |a: f64, b: f64, by: f64| is_at_least(by, a.max(b) / a.min(b));
     let held = if a == 0.0 { [0.0; 2] } else { [a.abs(), first.j?] };
-    for (at, (_, line)) in lines.iter().enumerate().skip(1) {
+    let (mut slowest, mut whole, mut longest) = (first.v, lines[0].0, lines[0].0);
+    for (at, (length, line)) in lines.iter().enumerate().skip(1) {
         let corner = float(path.line(at)?.corner) * second();
-        let both = most.v.min(line.v);
-        if (fastest..both).contains(&corner) {
-            // A bend, if the lines are short for it.
-            return None;
-        }
-        let is_open = is_at_least(corner, both.max(fastest));
-        let same = [alike(line.v, most.v, 129.0 / 128.0), alike(line.a, most.a, 1.5), alike(line.j?, most.j?, 1.5)];
+        let is_open = is_at_least(corner, fastest);
         let least = Most { v: most.v.min(line.v), a: most.a.min(line.a), j: Some(most.j?.min(line.j?)) };
+        (whole, longest) = (whole + length, longest.max(*length));
+        let next = corner.min(least.v);
+        let cap = slowest.min(next);
+        // Where a corner allows less than the lines, they are a bend if they are short for it.
+        let speeds = if is_at_least(cap, least.v) {
+            alike(line.v, most.v, 129.0 / 128.0)
+        } else {
+            let before = if more > 0 { slowest } else { cap };
+            let is_short = |way: f64, part: f64| is_at_least(cap.powi(3) / part, least.j.unwrap() * way.powi(2));
+            let near = is_at_least(cap * 1.125, before) && is_at_least(cap * 1.125, next);
+            is_short(longest, 8.0) && (near || is_short(whole, 2.0))
+        };
+        let same = [speeds, alike(line.a, most.a, 1.5), alike(line.j?, most.j?, 1.5)];
         if same != [true; 3]
             || !is_open
             || line.v < fastest.max(v)
@@ -121,9 +129,9 @@ fn run(path: &Lines, lines: &[(f64, Most)], [v, a]: [f64; 2], fastest: f64) -> O
         {
             break;
         }
-        (more, most) = (more + 1, least);
+        (more, most, slowest) = (more + 1, least, cap);
     }
-    sure.get().then_some((more, most))
+    sure.get().then_some((more, Most { v: slowest, ..most }))
 }
 
 proptest! {
@@ -148,6 +156,7 @@ proptest! {
         let Some((course, bounds)) = path.course(0, start, (at[0], at[1]), (Real::ONE, None)) else { return Ok(()) };
         if course.slow {
             // It cannot be slow enough at the end of its run: it brakes over more lines.
+            prop_assert!(course.more > more, "{case}");
             return Ok(());
         }
         let got = limits(&bounds);
