@@ -56,13 +56,12 @@ for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done
 
+# As many side by side as there are processors.
 hdsl=$(built "$firmware/rp2350-hdsl")/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
-.venv/bin/python rp2350/compare.py "$hdsl"
-.venv/bin/python rp2350/hdsl.py "$hdsl"
-.venv/bin/python rp2350/hdsl_mistakes.py "$hdsl"
 pico2=$(built "$firmware/pico2")/thumbv8m.main-none-eabihf/release
-.venv/bin/python rp2350/masters.py "$pico2"
-.venv/bin/python rp2350/mistakes.py "$pico2"
+printf '%s\n' rp2350/hdsl.py "$hdsl" rp2350/hdsl_mistakes.py "$hdsl" rp2350/compare.py "$hdsl" \
+    rp2350/masters.py "$pico2" rp2350/mistakes.py "$pico2" |
+    xargs -d '\n' -n 2 -P "$(nproc)" .venv/bin/python
 
 .venv/bin/python motion/check.py rp2040 "$(built "$firmware/rp2040")/thumbv6m-none-eabi/release/motion"
 .venv/bin/python motion/check.py stm32f405 \
