@@ -28,7 +28,7 @@ pub(crate) enum Piped {
 }
 
 /// The name of the standard input.
-const STDIN: &str = "standard input";
+pub(crate) const STDIN: &str = "standard input";
 
 /// Opens `path`, or the standard input for `-`. `grows`: wait for more data at its end.
 pub(crate) fn open(path: &Path, grows: bool) -> Result<Input, Fault> {

@@ -124,11 +124,16 @@ impl Part {
     }
 
     fn open(&self, path: &Path) -> Result<Program<BufReader<File>>, Fault> {
+        let name = path.display().to_string();
+        let once =
+            |name| Fault::new(name, At::File, "cannot be read twice, to be checked and to be run: copy it into a file");
+        if path.as_os_str() == "-" {
+            return Err(once(files::STDIN));
+        }
         let file = files::open_file(path)?;
         if !file.metadata().is_ok_and(|data| data.is_file()) {
-            let what = "cannot be read twice, to be checked and to be run: copy it into a file";
-            return Err(Fault::new(&path.display().to_string(), At::File, what));
+            return Err(once(&name));
         }
-        Ok(Program::new(&path.display().to_string(), BufReader::new(file), self.block_delete))
+        Ok(Program::new(&name, BufReader::new(file), self.block_delete))
     }
 }

@@ -133,6 +133,28 @@ impl Curve {
         Some(piece.after(high))
     }
 
+    /// Returns whether it has slowed down to a speed after a distance from the point where it was joined.
+    pub(super) fn has_slowed_down(&self, way: Real, to: Real) -> bool {
+        let p = self.skipped.1 + way;
+        let begun = self.pieces().iter().rposition(|piece| piece.p <= p);
+        let Some((piece, (end, _))) = begun.and_then(|at| self.piece(at)).filter(|(piece, _)| !piece.up) else {
+            return false;
+        };
+        let (mut low, mut high) = (Real::ZERO, end - piece.time);
+        for _ in 0..64 {
+            let middle = (low + high).half();
+            let (place, v) = piece.way(middle);
+            // It only gets slower.
+            match (place < p, v <= to) {
+                (true, true) => return true,
+                (false, false) => return false,
+                (true, false) => low = middle,
+                (false, true) => high = middle,
+            }
+        }
+        false
+    }
+
     /// Returns the planned distance, from the point where the curve was joined to its end.
     pub(super) fn way(&self) -> Real {
         self.p - self.skipped.1

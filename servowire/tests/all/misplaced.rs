@@ -108,10 +108,13 @@ fn a_file_that_is_not_there() {
 #[test]
 fn a_part_program_comes_from_no_pipe() {
     for command in ["profile", "cnc"] {
-        let mut run = Command::new(env!("CARGO_BIN_EXE_servowire"));
-        let run = run.args([command, "--gcode", "/dev/stdin"]).stdin(Stdio::piped()).output().unwrap();
-        let said = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.code() == Some(2) && said.contains("/dev/stdin: cannot be read twice"), "{said}");
+        for (file, name) in [("/dev/stdin", "/dev/stdin"), ("-", "standard input")] {
+            let mut run = Command::new(env!("CARGO_BIN_EXE_servowire"));
+            let run = run.args([command, "--gcode", file]).stdin(Stdio::piped()).output().unwrap();
+            let said = String::from_utf8_lossy(&run.stderr);
+            let want = format!("{name}: cannot be read twice");
+            assert!(run.status.code() == Some(2) && said.contains(&want), "{said}");
+        }
     }
 }
 

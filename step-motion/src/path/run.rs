@@ -157,7 +157,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 speed = speed - speed.scaled(-40);
             }
         }
-        Some(Kind { part, speed, held, any: false, feeds: false, early: self.early(start, before, &first.bounds) })
+        let early = self.early(start, before, &first.bounds);
+        Some(Kind { part, speed, corner: speed, held, any: false, feeds: false, early })
     }
 
     /// Returns the greatest speed of a motion a distance before a line, if that is less than it can reach there; 0 on the line.
@@ -182,7 +183,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let kind = Kind { any: any.is_some(), ..self.under_way(at, (start, before), (None, how.0))? };
         // With the limits of no more lines than the stop takes.
         let mut run = self.single(at, kind)?;
-        let mut own = run.bounds;
+        let (mut own, mut whole) = (run.bounds, None);
         for _ in 0..M {
             own = Self::own(&run, how);
             if any.is_some_and(|least| least.allows_more(&own)) {
@@ -190,7 +191,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
             let Ok(curve) = plan(start, Goal::Speed(Real::ZERO), &own) else { break };
             let way = (place + curve.way()) - before;
-            if curve.way() <= ((run.length + before) - place) + SLACK {
+            let left = (run.length + before) - place;
+            if curve.way() <= left + SLACK {
+                if whole.is_some() && !self.is_slow_at_corners(at, &run, kind.speed, (&curve, left)) {
+                    break;
+                }
                 // Rounding must not let it begin a line after the run.
                 let (end, rest) = self.locate(at, way, at.saturating_add(run.more));
                 let whole = self.line(end).is_some_and(|line| line.cut || line.length <= rest + SLACK);
@@ -199,13 +204,30 @@ impl<const N: usize, const M: usize> Path<N, M> {
             }
             let (end, _) = self.locate(at, way, self.len);
             let most = end.saturating_sub(at).max(run.more.saturating_add(1));
-            let before = run.more;
+            let known = run.more;
             self.lengthen(at, &mut run, kind, most);
-            if run.more == before {
+            if run.more == known {
+                // The next corner is for less speed than the present one; the stop may have slowed down to that.
+                whole = whole.or(Some((run, own)));
+                let next = known.saturating_add(1);
+                if self.line(at.saturating_add(next)).is_some_and(|line| curve.has_slowed_down(left, line.corner)) {
+                    self.lengthen(at, &mut run, Kind { corner: Real::ZERO, ..kind }, next);
+                }
+            }
+            if run.more == known {
                 break;
             }
         }
-        Some(Err((run, own)))
+        Some(Err(whole.unwrap_or((run, own))))
+    }
+
+    /// Returns whether a curve along a run, which is `left` long, passes each corner for less than `speed` as slowly as that allows.
+    fn is_slow_at_corners(&self, at: usize, run: &Run, speed: Real, (curve, mut left): (&Curve, Real)) -> bool {
+        (at..at.saturating_add(run.more)).rev().all(|at| {
+            let Some(line) = self.line(at.saturating_add(1)) else { return false };
+            left = left - line.length;
+            line.corner >= speed || curve.has_slowed_down(left, line.corner)
+        })
     }
 
     /// Plans over the rest of a run, within `bounds`, to a speed at its end; if that is not possible, to the nearest one that is.
@@ -472,6 +494,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             Kind {
                 part: Some(part),
                 speed: Real::ZERO,
+                corner: Real::ZERO,
                 held: [Real::ZERO; 2],
                 any: false,
                 feeds: false,

@@ -29,8 +29,9 @@ pub(crate) struct Run {
 pub(super) struct Kind {
     /// At most a fraction of the requested speeds; without one, all that the axes allow.
     pub(super) part: Option<Real>,
-    /// The speed under way, and its acceleration and jerk: limits below these would make them jump.
+    /// The speed under way, that at the next corner, and acceleration and jerk: limits below these would make them jump.
     pub(super) speed: Real,
+    pub(super) corner: Real,
     pub(super) held: [Real; 2],
     /// Also lines that allow other accelerations; or that are requested at other speeds.
     pub(super) any: bool,
@@ -57,9 +58,9 @@ impl Run {
     /// Adds the next line; returns false if it has to stay outside.
     #[inline]
     pub(super) fn add<const N: usize>(&mut self, line: &Line<N>, kind: Kind) -> bool {
-        let Kind { part, speed, held, any, feeds, .. } = kind;
+        let Kind { part, speed, corner, held, any, feeds, .. } = kind;
         let Run { more, length, bounds, allowed: lines, longest } = self;
-        let (Some(jerk), Some(other), true) = (bounds.jerk, line.bounds.jerk, line.corner >= speed) else {
+        let (Some(jerk), Some(other), true) = (bounds.jerk, line.bounds.jerk, line.corner >= corner) else {
             return false;
         };
         let (own, most) = (line.bounds.a, allowed(line, part));

@@ -32,6 +32,7 @@ fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
         let kind = Kind {
             part: Some(Real::ONE),
             speed: real(v / second()),
+            corner: Real::ZERO,
             held: [Real::ZERO; 2],
             any: true,
             feeds: false,
