@@ -16,8 +16,8 @@ pub(super) struct Limit {
     most: f64,
 }
 
-pub(super) const SPEED: Limit =
-    Limit { key: "speed", unit: "mm/min", seconds: 60.0, steps: "step/s", most: u32::MAX as f64 };
+/// Half of the clock of a part program, whose ticks are ns.
+pub(super) const SPEED: Limit = Limit { key: "speed", unit: "mm/min", seconds: 60.0, steps: "step/s", most: 5e8 };
 
 pub(super) const ACCELERATION: Limit =
     Limit {

@@ -468,6 +468,10 @@ fn limits_that_are_too_high_are_named() {
             "X:acceleration=2000000 is above 214748.364 mm/s², the greatest at 10000 steps/mm",
         ),
         (
+            &["profile", "--gcode", program, "--axis", "X:speed=1e9"],
+            "X:speed=1000000000 is above 375000000 mm/min, the greatest at 80 steps/mm",
+        ),
+        (
             &["cnc", "--gcode", program, "--axis", "Y:speed=200000"],
             "Y:speed=200000 is above 187500 mm/min, the greatest at 80 steps/mm: a step in each cycle of 4 us",
         ),
