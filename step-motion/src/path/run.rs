@@ -249,7 +249,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
         }
         // Less than was asked for may take less distance.
         let slower = || to(slower_exit(start, left, speed, bounds)?);
-        to(speed).or_else(slower).or_else(|| {
+        // A brake is here because no rest fits.
+        let asked = if shorter.kind.part.is_some() { to(speed).or_else(slower) } else { None };
+        asked.or_else(|| {
             let slowest = slowest_exit(start, left, speed, bounds);
             // Mostly it comes near a speed from which all lines are known to be slow enough in time.
             let known = self.known_exit(last).map(|known| known.max(self.promised(last)));
