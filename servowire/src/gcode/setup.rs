@@ -240,7 +240,7 @@ mod tests {
         }
     }
 
-    /// In the user's units: 2^31 - 1 steps/s² at 10000 steps/mm are 214748.3647 mm/s².
+    /// In the user's units: 2^31 - 1 steps/s² at 10000 steps/mm are 214748.3647 mm/s²; a step in 2 ns are 3 km/min.
     #[test]
     fn what_is_above_the_greatest_limit() {
         for (text, want) in [
@@ -249,12 +249,12 @@ mod tests {
                 "X:acceleration=2000000 is above 214748.364 mm/s², the greatest",
             ),
             ("Y:steps-per-mm=80,jerk=1e30", "Y:jerk=1e30 is above 219902325555.187 mm/s³, the greatest"),
-            ("Z:steps-per-mm=10000,speed=1e8", "Z:speed=100000000 is above 25769803.77 mm/min, the greatest"),
+            ("Z:steps-per-mm=10000,speed=1e8", "Z:speed=100000000 is above 3000000 mm/min, the greatest"),
         ] {
             let error = limits(text).unwrap_err();
             assert!(error.contains(want), "{text}: {error}");
         }
-        assert!(limits("X:steps-per-mm=10000,acceleration=214748.364,speed=25769803.77").is_ok());
+        assert!(limits("X:steps-per-mm=10000,acceleration=214748.364,speed=3000000").is_ok());
     }
 
     /// Over all that is said of an axis, in whatever order.
