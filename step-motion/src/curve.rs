@@ -140,6 +140,9 @@ impl Curve {
         let Some((piece, (end, _))) = begun.and_then(|at| self.piece(at)).filter(|(piece, _)| !piece.up) else {
             return false;
         };
+        if piece.v <= to {
+            return true;
+        }
         let (mut low, mut high) = (Real::ZERO, end - piece.time);
         for _ in 0..64 {
             let middle = (low + high).half();
@@ -252,5 +255,24 @@ mod tests {
             let there = curve.after(Real::new(way)).unwrap();
             assert!(there.p.distance(Real::new(way)) <= Real::ONE.scaled(-40), "{there:?} for {way}");
         }
+    }
+
+    /// From 16 at 2 to 8, over 48, and at 1 to rest, over 32; joined after 8.
+    #[test]
+    fn where_a_brake_has_slowed_down() {
+        let mut curve = Curve::new();
+        for (time, way, v, a) in [(4, 48, 16, 2), (8, 32, 8, 1)] {
+            let [time, way, v, a] = [time, way, v, a].map(Real::new);
+            curve.push((time, way), [v, a, Real::ZERO], false, Bend::Flat);
+        }
+        curve.skipped.1 = Real::new(8);
+        for (way, v) in [(20, 12), (40, 8), (54, 6), (64, 4), (70, 2)] {
+            let has = [v - 1, v + 1].map(|to| curve.has_slowed_down(Real::new(way), Real::new(to)));
+            assert_eq!(has, [false, true], "{way}");
+        }
+        assert!(!Curve::new().has_slowed_down(Real::ZERO, Real::HUGE));
+        let mut faster = Curve::new();
+        faster.push((Real::new(4), Real::new(16)), [Real::ZERO, Real::new(2), Real::ZERO], true, Bend::Flat);
+        assert!(!faster.has_slowed_down(Real::new(4), Real::new(100)), "it gets faster");
     }
 }
