@@ -135,7 +135,7 @@ fn run(path: &Lines, lines: &[(f64, Most)], [v, a]: [f64; 2], fastest: f64) -> O
 }
 
 /// The way that is left of a stop where it has slowed down to a speed; all of it and more if it never is faster.
-fn braking_way([v, a]: [f64; 2], to: f64, most: Most) -> f64 {
+pub(crate) fn braking_way([v, a]: [f64; 2], to: f64, most: Most) -> f64 {
     let j = most.j.unwrap();
     // As from a steady motion, part of which has passed if it slows down already.
     let from = v + a * a / (2.0 * j);

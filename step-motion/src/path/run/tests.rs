@@ -3,7 +3,7 @@
 use super::*;
 use crate::limits::Limits;
 use crate::tests::model::change;
-use crate::tests::path::{Lines, To, limits, near, outcome, path, second};
+use crate::tests::path::{Lines, To, braking_way, limits, near, outcome, path, second};
 use crate::tests::{float, real};
 
 fn steady(v: f64) -> Motion {
@@ -216,4 +216,24 @@ fn an_override_stops_at_no_joint() {
     let (got, _, exit) = outcome(&course);
     assert!(course.more == 1 && near(got, left), "{} {got} for {left}", course.more);
     assert!(exit > 1350.0 && (change([4500.0, 0.0], exit, least).1 - left).abs() < 1e-2, "{exit}");
+}
+
+/// From 1000 steps/s, 100 steps before the end of a line that allows 5000 steps/s² and one that allows 4167: at the joint, the least of both
+/// counts. Slower corners are not passed on one curve, all others are.
+#[test]
+fn a_stop_is_slow_enough_for_each_corner_on_its_way() {
+    let mut path = path(&[([1000, 10, 10], 1000), ([1000, 12, 10], 1000)]);
+    let length = float(path.line(0).unwrap().length);
+    let mut passed = std::vec::Vec::new();
+    for corner in 1..1000 {
+        path.lines[1].as_mut().unwrap().corner = real(f64::from(corner) / second());
+        let from = (real(length - 100.0), Real::ZERO);
+        let Ok((course, bounds)) = path.stop(0, steady(1000.0), from, (None, false), None).unwrap() else { continue };
+        let left = outcome(&course).0 - 100.0;
+        let most = braking_way([1000.0, 0.0], f64::from(corner), limits(&bounds));
+        assert!(course.more == 1 && left <= most * 1.000_001, "{corner}: {left} of {most}");
+        passed.push(corner);
+    }
+    let least = passed[0];
+    assert!((200..999).contains(&least) && passed.len() == 1000 - least as usize, "{passed:?}");
 }
