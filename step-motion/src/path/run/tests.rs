@@ -225,7 +225,7 @@ fn a_stop_is_slow_enough_for_each_corner_on_its_way() {
     let mut path = path(&[([1000, 10, 10], 1000), ([1000, 12, 10], 1000)]);
     let length = float(path.line(0).unwrap().length);
     let mut passed = std::vec::Vec::new();
-    for corner in 1..1000 {
+    for corner in 1..1000_u16 {
         path.lines[1].as_mut().unwrap().corner = real(f64::from(corner) / second());
         let from = (real(length - 100.0), Real::ZERO);
         let Ok((course, bounds)) = path.stop(0, steady(1000.0), from, (None, false), None).unwrap() else { continue };
@@ -235,5 +235,5 @@ fn a_stop_is_slow_enough_for_each_corner_on_its_way() {
         passed.push(corner);
     }
     let least = passed[0];
-    assert!((200..999).contains(&least) && passed.len() == 1000 - least as usize, "{passed:?}");
+    assert!((200..999).contains(&least) && passed.len() == usize::from(1000 - least), "{passed:?}");
 }
