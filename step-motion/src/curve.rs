@@ -123,8 +123,8 @@ impl Curve {
     /// Returns the state after a distance from the point where the curve was joined.
     pub(super) fn after(&self, way: Real) -> Option<Piece> {
         let p = self.skipped.1 + way;
-        let (piece, (end, _)) = self.piece(self.pieces().iter().rposition(|piece| piece.p <= p).unwrap_or(0))?;
-        let (mut low, mut high) = (Real::ZERO, end - piece.time);
+        let (piece, mut high) = self.piece_at(p)?;
+        let mut low = Real::ZERO;
         // By halves: it is needed once a line, by a caller that goes from line to line.
         for _ in 0..64 {
             let middle = (low + high).half();
@@ -136,14 +136,11 @@ impl Curve {
     /// Returns whether it has slowed down to a speed after a distance from the point where it was joined.
     pub(super) fn has_slowed_down(&self, way: Real, to: Real) -> bool {
         let p = self.skipped.1 + way;
-        let begun = self.pieces().iter().rposition(|piece| piece.p <= p);
-        let Some((piece, (end, _))) = begun.and_then(|at| self.piece(at)).filter(|(piece, _)| !piece.up) else {
-            return false;
-        };
+        let Some((piece, mut high)) = self.piece_at(p).filter(|(piece, _)| !piece.up) else { return false };
         if piece.v <= to {
             return true;
         }
-        let (mut low, mut high) = (Real::ZERO, end - piece.time);
+        let mut low = Real::ZERO;
         for _ in 0..64 {
             let middle = (low + high).half();
             let (place, v) = piece.way(middle);
@@ -156,6 +153,12 @@ impl Curve {
             }
         }
         false
+    }
+
+    /// Returns the piece at a distance from the start of the curve, and how long it lasts.
+    fn piece_at(&self, p: Real) -> Option<(&Piece, Real)> {
+        let at = self.pieces().iter().rposition(|piece| piece.p <= p).unwrap_or(0);
+        self.piece(at).map(|(piece, (end, _))| (piece, end - piece.time))
     }
 
     /// Returns the planned distance, from the point where the curve was joined to its end.

@@ -87,3 +87,28 @@ pub(crate) fn slowest_exit(state: State, n: f64, exit: f64, most: Most) -> f64 {
 pub(crate) fn coasted([v, a]: State, most: Most) -> f64 {
     v + most.j.map_or(0.0, |j| a * a.abs() / (2.0 * j))
 }
+
+/// The way that is left of a stop where it has slowed down to a speed; all of it and more if it never is faster.
+pub(crate) fn braking_way([v, a]: State, to: f64, most: Most) -> f64 {
+    let j = most.j.unwrap();
+    // As from a steady motion, part of which has passed if it slows down already.
+    let from = v + a * a / (2.0 * j);
+    if to >= from {
+        return f64::INFINITY;
+    }
+    let peak = most.a.min((j * from).sqrt());
+    let bend = peak * peak / (2.0 * j);
+    let fading = |v: f64| j * (2.0 * v / j).sqrt().powi(3) / 6.0;
+    let flat = |v: f64| fading(bend) + (v * v - bend * bend) / (2.0 * peak);
+    if to <= bend {
+        fading(to)
+    } else if to <= from - bend {
+        flat(to)
+    } else {
+        let begun = |v: f64| {
+            let time = (2.0 * (from - v) / j).sqrt();
+            from * time - j * time.powi(3) / 6.0
+        };
+        flat(from - bend) + begun(from - bend) - begun(to)
+    }
+}

@@ -1,6 +1,6 @@
 //! Runs of lines, beside sums of their lengths and the least of their limits.
 
-use super::model::{Most, change, coasted};
+use super::model::{Most, braking_way, change, coasted};
 use super::{float, real};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
@@ -45,7 +45,7 @@ pub(crate) fn path(lines: &[To]) -> Lines {
 }
 
 /// Lengths in steps and limits in seconds.
-fn modelled((by, feed): &To) -> (f64, Most) {
+pub(crate) fn modelled((by, feed): &To) -> (f64, Most) {
     let length = by.iter().map(|steps| (*steps as f64).powi(2)).sum::<f64>().sqrt();
     let least = |of: fn((u32, u32, u64)) -> f64| {
         let own = |axis: usize| of(LIMITS[axis]) * length / by[axis].abs() as f64;
@@ -61,7 +61,7 @@ pub(crate) fn limits(bounds: &Bounds) -> Most {
     Most { v: float(bounds.v) * second, a: float(bounds.a) * second.powi(2), j: jerk }
 }
 
-fn motion([v, a]: [f64; 2]) -> Motion {
+pub(crate) fn motion([v, a]: [f64; 2]) -> Motion {
     Motion { v: real(v / second()), a: real(a.abs() / second().powi(2)), up: a >= 0.0 }
 }
 
@@ -132,31 +132,6 @@ fn run(path: &Lines, lines: &[(f64, Most)], [v, a]: [f64; 2], fastest: f64) -> O
         (more, most, slowest) = (more + 1, least, cap);
     }
     sure.get().then_some((more, Most { v: slowest, ..most }))
-}
-
-/// The way that is left of a stop where it has slowed down to a speed; all of it and more if it never is faster.
-pub(crate) fn braking_way([v, a]: [f64; 2], to: f64, most: Most) -> f64 {
-    let j = most.j.unwrap();
-    // As from a steady motion, part of which has passed if it slows down already.
-    let from = v + a * a / (2.0 * j);
-    if to >= from {
-        return f64::INFINITY;
-    }
-    let peak = most.a.min((j * from).sqrt());
-    let bend = peak * peak / (2.0 * j);
-    let fading = |v: f64| j * (2.0 * v / j).sqrt().powi(3) / 6.0;
-    let flat = |v: f64| fading(bend) + (v * v - bend * bend) / (2.0 * peak);
-    if to <= bend {
-        fading(to)
-    } else if to <= from - bend {
-        flat(to)
-    } else {
-        let begun = |v: f64| {
-            let time = (2.0 * (from - v) / j).sqrt();
-            from * time - j * time.powi(3) / 6.0
-        };
-        flat(from - bend) + begun(from - bend) - begun(to)
-    }
 }
 
 proptest! {
@@ -286,7 +261,7 @@ proptest! {
 }
 
 /// Four lines of 1000 steps.
-fn four(ways: [[i64; 2]; 4]) -> Lines {
+pub(crate) fn four(ways: [[i64; 2]; 4]) -> Lines {
     path(&ways.map(|[y, z]| ([1000, y, z], 1000)))
 }
 
@@ -306,55 +281,8 @@ fn an_acceleration_or_jerk_under_way_is_held() {
     assert_eq!(more(&mut path, 5000.25), 3, "rounding must not end a run");
 }
 
-/// A corner is slow enough for what a motion that still speeds up comes to: with 250 steps/s² and 5100 steps/s³, 6 steps/s more.
-#[test]
-fn a_stop_leads_over_no_corner_that_is_too_slow() {
-    let path = path(&[([1000, 10, 200], 1000), ([1000, 200, 200], 1000)]);
-    let corner = float(path.line(1).unwrap().corner) * second();
-    assert!((100.0..600.0).contains(&corner), "{corner}");
-    let stops = |v: f64| {
-        path.stop(0, motion([v, 250.0]), (real(1000.0), Real::ZERO), (None, false), Some(Bounds::NONE)).unwrap().is_ok()
-    };
-    assert_eq!([corner - 7.0, corner - 5.0].map(stops), [true, false]);
-}
-
 fn steady(v: f64) -> Motion {
     motion([v, 0.0])
-}
-
-/// A stop that is whole ends with its line, to 2^-16 of a step.
-#[test]
-fn a_stop_right_at_the_end_of_a_line() {
-    let path = four([[10, 10]; 4]);
-    let stop =
-        |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), None).unwrap().unwrap().0;
-    let (way, ..) = outcome(&stop(0.0));
-    let (length, slack) = (float(path.line(0).unwrap().length), 16_f64.exp2().recip());
-    for (short, more, whole) in [
-        (1.0, 0, false),
-        (2.0 * slack, 0, false),
-        (0.5 * slack, 0, true),
-        (-0.5 * slack, 0, true),
-        (-2.0 * slack, 1, false),
-        (-1.0, 1, false),
-    ] {
-        let course = stop(length - way - short);
-        assert_eq!((course.more, course.whole), (more, whole), "{short}");
-    }
-}
-
-/// If it does not fit: as slow as it can get to the end of the run, which is all that is left of the line.
-#[test]
-fn a_brake_that_is_too_late() {
-    let path = path(&[([100, 1, 1], 1000), ([1000, 10, 20], 1000)]);
-    for (place, before) in [(0.0, 0.0), (30.0, 0.0), (0.0, 20.0)] {
-        let (course, _) = path.brake(0, steady(1000.0), (real(place), real(before)), (None, false)).unwrap();
-        let (way, _, exit) = outcome(&course);
-        let (length, most) = modelled(&([100, 1, 1], 1000));
-        assert!(near(way, length + before - place), "{way}");
-        let need = change([1000.0, 0.0], exit, most).1;
-        assert!(exit > 0.0 && (need / way - 1.0).abs() < 1e-3, "{need} of {way} to {exit}");
-    }
 }
 
 /// The time of a stop over several lines is that of all its curves.

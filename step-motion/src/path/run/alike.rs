@@ -29,10 +29,11 @@ pub(crate) struct Run {
 pub(super) struct Kind {
     /// At most a fraction of the requested speeds; without one, all that the axes allow.
     pub(super) part: Option<Real>,
-    /// The speed under way, that at the next corner, and acceleration and jerk: limits below these would make them jump.
+    /// The speed under way, and its acceleration and jerk: limits below these would make them jump.
     pub(super) speed: Real,
-    pub(super) corner: Real,
     pub(super) held: [Real; 2],
+    /// The least speed that the next corner has to allow: mostly that under way.
+    pub(super) corner: Real,
     /// Also lines that allow other accelerations; or that are requested at other speeds.
     pub(super) any: bool,
     pub(super) feeds: bool,

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::limits::Limits;
-use crate::tests::model::change;
-use crate::tests::path::{Lines, To, braking_way, limits, near, outcome, path, second};
+use crate::tests::model::{braking_way, change};
+use crate::tests::path::{Lines, To, four, limits, modelled, motion, near, outcome, path, second};
 use crate::tests::{float, real};
 
 fn steady(v: f64) -> Motion {
@@ -32,8 +32,8 @@ fn no_motion_leads_on_to_a_line_that_is_too_slow_for_it() {
         let kind = Kind {
             part: Some(Real::ONE),
             speed: real(v / second()),
-            corner: Real::ZERO,
             held: [Real::ZERO; 2],
+            corner: Real::ZERO,
             any: true,
             feeds: false,
             early: Real::ZERO,
@@ -236,4 +236,51 @@ fn a_stop_is_slow_enough_for_each_corner_on_its_way() {
     }
     let least = passed[0];
     assert!((200..999).contains(&least) && passed.len() == usize::from(1000 - least), "{passed:?}");
+}
+
+/// A corner is slow enough for what a motion that still speeds up comes to: with 250 steps/s² and 5100 steps/s³, 6 steps/s more.
+#[test]
+fn a_stop_leads_over_no_corner_that_is_too_slow() {
+    let path = path(&[([1000, 10, 200], 1000), ([1000, 200, 200], 1000)]);
+    let corner = float(path.line(1).unwrap().corner) * second();
+    assert!((100.0..600.0).contains(&corner), "{corner}");
+    let stops = |v: f64| {
+        path.stop(0, motion([v, 250.0]), (real(1000.0), Real::ZERO), (None, false), Some(Bounds::NONE)).unwrap().is_ok()
+    };
+    assert_eq!([corner - 7.0, corner - 5.0].map(stops), [true, false]);
+}
+
+/// A stop that is whole ends with its line, to 2^-16 of a step.
+#[test]
+fn a_stop_right_at_the_end_of_a_line() {
+    let path = four([[10, 10]; 4]);
+    let stop =
+        |place: f64| path.stop(0, steady(1000.0), (real(place), Real::ZERO), (None, false), None).unwrap().unwrap().0;
+    let (way, ..) = outcome(&stop(0.0));
+    let (length, slack) = (float(path.line(0).unwrap().length), 16_f64.exp2().recip());
+    for (short, more, whole) in [
+        (1.0, 0, false),
+        (2.0 * slack, 0, false),
+        (0.5 * slack, 0, true),
+        (-0.5 * slack, 0, true),
+        (-2.0 * slack, 1, false),
+        (-1.0, 1, false),
+    ] {
+        let course = stop(length - way - short);
+        assert_eq!((course.more, course.whole), (more, whole), "{short}");
+    }
+}
+
+/// If it does not fit: as slow as it can get to the end of the run, which is all that is left of the line.
+#[test]
+fn a_brake_that_is_too_late() {
+    let path = path(&[([100, 1, 1], 1000), ([1000, 10, 20], 1000)]);
+    for (place, before) in [(0.0, 0.0), (30.0, 0.0), (0.0, 20.0)] {
+        let (course, _) = path.brake(0, steady(1000.0), (real(place), real(before)), (None, false)).unwrap();
+        let (way, _, exit) = outcome(&course);
+        let (length, most) = modelled(&([100, 1, 1], 1000));
+        assert!(near(way, length + before - place), "{way}");
+        let need = change([1000.0, 0.0], exit, most).1;
+        assert!(exit > 0.0 && (need / way - 1.0).abs() < 1e-3, "{need} of {way} to {exit}");
+    }
 }
